@@ -1,0 +1,37 @@
+# Two commands: `make demo` and `make test`. Both make the environment they need.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: demo test test-slow lint check urdf figures report bench dist clean
+
+demo: $(VENV)/.installed
+	$(BIN)/vdsm batch --out out/demo
+
+test: $(VENV)/.installed
+	$(BIN)/pytest -n 2 -m "not slow"
+
+test-slow: $(VENV)/.installed
+	$(BIN)/pytest -n 2 -m slow
+
+lint: $(VENV)/.installed
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+check: lint test
+
+urdf: $(VENV)/.installed
+	$(BIN)/vdsm urdf hrm8 --out urdf/hrm8.urdf
+
+dist: $(VENV)/.installed
+	.ci/test-wheel
+
+clean:
+	rm -rf $(VENV) build dist out test-output
+
+# The environment: made once, refreshed when what it is made from changes.
+$(VENV)/.installed: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	touch $@

@@ -1,0 +1,108 @@
+"""Every exception the package raises on purpose.
+
+    VdsmError
+    ├── InvalidInput          exit 2: a file, field or argument is wrong
+    │   ├── InvalidFile       names the file, the place in it and the expectation
+    │   └── UnknownName       lists the known names
+    ├── Infeasible            exit 1: the problem is well-formed and has no plan here
+    │   ├── OutOfReach        step 1 says no
+    │   ├── LinkTooShort      a projected gap exceeds its link
+    │   ├── LimitExceeded     a joint limit would be broken
+    │   ├── PathBlocked       the tip's route meets the danger region
+    │   └── NoPlanFound       the budget ended without a plan; not a proof
+    └── VerificationFailed    exit 1: a check could not be carried out
+
+Messages say what, where, how much and against what; the same facts are attributes.
+"""
+
+
+class VdsmError(Exception):
+    """Base of all errors raised on purpose."""
+
+
+class InvalidInput(VdsmError):
+    """An input breaks its contract."""
+
+
+class InvalidFile(InvalidInput):
+    """A file breaks its contract.
+
+    Args:
+        file: The file as the user named it.
+        where: Field or line inside the file; empty for the file as a whole.
+        problem: What is wrong and what was expected.
+    """
+
+    def __init__(self, *, file: object, where: str = "", problem: str) -> None:
+        self.file, self.where, self.problem = str(file), where, problem
+        place = f"{file}: {where}" if where else str(file)
+        super().__init__(f"{place}: {problem}")
+
+
+class UnknownName(InvalidInput):
+    """A name is not among the known ones."""
+
+    def __init__(self, *, kind: str, name: str, known: tuple[str, ...]) -> None:
+        self.kind, self.name, self.known = kind, name, known
+        super().__init__(f"unknown {kind} {name!r}; known: {', '.join(known)}")
+
+
+class Infeasible(VdsmError):
+    """The problem is well-formed and this method has no plan for it."""
+
+
+class OutOfReach(Infeasible):
+    """A tip position lies farther from the rail than the arm reaches."""
+
+    def __init__(
+        self, *, sample: int, distance: float, reach: float, reason: str
+    ) -> None:
+        self.sample, self.distance, self.reach = sample, distance, reach
+        message = (
+            f"tip waypoint {sample} lies {distance:.6f} m from the rail, "
+            f"beyond the reach of {reach:.6f} m ({reason})"
+        )
+        super().__init__(message)
+
+
+class LinkTooShort(Infeasible):
+    """The projections of two adjacent joints are farther apart than the link."""
+
+    def __init__(self, *, sample: int, link: int, gap: float, length: float) -> None:
+        self.sample, self.link, self.gap, self.length = sample, link, gap, length
+        message = (
+            f"sample {sample}: projected gap {gap:.6f} m exceeds "
+            f"link {link} of length {length:.6f} m (excess {gap - length:.3e} m)"
+        )
+        super().__init__(message)
+
+
+class LimitExceeded(Infeasible):
+    """A configuration breaks a joint limit."""
+
+    def __init__(
+        self, *, sample: int, quantity: str, value: float, limit: float, unit: str
+    ) -> None:
+        self.sample, self.quantity = sample, quantity
+        self.value, self.limit, self.unit = value, limit, unit
+        message = (
+            f"sample {sample}: {quantity} is {value:.4f} {unit}, "
+            f"the limit is {limit:.4f} {unit}"
+        )
+        super().__init__(message)
+
+
+class PathBlocked(Infeasible):
+    """The tip cannot be brought past an obstacle by this method."""
+
+    def __init__(self, *, obstacle: str, reason: str) -> None:
+        self.obstacle, self.reason = obstacle, reason
+        super().__init__(f"obstacle {obstacle!r} blocks the tip path: {reason}")
+
+
+class NoPlanFound(Infeasible):
+    """The search ended without a plan; this proves nothing about the problem."""
+
+
+class VerificationFailed(VdsmError):
+    """A check could not be carried out at all."""

@@ -1,0 +1,1 @@
+"""Closed-form geometry: no robot, no obstacle names, no robotics library."""

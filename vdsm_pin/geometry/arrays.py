@@ -1,0 +1,56 @@
+"""Array types and the few checked operations everybody needs."""
+
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+IntArray: TypeAlias = npt.NDArray[np.int64]
+BoolArray: TypeAlias = npt.NDArray[np.bool_]
+
+
+def frozen(value: Any, dtype: type[Any] = np.float64) -> npt.NDArray[Any]:
+    """A read-only C-ordered copy of an array-like value."""
+    array = np.array(value, dtype=dtype, order="C")
+    array.setflags(write=False)
+    return array
+
+
+def checked_arcsin(value: FloatArray, tolerance: float) -> FloatArray:
+    """Arcsine that forgives rounding and nothing more.
+
+    Args:
+        value: Sines, any shape; [-].
+        tolerance: Excess over 1 that counts as rounding; [-].
+
+    Returns:
+        Angles in [-pi/2, pi/2], same shape; [rad].
+
+    Raises:
+        ValueError: If an entry exceeds 1 by more than the tolerance, or is NaN.
+    """
+    excess = np.abs(value) - 1.0
+    if not (excess <= tolerance).all():
+        message = f"sine out of domain by {np.max(excess):.3e} (> {tolerance:.1e})"
+        raise ValueError(message)
+    return np.asarray(np.arcsin(np.clip(value, -1.0, 1.0)))
+
+
+def rotation_from_rpy(rpy: FloatArray) -> FloatArray:
+    """Rotation matrix Rz(yaw) @ Ry(pitch) @ Rx(roll), the URDF order.
+
+    Args:
+        rpy: Roll, pitch, yaw, shape (3,); [rad].
+
+    Returns:
+        Rotation, shape (3, 3); [-].
+    """
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )

@@ -1,0 +1,169 @@
+"""The arm: a rail, N links on universal joints, cables (paper, section 2, Table 1)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidInput, UnknownName
+from vdsm_pin.geometry.arrays import FloatArray, frozen
+
+MAX_LINKS: Final = 40
+"""Largest number of links the package is tested with."""
+
+
+@dataclass(frozen=True)
+class CableLayout:
+    """Where the three driving cables of each link run (paper, section 5.2).
+
+    Args:
+        hole_radius: Radius r of the circle of cable holes; [m].
+        half_gap: Distance d from a joint centre to the link's end face; [m].
+        hole_angles: phi of the holes a, b, c of each link, shape (N, 3); [rad].
+    """
+
+    hole_radius: float
+    half_gap: float
+    hole_angles: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the array and refuse impossible sizes."""
+        object.__setattr__(self, "hole_angles", frozen(self.hole_angles))
+        if not self.hole_radius > 0.0:
+            message = f"hole_radius is {self.hole_radius} m, expected above 0"
+            raise InvalidInput(message)
+        if not self.half_gap > 0.0:
+            message = f"half_gap is {self.half_gap} m, expected above 0"
+            raise InvalidInput(message)
+        if self.hole_angles.ndim != 2 or self.hole_angles.shape[1] != 3:
+            shape = self.hole_angles.shape
+            message = f"hole_angles has shape {shape}, expected (N, 3)"
+            raise InvalidInput(message)
+
+
+def paper_hole_angles(n_links: int) -> FloatArray:
+    """Hole angles as in Fig. 10, for any number of links.
+
+    The 3N holes are 360/3N deg apart; phi_b of link 5 is 0 in the paper's arm of eight
+    (phi_ijb = 15 (j - 5) deg), and a and c lie 120 deg to either side of b.
+
+    Args:
+        n_links: Number of links N.
+
+    Returns:
+        phi of the holes a, b, c, shape (N, 3), in [0, 2 pi); [rad].
+    """
+    step = 2.0 * np.pi / (3 * n_links)
+    phi_b = step * (np.arange(1, n_links + 1) - (n_links // 2 + 1))
+    third = 2.0 * np.pi / 3.0
+    return np.mod(np.stack([phi_b - third, phi_b, phi_b + third], axis=1), 2.0 * np.pi)
+
+
+@dataclass(frozen=True)
+class Manipulator:
+    """Lengths, body and limits of one arm. A link is a capsule about its axis.
+
+    Args:
+        name: Name for reports and the URDF.
+        link_lengths: L_1..L_N between joint centres, shape (N,); [m].
+        link_radius: Radius of the body, round ends; [m].
+        max_link_angle: Largest link angle psi_i, the cone; [rad].
+        max_joint_angle: Largest absolute theta_i and alpha_i, the box; [rad].
+        base_range: Smallest and largest x0; [m].
+        cables: Cable holes.
+
+    Raises:
+        InvalidInput: If a value breaks its range.
+    """
+
+    name: str
+    link_lengths: FloatArray
+    link_radius: float
+    max_link_angle: float
+    max_joint_angle: float
+    base_range: tuple[float, float]
+    cables: CableLayout
+
+    def __post_init__(self) -> None:
+        """Freeze the array and refuse impossible arms."""
+        object.__setattr__(self, "link_lengths", frozen(self.link_lengths))
+        lengths = self.link_lengths
+        if lengths.ndim != 1 or not 2 <= lengths.size <= MAX_LINKS:
+            known = f"2 to {MAX_LINKS} lengths"
+            message = f"link_lengths has shape {lengths.shape}, expected {known}"
+            raise InvalidInput(message)
+        if not ((lengths > 0.0) & np.isfinite(lengths)).all():
+            message = f"link_lengths are {lengths.tolist()} m, expected all above 0"
+            raise InvalidInput(message)
+        if not 0.0 < self.link_radius < np.inf:
+            message = f"link_radius is {self.link_radius} m, expected above 0"
+            raise InvalidInput(message)
+        for name in ("max_link_angle", "max_joint_angle"):
+            if not 0.0 < getattr(self, name) < np.pi / 2.0:
+                value = np.rad2deg(getattr(self, name))
+                message = f"{name} is {value} deg, expected above 0 and below 90"
+                raise InvalidInput(message)
+        low, high = self.base_range
+        if not (np.isfinite(low) and np.isfinite(high) and low < high):
+            message = f"base_range is {self.base_range} m, expected low < high"
+            raise InvalidInput(message)
+        if self.cables.hole_angles.shape[0] != lengths.size:
+            count = self.cables.hole_angles.shape[0]
+            message = f"hole_angles has {count} rows, expected {lengths.size}"
+            raise InvalidInput(message)
+
+    @property
+    def n_links(self) -> int:
+        """Number of links N; joint centres are O_1..O_{N+1}."""
+        return int(self.link_lengths.size)
+
+    @cached_property
+    def stations(self) -> FloatArray:
+        """Arc length from O_1 to each joint centre, shape (N + 1,); [m]."""
+        return frozen(np.concatenate([[0.0], np.cumsum(self.link_lengths)]))
+
+    @property
+    def total_length(self) -> float:
+        """Sum of the link lengths; [m]."""
+        return float(self.stations[-1])
+
+    @cached_property
+    def ratios(self) -> FloatArray:
+        """k_{i,N+1}: each joint centre's station over the tip's, (N + 1,) (Eq. 5)."""
+        return frozen(self.stations / self.stations[-1])
+
+    def ratio(self, i: int, j: int) -> float:
+        """k_{i,j}, joints counted from 1 as in the paper (Eq. 6).
+
+        Raises:
+            ZeroDivisionError: For j = 1 and i > 1, where the paper has infinity.
+        """
+        return 1.0 if i == j else float(self.stations[i - 1] / self.stations[j - 1])
+
+
+def _hrm8() -> Manipulator:
+    """The arm of the paper's Table 1; body radius from 261.5 - 200 mm."""
+    lengths = np.array([486, 486, 486, 486, 486, 206, 206, 284]) * 1e-3
+    limit = float(np.deg2rad(42.5))
+    # r and d are not published; r stays inside the body, d inside half the last links.
+    cables = CableLayout(0.050, 0.030, paper_hole_angles(8))
+    # The paper calls the rail unrestricted; +-5 m exceeds every stroke of this arm.
+    return Manipulator("hrm8", lengths, 0.0615, limit, limit, (-5.0, 5.0), cables)
+
+
+BUILT_IN: Final[Mapping[str, Manipulator]] = MappingProxyType({"hrm8": _hrm8()})
+"""The arms a problem file may name."""
+
+
+def built_in(name: str) -> Manipulator:
+    """The built-in arm of that name.
+
+    Raises:
+        UnknownName: If there is none.
+    """
+    if name not in BUILT_IN:
+        raise UnknownName(kind="manipulator", name=name, known=tuple(BUILT_IN))
+    return BUILT_IN[name]

@@ -1,0 +1,1 @@
+"""Plans a motion; knows no robotics library and does not judge itself."""

@@ -1,0 +1,59 @@
+"""What the seven steps hand to each other; arrays with named axes."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class TipPath:
+    """The route of the tip, waypoint by waypoint (step 4).
+
+    Args:
+        points: Tip positions O_{N+1}, shape (n_samples, 3); [m].
+        on_path: Whether the tip is on the desired path, shape (n_samples,).
+        path_m: Arc length along the desired path, shape (n_samples,); [m].
+    """
+
+    points: FloatArray
+    on_path: BoolArray
+    path_m: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        for name, dtype in (("points", float), ("on_path", bool), ("path_m", float)):
+            object.__setattr__(self, name, frozen(getattr(self, name), dtype))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A planned motion with what each step found.
+
+    Args:
+        problem: What was asked.
+        strategy: Name of the strategy.
+        tip_path: Step 4's route.
+        centres: Joint centres O_1..O_{N+1}, shape (n_samples, N + 1, 3); [m].
+        trajectory: Joint values, the plan proper.
+        cable_lengths: l_ja, l_jb, l_jc, shape (n_samples, N, 3); [m].
+        notes: What the user should know, one sentence each: stretches not drawn,
+            rounds of refinement and their reasons, lower bounds proved.
+    """
+
+    problem: PlanningProblem
+    strategy: str
+    tip_path: TipPath
+    centres: FloatArray
+    trajectory: Trajectory
+    cable_lengths: FloatArray
+    notes: tuple[str, ...] = ()
+
+
+LinkClearance: TypeAlias = Callable[[FloatArray], FloatArray]
+"""Joint centres (n, N + 1, 3) to proved lower bounds of the clearance between each link
+and the nearest obstacle surface (n, N); [m]. Passed in, so that the planner does not
+import what will judge it."""

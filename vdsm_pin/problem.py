@@ -1,0 +1,146 @@
+"""The planning problem: arm, scene, desired tip path, required clearance."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.scene import Scene
+
+
+class Approach(StrEnum):
+    """How the tip comes onto the desired path (paper, 4.2.2)."""
+
+    SHORTEST = "shortest"
+    EQUIDISTANT = "equidistant"
+    NEAREST_EQUIDISTANT = "nearest_equidistant"
+
+
+class Blocked(StrEnum):
+    """What to do where the desired path itself cannot be drawn."""
+
+    DETOUR = "detour"
+    FAIL = "fail"
+
+
+@dataclass(frozen=True)
+class DesiredPath:
+    """What the tip shall draw, in the base frame.
+
+    Args:
+        start: Tip position at the start, shape (3,); [m].
+        points: Corners of the polyline, shape (n, 3), n >= 1; [m].
+        closed: Whether the last corner joins the first.
+        spacing: Largest distance of the tip between two rows; [m].
+        approach: The paper's three schemes.
+        retreat: Largest step back along -X while off the path; [m].
+        blocked: Detour or fail.
+        required_coverage: Least part of the path that must be drawn, 0 to 1; [-].
+
+    Raises:
+        InvalidInput: If a value breaks its range.
+    """
+
+    start: FloatArray
+    points: FloatArray
+    closed: bool = False
+    spacing: float = 0.010
+    approach: Approach = Approach.SHORTEST
+    retreat: float = 0.0
+    blocked: Blocked = Blocked.DETOUR
+    required_coverage: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check the values."""
+        object.__setattr__(self, "start", frozen(self.start))
+        object.__setattr__(self, "points", frozen(self.points))
+        if self.start.shape != (3,) or not np.isfinite(self.start).all():
+            message = (
+                f"tip_path.start is {self.start.tolist()}, expected 3 finite numbers"
+            )
+            raise InvalidInput(message)
+        if (
+            self.points.ndim != 2
+            or self.points.shape[1:] != (3,)
+            or not self.points.size
+        ):
+            message = f"tip_path.points has shape {self.points.shape}, expected (n, 3)"
+            raise InvalidInput(message)
+        if not np.isfinite(self.points).all():
+            message = "tip_path.points has a value that is not finite"
+            raise InvalidInput(message)
+        if not 0.0 < self.spacing < np.inf:
+            message = f"tip_path.spacing is {self.spacing} m, expected above 0"
+            raise InvalidInput(message)
+        if not 0.0 <= self.retreat < np.inf:
+            message = f"tip_path.retreat is {self.retreat} m, expected 0 or more"
+            raise InvalidInput(message)
+        if not 0.0 <= self.required_coverage <= 1.0:
+            value = self.required_coverage
+            message = f"tip_path.required_coverage is {value}, expected 0 to 1"
+            raise InvalidInput(message)
+
+    @cached_property
+    def corners(self) -> FloatArray:
+        """The polyline drawn, closing corner repeated, shape (m, 3); [m]."""
+        if self.closed and len(self.points) > 1:
+            return frozen(np.vstack([self.points, self.points[:1]]))
+        return self.points
+
+    @cached_property
+    def corner_stations(self) -> FloatArray:
+        """Arc length at each corner, shape (m,); [m]."""
+        sides = np.linalg.norm(np.diff(self.corners, axis=0), axis=1)
+        return frozen(np.concatenate([[0.0], np.cumsum(sides)]))
+
+    @property
+    def length(self) -> float:
+        """Arc length of the whole path; [m]."""
+        return float(self.corner_stations[-1])
+
+    def at(self, stations: FloatArray) -> FloatArray:
+        """Points of the path at arc lengths, shape (k,) to (k, 3); [m].
+
+        Stations outside [0, length] are clamped to the ends; for a closed path callers
+        wrap them first.
+        """
+        known = self.corner_stations
+        columns = [np.interp(stations, known, column) for column in self.corners.T]
+        return np.stack(columns, axis=-1)
+
+
+@dataclass(frozen=True)
+class PlanningProblem:
+    """All the planner may read, in the base frame: x along the rail.
+
+    Args:
+        name: Name for reports and folders.
+        manipulator: The arm.
+        scene: The obstacles.
+        path: What the tip shall draw.
+        required_clearance: Least distance between surfaces; [m].
+        T_world_base: Pose of the base frame in the user's frame, shape (4, 4);
+            readers and writers apply it, nobody else needs it.
+
+    Raises:
+        InvalidInput: If the required clearance is negative or not finite.
+    """
+
+    name: str
+    manipulator: Manipulator
+    scene: Scene
+    path: DesiredPath
+    required_clearance: float
+    T_world_base: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the pose and check the clearance."""
+        object.__setattr__(self, "T_world_base", frozen(self.T_world_base))
+        if not 0.0 <= self.required_clearance < np.inf:
+            value = self.required_clearance
+            message = f"required_clearance is {value} m, expected 0 or more"
+            raise InvalidInput(message)

@@ -1,0 +1,1 @@
+"""Records to CSV, JSON, HTML and JUnit; no physics."""

@@ -1,0 +1,356 @@
+"""Obstacles: named solids in the base frame, and the convex pieces they are made of.
+
+Everything that measures a distance works on pieces. There are three kinds: the hull of
+a few points grown by a radius, a flat-ended cylinder, and a half-space. A sphere,
+capsule, box, convex prism and triangle are hulls; a non-convex prism is several; a mesh
+is one hull per triangle plus, where it is watertight, an inside.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, TypeAlias
+
+import numpy as np
+import shapely
+
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+
+BOX_CORNERS: Final = frozen(
+    [[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]
+)
+"""Corners of the cube [-1, 1]^3, shape (8, 3); [-]."""
+
+
+@dataclass(frozen=True)
+class Hull:
+    """Convex hull of points, grown by a radius.
+
+    Args:
+        points: Shape (n, 3), n >= 1; [m].
+        radius: 0 or more; [m].
+    """
+
+    points: FloatArray
+    radius: float = 0.0
+
+
+@dataclass(frozen=True)
+class FlatCylinder:
+    """Solid cylinder with flat ends.
+
+    Args:
+        centre: Shape (3,); [m].
+        axis: Unit vector, shape (3,); [-].
+        half_length: Half the height; [m].
+        radius: [m].
+    """
+
+    centre: FloatArray
+    axis: FloatArray
+    half_length: float
+    radius: float
+
+
+@dataclass(frozen=True)
+class HalfSpacePiece:
+    """Points p with normal . p <= offset.
+
+    Args:
+        normal: Outward unit vector, shape (3,); [-].
+        offset: [m].
+    """
+
+    normal: FloatArray
+    offset: float
+
+
+Piece: TypeAlias = Hull | FlatCylinder | HalfSpacePiece
+
+
+def _check_finite(name: str, **values: object) -> None:
+    for field, value in values.items():
+        if not np.isfinite(np.asarray(value, dtype=float)).all():
+            message = f"obstacle {name!r}: {field} is {value}, expected finite numbers"
+            raise InvalidInput(message)
+
+
+def _check_positive(name: str, **values: float) -> None:
+    for field, value in values.items():
+        if not value > 0.0:
+            message = f"obstacle {name!r}: {field} is {value} m, expected above 0"
+            raise InvalidInput(message)
+
+
+def _freeze(obstacle: object, *fields: str) -> None:
+    for field in fields:
+        object.__setattr__(obstacle, field, frozen(getattr(obstacle, field)))
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A ball.
+
+    Args:
+        name: Unique name.
+        centre: Shape (3,); [m].
+        radius: [m].
+    """
+
+    name: str
+    centre: FloatArray
+    radius: float
+
+    def __post_init__(self) -> None:
+        """Freeze the array and check the sizes."""
+        _freeze(self, "centre")
+        _check_finite(self.name, centre=self.centre, radius=self.radius)
+        _check_positive(self.name, radius=self.radius)
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        return (Hull(frozen(self.centre[None]), self.radius),)
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """A segment grown by a radius.
+
+    Args:
+        name: Unique name.
+        centre: Shape (3,); [m].
+        axis: Unit vector, shape (3,); [-].
+        half_length: Half the distance between the cap centres; [m].
+        radius: [m].
+    """
+
+    name: str
+    centre: FloatArray
+    axis: FloatArray
+    half_length: float
+    radius: float
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check the sizes."""
+        _freeze(self, "centre", "axis")
+        _check_finite(self.name, centre=self.centre, axis=self.axis)
+        _check_positive(self.name, radius=self.radius, half_length=self.half_length)
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        offset = self.half_length * self.axis
+        return (
+            Hull(frozen([self.centre - offset, self.centre + offset]), self.radius),
+        )
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """A cylinder with flat ends.
+
+    Args:
+        name: Unique name.
+        centre: Shape (3,); [m].
+        axis: Unit vector, shape (3,); [-].
+        half_length: Half the height; [m].
+        radius: [m].
+    """
+
+    name: str
+    centre: FloatArray
+    axis: FloatArray
+    half_length: float
+    radius: float
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check the sizes."""
+        _freeze(self, "centre", "axis")
+        _check_finite(self.name, centre=self.centre, axis=self.axis)
+        _check_positive(self.name, radius=self.radius, half_length=self.half_length)
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        return (FlatCylinder(self.centre, self.axis, self.half_length, self.radius),)
+
+
+@dataclass(frozen=True)
+class Box:
+    """A cuboid.
+
+    Args:
+        name: Unique name.
+        centre: Shape (3,); [m].
+        rotation: R_base_box, shape (3, 3); [-].
+        half_size: Half the edge lengths, shape (3,); [m].
+    """
+
+    name: str
+    centre: FloatArray
+    rotation: FloatArray
+    half_size: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check the sizes."""
+        _freeze(self, "centre", "rotation", "half_size")
+        _check_finite(self.name, centre=self.centre, rotation=self.rotation)
+        for value in self.half_size:
+            _check_positive(self.name, half_size=float(value))
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        corners = self.centre + (BOX_CORNERS * self.half_size) @ self.rotation.T
+        return (Hull(frozen(corners)),)
+
+
+@dataclass(frozen=True)
+class Prism:
+    """A simple polygon swept along its normal.
+
+    Args:
+        name: Unique name.
+        origin: Origin of the section frame, shape (3,); [m].
+        rotation: R_base_section, shape (3, 3): columns are the section's two in-plane
+            axes and the sweep axis; [-].
+        polygon: Corners in the section plane, shape (n, 2), either sense; [m].
+        span: Where the sweep starts and ends along the sweep axis; [m].
+    """
+
+    name: str
+    origin: FloatArray
+    rotation: FloatArray
+    polygon: FloatArray
+    span: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and refuse polygons that enclose no simple area."""
+        _freeze(self, "origin", "rotation", "polygon")
+        _check_finite(
+            self.name, origin=self.origin, polygon=self.polygon, span=self.span
+        )
+        if self.polygon.ndim != 2 or self.polygon.shape[0] < 3:
+            message = f"obstacle {self.name!r}: polygon needs at least 3 corners"
+            raise InvalidInput(message)
+        shape = shapely.Polygon(self.polygon)
+        if not shape.is_valid or not shape.area > 0.0:
+            reason = shapely.is_valid_reason(shape)
+            message = f"obstacle {self.name!r}: polygon is not simple ({reason})"
+            raise InvalidInput(message)
+        if not self.span[0] < self.span[1]:
+            message = f"obstacle {self.name!r}: span {self.span} m, expected from < to"
+            raise InvalidInput(message)
+
+    @cached_property
+    def convex_sections(self) -> tuple[FloatArray, ...]:
+        """The section as convex polygons, each of shape (k, 2); [m]."""
+        shape = shapely.Polygon(self.polygon)
+        if shape.equals(shape.convex_hull):
+            return (frozen(self.polygon),)
+        triangles = shapely.constrained_delaunay_triangles(shape)
+        return tuple(
+            frozen(np.asarray(part.exterior.coords)[:3]) for part in triangles.geoms
+        )
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        hulls = []
+        for section in self.convex_sections:
+            ends = [
+                np.column_stack([section, np.full(len(section), s)]) for s in self.span
+            ]
+            hulls.append(Hull(frozen(self.origin + np.vstack(ends) @ self.rotation.T)))
+        return tuple(hulls)
+
+
+@dataclass(frozen=True)
+class HalfSpace:
+    """Everything on one side of a plane: (p - point) . normal <= 0.
+
+    Args:
+        name: Unique name.
+        point: A point of the plane, shape (3,); [m].
+        normal: Unit vector out of the solid, shape (3,); [-].
+    """
+
+    name: str
+    point: FloatArray
+    normal: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        _freeze(self, "point", "normal")
+        _check_finite(self.name, point=self.point, normal=self.normal)
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        return (HalfSpacePiece(self.normal, float(self.normal @ self.point)),)
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles; a solid where they are watertight, else a surface.
+
+    Args:
+        name: Unique name.
+        vertices: Shape (n, 3), in the base frame; [m].
+        triangles: Vertex indices, shape (m, 3), m >= 1.
+        watertight: Whether the triangles enclose an inside.
+    """
+
+    name: str
+    vertices: FloatArray
+    triangles: IntArray
+    watertight: bool
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check the indices."""
+        _freeze(self, "vertices")
+        object.__setattr__(self, "triangles", frozen(self.triangles, np.int64))
+        _check_finite(self.name, vertices=self.vertices)
+        count = len(self.vertices)
+        if (
+            not self.triangles.size
+            or not ((self.triangles >= 0) & (self.triangles < count)).all()
+        ):
+            message = f"obstacle {self.name!r}: triangles do not index {count} vertices"
+            raise InvalidInput(message)
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """One hull per triangle."""
+        return tuple(Hull(frozen(corners)) for corners in self.vertices[self.triangles])
+
+
+Obstacle: TypeAlias = Sphere | Capsule | Cylinder | Box | Prism | HalfSpace | Mesh
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All obstacles of one problem, in the base frame.
+
+    Args:
+        obstacles: Any number, names unique.
+
+    Raises:
+        InvalidInput: If two share a name.
+    """
+
+    obstacles: tuple[Obstacle, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse duplicate names."""
+        names = [obstacle.name for obstacle in self.obstacles]
+        for name in names:
+            if names.count(name) > 1:
+                message = f"two obstacles are named {name!r}; names are unique"
+                raise InvalidInput(message)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names in file order."""
+        return tuple(obstacle.name for obstacle in self.obstacles)

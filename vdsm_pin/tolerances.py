@@ -1,0 +1,56 @@
+"""Every tolerance of the package, with its unit and its reason."""
+
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerances:
+    """The numbers that decide between equal and different."""
+
+    sine_excess: float = 1e-12
+    """Excess of a sine over 1 that counts as rounding; [-]."""
+
+    joint_centre: float = 1e-9
+    """Joint centres by Pinocchio against the closed form; [m].
+
+    Both are sums of at most 40 products of order 1 m; 1e-12 is seen, 1e-9 promised.
+    """
+
+    tip_on_path: float = 1e-6
+    """Tip against the desired path at a waypoint marked on_path; [m]."""
+
+    cable_round_trip: float = 1e-9
+    """Angles recovered from cable lengths; [rad]."""
+
+    joint_limit: float = 1e-9
+    """Excess over theta/alpha/psi that counts as rounding of a CSV; [rad]."""
+
+    base_limit: float = 1e-9
+    """Excess over the x0 range that counts as rounding of a CSV; [m]."""
+
+    changed_angle: float = 8.726646259971648e-4
+    """A link angle above this counts as changed: 0.05 deg; [rad]."""
+
+    coal_gjk: float = 1e-8
+    """Coal's gjk_tolerance: 1e-6 is 1.5e-6 m unsafe, 1e-12 returns NaN; [m]."""
+
+    coal_agreement: float = 5e-6
+    """Coal's distance against our bracket: beyond it the row is undecided; [m]."""
+
+    bracket_gap: float = 1e-9
+    """Upper minus lower at which a distance bracket counts as closed; [m]."""
+
+    arithmetic: float = 1e-11
+    """Bound of all rounding in one clearance evaluation for scenes within 100 m; [m].
+
+    A coordinate is a sum of at most 40 terms below 100 m, each within 8 ulp of
+    1.4e-14 m: 40 * 8 * 1.4e-14 = 4.5e-12 m.
+    """
+
+    on_path_length: float = 1e-9
+    """Arc lengths closer than this are the same place on the desired path; [m]."""
+
+
+TOLERANCES: Final = Tolerances()
+"""The values in force. Reports print them all."""

@@ -1,0 +1,73 @@
+"""A trajectory: rows of joint values, joined by straight lines in joint space."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """What a planner hands over and a verifier judges.
+
+    Args:
+        on_path: Whether the tip is on the desired path, shape (n_samples,).
+        path_m: Arc length of the tip along the desired path (on detours: of the place
+            where it left), shape (n_samples,); [m].
+        x0: Base position on the rail, shape (n_samples,); [m].
+        alpha: Yaw angles, shape (n_samples, N); [rad].
+        theta: Pitch angles, shape (n_samples, N); [rad].
+
+    Raises:
+        InvalidInput: If shapes disagree, a value is not finite, or there is no row.
+    """
+
+    on_path: BoolArray
+    path_m: FloatArray
+    x0: FloatArray
+    alpha: FloatArray
+    theta: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check their shapes."""
+        object.__setattr__(self, "on_path", frozen(self.on_path, np.bool_))
+        for name in ("path_m", "x0", "alpha", "theta"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        n, shape = self.x0.size, self.alpha.shape
+        if n == 0:
+            message = "a trajectory needs at least one row"
+            raise InvalidInput(message)
+        same = self.on_path.shape == self.path_m.shape == self.x0.shape == (n,)
+        if (
+            not same
+            or self.theta.shape != shape
+            or shape[:1] != (n,)
+            or len(shape) != 2
+        ):
+            message = f"trajectory arrays disagree: x0 {self.x0.shape}, alpha {shape}"
+            raise InvalidInput(message)
+        for name in ("path_m", "x0", "alpha", "theta"):
+            if not np.isfinite(getattr(self, name)).all():
+                message = f"trajectory has a value of {name} that is not finite"
+                raise InvalidInput(message)
+
+    @property
+    def n_samples(self) -> int:
+        """Number of rows."""
+        return int(self.x0.size)
+
+    @property
+    def n_links(self) -> int:
+        """Number of links N."""
+        return int(self.alpha.shape[1])
+
+    @property
+    def joints(self) -> FloatArray:
+        """All joint values q = (x0, alpha1, theta1, ..), shape (n_samples, 1 + 2N).
+
+        Metres in the first column, radians in the others.
+        """
+        angles = np.stack([self.alpha, self.theta], axis=2).reshape(self.n_samples, -1)
+        return np.concatenate([self.x0[:, None], angles], axis=1)

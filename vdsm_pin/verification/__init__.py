@@ -1,0 +1,1 @@
+"""Judges a trajectory; never sees planner code."""

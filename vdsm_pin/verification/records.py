@@ -1,0 +1,190 @@
+"""What a verification returns: verdicts, rows of evidence, brackets."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TypeAlias
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.trajectory import Trajectory
+
+
+class Verdict(StrEnum):
+    """Outcome of one check or of the whole; undecided is a failure."""
+
+    CERTIFIED = "certified"
+    REFUTED = "refuted"
+    UNDECIDED = "undecided"
+
+
+def combine(verdicts: tuple[Verdict, ...]) -> Verdict:
+    """Refuted beats undecided beats certified; nothing at all is undecided."""
+    if Verdict.REFUTED in verdicts:
+        return Verdict.REFUTED
+    if Verdict.UNDECIDED in verdicts or not verdicts:
+        return Verdict.UNDECIDED
+    return Verdict.CERTIFIED
+
+
+@dataclass(frozen=True)
+class Check:
+    """One row of evidence.
+
+    Args:
+        name: What was checked, in field terms.
+        verdict: Its outcome; a check with count 0 is never certified.
+        count: Items checked.
+        worst: The worst value found or bounded; NaN where there is none.
+        limit: What it was held against; NaN where there is none.
+        unit: SI unit of both ("m", "rad", "-").
+        where: The place of the worst case in words, joints and links from 1.
+    """
+
+    name: str
+    verdict: Verdict
+    count: int
+    worst: float
+    limit: float
+    unit: str
+    where: str = ""
+
+
+@dataclass(frozen=True)
+class ErrorBox:
+    """How far the real motion may stray from the nominal one.
+
+    Args:
+        joint: Largest error of every theta_i and alpha_i; [rad].
+        base: Largest error of x0; [m].
+        obstacle: Largest displacement of an obstacle surface; [m].
+    """
+
+    joint: float = 0.0
+    base: float = 0.0
+    obstacle: float = 0.0
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A link and what it must stay clear of: an obstacle, or another link.
+
+    Args:
+        link: 1 to N.
+        obstacle: Name; empty for a pair of links.
+        other_link: link + 2 to N for a pair of links, else 0.
+    """
+
+    link: int
+    obstacle: str = ""
+    other_link: int = 0
+
+    @property
+    def label(self) -> str:
+        """The partner in words: an obstacle's name or 'link k'."""
+        return self.obstacle if self.obstacle else f"link {self.other_link}"
+
+
+@dataclass(frozen=True)
+class ClosestApproach:
+    """The clearance bracket of one pair over one interval, with its witness.
+
+    Args:
+        interval: Rows interval and interval + 1 bound it, counted from 0.
+        time: Where in the interval the upper bound was found, 0 to 1.
+        pair: The pair.
+        lower: Proved lower bound of the clearance over the interval; [m].
+        upper: Clearance at that time, proved from above; negative inside; [m].
+        station: Arc length of the witness along the link's axis; [m].
+        link_point: Witness on the link's surface, base frame, shape (3,); [m].
+        other_point: Witness on the partner's surface, base frame, shape (3,); [m].
+    """
+
+    interval: int
+    time: float
+    pair: Pair
+    lower: float
+    upper: float
+    station: float
+    link_point: FloatArray
+    other_point: FloatArray
+
+
+@dataclass(frozen=True)
+class ClearanceChunk:
+    """Brackets of consecutive intervals; long motions arrive in many chunks.
+
+    Args:
+        first_interval: Number of the first row.
+        lower: Proved lower bounds, shape (m, n_pairs); [m].
+        upper: Proved upper bounds at `time`, shape (m, n_pairs); [m].
+        time: Place of the upper bounds in their intervals, shape (m, n_pairs).
+        verdict: 0 certified, 1 refuted, 2 undecided, shape (m, n_pairs).
+        link_point: Witnesses on the links, base frame, shape (m, n_pairs, 3); [m].
+        other_point: Witnesses on the partners, shape (m, n_pairs, 3); [m].
+    """
+
+    first_interval: int
+    lower: FloatArray
+    upper: FloatArray
+    time: FloatArray
+    verdict: IntArray
+    link_point: FloatArray
+    other_point: FloatArray
+
+
+ClearanceSink: TypeAlias = Callable[[ClearanceChunk], None]
+"""Receives chunks in order while a verification runs (a CSV writer, say)."""
+
+
+@dataclass(frozen=True)
+class ClearanceProfile:
+    """Brackets along the motion, reduced to what a plot shows.
+
+    Args:
+        link_lower: Least over the obstacles, shape (n_intervals, N); [m].
+        link_upper: The same for the upper bounds; [m].
+        obstacle_lower: Least over the links, shape (n_intervals, n_obstacles); [m].
+        obstacle_upper: The same for the upper bounds; [m].
+    """
+
+    link_lower: FloatArray
+    link_upper: FloatArray
+    obstacle_lower: FloatArray
+    obstacle_upper: FloatArray
+
+
+@dataclass(frozen=True)
+class Verification:
+    """The judgement of one trajectory against one problem.
+
+    Args:
+        problem: What was asked.
+        trajectory: What was judged.
+        errors: The error box the clearance proof covers.
+        pairs: Every pair judged, in the column order of the chunks.
+        checks: One row per check, in a fixed order.
+        closest: The closest approaches over the whole motion, nearest first, one per
+            pair at most, ten at most; the first is the minimum clearance.
+        profile: Brackets along the motion.
+        coverage: Proved part of the desired path that is drawn, 0 to 1; [-].
+        undrawn: Stretches not drawn, arc lengths from and to, shape (k, 2); [m].
+        joint_error: Largest joint error still certified; 0 if none is; NaN if it was
+            not asked for; [rad].
+    """
+
+    problem: PlanningProblem
+    trajectory: Trajectory
+    errors: ErrorBox
+    pairs: tuple[Pair, ...]
+    checks: tuple[Check, ...]
+    closest: tuple[ClosestApproach, ...]
+    profile: ClearanceProfile
+    coverage: float
+    undrawn: FloatArray
+    joint_error: float
+
+    @property
+    def verdict(self) -> Verdict:
+        """Certified only if every check is."""
+        return combine(tuple(check.verdict for check in self.checks))
