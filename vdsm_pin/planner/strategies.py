@@ -1,0 +1,27 @@
+"""Strategies by name: the one place where a new way of planning is added."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Final, TypeAlias
+
+from vdsm_pin.errors import UnknownName
+from vdsm_pin.planner.records import LinkClearance, Plan
+from vdsm_pin.problem import PlanningProblem
+
+Strategy: TypeAlias = Callable[[PlanningProblem, LinkClearance, float], Plan]
+"""(problem, clearance, margin) -> plan. `margin` is what the strategy shall keep beyond
+the required clearance [m]; the refinement raises it where verification asks for more."""
+
+STRATEGIES: Final[Mapping[str, Strategy]] = MappingProxyType({})
+"""Every strategy a user may name."""
+
+
+def strategy(name: str) -> Strategy:
+    """The strategy of that name.
+
+    Raises:
+        UnknownName: If there is none.
+    """
+    if name not in STRATEGIES:
+        raise UnknownName(kind="strategy", name=name, known=tuple(STRATEGIES))
+    return STRATEGIES[name]
