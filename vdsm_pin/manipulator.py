@@ -141,7 +141,9 @@ class Manipulator:
         Raises:
             ZeroDivisionError: For j = 1 and i > 1, where the paper has infinity.
         """
-        return 1.0 if i == j else float(self.stations[i - 1] / self.stations[j - 1])
+        return (
+            1.0 if i == j else float(self.stations[i - 1]) / float(self.stations[j - 1])
+        )
 
 
 def _hrm8() -> Manipulator:

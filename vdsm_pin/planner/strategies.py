@@ -10,7 +10,7 @@ from vdsm_pin.problem import PlanningProblem
 
 Strategy: TypeAlias = Callable[[PlanningProblem, LinkClearance, float], Plan]
 """(problem, clearance, margin) -> plan. `margin` is what the strategy shall keep beyond
-the required clearance [m]; the refinement raises it where verification asks for more."""
+the required clearance [m]; the refinement raises it where verification asks for it."""
 
 STRATEGIES: Final[Mapping[str, Strategy]] = MappingProxyType({})
 """Every strategy a user may name."""

@@ -1,0 +1,66 @@
+"""Obstacles: what they refuse, and that their pieces are the solid they claim."""
+
+import numpy as np
+import pytest
+import shapely
+
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.scene import Box, Capsule, Hull, Mesh, Prism, Scene, Sphere
+
+EYE = np.eye(3)
+L_SHAPE = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 3], [0, 3]]
+
+
+def prism(polygon: object, span: tuple[float, float] = (0.0, 1.0)) -> Prism:
+    return Prism("p", np.zeros(3), EYE, np.asarray(polygon, dtype=float), span)
+
+
+def test_duplicate_names_are_refused() -> None:
+    ball = Sphere("a", np.zeros(3), 1.0)
+    with pytest.raises(InvalidInput, match="'a'"):
+        Scene((ball, ball))
+
+
+@pytest.mark.parametrize("radius", [0.0, -1.0, np.nan, np.inf])
+def test_radius_must_be_positive_and_finite(radius: float) -> None:
+    with pytest.raises(InvalidInput, match="radius"):
+        Sphere("a", np.zeros(3), radius)
+
+
+def test_a_self_crossing_polygon_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="not simple"):
+        prism([[0, 0], [1, 1], [1, 0], [0, 1]])
+
+
+def test_convex_prism_is_one_piece_with_all_corners() -> None:
+    (piece,) = prism([[0, 0], [1, 0], [0, 1]], (2.0, 5.0)).pieces
+    assert isinstance(piece, Hull)
+    assert piece.points.shape == (6, 3)
+    assert set(piece.points[:, 2]) == {2.0, 5.0}
+
+
+def test_non_convex_prism_pieces_tile_the_section() -> None:
+    sections = [shapely.Polygon(s) for s in prism(L_SHAPE).convex_sections]
+    assert len(sections) > 1
+    union = shapely.union_all(sections)
+    assert union.symmetric_difference(shapely.Polygon(L_SHAPE)).area == 0.0
+    assert sum(s.area for s in sections) == pytest.approx(union.area)
+
+
+def test_box_corners_follow_its_rotation() -> None:
+    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    (piece,) = Box("b", np.ones(3), turn, np.array([1.0, 2, 3])).pieces
+    assert isinstance(piece, Hull)
+    np.testing.assert_allclose(np.ptp(piece.points, axis=0), [4, 2, 6])
+
+
+def test_capsule_piece_is_its_segment_grown() -> None:
+    (piece,) = Capsule("c", np.zeros(3), np.array([0.0, 1, 0]), 0.5, 0.1).pieces
+    assert isinstance(piece, Hull)
+    assert piece.radius == 0.1
+    np.testing.assert_array_equal(piece.points, [[0, -0.5, 0], [0, 0.5, 0]])
+
+
+def test_mesh_indices_must_exist() -> None:
+    with pytest.raises(InvalidInput, match="index"):
+        Mesh("m", np.zeros((3, 3)), np.array([[0, 1, 3]]), False)
