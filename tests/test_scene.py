@@ -5,7 +5,8 @@ import pytest
 import shapely
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.scene import Box, Capsule, Hull, Mesh, Prism, Scene, Sphere
+from vdsm_pin.geometry.convex import Hull
+from vdsm_pin.scene import Box, Capsule, Mesh, Prism, Scene, Sphere
 
 EYE = np.eye(3)
 L_SHAPE = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 3], [0, 3]]

@@ -1,9 +1,7 @@
 """Obstacles: named solids in the base frame, and the convex pieces they are made of.
 
-Everything that measures a distance works on pieces. There are three kinds: the hull of
-a few points grown by a radius, a flat-ended cylinder, and a half-space. A sphere,
-capsule, box, convex prism and triangle are hulls; a non-convex prism is several; a mesh
-is one hull per triangle plus, where it is watertight, an inside.
+Everything that measures a distance works on pieces (`geometry/convex.py`). A mesh is one
+hull per triangle plus, where it is watertight, an inside.
 """
 
 from dataclasses import dataclass
@@ -15,57 +13,12 @@ import shapely
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
 
 BOX_CORNERS: Final = frozen(
     [[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]
 )
 """Corners of the cube [-1, 1]^3, shape (8, 3); [-]."""
-
-
-@dataclass(frozen=True)
-class Hull:
-    """Convex hull of points, grown by a radius.
-
-    Args:
-        points: Shape (n, 3), n >= 1; [m].
-        radius: 0 or more; [m].
-    """
-
-    points: FloatArray
-    radius: float = 0.0
-
-
-@dataclass(frozen=True)
-class FlatCylinder:
-    """Solid cylinder with flat ends.
-
-    Args:
-        centre: Shape (3,); [m].
-        axis: Unit vector, shape (3,); [-].
-        half_length: Half the height; [m].
-        radius: [m].
-    """
-
-    centre: FloatArray
-    axis: FloatArray
-    half_length: float
-    radius: float
-
-
-@dataclass(frozen=True)
-class HalfSpacePiece:
-    """Points p with normal . p <= offset.
-
-    Args:
-        normal: Outward unit vector, shape (3,); [-].
-        offset: [m].
-    """
-
-    normal: FloatArray
-    offset: float
-
-
-Piece: TypeAlias = Hull | FlatCylinder | HalfSpacePiece
 
 
 def _check_finite(name: str, **values: object) -> None:
