@@ -10,6 +10,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.units import MM_PER_M
 
 MAX_LINKS: Final = 40
 """Largest number of links the package is tested with."""
@@ -148,7 +149,7 @@ class Manipulator:
 
 def _hrm8() -> Manipulator:
     """The arm of the paper's Table 1; body radius from 261.5 - 200 mm."""
-    lengths = np.array([486, 486, 486, 486, 486, 206, 206, 284]) * 1e-3
+    lengths = np.array([486, 486, 486, 486, 486, 206, 206, 284]) / MM_PER_M
     limit = float(np.deg2rad(42.5))
     # r and d are not published; r stays inside the body, d inside half the last links.
     cables = CableLayout(0.050, 0.030, paper_hole_angles(8))

@@ -27,6 +27,13 @@ class Blocked(StrEnum):
     FAIL = "fail"
 
 
+class Order(StrEnum):
+    """In which order the desired path may be drawn."""
+
+    AS_GIVEN = "as_given"
+    FREE = "free"
+
+
 @dataclass(frozen=True)
 class DesiredPath:
     """What the tip shall draw, in the base frame.
@@ -40,6 +47,10 @@ class DesiredPath:
         retreat: Largest step back along -X while off the path; [m].
         blocked: Detour or fail.
         required_coverage: Least part of the path that must be drawn, 0 to 1; [-].
+        start_joints: Joint values q = (x0, alpha1, theta1, ..) at the start, shape
+            (1 + 2N,), with `start` their tip; None where the arm starts straight;
+            [m] in the first entry, [rad] in the others.
+        order: Whether waypoints may be drawn in another order or direction.
 
     Raises:
         InvalidInput: If a value breaks its range.
@@ -53,11 +64,15 @@ class DesiredPath:
     retreat: float = 0.0
     blocked: Blocked = Blocked.DETOUR
     required_coverage: float = 0.0
+    start_joints: FloatArray | None = None
+    order: Order = Order.AS_GIVEN
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check the values."""
         object.__setattr__(self, "start", frozen(self.start))
         object.__setattr__(self, "points", frozen(self.points))
+        if self.start_joints is not None:
+            object.__setattr__(self, "start_joints", frozen(self.start_joints))
         if self.start.shape != (3,) or not np.isfinite(self.start).all():
             message = (
                 f"tip_path.start is {self.start.tolist()}, expected 3 finite numbers"
@@ -125,9 +140,12 @@ class PlanningProblem:
         required_clearance: Least distance between surfaces; [m].
         T_world_base: Pose of the base frame in the user's frame, shape (4, 4);
             readers and writers apply it, nobody else needs it.
+        required_self_clearance: Least distance between the surfaces of two links that
+            are not neighbours; [m].
 
     Raises:
-        InvalidInput: If the required clearance is negative or not finite.
+        InvalidInput: If a required clearance is negative or not finite, or the
+            joint values at the start do not fit the arm.
     """
 
     name: str
@@ -136,11 +154,19 @@ class PlanningProblem:
     path: DesiredPath
     required_clearance: float
     T_world_base: FloatArray
+    required_self_clearance: float = 0.0
 
     def __post_init__(self) -> None:
         """Freeze the pose and check the clearance."""
         object.__setattr__(self, "T_world_base", frozen(self.T_world_base))
-        if not 0.0 <= self.required_clearance < np.inf:
-            value = self.required_clearance
-            message = f"required_clearance is {value} m, expected 0 or more"
+        for field in ("required_clearance", "required_self_clearance"):
+            value = getattr(self, field)
+            if not 0.0 <= value < np.inf:
+                message = f"{field} is {value} m, expected 0 or more"
+                raise InvalidInput(message)
+        joints, count = self.path.start_joints, 1 + 2 * self.manipulator.n_links
+        if joints is not None and not (
+            joints.shape == (count,) and np.isfinite(joints).all()
+        ):
+            message = f"start_joints is {joints.tolist()}, expected {count} numbers"
             raise InvalidInput(message)

@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import Final, TypeAlias
 
 import numpy as np
-import shapely
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
@@ -187,6 +186,8 @@ class Prism:
         if self.polygon.ndim != 2 or self.polygon.shape[0] < 3:
             message = f"obstacle {self.name!r}: polygon needs at least 3 corners"
             raise InvalidInput(message)
+        import shapely  # slow to import, and only prisms need it
+
         shape = shapely.Polygon(self.polygon)
         if not shape.is_valid or not shape.area > 0.0:
             reason = shapely.is_valid_reason(shape)
@@ -199,6 +200,8 @@ class Prism:
     @cached_property
     def convex_sections(self) -> tuple[FloatArray, ...]:
         """The section as convex polygons, each of shape (k, 2); [m]."""
+        import shapely
+
         shape = shapely.Polygon(self.polygon)
         if shape.equals(shape.convex_hull):
             return (frozen(self.polygon),)

@@ -48,6 +48,19 @@ class Tolerances:
     1.4e-14 m: 40 * 8 * 1.4e-14 = 4.5e-12 m.
     """
 
+    scene_extent: float = 100.0
+    """Largest coordinate in the base frame, for which `arithmetic` is derived; [m]."""
+
+    mesh_size_low: float = 1.0 / 300.0
+    """Mesh diagonal over arm length below which the unit is taken to be wrong; [-].
+
+    A millimetre taken for a metre is off by 1000; parts that matter to an arm are
+    between a tenth and a few times its length.
+    """
+
+    mesh_size_high: float = 30.0
+    """Mesh diagonal over arm length above which the unit is taken to be wrong; [-]."""
+
     on_path_length: float = 1e-9
     """Arc lengths closer than this are the same place on the desired path; [m]."""
 

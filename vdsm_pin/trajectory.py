@@ -1,11 +1,15 @@
 """A trajectory: rows of joint values, joined by straight lines in joint space."""
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
+
+MAX_ROWS: Final = 5_000_000
+"""Largest number of rows of one trajectory."""
 
 
 @dataclass(frozen=True)

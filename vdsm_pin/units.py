@@ -3,8 +3,11 @@
 from collections.abc import Mapping
 from typing import Final
 
-METRES_PER_UNIT: Final[Mapping[str, float]] = {"m": 1.0, "mm": 1e-3}
-"""Length units a problem file may name."""
+UNITS_PER_METRE: Final[Mapping[str, float]] = {"m": 1.0, "mm": 1e3}
+"""Length units a problem file may name.
+
+Readers divide by these: 206 / 1e3 is the number closest to 0.206, 206 * 1e-3 is not.
+"""
 
 MM_PER_M: Final = 1e3
 """Millimetres in a metre."""
