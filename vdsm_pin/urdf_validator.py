@@ -1,0 +1,189 @@
+"""Refuses URDF documents that the usual readers take and misread.
+
+yourdfpy's own check lets pass a missing parent link, a name used twice, a loop, a
+negative mass and limits that are upside down; Pinocchio drops shapes it does not know.
+"""
+
+import xml.etree.ElementTree as ET
+from collections import Counter
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray
+
+JOINT_KINDS: Final = ("fixed", "revolute", "prismatic", "continuous")
+"""Joint types this package can do something with."""
+
+SIZES: Final = {
+    "sphere": {"radius": 1},
+    "cylinder": {"radius": 1, "length": 1},
+    "box": {"size": 3},
+}
+"""Shapes every reader takes, with the count of numbers in each of their sizes."""
+
+
+def validate_urdf(text: str) -> None:
+    """Refuse a URDF document with any defect that a reader might let pass.
+
+    Args:
+        text: The document.
+
+    Raises:
+        InvalidInput: If the text is not XML; a name is missing or used twice; a joint
+            names a link that does not exist; the links are not one tree; a mass,
+            inertia or size is impossible; a limit is missing or upside down; an axis
+            is zero; a number is not one; or a shape is one that a reader would drop.
+    """
+    try:
+        robot = ET.fromstring(text)
+    except ET.ParseError as error:
+        message = f"URDF is not XML: {error}"
+        raise InvalidInput(message) from error
+    if robot.tag != "robot":
+        message = f"URDF's root element is <{robot.tag}>, expected <robot>"
+        raise InvalidInput(message)
+    for problem in _problems(robot):
+        message = f"URDF: {problem}"
+        raise InvalidInput(message)
+
+
+def _problems(robot: ET.Element) -> Iterator[str]:
+    for kind in ("link", "joint"):
+        names = Counter(element.get("name", "") for element in robot.findall(kind))
+        for name, count in names.items():
+            if not name:
+                yield f"a {kind} has no name"
+            if count > 1:
+                yield f"{count} {kind}s are named {name!r}; names are unique"
+    for joint in robot.findall("joint"):
+        yield from _joint_problems(joint)
+    yield from _tree_problems(robot)
+    for link in robot.findall("link"):
+        yield from _link_problems(link)
+
+
+def _tree_problems(robot: ET.Element) -> Iterator[str]:
+    links = {link.get("name", "") for link in robot.findall("link")}
+    parent_of: dict[str, str] = {}
+    for joint in robot.findall("joint"):
+        name = joint.get("name", "")
+        ends = {end: _attribute(joint, end, "link") for end in ("parent", "child")}
+        for end, link in ends.items():
+            if link not in links:
+                yield f"joint {name!r}: {end} link {link!r} does not exist"
+        if ends["child"] in parent_of:
+            yield f"joint {name!r}: link {ends['child']!r} already has a parent"
+        parent_of[ends["child"]] = ends["parent"]
+    roots = sorted(links - parent_of.keys())
+    if len(roots) != 1:
+        yield f"expected one root link, found {len(roots)}: {', '.join(roots) or '-'}"
+    for link in sorted(links):
+        seen = {link}
+        while (link := parent_of.get(link, "")) != "":
+            if link in seen:
+                yield f"link {link!r} is its own ancestor: a loop"
+                break
+            seen.add(link)
+
+
+def _joint_problems(joint: ET.Element) -> Iterator[str]:
+    where = f"joint {joint.get('name', '')!r}"
+    kind = joint.get("type", "")
+    if kind not in JOINT_KINDS:
+        yield f"{where}: type {kind!r}, expected one of {', '.join(JOINT_KINDS)}"
+    yield from _origin_problems(joint, where)
+    if kind == "fixed":
+        return
+    if joint.find("axis") is not None:
+        axis = _numbers(joint, "axis", "xyz", 3)
+        if axis is None or not np.linalg.norm(axis) > 0.0:
+            yield f"{where}: axis {_attribute(joint, 'axis', 'xyz')!r} is no direction"
+    if kind == "continuous":
+        return
+    low = _numbers(joint, "limit", "lower", 1)
+    high = _numbers(joint, "limit", "upper", 1)
+    if low is None or high is None:
+        yield f"{where}: limit needs numbers lower and upper"
+    elif not low[0] < high[0]:
+        yield f"{where}: lower limit {low[0]} is not below upper limit {high[0]}"
+    for name in ("effort", "velocity"):
+        bound = _numbers(joint, "limit", name, 1)
+        if bound is None or not bound[0] >= 0.0:
+            text = _attribute(joint, "limit", name)
+            yield f"{where}: limit {name} is {text!r}, expected 0 or more"
+
+
+def _link_problems(link: ET.Element) -> Iterator[str]:
+    where = f"link {link.get('name', '')!r}"
+    inertial = link.find("inertial")
+    if inertial is not None:
+        yield from _origin_problems(inertial, where)
+        yield from _inertia_problems(inertial, where)
+    for shape in link.findall("visual") + link.findall("collision"):
+        yield from _origin_problems(shape, where)
+        yield from _shape_problems(shape, where)
+
+
+def _inertia_problems(inertial: ET.Element, where: str) -> Iterator[str]:
+    mass = _numbers(inertial, "mass", "value", 1)
+    if mass is None or not mass[0] > 0.0:
+        text = _attribute(inertial, "mass", "value")
+        yield f"{where}: mass is {text!r}, expected above 0"
+    names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    values = [_numbers(inertial, "inertia", name, 1) for name in names]
+    numbers = [float(value[0]) for value in values if value is not None]
+    if len(numbers) < len(names):
+        yield f"{where}: inertia needs the six numbers {', '.join(names)}"
+        return
+    xx, yy, zz, xy, xz, yz = numbers
+    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if not moments[0] > 0.0:
+        yield f"{where}: inertia is not positive definite"
+    elif not moments[2] <= moments[0] + moments[1]:
+        yield f"{where}: inertia breaks the triangle inequality of a real body"
+
+
+def _shape_problems(shape: ET.Element, where: str) -> Iterator[str]:
+    geometry = shape.find("geometry")
+    bodies = [] if geometry is None else list(geometry)
+    if geometry is None or len(bodies) != 1:
+        yield f"{where}: {shape.tag} has {len(bodies)} geometries, expected 1"
+        return
+    kind = bodies[0].tag
+    if kind not in SIZES:
+        known = ", ".join(SIZES)
+        yield f"{where}: <{kind}> is not read by everybody; expected one of {known}"
+        return
+    for name, count in SIZES[kind].items():
+        value = _numbers(geometry, kind, name, count)
+        if value is None or not (value > 0.0).all():
+            text = _attribute(geometry, kind, name)
+            yield f"{where}: {kind} {name} is {text!r}, expected above 0"
+
+
+def _origin_problems(element: ET.Element, where: str) -> Iterator[str]:
+    origin = element.find("origin")
+    for name in () if origin is None else sorted(origin.keys()):
+        if name in ("xyz", "rpy") and _numbers(element, "origin", name, 3) is None:
+            text = _attribute(element, "origin", name)
+            yield f"{where}: origin {name} is {text!r}, expected 3 finite numbers"
+
+
+def _attribute(element: ET.Element, child: str, name: str) -> str:
+    """An attribute of a child element; empty where either is missing."""
+    found = element.find(child)
+    return "" if found is None else found.get(name, "")
+
+
+def _numbers(
+    element: ET.Element, child: str, name: str, count: int
+) -> FloatArray | None:
+    """The finite numbers in a child's attribute; None where they are not `count`."""
+    try:
+        values = np.array(_attribute(element, child, name).split(), dtype=np.float64)
+    except ValueError:
+        return None
+    return values if values.size == count and np.isfinite(values).all() else None

@@ -1,0 +1,54 @@
+"""Forward kinematics by two roads: Pinocchio on the URDF against the closed form."""
+
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.records import Check, Verdict
+
+CHUNK: Final = 4096
+"""Rows held in memory at a time."""
+
+
+def check_fk(
+    robot: RobotModel, problem: PlanningProblem, trajectory: Trajectory
+) -> Check:
+    """Compare every joint centre of every row.
+
+    Args:
+        robot: The arm in Pinocchio.
+        problem: Names the arm of the closed form.
+        trajectory: What is judged.
+
+    Returns:
+        The largest distance between the two, in metres. They compute the same thing, so
+        a difference refutes one of them and with it every other check.
+    """
+    worst, row, joint = -np.inf, 0, 0
+    for first in range(0, trajectory.n_samples, CHUNK):
+        part = slice(first, first + CHUNK)
+        joints = trajectory.x0[part], trajectory.alpha[part], trajectory.theta[part]
+        planned = joint_centres(problem.manipulator, *joints)
+        residual = np.linalg.norm(robot.joint_centres(*joints) - planned, axis=2)
+        here = int(np.argmax(residual))
+        if not residual.flat[here] <= worst:  # NaN counts as worse than anything
+            worst = float(residual.flat[here])
+            row, joint = np.unravel_index(here, residual.shape)  # type: ignore[assignment]
+            row += first
+        if np.isnan(worst):
+            break
+    passed = worst <= TOLERANCES.joint_centre
+    return Check(
+        name="joint centres by Pinocchio against the closed form",
+        verdict=Verdict.CERTIFIED if passed else Verdict.REFUTED,
+        count=trajectory.n_samples * (problem.manipulator.n_links + 1),
+        worst=worst,
+        limit=TOLERANCES.joint_centre,
+        unit="m",
+        where=f"waypoint {row}, joint centre O{joint + 1}",
+    )
