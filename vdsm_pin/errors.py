@@ -3,7 +3,8 @@
     VdsmError
     ├── InvalidInput          exit 2: a file, field or argument is wrong
     │   ├── InvalidFile       names the file, the place in it and the expectation
-    │   └── UnknownName       lists the known names
+    │   ├── UnknownName       lists the known names
+    │   └── InconsistentCables  no joint angles give these cable lengths
     ├── Infeasible            exit 1: the problem is well-formed and has no plan here
     │   ├── OutOfReach        step 1 says no
     │   ├── LinkTooShort      a projected gap exceeds its link
@@ -45,6 +46,21 @@ class UnknownName(InvalidInput):
     def __init__(self, *, kind: str, name: str, known: tuple[str, ...]) -> None:
         self.kind, self.name, self.known = kind, name, known
         super().__init__(f"unknown {kind} {name!r}; known: {', '.join(known)}")
+
+
+class InconsistentCables(InvalidInput):
+    """Three cable lengths of a link that no two joint angles give."""
+
+    def __init__(
+        self, *, sample: int, link: int, residual: float, tolerance: float
+    ) -> None:
+        self.sample, self.link = sample, link
+        self.residual, self.tolerance = residual, tolerance
+        message = (
+            f"sample {sample}: the cable lengths of link {link} fit no joint angles; "
+            f"the nearest leave {residual:.3e} m (tolerance {tolerance:.1e} m)"
+        )
+        super().__init__(message)
 
 
 class Infeasible(VdsmError):

@@ -23,6 +23,19 @@ class Tolerances:
     cable_round_trip: float = 1e-9
     """Angles recovered from cable lengths; [rad]."""
 
+    cable_length: float = 1e-11
+    """Length by which three cables of a link may contradict each other; [m].
+
+    Rounding of a 20 m cable summed over 40 joints is 1e-13 m; on a hole circle of
+    10 mm, 1e-11 m are the promised 1e-9 rad.
+    """
+
+    cable_step: float = 1e-7
+    """Newton step in tan(angle / 2) after which the next one is rounding; [-].
+
+    The steps converge quadratically: the error after a step of 1e-7 is about 1e-14.
+    """
+
     joint_limit: float = 1e-9
     """Excess over theta/alpha/psi that counts as rounding of a CSV; [rad]."""
 
