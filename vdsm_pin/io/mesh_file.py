@@ -1,0 +1,179 @@
+"""STL (binary and text) and OBJ files to triangles, in the order of the file.
+
+No vertex is moved: corners are joined only where they are equal to the last bit, so
+that a proof about these triangles is a proof about the file.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.io.source import decode, read_bytes
+
+MAX_MESH_BYTES: Final = 1 << 30
+MAX_TRIANGLES: Final = 5_000_000
+
+_STL_HEADER: Final = 80
+_STL_RECORD: Final = np.dtype(
+    [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")]
+)
+
+
+@dataclass(frozen=True)
+class MeshData:
+    """Triangles as a file has them.
+
+    Args:
+        vertices: Shape (n, 3), in the unit of the file.
+        triangles: Vertex indices, shape (m, 3), m >= 1.
+        watertight: Whether every edge belongs to exactly two triangles.
+        content: The bytes of the file.
+    """
+
+    vertices: FloatArray
+    triangles: IntArray
+    watertight: bool
+    content: bytes
+
+
+def read_mesh(path: Path) -> MeshData:
+    """The triangles of an STL or OBJ file.
+
+    Raises:
+        InvalidFile: If the file cannot be read, is of another kind, is damaged, has no
+            triangle, or has a coordinate that is not finite.
+    """
+    kind = path.suffix.lower()
+    if kind not in (".stl", ".obj"):
+        problem = f"has the ending {kind!r}, expected .stl or .obj"
+        raise InvalidFile(file=path, problem=problem)
+    content = read_bytes(path, limit=MAX_MESH_BYTES)
+    if kind == ".obj":
+        corners = _obj_corners(decode(content, path), path)
+    elif _is_binary_stl(content):
+        corners = _binary_stl_corners(content, path)
+    else:
+        corners = _text_stl_corners(content, path)
+    _check_corners(corners, path)
+    vertices, indices = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    triangles = indices.reshape(-1, 3).astype(np.int64)
+    return MeshData(vertices, triangles, is_closed(triangles), content)
+
+
+def is_closed(triangles: IntArray) -> bool:
+    """Whether every edge belongs to exactly two triangles, none of them degenerate."""
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    if (edges[:, 0] == edges[:, 1]).any():
+        return False
+    _, counts = np.unique(edges, axis=0, return_counts=True)
+    return bool((counts == 2).all())
+
+
+def _check_corners(corners: FloatArray, path: Path) -> None:
+    if not len(corners):
+        raise InvalidFile(file=path, problem="has no triangle")
+    if len(corners) > MAX_TRIANGLES:
+        problem = f"has {len(corners)} triangles, the most is {MAX_TRIANGLES}"
+        raise InvalidFile(file=path, problem=problem)
+    finite = np.isfinite(corners).all(axis=(1, 2))
+    if not finite.all():
+        first = int(np.argmin(finite)) + 1
+        problem = "has a coordinate that is not a finite number"
+        raise InvalidFile(file=path, where=f"triangle {first}", problem=problem)
+
+
+def _is_binary_stl(content: bytes) -> bool:
+    """Text files begin with `solid`; so do some binary ones, whose size tells."""
+    size = len(content) - _STL_HEADER - 4
+    if size >= 0:
+        count = int.from_bytes(content[_STL_HEADER : _STL_HEADER + 4], "little")
+        if size == count * _STL_RECORD.itemsize:
+            return True
+    return not content.lstrip()[:5].lower() == b"solid"
+
+
+def _binary_stl_corners(content: bytes, path: Path) -> FloatArray:
+    size = len(content) - _STL_HEADER - 4
+    if size < 0:
+        problem = f"is neither text nor binary STL: only {len(content)} bytes"
+        raise InvalidFile(file=path, problem=problem)
+    count = int.from_bytes(content[_STL_HEADER : _STL_HEADER + 4], "little")
+    expected = count * _STL_RECORD.itemsize
+    if size != expected:
+        problem = (
+            f"is damaged: its header promises {count} triangles, {expected} bytes, "
+            f"but {size} bytes follow"
+        )
+        raise InvalidFile(file=path, problem=problem)
+    records = np.frombuffer(content, dtype=_STL_RECORD, offset=_STL_HEADER + 4)
+    return np.asarray(records["corners"], dtype=np.float64)
+
+
+def _text_stl_corners(content: bytes, path: Path) -> FloatArray:
+    corners: list[list[float]] = []
+    in_loop, last = 0, ""
+    for number, line in enumerate(decode(content, path).splitlines(), 1):
+        words = line.split()
+        if not words:
+            continue
+        last = words[0].lower()
+        if last == "outer":
+            in_loop = len(corners)
+        elif last == "vertex":
+            corners.append(_numbers(words[1:], 3, path, number))
+        elif last == "endloop" and len(corners) - in_loop != 3:
+            problem = f"the facet has {len(corners) - in_loop} corners, expected 3"
+            raise InvalidFile(file=path, where=f"line {number}", problem=problem)
+    if last != "endsolid" or len(corners) % 3:
+        raise InvalidFile(
+            file=path, problem="is truncated: it does not end in endsolid"
+        )
+    return np.array(corners, dtype=np.float64).reshape(-1, 3, 3)
+
+
+def _obj_corners(text: str, path: Path) -> FloatArray:
+    vertices: list[list[float]] = []
+    faces: list[tuple[int, int, int]] = []
+    for number, line in enumerate(text.splitlines(), 1):
+        words = line.split("#", 1)[0].split()
+        if not words:
+            continue
+        if words[0] == "v":
+            vertices.append(_numbers(words[1:4], 3, path, number))
+        elif words[0] == "f":
+            face = [_index(word, len(vertices), path, number) for word in words[1:]]
+            if len(face) != 3:
+                problem = f"a face has {len(face)} corners, expected triangles only"
+                raise InvalidFile(file=path, where=f"line {number}", problem=problem)
+            faces.append((face[0], face[1], face[2]))
+    if not faces:
+        return np.zeros((0, 3, 3))
+    return np.array(vertices, dtype=np.float64)[np.array(faces)]
+
+
+def _index(word: str, count: int, path: Path, number: int) -> int:
+    """Vertex index of a face corner such as 7, 7/1 or -2//3, counted from 0."""
+    try:
+        index = int(word.split("/", 1)[0])
+    except ValueError:
+        index = 0
+    index = index - 1 if index > 0 else count + index
+    if not 0 <= index < count:
+        problem = f"the face corner {word!r} names none of the {count} vertices above"
+        raise InvalidFile(file=path, where=f"line {number}", problem=problem)
+    return index
+
+
+def _numbers(words: list[str], count: int, path: Path, number: int) -> list[float]:
+    try:
+        values = [float(word) for word in words]
+    except ValueError:
+        values = []
+    if len(values) != count:
+        problem = f"found {' '.join(words)!r}, expected {count} numbers"
+        raise InvalidFile(file=path, where=f"line {number}", problem=problem)
+    return values

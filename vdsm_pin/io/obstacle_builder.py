@@ -1,0 +1,268 @@
+"""Obstacles of a problem file to solids in the base frame, in metres."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import singledispatchmethod
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin import scene
+from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.io import problem_schema as schema
+from vdsm_pin.io.mesh_file import read_mesh
+from vdsm_pin.io.yaml_reader import Location, YamlDocument
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.units import UNITS_PER_METRE
+
+AXES: Final = {"x": 0, "y": 1, "z": 2}
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The file's frame and unit against the base frame and the metre.
+
+    Args:
+        unit: Name of the length unit.
+        rotation: R_world_base, shape (3, 3); [-].
+        position: Origin of the base in the file's frame, shape (3,); [m].
+    """
+
+    unit: str
+    rotation: FloatArray
+    position: FloatArray
+
+    def metres(self, lengths: object) -> FloatArray:
+        """Lengths of the file in metres, any shape."""
+        return np.asarray(lengths, dtype=np.float64) / UNITS_PER_METRE[self.unit]
+
+    def shown(self, metres: float) -> str:
+        """A length as the user would write it."""
+        return f"{metres * UNITS_PER_METRE[self.unit]:.6g} {self.unit}"
+
+    def point(self, lengths: object) -> FloatArray:
+        """Points of the file in the base frame, shape (..., 3); [m]."""
+        return (self.metres(lengths) - self.position) @ self.rotation
+
+    def direction(self, vector: FloatArray) -> FloatArray:
+        """A direction of the file in the base frame, shape (3,)."""
+        return vector @ self.rotation
+
+    def orientation(self, rpy_deg: list[float]) -> FloatArray:
+        """Roll, pitch, yaw of the file as R_base_body, shape (3, 3)."""
+        return self.rotation.T @ rotation_from_rpy(np.deg2rad(rpy_deg))
+
+
+def unit_vector(vector: FloatArray) -> FloatArray | None:
+    """A vector scaled to length 1, or None where it has no direction."""
+    largest = float(np.abs(vector).max())
+    if not 0.0 < largest < np.inf:
+        return None
+    scaled = vector / largest  # neither overflows nor underflows when squared
+    return np.asarray(scaled / np.linalg.norm(scaled))
+
+
+@dataclass
+class ObstacleBuilder:
+    """Converts the obstacles of one file.
+
+    Args:
+        document: The file, for messages.
+        folder: Where relative mesh paths start.
+        frame: The file's unit and pose.
+        arm_length: For judging the size of a mesh; [m].
+    """
+
+    document: YamlDocument
+    folder: Path
+    frame: Frame
+    arm_length: float
+    mesh_contents: list[bytes] = field(default_factory=list)
+
+    def build_all(self, models: list[schema.ObstacleModel]) -> scene.Scene:
+        """All obstacles, in file order.
+
+        Raises:
+            InvalidFile: If one is not a solid, or two share a name.
+        """
+        obstacles: list[scene.Obstacle] = []
+        first: dict[str, int] = {}
+        for i, model in enumerate(models):
+            if model.name in first:
+                problem = (
+                    f"is {model.name!r}, which obstacles[{first[model.name]}] is "
+                    "called already; names are unique"
+                )
+                raise self.document.invalid(("obstacles", i, "name"), problem)
+            first[model.name] = i
+            obstacles.append(self._checked(model, ("obstacles", i)))
+        return scene.Scene(tuple(obstacles))
+
+    def _checked(self, model: schema.ObstacleModel, at: Location) -> scene.Obstacle:
+        try:
+            obstacle: scene.Obstacle = self.build(model, at)
+        except InvalidFile:
+            raise
+        except InvalidInput as error:
+            raise self.document.invalid(at, str(error)) from None
+        self._check_extent(obstacle, at)
+        return obstacle
+
+    def _check_extent(self, obstacle: scene.Obstacle, at: Location) -> None:
+        """Distances are exact to a stated bound only within a stated extent."""
+        limit = TOLERANCES.scene_extent
+        reach = _extent(obstacle)
+        if not reach <= limit:
+            problem = (
+                f"{obstacle.name!r} reaches {self.frame.shown(reach)} from the base; "
+                f"expected at most {self.frame.shown(limit)}"
+            )
+            raise self.document.invalid(at, problem)
+
+    @singledispatchmethod
+    def build(self, model: object, at: Location) -> scene.Obstacle:
+        """One obstacle."""
+        raise NotImplementedError(type(model))
+
+    @build.register
+    def _(self, model: schema.SphereModel, at: Location) -> scene.Obstacle:
+        radius = float(self.frame.metres(model.radius))
+        return scene.Sphere(model.name, self.frame.point(model.center), radius)
+
+    @build.register
+    def _(self, model: schema.CylinderModel, at: Location) -> scene.Obstacle:
+        return self._round(scene.Cylinder, model, at)
+
+    @build.register
+    def _(self, model: schema.CapsuleModel, at: Location) -> scene.Obstacle:
+        return self._round(scene.Capsule, model, at)
+
+    def _round(
+        self,
+        make: Callable[..., scene.Obstacle],
+        model: schema.CylinderModel | schema.CapsuleModel,
+        at: Location,
+    ) -> scene.Obstacle:
+        if isinstance(model.axis, str):
+            vector = np.eye(3)[AXES[model.axis]]
+        else:
+            vector = self._unit(model.axis, (*at, "axis"))
+        return make(
+            model.name,
+            self.frame.point(model.center),
+            self.frame.direction(vector),
+            float(self.frame.metres(model.length)) / 2.0,
+            float(self.frame.metres(model.radius)),
+        )
+
+    @build.register
+    def _(self, model: schema.BoxModel, at: Location) -> scene.Obstacle:
+        centre, half_size = self.frame.point(model.center), np.array(model.size) / 2.0
+        rotation = self.frame.orientation(model.rpy_deg)
+        return scene.Box(model.name, centre, rotation, self.frame.metres(half_size))
+
+    @build.register
+    def _(self, model: schema.PrismModel, at: Location) -> scene.Obstacle:
+        if not model.from_ < model.to:
+            problem = f"is {model.to:g}, expected above from = {model.from_:g}"
+            raise self.document.invalid((*at, "to"), problem)
+        polygon = without_repeats(np.array(model.polygon), closed=True)
+        self._check_simple(polygon, (*at, "polygon"))
+        # Columns: the two axes of the section, then the sweep; right-handed.
+        order = np.roll(np.arange(3), -1 - AXES[model.axis])
+        low, high = self.frame.metres([model.from_, model.to])
+        return scene.Prism(
+            model.name,
+            self.frame.point([0.0, 0.0, 0.0]),
+            self.frame.rotation.T[:, order],
+            self.frame.metres(polygon),
+            (float(low), float(high)),
+        )
+
+    def _check_simple(self, polygon: FloatArray, at: Location) -> None:
+        import shapely
+
+        shape = shapely.Polygon(polygon) if len(polygon) > 2 else None
+        if shape is None or not shape.area > 0.0:
+            raise self.document.invalid(at, "encloses no area")
+        if not shape.is_valid:
+            reason = shapely.is_valid_reason(shape)
+            problem = f"crosses or touches itself ({reason}); expected a simple polygon"
+            raise self.document.invalid(at, problem)
+
+    @build.register
+    def _(self, model: schema.HalfSpaceModel, at: Location) -> scene.Obstacle:
+        normal = self._unit(model.normal, (*at, "normal"))
+        point = self.frame.point(model.point)
+        return scene.HalfSpace(model.name, point, self.frame.direction(normal))
+
+    @build.register
+    def _(self, model: schema.MeshModel, at: Location) -> scene.Obstacle:
+        try:
+            mesh = read_mesh(self.folder / model.file)
+        except InvalidFile as error:
+            place = f" {error.where}:" if error.where else ""
+            problem = f"{model.file!r}:{place} {error.problem}"
+            raise self.document.invalid((*at, "file"), problem) from None
+        self.mesh_contents.append(mesh.content)
+        vertices = mesh.vertices * model.scale
+        if model.check_size:
+            self._check_size(vertices, model, at)
+        turned = vertices @ rotation_from_rpy(np.deg2rad(model.rpy_deg)).T
+        corners = self.frame.point(turned + np.array(model.center))
+        return scene.Mesh(model.name, corners, mesh.triangles, mesh.watertight)
+
+    def _check_size(
+        self, vertices: FloatArray, model: schema.MeshModel, at: Location
+    ) -> None:
+        size = float(self.frame.metres(np.linalg.norm(np.ptp(vertices, axis=0))))
+        ratio = size / self.arm_length
+        if TOLERANCES.mesh_size_low <= ratio <= TOLERANCES.mesh_size_high:
+            return
+        factor = 1e-3 if ratio > 1.0 else 1e3
+        problem = (
+            f"makes {model.file!r} {self.frame.shown(size)} large beside an arm of "
+            f"{self.frame.shown(self.arm_length)}; if the file is in another unit, try "
+            f"scale: {model.scale * factor:g}, else set check_size: false"
+        )
+        raise self.document.invalid((*at, "scale"), problem)
+
+    def _unit(self, vector: list[float], at: Location) -> FloatArray:
+        unit = unit_vector(np.array(vector))
+        if unit is None:
+            raise self.document.invalid(at, f"is {vector}, which has no direction")
+        return unit
+
+
+def without_repeats(points: FloatArray, *, closed: bool) -> FloatArray:
+    """Points without those equal to the one before (for closed lines, cyclically)."""
+    before = np.roll(points, 1, axis=0)
+    keep = (points != before).any(axis=1)
+    if not closed or not keep.any():
+        keep[0] = True
+    return points[keep]
+
+
+def _extent(obstacle: scene.Obstacle) -> float:
+    """Largest distance of a solid's stated points from the base's origin; [m]."""
+    match obstacle:
+        case scene.HalfSpace():
+            return float(abs(obstacle.normal @ obstacle.point))
+        case scene.Mesh():
+            points, grown = obstacle.vertices, 0.0
+        case scene.Prism():
+            points = np.vstack([piece.points for piece in obstacle.pieces])
+            grown = 0.0
+        case scene.Sphere():
+            points, grown = obstacle.centre[None], obstacle.radius
+        case scene.Box():
+            points, grown = obstacle.centre[None], float(np.sum(obstacle.half_size))
+        case scene.Cylinder() | scene.Capsule():
+            arm = obstacle.half_length * obstacle.axis
+            points, grown = (
+                np.array([obstacle.centre + arm, obstacle.centre - arm]),
+                obstacle.radius,
+            )
+    return float(np.linalg.norm(points, axis=1).max()) + grown

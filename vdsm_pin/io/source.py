@@ -1,0 +1,103 @@
+"""Bytes from disk, with every way a path can be wrong told in one sentence."""
+
+import hashlib
+from collections.abc import Iterable
+from pathlib import Path
+
+from vdsm_pin.errors import InvalidFile
+
+
+def check_is_file(path: Path, *, named: object = None) -> None:
+    """Refuse what is not a readable regular file.
+
+    Args:
+        path: The file.
+        named: What the user called it; the path where not given.
+
+    Raises:
+        InvalidFile: If there is no file there, or something that is not one.
+    """
+    name = path if named is None else named
+    try:
+        if path.is_dir():
+            raise InvalidFile(file=name, problem="is a folder, expected a file")
+        if not path.exists():
+            raise InvalidFile(file=name, problem="does not exist")
+        if not path.is_file():
+            raise InvalidFile(file=name, problem="is not a regular file")
+    except (OSError, ValueError) as error:  # a name too long, or with a NUL in it
+        raise InvalidFile(file=name, problem=f"cannot be opened: {error}") from None
+
+
+def read_bytes(path: Path, *, limit: int) -> bytes:
+    """The content of a file of bounded size.
+
+    Args:
+        path: The file.
+        limit: Largest size accepted; [bytes].
+
+    Returns:
+        All of it.
+
+    Raises:
+        InvalidFile: If it cannot be read, is empty or is too large.
+    """
+    check_is_file(path)
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(limit + 1)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InvalidFile(file=path, problem=f"cannot be read: {reason}") from None
+    if not data:
+        raise InvalidFile(file=path, problem="is empty")
+    if len(data) > limit:
+        problem = f"is larger than {limit / 1e6:.0f} MB, the most that is read"
+        raise InvalidFile(file=path, problem=problem)
+    return data
+
+
+def read_text(path: Path, *, limit: int) -> str:
+    """The content of a UTF-8 file of bounded size, without a byte order mark.
+
+    Raises:
+        InvalidFile: As `read_bytes`, or if it is not UTF-8.
+    """
+    return decode(read_bytes(path, limit=limit), path)
+
+
+def decode(data: bytes, path: Path) -> str:
+    """Bytes as UTF-8 text, without a byte order mark.
+
+    Raises:
+        InvalidFile: If they are not UTF-8; names the line.
+    """
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        problem = f"is not UTF-8 text (byte 0x{data[error.start]:02x})"
+        raise InvalidFile(file=path, where=f"line {line}", problem=problem) from None
+
+
+def sha256_of(parts: Iterable[bytes]) -> str:
+    """SHA-256 of byte strings one after the other, in hexadecimal."""
+    digest = hashlib.sha256()
+    for part in parts:
+        digest.update(part)
+    return digest.hexdigest()
+
+
+def sha256_of_file(path: Path) -> str:
+    """SHA-256 of a file of any size, in hexadecimal.
+
+    Raises:
+        InvalidFile: If it cannot be read.
+    """
+    check_is_file(path)
+    try:
+        with path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InvalidFile(file=path, problem=f"cannot be read: {reason}") from None

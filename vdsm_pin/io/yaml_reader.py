@@ -1,0 +1,183 @@
+"""YAML to plain data with the line of every value; nothing else can come out.
+
+Works on parse events, one by one, so that neither a tag can build an object, nor deep
+nesting exhaust the stack, nor an alias expand without end. Plain scalars are read by
+the core schema of YAML 1.2: `1e-3` is a number, and `no` and `12:30` are text.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Final, TypeAlias
+
+import yaml
+
+from vdsm_pin.errors import InvalidFile
+
+Scalar: TypeAlias = str | int | float | bool | None
+Data: TypeAlias = "Scalar | list[Data] | dict[str, Data]"
+Location: TypeAlias = tuple[str | int, ...]
+
+MAX_DEPTH: Final = 32
+MAX_VALUES: Final = 1_000_000
+MAX_INTEGER_DIGITS: Final = 300
+
+_INTEGER: Final = re.compile(r"[-+]?[0-9]+")
+_FLOAT: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+_WORDS: Final[dict[str, Scalar]] = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL")),
+    **dict.fromkeys(("true", "True", "TRUE"), True),
+    **dict.fromkeys(("false", "False", "FALSE"), False),
+    **dict.fromkeys((".inf", ".Inf", ".INF", "+.inf"), float("inf")),
+    **dict.fromkeys(("-.inf", "-.Inf", "-.INF"), float("-inf")),
+    **dict.fromkeys((".nan", ".NaN", ".NAN"), float("nan")),
+}
+
+
+@dataclass(frozen=True)
+class YamlDocument:
+    """One document.
+
+    Args:
+        file: The file as the user named it.
+        data: Maps with text keys, lists, text, numbers, booleans, null.
+        lines: Line of every value of a map and of every map or list in a list, by its
+            location: the keys and indices that lead to it.
+    """
+
+    file: object
+    data: Data
+    lines: dict[Location, int]
+
+    def invalid(self, at: Location, problem: str) -> InvalidFile:
+        """The error that names a value by its field and line."""
+        line = self.line(at)
+        where = spelled(at)
+        if line is not None:
+            where = f"{where} (line {line})" if where else f"line {line}"
+        return InvalidFile(file=self.file, where=where, problem=problem)
+
+    def line(self, location: Location) -> int | None:
+        """Line of a value, or of the closest thing around it that has one."""
+        for end in range(len(location), -1, -1):
+            if location[:end] in self.lines:
+                return self.lines[location[:end]]
+        return None
+
+
+def spelled(location: Location) -> str:
+    """A location as people write it: obstacles[2].radius."""
+    text = "".join(f"[{s}]" if isinstance(s, int) else f".{s}" for s in location)
+    return text.removeprefix(".")
+
+
+def read_yaml(text: str, *, file: object) -> YamlDocument:
+    """One YAML document as plain data.
+
+    Args:
+        text: The whole file.
+        file: The file as the user named it, for messages.
+
+    Returns:
+        The data with line numbers.
+
+    Raises:
+        InvalidFile: If it is not YAML, holds not exactly one document, repeats a key,
+            names a tag of another language, nests too deep or is too large.
+    """
+    events = yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+    try:
+        return _Builder(events, file).document()
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        where = f"line {mark.line + 1}" if mark else ""
+        problem = f"is not YAML: {error.problem or error.context}"
+        raise InvalidFile(file=file, where=where, problem=problem) from None
+    except yaml.YAMLError as error:
+        problem = f"is not YAML: {' '.join(str(error).split())}"
+        raise InvalidFile(file=file, problem=problem) from None
+
+
+@dataclass
+class _Builder:
+    """Recursive descent over events, with a budget."""
+
+    events: Iterator[yaml.Event]
+    file: object
+    lines: dict[Location, int] = field(default_factory=dict)
+
+    def document(self) -> YamlDocument:
+        self.events = self._bounded(self.events)
+        next(self.events)  # the start of the stream
+        start = next(self.events)
+        if not isinstance(start, yaml.DocumentStartEvent):
+            raise InvalidFile(file=self.file, problem="holds no data")
+        data = self._value(next(self.events), ())
+        next(self.events)  # the end of the document
+        after = next(self.events)
+        if not isinstance(after, yaml.StreamEndEvent):
+            raise self._invalid(after, "a second document starts here, expected one")
+        return YamlDocument(self.file, data, self.lines)
+
+    def _bounded(self, events: Iterator[yaml.Event]) -> Iterator[yaml.Event]:
+        """The events, as long as they nest and number sanely."""
+        depth = 0
+        for count, event in enumerate(events):
+            if isinstance(event, yaml.CollectionStartEvent):
+                depth += 1
+            elif isinstance(event, yaml.CollectionEndEvent):
+                depth -= 1
+            if depth > MAX_DEPTH:
+                problem = f"nests deeper than {MAX_DEPTH} levels"
+                raise self._invalid(event, problem)
+            if count > MAX_VALUES:
+                problem = f"holds more than {MAX_VALUES} values"
+                raise self._invalid(event, problem)
+            yield event
+
+    def _value(self, event: yaml.Event, at: Location) -> Data:
+        if isinstance(event, yaml.AliasEvent):
+            problem = f"is an alias (*{event.anchor}); write the value out"
+            raise self._invalid(event, problem)
+        if event.tag is not None:
+            problem = f"has the tag {event.tag!r}; a problem file holds plain data only"
+            raise self._invalid(event, problem)
+        if isinstance(event, yaml.CollectionStartEvent):
+            self.lines.setdefault(at, event.start_mark.line + 1)
+        if isinstance(event, yaml.MappingStartEvent):
+            return self._mapping(at)
+        if isinstance(event, yaml.SequenceStartEvent):
+            return self._sequence(at)
+        return _scalar(event.value) if event.implicit[0] else str(event.value)
+
+    def _mapping(self, at: Location) -> dict[str, Data]:
+        data: dict[str, Data] = {}
+        while not isinstance(key := next(self.events), yaml.MappingEndEvent):
+            if not isinstance(key, yaml.ScalarEvent):
+                raise self._invalid(key, "a key is not plain text")
+            name = str(key.value)
+            if name in data:
+                problem = f"the key {name!r} appears twice"
+                raise self._invalid(key, problem)
+            self.lines[(*at, name)] = key.start_mark.line + 1
+            data[name] = self._value(next(self.events), (*at, name))
+        return data
+
+    def _sequence(self, at: Location) -> list[Data]:
+        data: list[Data] = []
+        while not isinstance(item := next(self.events), yaml.SequenceEndEvent):
+            data.append(self._value(item, (*at, len(data))))
+        return data
+
+    def _invalid(self, event: yaml.Event, problem: str) -> InvalidFile:
+        line = event.start_mark.line + 1
+        return InvalidFile(file=self.file, where=f"line {line}", problem=problem)
+
+
+def _scalar(text: str) -> Scalar:
+    """A plain scalar by the core schema of YAML 1.2."""
+    if text in _WORDS:
+        return _WORDS[text]
+    if _INTEGER.fullmatch(text) and len(text) <= MAX_INTEGER_DIGITS:
+        return int(text)
+    return float(text) if _FLOAT.fullmatch(text) else text
