@@ -152,7 +152,8 @@ def _obj_corners(text: str, path: Path) -> FloatArray:
             faces.append((face[0], face[1], face[2]))
     if not faces:
         return np.zeros((0, 3, 3))
-    return np.array(vertices, dtype=np.float64)[np.array(faces)]
+    corners: FloatArray = np.array(vertices, dtype=np.float64)[np.array(faces)]
+    return corners
 
 
 def _index(word: str, count: int, path: Path, number: int) -> int:

@@ -242,7 +242,8 @@ def without_repeats(points: FloatArray, *, closed: bool) -> FloatArray:
     keep = (points != before).any(axis=1)
     if not closed or not keep.any():
         keep[0] = True
-    return points[keep]
+    kept: FloatArray = points[keep]
+    return kept
 
 
 def _extent(obstacle: scene.Obstacle) -> float:
@@ -253,8 +254,14 @@ def _extent(obstacle: scene.Obstacle) -> float:
         case scene.Mesh():
             points, grown = obstacle.vertices, 0.0
         case scene.Prism():
-            points = np.vstack([piece.points for piece in obstacle.pieces])
-            grown = 0.0
+            ends = np.array(obstacle.span)
+            section = np.column_stack(
+                [
+                    np.repeat(obstacle.polygon, 2, axis=0),
+                    np.tile(ends, len(obstacle.polygon)),
+                ]
+            )
+            points, grown = obstacle.origin + section @ obstacle.rotation.T, 0.0
         case scene.Sphere():
             points, grown = obstacle.centre[None], obstacle.radius
         case scene.Box():

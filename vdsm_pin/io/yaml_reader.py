@@ -139,16 +139,16 @@ class _Builder:
         if isinstance(event, yaml.AliasEvent):
             problem = f"is an alias (*{event.anchor}); write the value out"
             raise self._invalid(event, problem)
+        if not isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent):
+            raise self._invalid(event, "is not a value")
         if event.tag is not None:
             problem = f"has the tag {event.tag!r}; a problem file holds plain data only"
             raise self._invalid(event, problem)
-        if isinstance(event, yaml.CollectionStartEvent):
-            self.lines.setdefault(at, event.start_mark.line + 1)
-        if isinstance(event, yaml.MappingStartEvent):
-            return self._mapping(at)
-        if isinstance(event, yaml.SequenceStartEvent):
-            return self._sequence(at)
-        return _scalar(event.value) if event.implicit[0] else str(event.value)
+        if isinstance(event, yaml.ScalarEvent):
+            return _scalar(event.value) if event.implicit[0] else str(event.value)
+        self.lines.setdefault(at, _line(event))
+        mapping = isinstance(event, yaml.MappingStartEvent)
+        return self._mapping(at) if mapping else self._sequence(at)
 
     def _mapping(self, at: Location) -> dict[str, Data]:
         data: dict[str, Data] = {}
@@ -159,7 +159,7 @@ class _Builder:
             if name in data:
                 problem = f"the key {name!r} appears twice"
                 raise self._invalid(key, problem)
-            self.lines[(*at, name)] = key.start_mark.line + 1
+            self.lines[(*at, name)] = _line(key)
             data[name] = self._value(next(self.events), (*at, name))
         return data
 
@@ -170,7 +170,7 @@ class _Builder:
         return data
 
     def _invalid(self, event: yaml.Event, problem: str) -> InvalidFile:
-        line = event.start_mark.line + 1
+        line = _line(event)
         return InvalidFile(file=self.file, where=f"line {line}", problem=problem)
 
 
@@ -181,3 +181,8 @@ def _scalar(text: str) -> Scalar:
     if _INTEGER.fullmatch(text) and len(text) <= MAX_INTEGER_DIGITS:
         return int(text)
     return float(text) if _FLOAT.fullmatch(text) else text
+
+
+def _line(event: yaml.Event) -> int:
+    mark = event.start_mark
+    return mark.line + 1 if mark is not None else 0

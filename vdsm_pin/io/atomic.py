@@ -1,0 +1,62 @@
+"""Files that appear whole or not at all."""
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from vdsm_pin.errors import InvalidFile
+
+
+@contextmanager
+def atomic_path(path: str | Path) -> Iterator[Path]:
+    """A path to write to, whose file takes its final name when the block succeeds.
+
+    The temporary file lies in the same folder, which is made where missing, and is
+    removed when the block fails. Content reaches the disk before the name does, so that
+    a crash leaves the old file or the new one.
+
+    Args:
+        path: Final name; an existing file is replaced.
+
+    Yields:
+        The temporary path.
+
+    Raises:
+        InvalidFile: If the folder cannot be made or the file not be written.
+    """
+    final = Path(path)
+    if final.is_dir():
+        raise InvalidFile(file=path, problem="is a folder, expected a file")
+    temporary = final.with_name(f".{final.name[:80]}.{secrets.token_hex(8)}.part")
+    try:
+        final.parent.mkdir(parents=True, exist_ok=True)
+        yield temporary
+        _flush(temporary)
+        temporary.replace(final)
+        _flush(final.parent)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InvalidFile(file=path, problem=f"cannot be written: {reason}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write UTF-8 text, whole or not at all.
+
+    Raises:
+        InvalidFile: If the file cannot be written.
+    """
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(text.encode("utf-8"))
+
+
+def _flush(path: Path) -> None:
+    """Bring a file, or the names in a folder, to the disk."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
