@@ -1,0 +1,194 @@
+"""Distance between the hull of a few points and a whole obstacle."""
+
+from math import sqrt
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.kernels import (
+    BRACKET,
+    LOWER,
+    NEAR,
+    NORMAL,
+    UPPER,
+    bracket,
+)
+from vdsm_pin.geometry.pieces import PackedPieces
+
+STACK: Final = 64
+"""Depth of the hierarchy's waiting list: pieces are halved, so 2^60 are enough."""
+
+
+@compiled
+def box_of(points: FloatArray, count: int, low: FloatArray, high: FloatArray) -> None:
+    """The box of some points, written to `low` and `high`, shape (3,) each; [m]."""
+    for c in range(3):
+        low[c] = high[c] = points[0, c]
+        for k in range(1, count):
+            low[c] = min(low[c], points[k, c])
+            high[c] = max(high[c], points[k, c])
+
+
+@compiled
+def box_distance(
+    pieces: PackedPieces, node: int, low: FloatArray, high: FloatArray
+) -> float:
+    """Distance between a node's box and another box, 0 where they meet; [m]."""
+    squared = 0.0
+    for c in range(3):
+        gap = max(
+            pieces.node_low[node, c] - high[c], low[c] - pieces.node_high[node, c]
+        )
+        if gap > 0.0:
+            squared += gap * gap
+    return sqrt(squared)
+
+
+@compiled
+def box_support(
+    pieces: PackedPieces, node: int, nx: float, ny: float, nz: float
+) -> float:
+    """Least n.x over a node's box; -inf for a half-space; [m] for a unit n."""
+    low, high = pieces.node_low[node], pieces.node_high[node]
+    if np.isinf(low[0]):
+        return -np.inf
+    x = nx * (low[0] if nx > 0.0 else high[0])
+    y = ny * (low[1] if ny > 0.0 else high[1])
+    z = nz * (low[2] if nz > 0.0 else high[2])
+    return float(x + y + z)
+
+
+@compiled
+def obstacle_bracket(
+    pieces: PackedPieces,
+    obstacle: int,
+    points: FloatArray,
+    count: int,
+    goal: float,
+    scratch: FloatArray,
+    stack: IntArray,
+    trial: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Distance between the hull of some points and an obstacle's pieces.
+
+    Args:
+        pieces: The scene.
+        obstacle: Number of the obstacle.
+        points: Shape (>= count, 3); [m].
+        count: How many of them.
+        goal: Width of the bracket at which to stop; [m].
+        scratch: Working space, shape (SCRATCH_ROWS + 2, 3).
+        stack: Working space, shape (STACK,).
+        trial: Working space, shape (BRACKET + 4,).
+        out: As for `bracket`: the guess of n on entry, on return the least lower and
+            the least upper bound over the pieces, with n of the former and the witness
+            points of the latter.
+    """
+    root = pieces.root[obstacle]
+    first = pieces.node_range[root, 0]
+    if pieces.node_range[root, 1] - first == 1:
+        bracket(pieces, first, points, count, goal, scratch, out)
+        return
+    low, high = scratch[-2], scratch[-1]
+    box_of(points, count, low, high)
+    trial[NORMAL:NEAR] = out[NORMAL:NEAR]
+    out[LOWER] = out[UPPER] = np.inf
+    stack[0] = root
+    waiting = 1
+    while waiting > 0:
+        waiting -= 1
+        node = stack[waiting]
+        if box_distance(pieces, node, low, high) >= out[LOWER]:
+            continue
+        if _plane_gap(pieces, node, points, count) >= out[LOWER]:
+            continue
+        first = pieces.node_range[node, 0]
+        if pieces.node_range[node, 1] - first > 1:
+            waiting = _push_children(pieces, node, low, high, stack, waiting)
+            continue
+        bracket(pieces, first, points, count, goal, scratch, trial)
+        if trial[UPPER] < out[UPPER]:
+            out[UPPER] = trial[UPPER]
+            out[NEAR:BRACKET] = trial[NEAR:BRACKET]
+        if trial[LOWER] < out[LOWER]:
+            out[LOWER] = trial[LOWER]
+            out[NORMAL:NEAR] = trial[NORMAL:NEAR]
+
+
+@compiled
+def _plane_gap(
+    pieces: PackedPieces, node: int, points: FloatArray, count: int
+) -> float:
+    """Gap of one plane between some points and a node's box; a lower bound; [m].
+
+    The plane faces the middle of the box from the nearest point of the first two
+    points' segment.
+    """
+    low, high = pieces.node_low[node], pieces.node_high[node]
+    span = along = 0.0
+    for c in range(3):
+        d = points[1, c] - points[0, c]
+        span += d * d
+        along += d * (0.5 * (low[c] + high[c]) - points[0, c])
+    t = min(1.0, max(0.0, along / span)) if span > 0.0 else 0.0
+    nx = 0.5 * (low[0] + high[0]) - (points[0, 0] + t * (points[1, 0] - points[0, 0]))
+    ny = 0.5 * (low[1] + high[1]) - (points[0, 1] + t * (points[1, 1] - points[0, 1]))
+    nz = 0.5 * (low[2] + high[2]) - (points[0, 2] + t * (points[1, 2] - points[0, 2]))
+    length = sqrt(nx * nx + ny * ny + nz * nz)
+    if not length > 0.0:
+        return -np.inf
+    high_side = -np.inf
+    for k in range(count):
+        value = nx * points[k, 0] + ny * points[k, 1] + nz * points[k, 2]
+        high_side = max(high_side, value)
+    return (box_support(pieces, node, nx, ny, nz) - high_side) / length
+
+
+@compiled
+def _push_children(
+    pieces: PackedPieces,
+    node: int,
+    low: FloatArray,
+    high: FloatArray,
+    stack: IntArray,
+    waiting: int,
+) -> int:
+    """Push both children, the nearer one last so that it is seen first."""
+    left, right = node + 1, pieces.node_right[node]
+    left_gap = box_distance(pieces, left, low, high)
+    right_gap = box_distance(pieces, right, low, high)
+    if left_gap <= right_gap:
+        stack[waiting], stack[waiting + 1] = right, left
+    else:
+        stack[waiting], stack[waiting + 1] = left, right
+    return waiting + 2
+
+
+@compiled
+def crossings(pieces: PackedPieces, obstacle: int, x: float, y: float, z: float) -> int:
+    """Triangles of a mesh that the ray from a point along +z passes through.
+
+    Edges count half-open, so a ray through an edge or corner crosses once; in floating
+    point this is a guess near edges, `verification/inside.py` is exact.
+    """
+    count = 0
+    for p in range(pieces.first_piece[obstacle], pieces.first_piece[obstacle + 1]):
+        start = pieces.first_point[p]
+        a, b, c = (
+            pieces.points[start],
+            pieces.points[start + 1],
+            pieces.points[start + 2],
+        )
+        if max(a[2], b[2], c[2]) < z:
+            continue
+        u = (b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)
+        v = (c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)
+        w = (a[0] - x) * (b[1] - y) - (a[1] - y) * (b[0] - x)
+        if not ((u > 0.0 and v > 0.0 and w > 0.0) or (u < 0.0 and v < 0.0 and w < 0.0)):
+            continue
+        if (u * a[2] + v * b[2] + w * c[2]) / (u + v + w) > z:
+            count += 1
+    return count
