@@ -11,7 +11,7 @@ import numpy as np
 from vdsm_pin import scene
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
-from vdsm_pin.io import problem_schema as schema
+from vdsm_pin.io import obstacle_schema as schema
 from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
 from vdsm_pin.tolerances import TOLERANCES
@@ -237,12 +237,12 @@ class ObstacleBuilder:
 
 
 def without_repeats(points: FloatArray, *, closed: bool) -> FloatArray:
-    """Points without those equal to the one before (for closed lines, cyclically)."""
-    before = np.roll(points, 1, axis=0)
-    keep = (points != before).any(axis=1)
-    if not closed or not keep.any():
-        keep[0] = True
+    """Points without those equal to the one before; of a closed line, the last too."""
+    keep = np.ones(len(points), dtype=np.bool_)
+    keep[1:] = (points[1:] != points[:-1]).any(axis=1)
     kept: FloatArray = points[keep]
+    if closed and len(kept) > 1 and (kept[-1] == kept[0]).all():
+        kept = kept[:-1]
     return kept
 
 

@@ -5,13 +5,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from pydantic import ValidationError
-from pydantic_core import ErrorDetails
 
 from vdsm_pin.errors import InvalidFile, UnknownName
 from vdsm_pin.io.problem_builder import build_problem
+from vdsm_pin.io.problem_errors import first_error
 from vdsm_pin.io.problem_schema import ProblemModel
 from vdsm_pin.io.source import check_is_file, decode, read_bytes, sha256_of
-from vdsm_pin.io.yaml_reader import Data, Location, YamlDocument, read_yaml
+from vdsm_pin.io.yaml_reader import read_yaml
 from vdsm_pin.problem import PlanningProblem
 
 MAX_PROBLEM_BYTES: Final = 32 << 20
@@ -19,8 +19,6 @@ MAX_PROBLEM_BYTES: Final = 32 << 20
 SCHEMA_DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
 
 _FOLDER: Final = Path(__file__).resolve().parent.parent / "problems"
-
-_KINDS: Final = {dict: "a mapping", list: "a list", str: "text", type(None): "nothing"}
 
 
 @dataclass(frozen=True)
@@ -57,7 +55,7 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
     try:
         model = ProblemModel.model_validate(document.data)
     except ValidationError as error:
-        raise _first_error(error, document) from None
+        raise first_error(error, document) from None
     stem = "".join(c if c.isascii() and c.isalnum() else "_" for c in path.stem)
     built = build_problem(model, document, name=stem, folder=path.parent)
     return ProblemFile(built.problem, path, sha256_of([content, *built.mesh_contents]))
@@ -105,84 +103,3 @@ def problem_schema() -> dict[str, Any]:
     """JSON Schema of the problem file, for editors."""
     schema = ProblemModel.model_json_schema(by_alias=True)
     return {"$schema": SCHEMA_DIALECT, "title": "vdsm problem file", **schema}
-
-
-def _first_error(error: ValidationError, document: YamlDocument) -> InvalidFile:
-    """The error nearest to the top of the file, in this package's words."""
-    found = [
-        (_location(details, document.data), details)
-        for details in error.errors(include_url=False, include_context=True)
-    ]
-    at, details = min(found, key=lambda pair: document.line(pair[0]) or 0)
-    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-    return document.invalid(at, _problem(details) + more)
-
-
-def _location(details: ErrorDetails, data: Data) -> Location:
-    """Where an error is, without the names of the union members tried on the way."""
-    location: list[str | int] = []
-    value: Any = data
-    *_, last = details["loc"] or ("",)
-    for step in details["loc"]:
-        if isinstance(value, dict) and step in value:
-            value = value[step]
-        elif isinstance(value, list) and isinstance(step, int) and step < len(value):
-            value = value[step]
-        elif not (details["type"] == "missing" and step == last):
-            continue
-        location.append(step)
-    return tuple(location)
-
-
-def _problem(details: ErrorDetails) -> str:
-    """One clause: the value found and what was expected."""
-    kind, context = details["type"], details.get("ctx", {})
-    match kind:
-        case "missing":
-            return "is missing"
-        case "extra_forbidden":
-            return "is not a known key"
-        case "union_tag_not_found":
-            return f"has no {context['discriminator']}"
-    found = _shown(details["input"])
-    match kind:
-        case "union_tag_invalid":
-            found, expected = repr(context["tag"]), f"one of {context['expected_tags']}"
-        case "literal_error":
-            expected = context["expected"]
-        case "float_type" | "int_type":
-            expected = "a number"
-        case "finite_number":
-            expected = "a finite number"
-        case "string_type":
-            expected = "text"
-        case "bool_type":
-            expected = "true or false"
-        case "list_type":
-            expected = "a list"
-        case "model_type" | "model_attributes_type":
-            expected = "a mapping"
-        case "greater_than":
-            expected = f"above {context['gt']:g}"
-        case "greater_than_equal":
-            expected = f"{context['ge']:g} or more"
-        case "less_than":
-            expected = f"below {context['lt']:g}"
-        case "less_than_equal":
-            expected = f"{context['le']:g} or less"
-        case "too_short" | "too_long":
-            few = kind == "too_short"
-            found = f"a list of {context['actual_length']}"
-            bound = context["min_length" if few else "max_length"]
-            expected = f"at {'least' if few else 'most'} {bound} entries"
-        case _:
-            expected = details["msg"][:1].lower() + details["msg"][1:]
-    return f"is {found}, expected {expected}"
-
-
-def _shown(value: object) -> str:
-    """A value as short as a message needs it."""
-    if type(value) in (dict, list) or value is None:
-        return _KINDS[type(value)]
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -6,39 +6,33 @@ are in the file's `length_unit`, angles in degrees; `problem_builder.py` convert
 
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
+from pydantic import BeforeValidator, Discriminator, Field, Tag
 
+from vdsm_pin.io.obstacle_schema import ObstacleModel
+from vdsm_pin.io.schema_types import (
+    FileModel,
+    FolderName,
+    NotNegative,
+    Number,
+    Positive,
+    Range,
+    Vector,
+    text_or_not,
+)
 from vdsm_pin.manipulator import MAX_LINKS
 
-Positive: TypeAlias = Annotated[float, Field(gt=0.0)]
-Vector: TypeAlias = Annotated[list[float], Field(min_length=3, max_length=3)]
-Range: TypeAlias = Annotated[list[float], Field(min_length=2, max_length=2)]
 Lengths: TypeAlias = Annotated[
     list[Positive], Field(min_length=2, max_length=MAX_LINKS)
 ]
-PathPoint: TypeAlias = Annotated[str, Field(min_length=1, max_length=4096)]
-ObstacleName: TypeAlias = Annotated[
-    str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_ .()#+-]*$", max_length=100)
-]
-FolderName: TypeAlias = Annotated[
-    str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.+-]*$", max_length=100)
-]
 
 
-def _text_or_not(value: Any) -> str:
-    return "name" if isinstance(value, str) else "value"
+def _not_bool(value: Any) -> Any:
+    """True equals 1 in Python; in a file it is another value."""
+    return str(value).lower() if isinstance(value, bool) else value
 
 
 def _list_or_not(value: Any) -> str:
     return "point" if isinstance(value, list) else "joints"
-
-
-class FileModel(BaseModel):
-    """Base: unknown keys refused, no silent conversion, every number finite."""
-
-    model_config = ConfigDict(
-        extra="forbid", strict=True, frozen=True, allow_inf_nan=False
-    )
 
 
 class CablesModel(FileModel):
@@ -102,123 +96,16 @@ class BasePoseModel(FileModel):
 
 ManipulatorField: TypeAlias = Annotated[
     Annotated[str, Tag("name")] | Annotated[ManipulatorModel, Tag("value")],
-    Discriminator(_text_or_not),
-]
-Axis: TypeAlias = Annotated[
-    Annotated[Literal["x", "y", "z"], Tag("name")] | Annotated[Vector, Tag("value")],
-    Discriminator(_text_or_not),
-]
-
-
-class _Named(FileModel):
-    name: ObstacleName = Field(description="Unique name of the obstacle.")
-
-
-class _Round(_Named):
-    axis: Axis = Field(description="x, y or z, or a vector of any length.")
-    center: Vector = Field(description="Middle of the axis [length_unit].")
-    radius: Positive = Field(description="[length_unit]")
-
-
-class CylinderModel(_Round):
-    """A solid cylinder with flat ends."""
-
-    shape: Literal["cylinder"]
-    length: Positive = Field(description="From end face to end face [length_unit].")
-
-
-class CapsuleModel(_Round):
-    """A segment grown by a radius."""
-
-    shape: Literal["capsule"]
-    length: Positive = Field(description="Between the cap centres [length_unit].")
-
-
-class SphereModel(_Named):
-    """A ball."""
-
-    shape: Literal["sphere"]
-    center: Vector = Field(description="[length_unit]")
-    radius: Positive = Field(description="[length_unit]")
-
-
-class BoxModel(_Named):
-    """A cuboid."""
-
-    shape: Literal["box"]
-    center: Vector = Field(description="[length_unit]")
-    size: Annotated[list[Positive], Field(min_length=3, max_length=3)] = Field(
-        description="Edge lengths [length_unit]."
-    )
-    rpy_deg: Vector = Field(
-        default=[0.0, 0.0, 0.0], description="Roll, pitch, yaw, R = Rz Ry Rx [deg]."
-    )
-
-
-class PrismModel(_Named):
-    """A simple polygon swept along an axis; it need not be convex."""
-
-    shape: Literal["prism"]
-    axis: Literal["x", "y", "z"] = Field(description="Direction of the sweep.")
-    polygon: list[Range] = Field(
-        min_length=3,
-        description="Corners [length_unit]; across axis x: [y, z]; across y: [z, x]; "
-        "across z: [x, y].",
-    )
-    from_: float = Field(
-        alias="from", description="Start on the axis [length_unit], below `to`."
-    )
-    to: float = Field(description="End on the axis [length_unit].")
-
-
-class HalfSpaceModel(_Named):
-    """Everything on one side of a plane: solid where (p - point) . normal <= 0."""
-
-    shape: Literal["half_space"]
-    point: Vector = Field(description="A point of the plane [length_unit].")
-    normal: Vector = Field(description="Out of the solid, of any length.")
-
-
-class MeshModel(_Named):
-    """Triangles from an STL or OBJ file; solid if watertight, else a surface."""
-
-    shape: Literal["mesh"]
-    file: PathPoint = Field(description="Path, relative to this file.")
-    scale: Positive = Field(
-        default=1.0, description="Length units of this file per unit of the mesh."
-    )
-    center: Vector = Field(
-        default=[0.0, 0.0, 0.0],
-        description="Where the origin of the mesh goes [length_unit].",
-    )
-    rpy_deg: Vector = Field(
-        default=[0.0, 0.0, 0.0], description="Roll, pitch, yaw, R = Rz Ry Rx [deg]."
-    )
-    check_size: bool = Field(
-        default=True,
-        description="Refuse a mesh so large or small beside the arm that its unit "
-        "must be wrong.",
-    )
-
-
-ObstacleModel: TypeAlias = Annotated[
-    CylinderModel
-    | PrismModel
-    | SphereModel
-    | CapsuleModel
-    | BoxModel
-    | HalfSpaceModel
-    | MeshModel,
-    Field(discriminator="shape"),
+    Discriminator(text_or_not),
 ]
 
 
 class JointsModel(FileModel):
     """Joint values of the whole arm."""
 
-    x0: float = Field(description="Base position on the rail [length_unit].")
-    alpha_deg: list[float] = Field(description="Yaw of joints 1..N [deg].")
-    theta_deg: list[float] = Field(description="Pitch of joints 1..N [deg].")
+    x0: Number = Field(description="Base position on the rail [length_unit].")
+    alpha_deg: list[Number] = Field(description="Yaw of joints 1..N [deg].")
+    theta_deg: list[Number] = Field(description="Pitch of joints 1..N [deg].")
 
 
 class StartJointsModel(FileModel):
@@ -253,9 +140,8 @@ class TipPathModel(FileModel):
     approach: Literal["shortest", "equidistant", "nearest_equidistant"] = Field(
         default="shortest", description="How the tip comes onto the path."
     )
-    retreat: float = Field(
+    retreat: NotNegative = Field(
         default=0.0,
-        ge=0.0,
         description="Step back along -X of the base while off the path [length_unit].",
     )
     blocked: Literal["detour", "fail"] = Field(
@@ -277,7 +163,9 @@ class TipPathModel(FileModel):
 class ProblemModel(FileModel):
     """A planning problem for a hyper-redundant manipulator."""
 
-    vdsm_problem: Literal[1] = Field(description="Version of this format.")
+    vdsm_problem: Annotated[Literal[1], BeforeValidator(_not_bool)] = Field(
+        description="Version of this format."
+    )
     name: FolderName | None = Field(
         default=None, description="Name for reports and folders. Default: the file's."
     )
@@ -293,12 +181,11 @@ class ProblemModel(FileModel):
     )
     obstacles: list[ObstacleModel] = Field(default=[], description="Solids to avoid.")
     tip_path: TipPathModel = Field(description="What the tip shall draw.")
-    required_clearance: float = Field(
-        ge=0.0, description="Between the surfaces of arm and obstacles [length_unit]."
+    required_clearance: NotNegative = Field(
+        description="Between the surfaces of arm and obstacles [length_unit]."
     )
-    required_self_clearance: float = Field(
+    required_self_clearance: NotNegative = Field(
         default=0.0,
-        ge=0.0,
         description="Between the surfaces of links that are not neighbours "
         "[length_unit].",
     )

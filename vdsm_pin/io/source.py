@@ -26,7 +26,8 @@ def check_is_file(path: Path, *, named: object = None) -> None:
         if not path.is_file():
             raise InvalidFile(file=name, problem="is not a regular file")
     except (OSError, ValueError) as error:  # a name too long, or with a NUL in it
-        raise InvalidFile(file=name, problem=f"cannot be opened: {error}") from None
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InvalidFile(file=name, problem=f"cannot be opened: {reason}") from None
 
 
 def read_bytes(path: Path, *, limit: int) -> bytes:

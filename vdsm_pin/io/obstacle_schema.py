@@ -1,0 +1,125 @@
+"""The seven shapes of the problem file as pydantic models."""
+
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import Discriminator, Field, Tag
+
+from vdsm_pin.io.schema_types import (
+    FileModel,
+    Number,
+    ObstacleName,
+    Positive,
+    Range,
+    Vector,
+    text_or_not,
+)
+
+Axis: TypeAlias = Annotated[
+    Annotated[Literal["x", "y", "z"], Tag("name")] | Annotated[Vector, Tag("value")],
+    Discriminator(text_or_not),
+]
+
+
+class _Named(FileModel):
+    name: ObstacleName = Field(description="Unique name of the obstacle.")
+
+
+class _Round(_Named):
+    axis: Axis = Field(description="x, y or z, or a vector of any length.")
+    center: Vector = Field(description="Middle of the axis [length_unit].")
+    radius: Positive = Field(description="[length_unit]")
+
+
+class CylinderModel(_Round):
+    """A solid cylinder with flat ends."""
+
+    shape: Literal["cylinder"]
+    length: Positive = Field(description="From end face to end face [length_unit].")
+
+
+class CapsuleModel(_Round):
+    """A segment grown by a radius."""
+
+    shape: Literal["capsule"]
+    length: Positive = Field(description="Between the cap centres [length_unit].")
+
+
+class SphereModel(_Named):
+    """A ball."""
+
+    shape: Literal["sphere"]
+    center: Vector = Field(description="[length_unit]")
+    radius: Positive = Field(description="[length_unit]")
+
+
+class BoxModel(_Named):
+    """A cuboid."""
+
+    shape: Literal["box"]
+    center: Vector = Field(description="[length_unit]")
+    size: Annotated[list[Positive], Field(min_length=3, max_length=3)] = Field(
+        description="Edge lengths [length_unit]."
+    )
+    rpy_deg: Vector = Field(
+        default=[0.0, 0.0, 0.0], description="Roll, pitch, yaw, R = Rz Ry Rx [deg]."
+    )
+
+
+class PrismModel(_Named):
+    """A simple polygon swept along an axis; it need not be convex."""
+
+    shape: Literal["prism"]
+    axis: Literal["x", "y", "z"] = Field(description="Direction of the sweep.")
+    polygon: list[Range] = Field(
+        min_length=3,
+        description="Corners [length_unit]; across axis x: [y, z]; across y: [z, x]; "
+        "across z: [x, y].",
+    )
+    from_: Number = Field(
+        alias="from", description="Start on the axis [length_unit], below `to`."
+    )
+    to: Number = Field(description="End on the axis [length_unit].")
+
+
+class HalfSpaceModel(_Named):
+    """Everything on one side of a plane: solid where (p - point) . normal <= 0."""
+
+    shape: Literal["half_space"]
+    point: Vector = Field(description="A point of the plane [length_unit].")
+    normal: Vector = Field(description="Out of the solid, of any length.")
+
+
+class MeshModel(_Named):
+    """Triangles from an STL or OBJ file; solid if watertight, else a surface."""
+
+    shape: Literal["mesh"]
+    file: Annotated[str, Field(min_length=1, max_length=4096)] = Field(
+        description="Path, relative to this file."
+    )
+    scale: Positive = Field(
+        default=1.0, description="Length units of this file per unit of the mesh."
+    )
+    center: Vector = Field(
+        default=[0.0, 0.0, 0.0],
+        description="Where the origin of the mesh goes [length_unit].",
+    )
+    rpy_deg: Vector = Field(
+        default=[0.0, 0.0, 0.0], description="Roll, pitch, yaw, R = Rz Ry Rx [deg]."
+    )
+    check_size: bool = Field(
+        default=True,
+        description="Refuse a mesh so large or small beside the arm that its unit "
+        "must be wrong.",
+    )
+
+
+ObstacleModel: TypeAlias = Annotated[
+    CylinderModel
+    | PrismModel
+    | SphereModel
+    | CapsuleModel
+    | BoxModel
+    | HalfSpaceModel
+    | MeshModel,
+    Field(discriminator="shape"),
+]

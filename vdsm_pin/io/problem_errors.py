@@ -1,0 +1,162 @@
+"""Pydantic's complaints in this package's words: field, line, value, expectation."""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.io import obstacle_schema as shapes
+from vdsm_pin.io import problem_schema as schema
+from vdsm_pin.io.schema_types import FOLDER_PATTERN, OBSTACLE_PATTERN, FileModel
+from vdsm_pin.io.yaml_reader import Data, Location, YamlDocument
+
+_SHAPES: Final = ("cylinder", "prism", "sphere", "capsule", "box", "half_space", "mesh")
+
+LONGEST_SHOWN: Final = 60
+"""Values are cut to this many characters in a message."""
+
+_MODELS: Final[Mapping[str | int, type[FileModel]]] = {
+    "manipulator": schema.ManipulatorModel,
+    "value": schema.ManipulatorModel,
+    "cables": schema.CablesModel,
+    "base": schema.BasePoseModel,
+    "tip_path": schema.TipPathModel,
+    "joints": schema.JointsModel,
+    "cylinder": shapes.CylinderModel,
+    "capsule": shapes.CapsuleModel,
+    "sphere": shapes.SphereModel,
+    "box": shapes.BoxModel,
+    "prism": shapes.PrismModel,
+    "half_space": shapes.HalfSpaceModel,
+    "mesh": shapes.MeshModel,
+}
+"""The model that holds a field, by the step before it in pydantic's location."""
+
+_EITHER: Final[Mapping[str | int, str]] = {
+    "manipulator": "the name of a built-in arm or a mapping",
+    "start": "3 numbers or a mapping with joints",
+    "axis": "x, y, z or a list of 3 numbers",
+}
+"""What fields of two forms take."""
+
+_NAMES: Final = {
+    FOLDER_PATTERN: "letters, digits and _.+- only, a letter or digit first",
+    OBSTACLE_PATTERN: "letters, digits, spaces, _.()#+- only, a letter or digit first",
+}
+
+
+def first_error(error: ValidationError, document: YamlDocument) -> InvalidFile:
+    """The error nearest to the top of the file.
+
+    Args:
+        error: All that pydantic found.
+        document: The file, for its lines.
+
+    Returns:
+        One error that names field, line, value and expectation.
+    """
+    found = [
+        (_location(details, document.data), details)
+        for details in error.errors(include_url=False)
+    ]
+    at, details = min(found, key=lambda pair: document.line(pair[0]) or 0)
+    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+    return document.invalid(at, _problem(details, at) + more)
+
+
+def _location(details: ErrorDetails, data: Data) -> Location:
+    """Where an error is, without the names of the union members tried on the way."""
+    location: list[str | int] = []
+    value: Any = data
+    for step in details["loc"]:
+        if isinstance(value, dict) and step in value:
+            value = value[step]
+        elif isinstance(value, list) and isinstance(step, int) and step < len(value):
+            value = value[step]
+        else:
+            continue
+        location.append(step)
+    if details["type"] == "missing":
+        location.append(details["loc"][-1])
+    elif details["type"].startswith("union_tag"):
+        location.append("shape")
+    return tuple(location)
+
+
+def _problem(details: ErrorDetails, at: Location) -> str:
+    """One clause: the value found and what was expected."""
+    loc, kind, context = details["loc"], details["type"], details.get("ctx", {})
+    match kind:
+        case "missing":
+            field = _model(loc).model_fields.get(str(loc[-1]))
+            hint = field.description if field else None
+            return f"is missing; expected: {hint}" if hint else "is missing"
+        case "extra_forbidden":
+            fields = _model(loc).model_fields.items()
+            known = ", ".join(field.alias or name for name, field in fields)
+            return f"is not a known key; known: {known}"
+        case "union_tag_not_found":
+            return f"is missing; expected: one of {', '.join(_SHAPES)}"
+        case "union_tag_invalid":
+            return f"is {context['tag']!r}, expected one of {', '.join(_SHAPES)}"
+    return f"is {_shown(details['input'])}, expected {_expected(details, at)}"
+
+
+def _model(loc: tuple[str | int, ...]) -> type[FileModel]:
+    return _MODELS[loc[-2]] if len(loc) > 1 else schema.ProblemModel
+
+
+def _expected(details: ErrorDetails, at: Location) -> str:
+    kind, context = details["type"], details.get("ctx", {})
+    if kind.endswith("_type") and at and at[-1] in _EITHER:
+        return _EITHER[at[-1]]
+    words = {
+        "float_type": "a number",
+        "finite_number": "a finite number",
+        "string_type": "text",
+        "bool_type": "true or false",
+        "list_type": "a list",
+        "model_type": "a mapping",
+        "model_attributes_type": "a mapping",
+    }
+    match kind:
+        case "literal_error":
+            return str(context["expected"])
+        case "greater_than":
+            return f"above {context['gt']:g}"
+        case "greater_than_equal":
+            return f"{context['ge']:g} or more"
+        case "less_than":
+            return f"below {context['lt']:g}"
+        case "less_than_equal":
+            return f"{context['le']:g} or less"
+        case "too_short":
+            return f"at least {_entries(context['min_length'])}"
+        case "too_long":
+            return f"at most {_entries(context['max_length'])}"
+        case "string_pattern_mismatch":
+            return _NAMES[context["pattern"]]
+    return words.get(kind) or details["msg"][:1].lower() + details["msg"][1:]
+
+
+def _entries(count: int) -> str:
+    return f"{count} entry" if count == 1 else f"{count} entries"
+
+
+def _shown(value: object) -> str:
+    """A value as short as a message needs it, as YAML has it."""
+    match value:
+        case None:
+            return "empty"
+        case bool():
+            return str(value).lower()
+        case dict():
+            return "a mapping"
+        case list() if len(value) > 6:
+            return f"a list of {len(value)}"
+    text = repr(value)
+    if len(text) <= LONGEST_SHOWN:
+        return text
+    return f"{text[: LONGEST_SHOWN - 3]}..."
