@@ -1,0 +1,1 @@
+"""Plans in any scene with few bent joints: one graph of sparse shapes."""

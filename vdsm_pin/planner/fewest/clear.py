@@ -1,0 +1,104 @@
+"""Whether a motion in the chart keeps clearance and limits, asked as rarely as can be.
+
+Clearance changes no faster than the body moves: an interval whose ends are clear by
+more than half the way between them needs no further look. The rest is halved. This is a
+planner's check; the proof over continuous time is the verifier's.
+"""
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.planner.fewest.motion import Intervals, link_angles_at
+from vdsm_pin.planner.fewest.roadmap import link_limit
+from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.problem import PlanningProblem
+
+
+class Judge:
+    """Asks the clearance function about places of a motion.
+
+    Args:
+        problem: Arm and limits.
+        clearance: The clearance function.
+        required: Clearance to keep; [m].
+        finest: Way of the body below which an interval between two clear
+            configurations counts as clear; [m].
+    """
+
+    def __init__(
+        self,
+        problem: PlanningProblem,
+        clearance: LinkClearance,
+        required: float,
+        finest: float,
+    ) -> None:
+        self.problem, self.clearance = problem, clearance
+        self.required, self.finest = required, finest
+        self.limit = link_limit(problem)
+        self.evaluated = 0
+
+    def _states(
+        self,
+        intervals: Intervals,
+        interval: IntArray,
+        share: FloatArray,
+        bend: FloatArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Joint centres and clearance, -inf where a limit is broken."""
+        manipulator = self.problem.manipulator
+        centres = intervals.centres(manipulator, interval, share)
+        peak = link_angles_at(centres).max(axis=1)
+        base = centres[:, 0, 0]
+        low, high = manipulator.base_range
+        fine = (peak <= np.minimum(self.limit, bend)) & (base >= low) & (base <= high)
+        room = np.full(len(fine), -np.inf)
+        if fine.any():
+            room[fine] = self.clearance(centres[fine]).min(axis=1)
+            self.evaluated += int(fine.sum())
+        return centres, room
+
+    def clear(
+        self,
+        intervals: Intervals,
+        required: FloatArray | None = None,
+        bend: FloatArray | None = None,
+    ) -> BoolArray:
+        """Which intervals of the motion are clear, shape (n - 1,).
+
+        Args:
+            knots: The motion.
+            intervals: Straight lines in the chart.
+            required: Clearance to keep in each interval; [m].
+            bend: Largest link angle in each interval; [rad].
+        """
+        count = len(intervals.tips)
+        need = np.full(count, self.required) if required is None else required
+        most = np.full(count, np.inf) if bend is None else bend
+        number = np.arange(count)
+        low, high = np.zeros(count), np.ones(count)
+        good = np.ones(count, dtype=np.bool_)
+        tol = 1e-9
+        c0, r0 = self._states(intervals, number, low, most + tol)
+        c1, r1 = self._states(intervals, number, high, most + tol)
+        good &= (r0 >= need - tol) & (r1 >= need - tol)
+        for _ in range(16):
+            way = np.linalg.norm(c1 - c0, axis=2).max(axis=1)
+            need_here = need[number]
+            least = (r0 + r1 - way) / 2.0
+            open_ = (least < need_here) & (way > self.finest)
+            # A long interval may hide a bend or a curve: look at its middle anyway.
+            open_ |= way > 0.2
+            open_ &= good[number]
+            if not open_.any():
+                break
+            number, low, high = number[open_], low[open_], high[open_]
+            c0, c1, r0, r1 = c0[open_], c1[open_], r0[open_], r1[open_]
+            middle = (low + high) / 2.0
+            cm, rm = self._states(intervals, number, middle, most[number] + tol)
+            bad = ~(rm >= need[number] - tol)
+            good[number[bad]] = False
+            number = np.concatenate([number, number])
+            low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
+            c0, c1 = np.concatenate([c0, cm]), np.concatenate([cm, c1])
+            r0, r1 = np.concatenate([r0, rm]), np.concatenate([rm, r1])
+        return good

@@ -1,0 +1,236 @@
+"""A motion as knots in the chart, and its rows (Eq. 5, 7).
+
+The chart is (tip, D_2..D_N): D_i is the offset of joint i's projection from where the
+straight arm to that tip has it, P_i = k_i T + D_i. Between knots tip and offsets run
+along straight lines, so the tip is exact, links keep their length, and an arm that is
+straight at both knots stays straight. An offset with a corner at joint m is a knee
+there; where one knee turns into another, both are bent on the way and no third one.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.kinematics import joint_angles
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.planner.fewest.roadmap import Roadmap
+from vdsm_pin.planner.fewest.sequence import Sequence
+from vdsm_pin.planner.lift import rises_squared
+
+
+@dataclass(frozen=True)
+class Knots:
+    """Corners of the motion in the chart.
+
+    Args:
+        tips: Shape (n, 3); [m].
+        offsets: D_1..D_{N+1}, shape (n, N + 1, 2), the first and last zero; [m].
+        stations: Arc length along the desired path, on ways that of the place left,
+            shape (n,); [m].
+        drawn: Whether the tip draws from knot k to k + 1, shape (n - 1,).
+        edges: Nodes joined by each interval, -1 where it is none of the graph's, shape
+            (n - 1, 2).
+    """
+
+    tips: FloatArray
+    offsets: FloatArray
+    stations: FloatArray
+    drawn: BoolArray
+    edges: IntArray
+
+    def take(self, kept: IntArray) -> "Knots":
+        """Only these knots; an interval is drawn if all it replaces were."""
+        drawn = [self.drawn[a:b].all() for a, b in itertools.pairwise(kept)]
+        whole = np.diff(kept) == 1
+        edges = np.where(whole[:, None], self.edges[kept[:-1]], -1)
+        return Knots(
+            self.tips[kept],
+            self.offsets[kept],
+            self.stations[kept],
+            np.array(drawn, dtype=np.bool_),
+            edges,
+        )
+
+    def pick(self, intervals: IntArray) -> "Intervals":
+        """Some intervals on their own."""
+        return Intervals(
+            self.tips[intervals],
+            self.tips[intervals + 1],
+            self.offsets[intervals],
+            self.offsets[intervals + 1],
+        )
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Straight lines in the chart, each on its own.
+
+    Args:
+        tips: Where they begin, shape (n, 3); [m].
+        next_tips: Where they end; [m].
+        offsets: D_1..D_{N+1} where they begin, shape (n, N + 1, 2); [m].
+        next_offsets: D_1..D_{N+1} where they end; [m].
+    """
+
+    tips: FloatArray
+    next_tips: FloatArray
+    offsets: FloatArray
+    next_offsets: FloatArray
+
+    def centres(
+        self, manipulator: Manipulator, interval: IntArray, share: FloatArray
+    ) -> FloatArray:
+        """Joint centres at places of the intervals (Eq. 7).
+
+        Args:
+            manipulator: The arm.
+            interval: Interval of each place, shape (r,).
+            share: Where in its interval, 0 to 1, shape (r,).
+
+        Returns:
+            Shape (r, N + 1, 3), NaN where a link is too short; [m].
+        """
+        t = share[:, None]
+        tips = (1.0 - t) * self.tips[interval] + t * self.next_tips[interval]
+        t = t[..., None]
+        offsets = (1.0 - t) * self.offsets[interval] + t * self.next_offsets[interval]
+        planar = tips[:, None, 1:] * manipulator.ratios[:, None] + offsets
+        squares = rises_squared(manipulator, planar)
+        rises = np.sqrt(np.where(squares > 0.0, squares, np.nan))
+        centres = np.zeros((*planar.shape[:2], 3))
+        centres[..., 1:] = planar
+        centres[:, -1, 0] = tips[:, 0]
+        back = np.cumsum(rises[:, ::-1], axis=1)[:, ::-1]
+        centres[:, :-1, 0] = tips[:, :1] - back
+        return centres
+
+
+def offsets_of(
+    manipulator: Manipulator, tips: FloatArray, knees: IntArray, slopes: FloatArray
+) -> FloatArray:
+    """Offsets of sparse shapes at tips, shape (n, N + 1, 2); [m].
+
+    Args:
+        manipulator: The arm.
+        tips: Shape (n, 3); [m].
+        knees: Rows (i, j) of `Shapes`, shape (n, 2).
+        slopes: Rows of `Shapes`, shape (n, 4); [-].
+    """
+    stations = manipulator.stations
+    s1, s2 = stations[knees[:, 0]], stations[knees[:, 1]]
+    line = tips[:, None, 1:] * manipulator.ratios[:, None]
+    p1 = s1[:, None] * slopes[:, :2]
+    p2 = p1 + (s2 - s1)[:, None] * slopes[:, 2:]
+    end = tips[:, 1:]
+    bends = [(np.zeros(len(tips)), np.zeros_like(end)), (s1, p1), (s2, p2)]
+    bends.append((np.full(len(tips), stations[-1]), end))
+    planar = np.zeros_like(line)
+    for (sa, pa), (sb, pb) in itertools.pairwise(bends):
+        span = np.where(sb > sa, sb - sa, 1.0)
+        share = (stations[None, :] - sa[:, None]) / span[:, None]
+        on = (share >= 0.0) & (share <= 1.0) & (sb > sa)[:, None]
+        piece = pa[:, None] + share[..., None] * (pb - pa)[:, None]
+        planar = np.where(on[..., None], piece, planar)
+    offsets = planar - line
+    offsets[knees[:, 1] == 0] = 0.0
+    offsets[:, [0, -1]] = 0.0
+    return np.asarray(offsets)
+
+
+def knots_of(manipulator: Manipulator, roadmap: Roadmap, sequence: Sequence) -> Knots:
+    """The knots of a sequence; a leg begins where the one before ends."""
+    nodes: list[int] = []
+    stations: list[float] = []
+    drawn: list[bool] = []
+    for leg in sequence.legs:
+        again = 1 if nodes else 0
+        nodes += leg.nodes[again:]
+        stations += [roadmap.route.stations[k] for k in leg.layers[again:]]
+        drawn += [leg.drawn] * (len(leg.nodes) - 1)
+    number = np.array(nodes)
+    node = roadmap.node[number]
+    tips = roadmap.route.tips[node // roadmap.shapes.size]
+    shape = node % roadmap.shapes.size
+    offsets = offsets_of(
+        manipulator, tips, roadmap.shapes.knees[shape], roadmap.shapes.slopes[shape]
+    )
+    edges = np.stack([number[:-1], number[1:]], axis=1)
+    return Knots(
+        tips, offsets, np.array(stations), np.array(drawn, dtype=np.bool_), edges
+    )
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Configurations along the motion, close enough to be rows of a trajectory.
+
+    Args:
+        interval: Interval of the knots each row lies in, shape (r,).
+        share: Where in its interval, 0 to 1, shape (r,).
+        centres: Joint centres, shape (r, N + 1, 3), NaN where a link is too short; [m].
+    """
+
+    interval: IntArray
+    share: FloatArray
+    centres: FloatArray
+
+
+def rows_at(
+    manipulator: Manipulator, knots: Knots, interval: IntArray, share: FloatArray
+) -> Rows:
+    """Configurations at given places of the motion."""
+    every = knots.pick(np.arange(len(knots.drawn)))
+    return Rows(interval, share, every.centres(manipulator, interval, share))
+
+
+def spread(counts: IntArray) -> tuple[IntArray, FloatArray]:
+    """Places that divide each interval evenly, the very last knot included.
+
+    Args:
+        counts: Number of rows from each knot (included) to the next (left out).
+    """
+    interval = np.repeat(np.arange(len(counts)), counts)
+    begin = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    share = (np.arange(counts.sum()) - begin[interval]) / counts[interval]
+    return (
+        np.append(interval, len(counts) - 1),
+        np.append(share, 1.0),
+    )
+
+
+def link_angles_at(centres: FloatArray) -> FloatArray:
+    """Psi of every joint, shape (r, N); NaN where a link is short; [rad]."""
+    axes = np.diff(centres, axis=1)
+    axes = axes / np.linalg.norm(axes, axis=2, keepdims=True)
+    rail = np.zeros_like(axes[:, :1])
+    rail[..., 0] = 1.0
+    axes = np.concatenate([rail, axes], axis=1)
+    chord = np.linalg.norm(np.diff(axes, axis=1), axis=2)
+    return np.asarray(2.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)))
+
+
+def dense_rows(
+    manipulator: Manipulator, knots: Knots, spacing: float, turn: float
+) -> Rows:
+    """Rows whose tips are at most `spacing` apart and whose joints turn at most `turn`.
+
+    Every knot is a row.
+    """
+    way = np.linalg.norm(np.diff(knots.tips, axis=0), axis=1)
+    counts = np.maximum(1, np.ceil(way / spacing - 1e-9)).astype(np.int64)
+    for _ in range(12):
+        rows = rows_at(manipulator, knots, *spread(counts))
+        alpha, theta = joint_angles(manipulator, rows.centres)
+        step = np.maximum(
+            np.abs(np.diff(alpha, axis=0)), np.abs(np.diff(theta, axis=0))
+        ).max(axis=1)
+        worst = np.zeros(len(counts))
+        np.maximum.at(worst, rows.interval[:-1], step)
+        if (worst <= turn).all():
+            break
+        counts = np.where(
+            worst > turn, np.ceil(counts * worst / turn * 1.05).astype(np.int64), counts
+        )
+    return rows

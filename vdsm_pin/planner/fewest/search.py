@@ -1,0 +1,69 @@
+"""One search: a roadmap, the cheapest sequence, and again with what proved blocked."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import IntArray
+from vdsm_pin.planner.fewest.clear import Judge
+from vdsm_pin.planner.fewest.motion import Knots, knots_of
+from vdsm_pin.planner.fewest.roadmap import Roadmap
+from vdsm_pin.planner.fewest.sequence import Planner, Sequence
+
+
+@dataclass(frozen=True)
+class Found:
+    """What one search came to.
+
+    Args:
+        roadmap: The graph searched.
+        sequence: The sequence of nodes.
+        knots: Its knots, every interval clear.
+        rounds: Sequences tried.
+    """
+
+    roadmap: Roadmap
+    sequence: Sequence
+    knots: Knots
+    rounds: int
+
+    @property
+    def undrawn_m(self) -> float:
+        """Length of the desired path that is not drawn; [m]."""
+        gaps = np.diff(self.roadmap.route.stations)
+        return float(sum(gaps[k - 1] for k in self.sequence.skipped))
+
+
+def search(judge: Judge, roadmap: Roadmap, home: int, rounds: int) -> Found | None:
+    """The cheapest sequence whose every interval is clear.
+
+    Args:
+        judge: Says which intervals are clear.
+        roadmap: The graph.
+        home: The node the motion starts from.
+        rounds: Largest number of sequences tried.
+
+    Returns:
+        None if the rounds end or nothing is drawn.
+    """
+    planner = Planner(roadmap, home)
+    known: set[tuple[int, int]] = set()
+    for count in range(1, rounds + 1):
+        sequence = planner.sequence()
+        if not any(leg.drawn for leg in sequence.legs):
+            return None
+        knots = knots_of(judge.problem.manipulator, roadmap, sequence)
+        fresh = _fresh(knots.edges, known)
+        good = judge.clear(knots.pick(fresh)) if fresh.size else np.ones(0, bool)
+        bad = fresh[~good]
+        if not bad.size:
+            return Found(roadmap, sequence, knots, count)
+        known.update(map(tuple, np.sort(knots.edges[fresh[good]], axis=1).tolist()))
+        planner.blocked.add(knots.edges[bad])
+    return None
+
+
+def _fresh(edges: IntArray, known: set[tuple[int, int]]) -> IntArray:
+    """Intervals whose edge has not been looked at."""
+    pairs = np.sort(edges, axis=1).tolist()
+    return np.array([k for k, e in enumerate(pairs) if tuple(e) not in known], int)

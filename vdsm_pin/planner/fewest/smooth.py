@@ -1,0 +1,162 @@
+"""Shorter motions: stretches of knots replaced by straight lines in the chart."""
+
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.planner.fewest.clear import Judge
+from vdsm_pin.planner.fewest.motion import Knots, link_angles_at, rows_at
+from vdsm_pin.planner.fewest.roadmap import Taste
+from vdsm_pin.tolerances import TOLERANCES
+
+
+@dataclass(frozen=True)
+class _State:
+    """What a replacement is held against, knot by knot."""
+
+    changed: IntArray
+    bend: FloatArray
+    room: FloatArray
+
+
+def _state(judge: Judge, knots: Knots) -> _State:
+    n = len(knots.tips)
+    interval = np.minimum(np.arange(n), n - 2)
+    share = (np.arange(n) - interval).astype(float)
+    centres = rows_at(judge.problem.manipulator, knots, interval, share).centres
+    angles = link_angles_at(centres)
+    changed = (angles > TOLERANCES.changed_angle).sum(axis=1)
+    room = judge.clearance(centres).min(axis=1)
+    return _State(changed, angles.max(axis=1), room)
+
+
+def _runs(knots: Knots) -> list[tuple[int, int]]:
+    """Maximal runs of intervals of one kind, as first and last knot."""
+    change = np.flatnonzero(np.diff(knots.drawn.astype(int))) + 1
+    marks = [0, *change.tolist(), len(knots.drawn)]
+    return list(itertools.pairwise(marks))
+
+
+def _share(knots: Knots, a: int, b: int) -> FloatArray:
+    """Where the inner knots of a..b come to lie between its ends, 0 to 1."""
+    if knots.drawn[a]:
+        length = knots.stations[a : b + 1] - knots.stations[a]
+    else:
+        way = np.linalg.norm(np.diff(knots.tips[a : b + 1], axis=0), axis=1)
+        turn = np.diff(knots.offsets[a : b + 1], axis=0)
+        way = way + np.abs(turn).max(axis=(1, 2))
+        length = np.concatenate([[0.0], np.cumsum(way)])
+    if not length[-1] > 0.0:
+        return np.linspace(0.0, 1.0, b - a + 1)
+    return np.asarray(length / length[-1])
+
+
+def _flattened(knots: Knots, spans: list[tuple[int, int]]) -> Knots:
+    """Knots with every span's inner knots on the line between its ends."""
+    tips, offsets = knots.tips.copy(), knots.offsets.copy()
+    edges = knots.edges.copy()
+    for a, b in spans:
+        t = _share(knots, a, b)
+        offsets[a : b + 1] = (1 - t)[:, None, None] * offsets[a] + t[
+            :, None, None
+        ] * offsets[b]
+        if not knots.drawn[a]:
+            tips[a : b + 1] = (1 - t)[:, None] * tips[a] + t[:, None] * tips[b]
+        edges[a:b] = -1
+    return replace(knots, tips=tips, offsets=offsets, edges=edges)
+
+
+def _spans(knots: Knots, stride: int, phase: int) -> list[tuple[int, int]]:
+    spans = []
+    for begin, end in _runs(knots):
+        marks = list(range(begin + phase, end, stride))
+        marks = [m for m in (begin, *marks, end) if begin <= m <= end]
+        marks = sorted(set(marks))
+        spans += [(a, b) for a, b in itertools.pairwise(marks) if b - a > 1]
+    return spans
+
+
+def _allowed(state: _State, new: _State, span: tuple[int, int], drawn: bool) -> bool:
+    """Whether a flattened span bends no more joints over its length than before."""
+    a, b = span
+    if not drawn:
+        return True
+    return int(new.changed[a + 1 : b].sum()) <= int(state.changed[a + 1 : b].sum())
+
+
+def smooth(judge: Judge, knots: Knots, taste: Taste) -> Knots:
+    """Knots pulled straight wherever that keeps clearance, limits and sparsity.
+
+    Long stretches are tried first, then ever shorter ones, all of one length at once.
+    """
+    longest = max(b - a for a, b in _runs(knots))
+    stride = 1 << max(1, int(np.ceil(np.log2(max(longest, 2)))))
+    while stride >= 2:
+        for phase in (0, stride // 2):
+            spans = _spans(knots, stride, phase)
+            if spans:
+                knots = _round(judge, knots, taste, spans)
+        stride //= 2
+    return knots
+
+
+def _round(
+    judge: Judge, knots: Knots, taste: Taste, spans: list[tuple[int, int]]
+) -> Knots:
+    state = _state(judge, knots)
+    trial = _flattened(knots, spans)
+    moved = np.zeros(len(knots.tips), dtype=np.bool_)
+    change = np.abs(trial.offsets - knots.offsets).max(axis=(1, 2))
+    change = np.maximum(change, np.abs(trial.tips - knots.tips).max(axis=1))
+    moved = change > TOLERANCES.joint_centre
+    spans = [(a, b) for a, b in spans if moved[a : b + 1].any()]
+    if not spans:
+        return knots
+    new = _state(judge, trial)
+    need, bend = _guards(judge, knots, state, taste, spans)
+    picked = np.concatenate([np.arange(a, b) for a, b in spans])
+    good = judge.clear(trial.pick(picked), need, bend)
+    kept = []
+    place = 0
+    for span in spans:
+        a, b = span
+        if good[place : place + b - a].all() and _allowed(
+            state, new, span, bool(knots.drawn[a])
+        ):
+            kept.append(span)
+        place += b - a
+    return _flattened(knots, kept)
+
+
+def _guards(
+    judge: Judge,
+    knots: Knots,
+    state: _State,
+    taste: Taste,
+    spans: list[tuple[int, int]],
+) -> tuple[FloatArray, FloatArray]:
+    """Clearance to keep and angle not to exceed, interval by interval of the spans."""
+    need, bend = [], []
+    for a, b in spans:
+        room = float(state.room[a : b + 1].min())
+        room = max(min(room, judge.required + taste.room / 2.0), judge.required)
+        most = max(float(state.bend[a : b + 1].max()), taste.easy_bend)
+        need += [room] * (b - a)
+        bend += [most] * (b - a)
+    return np.array(need), np.array(bend)
+
+
+def straightened(knots: Knots) -> Knots:
+    """Ways without the knots that lie on the line between their neighbours."""
+    kept: BoolArray = np.ones(len(knots.tips), dtype=np.bool_)
+    for k in range(1, len(knots.tips) - 1):
+        if knots.drawn[k - 1] or knots.drawn[k]:
+            continue
+        a = int(np.flatnonzero(kept[:k])[-1])
+        span = _flattened(knots, [(a, k + 1)])
+        gap = np.abs(span.offsets - knots.offsets)[a : k + 2].max()
+        gap = max(gap, np.abs(span.tips - knots.tips)[a : k + 2].max())
+        kept[k] = gap > TOLERANCES.joint_centre
+    return knots.take(np.flatnonzero(kept))
