@@ -1,0 +1,96 @@
+"""Distances of links at single rows: coarse bounds for all, brackets for some.
+
+The coarse bound covers a link with balls and an obstacle with its box, some ten
+nanoseconds a link; the bracket is the tight one.
+"""
+
+from math import sqrt
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.kernels import BRACKET, LOWER, NORMAL, SCRATCH_ROWS, UPPER
+from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
+from vdsm_pin.geometry.pieces import HALF_SPACE, PackedPieces
+
+BALLS: Final = 4
+"""Balls along a link; the coarse bound is loose by an eighth of the link's length."""
+
+
+@compiled
+def _box_gap(pieces: PackedPieces, o: int, x: float, y: float, z: float) -> float:
+    """Distance from a point to an obstacle's box or half-space; [m]."""
+    first, root = pieces.first_piece[o], pieces.root[o]
+    if pieces.kind[first] == HALF_SPACE:
+        n = pieces.axis[first]
+        return float(n[0] * x + n[1] * y + n[2] * z - pieces.extent[first])
+    low, high = pieces.node_low[root], pieces.node_high[root]
+    dx = max(low[0] - x, x - high[0], 0.0)
+    dy = max(low[1] - y, y - high[1], 0.0)
+    dz = max(low[2] - z, z - high[2], 0.0)
+    return sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@compiled
+def coarse_bounds(
+    pieces: PackedPieces, centres: FloatArray, radius: float
+) -> FloatArray:
+    """Lower bounds of the clearance of every link from every obstacle.
+
+    Args:
+        pieces: The scene.
+        centres: Joint centres, shape (n_samples, N + 1, 3); [m].
+        radius: Of the links; [m].
+
+    Returns:
+        Shape (n_samples, N, n_obstacles); [m].
+    """
+    n_samples, n_links, n_obstacles = (
+        centres.shape[0],
+        centres.shape[1] - 1,
+        pieces.root.size,
+    )
+    bounds = np.full((n_samples, n_links, n_obstacles), np.inf)
+    for k in range(n_samples):
+        for i in range(n_links):
+            start, end = centres[k, i], centres[k, i + 1]
+            dx, dy, dz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
+            ball = radius + 0.5 * sqrt(dx * dx + dy * dy + dz * dz) / BALLS
+            for o in range(n_obstacles):
+                for b in range(BALLS):
+                    t = (b + 0.5) / BALLS
+                    x, y, z = start[0] + t * dx, start[1] + t * dy, start[2] + t * dz
+                    gap = _box_gap(pieces, o, x, y, z) - ball
+                    bounds[k, i, o] = min(bounds[k, i, o], gap)
+    return bounds
+
+
+@compiled
+def row_brackets(
+    pieces: PackedPieces, ends: FloatArray, obstacle: IntArray, goal: float
+) -> FloatArray:
+    """Brackets of the distance between segments and obstacles.
+
+    Args:
+        pieces: The scene.
+        ends: End points of the segments, shape (m, 2, 3); [m].
+        obstacle: The obstacle each is held against, shape (m,).
+        goal: Width of a bracket at which to stop; [m].
+
+    Returns:
+        Lower and upper bounds, shape (m, 2); of a mesh's surface, inside or out; below
+        zero only the sign is meant; [m].
+    """
+    bounds = np.zeros((obstacle.size, 2))
+    scratch = np.zeros((SCRATCH_ROWS + 2, 3))
+    stack = np.zeros(STACK, np.int64)
+    trial, out = np.zeros(BRACKET + 4), np.zeros(BRACKET + 4)
+    out[NORMAL] = 1.0
+    for m in range(obstacle.size):
+        obstacle_bracket(
+            pieces, obstacle[m], ends[m], 2, goal, scratch, stack, trial, out
+        )
+        bounds[m, 0], bounds[m, 1] = out[LOWER], out[UPPER]
+    return bounds

@@ -1,0 +1,207 @@
+"""Obstacles as Coal geometry, and one careful distance call.
+
+What Coal 3.0 needs to be believed (each point has a test): a GJK tolerance of 1e-8,
+since 1e-6 reads 1.5e-6 m too far and 1e-12 returns NaN; the default EPA tolerance; a
+fresh result for every call, since a used one keeps its smaller value; and below zero
+only the sign. A mesh is its surface to Coal: whoever is inside one is told the distance
+to its skin, so that the sign of a body in a mesh has to come from elsewhere.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from vdsm_pin.errors import VerificationFailed
+from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.scene import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Obstacle,
+    Prism,
+    Sphere,
+)
+from vdsm_pin.tolerances import TOLERANCES
+
+
+@dataclass(frozen=True, eq=False)
+class CoalBody:
+    """One Coal geometry at its place; an obstacle is one or more of them.
+
+    Args:
+        geometry: A coal.CollisionGeometry.
+        pose: Its coal.Transform3s in the base frame.
+    """
+
+    geometry: Any
+    pose: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What Coal says about two bodies.
+
+    Args:
+        distance: Positive apart; where they meet only the sign is meant; -inf where
+            Coal gives no usable answer; [m].
+        near: Witness on the first body, base frame, shape (3,); [m].
+        far: Witness on the second, base frame, shape (3,); [m].
+    """
+
+    distance: float
+    near: FloatArray
+    far: FloatArray
+
+
+NOTHING: Final = Measured(
+    float("inf"), frozen(np.full(3, np.nan)), frozen(np.full(3, np.nan))
+)
+"""The distance to no body at all."""
+
+LARGEST: Final = float(np.finfo(np.float64).max)
+"""Coal's way to say that it has no answer, with a minus sign."""
+
+
+def coal_bodies(obstacle: Obstacle) -> tuple[CoalBody, ...]:
+    """The Coal geometry of an obstacle, in the base frame.
+
+    Args:
+        obstacle: Any obstacle of a scene.
+
+    Returns:
+        One body; for a prism over a non-convex polygon one per convex section.
+
+    Raises:
+        VerificationFailed: If Coal refuses the shape.
+    """
+    import coal
+
+    try:
+        return _bodies(coal, obstacle)
+    except (ValueError, RuntimeError) as error:
+        message = f"obstacle {obstacle.name!r}: Coal refuses the shape: {error}"
+        raise VerificationFailed(message) from error
+
+
+def _bodies(coal: Any, obstacle: Obstacle) -> tuple[CoalBody, ...]:
+    match obstacle:
+        case Sphere():
+            return (_placed(coal, coal.Sphere(obstacle.radius), obstacle.centre),)
+        case Capsule():
+            body = coal.Capsule(obstacle.radius, 2.0 * obstacle.half_length)
+            return (_placed(coal, body, obstacle.centre, _turn_z_to(obstacle.axis)),)
+        case Cylinder():
+            body = coal.Cylinder(obstacle.radius, 2.0 * obstacle.half_length)
+            return (_placed(coal, body, obstacle.centre, _turn_z_to(obstacle.axis)),)
+        case Box():
+            body = coal.Box(2.0 * obstacle.half_size)
+            return (_placed(coal, body, obstacle.centre, obstacle.rotation),)
+        case HalfSpace():
+            normal = obstacle.normal
+            body = coal.Halfspace(normal, float(normal @ obstacle.point))
+            return (_placed(coal, body, np.zeros(3)),)
+        case Prism():
+            return tuple(
+                _placed(
+                    coal, _hull(coal, _prism_corners(obstacle, section)), np.zeros(3)
+                )
+                for section in obstacle.convex_sections
+            )
+        case Mesh():
+            return (_placed(coal, _surface(coal, obstacle), np.zeros(3)),)
+
+
+def _placed(
+    coal: Any, geometry: Any, p: FloatArray, R: FloatArray | None = None
+) -> CoalBody:
+    rotation = np.eye(3) if R is None else R
+    return CoalBody(geometry, coal.Transform3s(np.array(rotation), np.array(p)))
+
+
+def _turn_z_to(axis: FloatArray) -> FloatArray:
+    """A rotation whose third column is the axis, shape (3, 3); [-]."""
+    start = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    x = np.cross(start, axis)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(axis, x), axis], axis=1)
+
+
+def _prism_corners(prism: Prism, section: FloatArray) -> FloatArray:
+    ends = [np.column_stack([section, np.full(len(section), s)]) for s in prism.span]
+    return np.asarray(prism.origin + np.vstack(ends) @ prism.rotation.T)
+
+
+def _hull(coal: Any, corners: FloatArray) -> Any:
+    points = coal.StdVec_Vec3s()
+    points.extend(list(corners))
+    return coal.Convex.convexHull(points, True, "Qt")
+
+
+def _surface(coal: Any, mesh: Mesh) -> Any:
+    """A hierarchy over the triangles; building one twice crashes Coal."""
+    bvh = coal.BVHModelOBBRSS()
+    bvh.beginModel(len(mesh.triangles), len(mesh.vertices))
+    bvh.addVertices(np.array(mesh.vertices))
+    bvh.addTriangles(np.array(mesh.triangles))
+    bvh.endModel()
+    if bvh.num_tris != len(mesh.triangles):
+        message = (
+            f"obstacle {mesh.name!r}: Coal loaded {bvh.num_tris} triangles "
+            f"of {len(mesh.triangles)}"
+        )
+        raise VerificationFailed(message)
+    return bvh
+
+
+def distance_request() -> Any:
+    """Coal's settings for a distance that can be compared with a proof."""
+    import coal
+
+    request = coal.DistanceRequest()
+    request.gjk_tolerance = TOLERANCES.coal_gjk
+    request.enable_signed_distance = True
+    return request
+
+
+def measure(
+    request: Any, geometry: Any, pose: Any, bodies: tuple[CoalBody, ...]
+) -> Measured:
+    """Distance between one body and the nearest part of an obstacle.
+
+    Args:
+        request: From `distance_request`.
+        geometry: A coal.CollisionGeometry.
+        pose: Its coal.Transform3s.
+        bodies: The obstacle.
+
+    Returns:
+        The nearest part's answer; one unusable answer makes the whole unusable.
+    """
+    import coal
+
+    best = NOTHING
+    for body in bodies:
+        result = coal.DistanceResult()
+        distance = coal.distance(
+            geometry, pose, body.geometry, body.pose, request, result
+        )
+        near, far = result.getNearestPoint1(), result.getNearestPoint2()
+        if not _usable(distance, result.min_distance, near, far):
+            return Measured(float("-inf"), near, far)
+        if distance < best.distance:
+            best = Measured(float(distance), near, far)
+    return best
+
+
+def _usable(distance: float, stored: float, near: FloatArray, far: FloatArray) -> bool:
+    """Whether an answer is one: a number, no sentinel, and borne out by its witness."""
+    if distance != stored or not abs(distance) < LARGEST:
+        return False
+    if distance <= 0.0:
+        return True
+    excess = abs(math.dist(near, far) - distance)
+    return excess <= TOLERANCES.coal_agreement

@@ -1,0 +1,229 @@
+"""Coal's distances at the rows of a trajectory, a second opinion on the proved ones.
+
+Poses come from Pinocchio, shapes from the URDF and distances from Coal; the brackets
+they are held against come from the closed-form kinematics and our own kernels. Coal
+proves nothing, so agreement certifies no clearance, and a disagreement leaves the
+motion undecided.
+
+Pairs that are far apart add no evidence. A chain of balls along each link against the
+boxes of the obstacles bounds every distance from below at a hundredth of the price; a
+row is measured where that bound is within reach, and every pair at its nearest row.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
+from vdsm_pin.geometry.row_bounds import coarse_bounds, row_brackets
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.robot_model import LinkPoses, RobotModel
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.coal_bodies import (
+    CoalBody,
+    coal_bodies,
+    distance_request,
+    measure,
+)
+from vdsm_pin.verification.records import Check, Verdict
+
+CHUNK_BOUNDS: Final = 1 << 20
+"""Coarse bounds held in memory at a time: rows times links times obstacles."""
+
+
+@dataclass(frozen=True)
+class CoalDistances:
+    """Measured distances between links and obstacles, with our brackets beside them.
+
+    Args:
+        sample: Row of the trajectory, from 0, shape (m,).
+        link: Link, from 0, shape (m,).
+        obstacle: Number of the obstacle in the scene, from 0, shape (m,).
+        distance: By Coal; -inf where its answer is unusable, shape (m,); [m].
+        lower: Proved lower bound at the row; [m].
+        upper: Proved upper bound at the row; [m].
+        link_point: Coal's witness on the link, base frame, shape (m, 3); [m].
+        other_point: Coal's witness on the obstacle, shape (m, 3); [m].
+    """
+
+    sample: IntArray
+    link: IntArray
+    obstacle: IntArray
+    distance: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    link_point: FloatArray
+    other_point: FloatArray
+
+    @property
+    def disagreement(self) -> FloatArray:
+        """How far Coal lies outside the bracket, inf if unusable, shape (m,); [m].
+
+        Where bodies meet only the sign counts, on both sides.
+        """
+        value, lower, upper = (
+            np.maximum(number, 0.0)
+            for number in (self.distance, self.lower, self.upper)
+        )
+        outside = np.maximum(np.maximum(lower - value, value - upper), 0.0)
+        return np.where(np.isfinite(self.distance), outside, np.inf)
+
+
+def check_coal(
+    robot: RobotModel,
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    proved: FloatArray | None = None,
+) -> tuple[Check, ...]:
+    """Hold Coal's distances to the obstacles against the proved brackets.
+
+    Args:
+        robot: The arm in Pinocchio and Coal.
+        problem: The scene.
+        trajectory: What is judged.
+        proved: Proved lower bounds over the intervals for the pairs of links and
+            obstacles, obstacle by obstacle, shape (n_intervals, n_obstacles * N); Coal
+            must not fall below them at either end of an interval; [m].
+
+    Returns:
+        One row of evidence with the largest disagreement; none for an empty scene.
+    """
+    scene, n_links = problem.scene, problem.manipulator.n_links
+    if not scene.obstacles:
+        return ()
+    count, worst, where = 0, -np.inf, ""
+    for found in coal_distances(robot, problem, trajectory, reach_of(problem)):
+        excess = found.disagreement
+        if proved is not None:
+            excess = np.maximum(excess, _below_proof(found, proved, n_links))
+        count += excess.size
+        k = int(np.argmax(excess))
+        if not excess[k] <= worst:
+            worst = float(excess[k])
+            where = (
+                f"waypoint {found.sample[k]}, link {found.link[k] + 1}, "
+                f"{scene.names[found.obstacle[k]]}: Coal {found.distance[k]:.9g} m, "
+                f"proved [{found.lower[k]:.9g}, {found.upper[k]:.9g}] m"
+            )
+    total = trajectory.n_samples * n_links * len(scene.obstacles)
+    agreed = worst <= TOLERANCES.coal_agreement
+    check = Check(
+        name="distances by Coal against the proved brackets",
+        verdict=Verdict.CERTIFIED if agreed else Verdict.UNDECIDED,
+        count=count,
+        worst=worst,
+        limit=TOLERANCES.coal_agreement,
+        unit="m",
+        where=f"{where}; {count} of {total} pairs within reach measured",
+    )
+    return (check,)
+
+
+def reach_of(problem: PlanningProblem) -> float:
+    """Distance up to which pairs are measured at every row; [m].
+
+    The required clearance and the arm's own radius past it.
+    """
+    return problem.required_clearance + problem.manipulator.link_radius
+
+
+def coal_distances(
+    robot: RobotModel, problem: PlanningProblem, trajectory: Trajectory, reach: float
+) -> Iterator[CoalDistances]:
+    """Measure the pairs within reach, chunk by chunk, then every pair not yet seen.
+
+    Args:
+        robot: The arm in Pinocchio and Coal.
+        problem: The scene.
+        trajectory: The rows.
+        reach: Measure where the coarse bound is at most this; inf for everything; [m].
+
+    Yields:
+        Distances in the order of the rows; last the pairs that never came within
+        reach, each at the row where its coarse bound is least.
+    """
+    arm, obstacles = problem.manipulator, problem.scene.obstacles
+    pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
+    bodies = [coal_bodies(obstacle) for obstacle in obstacles]
+    least = np.full((arm.n_links, len(obstacles)), np.inf)
+    nearest = np.zeros(least.shape, dtype=np.int64)
+    step = max(1, CHUNK_BOUNDS // least.size)
+    for first in range(0, trajectory.n_samples, step):
+        part = slice(first, first + step)
+        joints = trajectory.x0[part], trajectory.alpha[part], trajectory.theta[part]
+        centres = joint_centres(arm, *joints)
+        bounds = coarse_bounds(pieces, centres, arm.link_radius)
+        here = np.argmin(bounds, axis=0)
+        value = np.take_along_axis(bounds, here[None], axis=0)[0]
+        nearer = value < least
+        least[nearer], nearest[nearer] = value[nearer], here[nearer] + first
+        close = np.argwhere(bounds <= reach)
+        if close.size:
+            close[:, 0] += first
+            yield _measured(robot, trajectory, arm.link_radius, pieces, bodies, close)
+    unseen = np.argwhere(least > reach)
+    if unseen.size:
+        rows = nearest[unseen[:, 0], unseen[:, 1]]
+        far = np.column_stack([rows, unseen])
+        yield _measured(robot, trajectory, arm.link_radius, pieces, bodies, far)
+
+
+def _measured(
+    robot: RobotModel,
+    trajectory: Trajectory,
+    radius: float,
+    pieces: PackedPieces,
+    bodies: list[tuple[CoalBody, ...]],
+    pairs: IntArray,
+) -> CoalDistances:
+    """Ask Coal and the kernels about (sample, link, obstacle) triples, shape (m, 3)."""
+    rows, row_of_pair = np.unique(pairs[:, 0], return_inverse=True)
+    joints = trajectory.x0[rows], trajectory.alpha[rows], trajectory.theta[rows]
+    poses = robot.link_poses(*joints)
+    centres = joint_centres(robot.manipulator, *joints)
+    link, obstacle = pairs[:, 1], pairs[:, 2]
+    ends = np.stack(
+        [centres[row_of_pair, link], centres[row_of_pair, link + 1]], axis=1
+    )
+    bounds = row_brackets(pieces, ends, obstacle, TOLERANCES.bracket_gap) - radius
+    transforms = _capsule_transforms(robot, poses, row_of_pair, link)
+    request = distance_request()
+    distance = np.zeros(len(pairs))
+    near, far = np.zeros((2, len(pairs), 3))
+    for k, transform in enumerate(transforms):
+        capsule = robot.capsules[link[k]]
+        found = measure(request, capsule, transform, bodies[obstacle[k]])
+        distance[k], near[k], far[k] = found.distance, found.near, found.far
+    return CoalDistances(
+        pairs[:, 0], link, obstacle, distance, bounds[:, 0], bounds[:, 1], near, far
+    )
+
+
+def _capsule_transforms(
+    robot: RobotModel, poses: LinkPoses, row: IntArray, link: IntArray
+) -> Iterator[Any]:
+    """Coal's pose of a link's capsule for each (row, link), one after the other."""
+    import coal
+
+    rotations = poses.rotations[row, link]
+    local = robot.T_link_capsule[link]
+    turned = rotations @ local[:, :3, :3]
+    shifted = poses.origins[row, link] + np.einsum(
+        "nij,nj->ni", rotations, local[:, :3, 3]
+    )
+    return (coal.Transform3s(R, p) for R, p in zip(turned, shifted, strict=True))
+
+
+def _below_proof(found: CoalDistances, proved: FloatArray, n_links: int) -> FloatArray:
+    """By how much Coal falls below what was proved over the intervals at a row; [m]."""
+    column = found.obstacle * n_links + found.link
+    before = np.maximum(found.sample - 1, 0)
+    after = np.minimum(found.sample, len(proved) - 1)
+    bound = np.maximum(proved[before, column], proved[after, column])
+    # Where bodies meet only the sign counts.
+    return np.asarray(bound - np.maximum(found.distance, 0.0))
