@@ -77,6 +77,24 @@ class Tolerances:
     on_path_length: float = 1e-9
     """Arc lengths closer than this are the same place on the desired path; [m]."""
 
+    parallel: float = 1e-9
+    """Sine of the angle below which two directions count as parallel; [-]."""
+
+    on_boundary: float = 1e-9
+    """A point this little inside a planner's danger region is on its boundary; [m]."""
+
+    planned_clearance: float = 1e-6
+    """What a planner keeps beyond the clearance asked for; [m].
+
+    Proved lower bounds and the digits of a CSV stay a hundred times closer than this.
+    """
+
+    planned_step: float = 8.552113334772214e-2
+    """Largest change of a joint angle per row the planner leaves: 4.9 deg; [rad].
+
+    5 deg is asked for; the reserve covers the rounding of a CSV many times over.
+    """
+
 
 TOLERANCES: Final = Tolerances()
 """The values in force. Reports print them all."""

@@ -5,6 +5,7 @@ from types import MappingProxyType
 from typing import Final, TypeAlias
 
 from vdsm_pin.errors import UnknownName
+from vdsm_pin.planner.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Plan
 from vdsm_pin.problem import PlanningProblem
 
@@ -12,7 +13,7 @@ Strategy: TypeAlias = Callable[[PlanningProblem, LinkClearance, float], Plan]
 """(problem, clearance, margin) -> plan. `margin` is what the strategy shall keep beyond
 the required clearance [m]; the refinement raises it where verification asks for it."""
 
-STRATEGIES: Final[Mapping[str, Strategy]] = MappingProxyType({})
+STRATEGIES: Final[Mapping[str, Strategy]] = MappingProxyType({"paper": plan_paper})
 """Every strategy a user may name."""
 
 

@@ -1,0 +1,203 @@
+"""One obstacle across the rail, prismatic along Z or Y (obs3): one bend.
+
+Seen along the obstacle (from the top for Z, from the front for Y), the arm passes its
+section on one side. Where the straight arm would meet it, one joint b moves along the
+auxiliary line, the rest follow in proportion between O_1, O_b and the tip, so that the
+arm is two straight pieces (paper, 6.1: "adjusted in proportion between the first
+boundary and the second boundary"). The arm keeps its side all the way: to change it,
+it would have to withdraw.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+import shapely
+
+from vdsm_pin.errors import PathBlocked
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.planner.danger_region import DangerRegion
+from vdsm_pin.planner.project import project
+from vdsm_pin.planner.scale import scale
+from vdsm_pin.planner.sections import VIEWS, Section, grown_by
+from vdsm_pin.planner.tip_path import Route, drawn_rows, straight_route
+from vdsm_pin.problem import PlanningProblem
+
+SCAN: Final = 12
+"""Moves of the bend tried before the first clear one is narrowed down."""
+
+TRIAL_ROWS: Final = 48
+"""Waypoints on which the bends are compared."""
+
+HALVINGS: Final = 24
+"""Rounds of bisection: 2 m / 12 / 2^24 is 1e-8 m, far below every margin."""
+
+
+@dataclass(frozen=True)
+class AcrossRail:
+    """A complete choice for Steps 4 and 5.
+
+    Args:
+        problem: What was asked.
+        region: The danger region in the view (x, w), with everything behind it on
+            the side the arm must not pass.
+        axis: 0 where w is y, 1 where w is z.
+        side: The arm passes at larger w (1) or at smaller w (-1).
+        bend: Joint b that moves, 2..N.
+    """
+
+    problem: PlanningProblem
+    region: DangerRegion
+    axis: int
+    side: int
+    bend: int
+
+    def route(self) -> Route:
+        """Step 4: as without obstacles; the tip itself must stay clear."""
+        route = straight_route(self.problem.path)
+        points = route.tip_path.points[:, [0, 1 + self.axis]]
+        inside = self.region.contains(points)
+        if inside.any():
+            sample = int(np.argmax(inside))
+            reason = (
+                f"the tip would be in its danger region at waypoint {sample}; this "
+                "rule leads the arm round an obstacle across the rail, not the tip"
+            )
+            raise PathBlocked(obstacle=self.region.name, reason=reason)
+        return route
+
+    def joints(self, route: Route, reference: FloatArray) -> FloatArray:
+        """Step 5: the bend moves as little as clears the region."""
+        tip_x = route.tip_path.points[:, 0]
+        planar = reference.copy()
+        blocked = np.flatnonzero(~self.clear(reference, tip_x))
+        if len(blocked):
+            planar[blocked] = self._bent(reference[blocked], tip_x[blocked])
+        return planar
+
+    def _bent(self, reference: FloatArray, tip_x: FloatArray) -> FloatArray:
+        return self._moved(reference, self._least_move(reference, tip_x))
+
+    def _least_move(self, reference: FloatArray, tip_x: FloatArray) -> FloatArray:
+        """Smallest move of the bend that clears the region, (n,); [m]."""
+        farthest = self._farthest(reference)
+        scan = np.linspace(0.0, 1.0, SCAN + 1)
+        low, high = np.zeros(len(tip_x)), np.full(len(tip_x), np.nan)
+        for before, after in pairwise(scan):
+            open_ = np.flatnonzero(np.isnan(high))
+            moved = self._moved(reference[open_], after * farthest[open_])
+            clear = self.clear(moved, tip_x[open_])
+            low[open_[clear]], high[open_[clear]] = before, after
+        if np.isnan(high).any():
+            sample = int(np.argmax(np.isnan(high)))
+            reason = (
+                f"joint {self.bend} cannot lead the arm round it within the limit of "
+                f"psi_1 with the tip at {reference[sample, -1].tolist()} m"
+            )
+            raise PathBlocked(obstacle=self.region.name, reason=reason)
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            clear = self.clear(self._moved(reference, middle * farthest), tip_x)
+            low, high = np.where(clear, low, middle), np.where(clear, middle, high)
+        return high * farthest
+
+    def _farthest(self, reference: FloatArray) -> FloatArray:
+        """Largest move of the bend that leaves psi_1 within its cone, (n,); [m]."""
+        manipulator = self.problem.manipulator
+        at = reference[:, self.bend - 1]
+        cone = np.sin(manipulator.max_link_angle)
+        reach = manipulator.stations[self.bend - 1] * cone
+        along, across = at[:, self.axis], at[:, 1 - self.axis]
+        room = np.sqrt(np.maximum(reach**2 - across**2, 0.0))
+        return np.asarray(self.side * (self.side * room - along))
+
+    def _moved(self, reference: FloatArray, move: FloatArray) -> FloatArray:
+        """Bend moved to its side, the others in proportion, as `reference`; [m]."""
+        stations, b = self.problem.manipulator.stations, self.bend - 1
+        part = np.concatenate(
+            [
+                stations[: b + 1] / stations[b],
+                (stations[-1] - stations[b + 1 :]) / (stations[-1] - stations[b]),
+            ]
+        )
+        planar = reference.copy()
+        planar[..., self.axis] += self.side * move[:, None] * part
+        return planar
+
+    def clear(self, planar: FloatArray, tip_x: FloatArray) -> BoolArray:
+        """Whether the arm of one bend stays out of the region, (n,)."""
+        manipulator, b = self.problem.manipulator, self.bend - 1
+        corners = planar[:, [0, b, -1]]
+        lengths = np.diff(manipulator.stations[[0, b, -1]])
+        squares = lengths**2 - (np.diff(corners, axis=1) ** 2).sum(axis=2)
+        able = (squares > 0.0).all(axis=1)
+        rises = np.sqrt(np.maximum(squares, 0.0))
+        chain = np.zeros((len(tip_x), 3, 2))
+        chain[..., 1] = corners[..., self.axis]
+        chain[:, 2, 0] = tip_x
+        chain[:, 1, 0] = tip_x - rises[:, 1]
+        chain[:, 0, 0] = chain[:, 1, 0] - rises[:, 0]
+        return np.asarray(
+            able & (self.region.core_distance(chain) >= self.region.radius)
+        )
+
+    def largest_angle(self) -> float:
+        """Largest link angle over a few waypoints; infinite where there is none; [rad].
+
+        The link angles follow from the directions of the two straight pieces.
+        """
+        manipulator, path = self.problem.manipulator, self.problem.path
+        points = drawn_rows(path, 0.0).points
+        points = points[:: max(1, len(points) // TRIAL_ROWS)]
+        reference, tip_x = scale(manipulator, project(points)), points[:, 0]
+        blocked = ~self.clear(reference, tip_x)
+        try:
+            planar = self._bent(reference[blocked], tip_x[blocked])
+        except PathBlocked:
+            return np.inf
+        b = self.bend - 1
+        lengths = np.diff(manipulator.stations[[0, b, -1]])
+        across = np.diff(planar[:, [0, b, -1]], axis=1) / lengths[:, None]
+        along = np.sqrt(1.0 - (across**2).sum(axis=2))
+        cosine = along.prod(axis=1) + across.prod(axis=1).sum(axis=1)
+        return float(np.arccos(np.append(cosine, along[:, 0])).max(initial=0.0))
+
+
+def across_rail(
+    problem: PlanningProblem, section: Section, axis: str, margin: float
+) -> Iterator[AcrossRail]:
+    """Choices for one obstacle prismatic along Y or Z, the least bent first.
+
+    Args:
+        problem: What was asked.
+        section: The obstacle's section in the view (x, w).
+        axis: "y" or "z", along which it is prismatic.
+        margin: Kept beyond the required clearance; [m].
+    """
+    manipulator = problem.manipulator
+    growth = grown_by(problem, margin)
+    which = VIEWS[axis][1] - 1
+    # The side nearer to the rail first: from there the straight arm comes.
+    first = -1 if section.centre[1] > 0.0 else 1
+    for side in (first, -first):
+        region = _with_lee(section, growth, side, problem)
+        choices = [
+            AcrossRail(problem, region, which, side, bend)
+            for bend in range(2, manipulator.n_links + 1)
+        ]
+        yield from sorted(choices, key=AcrossRail.largest_angle)
+
+
+def _with_lee(
+    section: Section, growth: float, side: int, problem: PlanningProblem
+) -> DangerRegion:
+    """The section drawn out to beyond the arm's reach on the side not to be passed."""
+    far = 4.0 * problem.manipulator.total_length
+    drawn_out = section.points - np.array([0.0, side * far])
+    hull = shapely.MultiPoint(np.vstack([section.points, drawn_out])).convex_hull
+    oriented = shapely.orient_polygons(hull) if hull.geom_type == "Polygon" else hull
+    ring = shapely.get_coordinates(oriented)
+    corners = ring[:-1] if hull.geom_type == "Polygon" else ring
+    return DangerRegion(section.name, corners, section.radius + growth)

@@ -1,0 +1,99 @@
+"""The seam between the paper's pipeline and its ways of avoiding obstacles.
+
+An avoidance fixes Steps 4 and 5: where the tip goes, and where the joints go in the
+projection. The pipeline tries them in the order given here.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+from vdsm_pin.errors import Infeasible, NoPlanFound
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.across_rail import across_rail
+from vdsm_pin.planner.along_rail import along_rail
+from vdsm_pin.planner.sections import section_along
+from vdsm_pin.planner.tip_path import Route, straight_route
+from vdsm_pin.problem import PlanningProblem
+
+
+class Avoidance(Protocol):
+    """Steps 4 and 5 of one plan."""
+
+    def route(self) -> Route:
+        """Step 4: the tip's route; raises Infeasible where there is none."""
+        ...
+
+    def joints(self, route: Route, reference: FloatArray) -> FloatArray:
+        """Step 5: projected joint centres from the reference of Step 3.
+
+        Args:
+            route: Step 4's route.
+            reference: The straight arm's, shape (n_samples, N + 1, 2); [m].
+
+        Returns:
+            P_1..P_{N+1}, shape (n_samples, N + 1, 2); [m].
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Straight:
+    """No obstacle is met: the arm stays straight (paper, section 3).
+
+    Args:
+        problem: What was asked.
+    """
+
+    problem: PlanningProblem
+
+    def route(self) -> Route:
+        """Step 4 without obstacles."""
+        return straight_route(self.problem.path)
+
+    def joints(self, route: Route, reference: FloatArray) -> FloatArray:
+        """Step 5 without obstacles: the reference itself."""
+        return reference
+
+
+def avoidances(problem: PlanningProblem, margin: float) -> Iterator[Avoidance]:
+    """Every way the paper's rule offers to go round the scene's obstacle.
+
+    A body that is prismatic along several axes is tried along X first, where only its
+    section matters, then along Z and Y.
+
+    Args:
+        problem: What was asked.
+        margin: Kept beyond the required clearance; [m].
+
+    Raises:
+        NoPlanFound: If the paper's rule does not cover the scene.
+        PathBlocked: If a view rules its obstacle out.
+    """
+    obstacles = problem.scene.obstacles
+    if len(obstacles) != 1:
+        message = (
+            f"{len(obstacles)} obstacles are in the straight arm's way or near it; the "
+            "paper's rule goes round one (the strategy 'fewest' takes any number)"
+        )
+        raise NoPlanFound(message)
+    sections = {axis: section_along(obstacles[0], axis) for axis in "xzy"}
+    if not any(sections.values()):
+        message = (
+            f"obstacle {obstacles[0].name!r} is not prismatic along X, Y or Z, which "
+            "the paper's rule needs (the strategy 'fewest' takes any shape)"
+        )
+        raise NoPlanFound(message)
+    refusal: Infeasible | None = None
+    for axis, section in sections.items():
+        if section is None:
+            continue
+        try:
+            if axis == "x":
+                yield from along_rail(problem, section, margin)
+            else:
+                yield from across_rail(problem, section, axis, margin)
+        except Infeasible as error:
+            refusal = refusal or error
+    if refusal is not None:
+        raise refusal

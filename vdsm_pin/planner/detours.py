@@ -1,0 +1,317 @@
+"""Step 4 with an obstacle along the rail: the tip's way round it (paper, 4.2.2-4.2.3).
+
+Seen along X, the straight arm is a ray from P_1, and the danger region throws a shadow.
+A tip outside the shadow is reached straight; inside it the arm must bend round the
+region on one side. A tip that enters the shadow at one edge and leaves it at the other
+would wrap the arm round the obstacle. There the tip leaves the desired path (A4), walks
+back round the base-facing side of the region, and rejoins the path with the arm on the
+other side (A5).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from vdsm_pin.errors import PathBlocked
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.planner.danger_region import DangerRegion
+from vdsm_pin.planner.project import project
+from vdsm_pin.planner.tip_path import (
+    Route,
+    Rows,
+    drawn_rows,
+    join,
+    nearest_station,
+    off_path_rows,
+    rows_at,
+)
+from vdsm_pin.problem import Approach, DesiredPath
+from vdsm_pin.tolerances import TOLERANCES
+
+Judge: TypeAlias = Callable[[FloatArray, int], BoolArray]
+"""(tip positions (n, 3), side) to whether the arm can stand there so, shape (n,)."""
+
+
+@dataclass(frozen=True)
+class Visit:
+    """Waypoints first to last (included) of the path that lie in the shadow in a row.
+
+    Args:
+        first: First waypoint.
+        last: Last waypoint.
+        entry: Edge by which the path came in, 1 or -1; 0 if it begins inside.
+        exit: Edge by which it leaves; 0 if it ends inside.
+    """
+
+    first: int
+    last: int
+    entry: int
+    exit: int
+
+
+@dataclass(frozen=True)
+class Shadow:
+    """What the danger region hides from P_1.
+
+    Args:
+        region: The danger region; P_1, the origin, lies outside.
+    """
+
+    region: DangerRegion
+
+    def side(self, points: FloatArray) -> IntArray:
+        """1 left of the ray from P_1 through the region's centre, else -1, (n,)."""
+        centre = self.region.centre
+        left = centre[0] * points[:, 1] - centre[1] * points[:, 0]
+        return np.where(left > 0.0, 1, -1)
+
+    def covers(self, points: FloatArray) -> BoolArray:
+        """Whether the straight arm to points outside the region would meet it, (n,)."""
+        origin = np.zeros(2)
+        (low, low_normal), (high, high_normal) = (
+            self.region.tangent(origin, 1),
+            self.region.tangent(origin, -1),
+        )
+        radius = self.region.radius
+        right = low + radius * np.array([np.cos(low_normal), np.sin(low_normal)])
+        left = high + radius * np.array([np.cos(high_normal), np.sin(high_normal)])
+        x, y = points[:, 0], points[:, 1]
+        between = (right[0] * y - right[1] * x > 0.0) & (left[0] * y - left[1] * x < 0)
+        # Outside the region but inside the wedge: beyond it iff beyond its chord.
+        chord = left - right
+        beyond = chord[0] * (y - right[1]) - chord[1] * (x - right[0]) < 0.0
+        return np.asarray(between & beyond & ~self.region.contains(points))
+
+    def visits(self, points: FloatArray) -> list[Visit]:
+        """Stays in the shadow along a sequence of points outside or inside, (n, 2)."""
+        covered = self.covers(points)
+        inside, side = self.region.contains(points), self.side(points)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], covered, [False]])))
+        found = []
+        for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
+            entry = exit_ = 0
+            if first > 0 and not inside[first - 1]:
+                entry = int(side[first - 1])
+            if last + 1 < len(points) and not inside[last + 1]:
+                exit_ = int(side[last + 1])
+            found.append(Visit(int(first), int(last), entry, exit_))
+        return found
+
+
+def path_rows(path: DesiredPath, start: float, region: DangerRegion) -> Rows:
+    """Waypoints of the whole path, with one on each crossing of the boundary.
+
+    Args:
+        path: The desired path.
+        start: Arc length at which it is begun; [m].
+        region: The danger region.
+    """
+    rows = drawn_rows(path, start)
+    inside = region.contains(project(rows.points))
+    crossed = np.flatnonzero(inside[1:] != inside[:-1])
+    if not len(crossed):
+        return rows
+    within = np.where(
+        inside[crossed], rows.stations[crossed], rows.stations[crossed + 1]
+    )
+    without = np.where(
+        inside[crossed], rows.stations[crossed + 1], rows.stations[crossed]
+    )
+    while np.abs(within - without).max() > TOLERANCES.on_boundary:
+        middle = 0.5 * (within + without)
+        hit = region.contains(project(rows_at(path, middle).points))
+        within, without = np.where(hit, middle, within), np.where(hit, without, middle)
+    return rows_at(path, np.unique(np.concatenate([rows.stations, without])))
+
+
+def first_station(path: DesiredPath, region: DangerRegion) -> tuple[float, str]:
+    """Where the tip joins a closed path, by the scheme asked for (paper, 4.2.2).
+
+    The equidistant points are those where the line from the start through the centre of
+    the obstacle meets the path behind the obstacle: there both ways round are equal.
+
+    Returns:
+        The arc length [m], and a note where the scheme had to be widened.
+    """
+    if path.approach is Approach.SHORTEST or not path.closed:
+        return nearest_station(path), ""
+    start = path.start[1:]
+    ray = region.centre - start
+    offsets = project(path.corners) - start
+    across = ray[0] * offsets[:, 1] - ray[1] * offsets[:, 0]
+    crossed = np.flatnonzero((across[:-1] <= 0.0) != (across[1:] <= 0.0))
+    part = across[crossed] / (across[crossed] - across[crossed + 1])
+    sides = np.diff(path.corner_stations)[crossed]
+    stations = path.corner_stations[crossed] + part * sides
+    along = (project(path.at(stations)) - start) @ ray / (ray @ ray)
+    stations, along = stations[along > 1.0], along[along > 1.0]
+    if not len(stations):
+        return nearest_station(path), "no equidistant point: the nearest point is used"
+    note = ""
+    if path.approach is Approach.EQUIDISTANT and len(stations) > 1:
+        note = f"{len(stations)} equidistant points: the nearest is used"
+    return float(stations[np.argmin(along)]), note
+
+
+def detour_route(path: DesiredPath, region: DangerRegion, judge: Judge) -> Route:
+    """The tip's whole route round one region: onto the path, along it, and back.
+
+    Args:
+        path: The desired path.
+        region: The danger region of the tip.
+        judge: Which tip positions the arm can take on a side.
+
+    Returns:
+        The route with the arm's side at every waypoint.
+
+    Raises:
+        PathBlocked: If nothing of the path can be drawn, or a way cannot be joined.
+    """
+    shadow = Shadow(region)
+    station, note = first_station(path, region)
+    rows = path_rows(path, station, region)
+    pieces = _drawable(rows, shadow, judge)
+    if not pieces:
+        raise PathBlocked(
+            obstacle=region.name, reason="no point of the path can be drawn"
+        )
+    ways: list[Rows] = []
+    here, label = path.start, 0
+    for piece in pieces:
+        left_at = ways[-1].stations[-1] if ways else piece.stations[0]
+        way = _connect(path, shadow, here, label, piece, float(left_at))
+        ways += [way, piece]
+        here, label = piece.points[-1], int(piece.side[-1])
+    if path.closed:
+        home = Rows(path.start[None], np.zeros(1), False, np.zeros(1, np.int64))
+        left_at = float(ways[-1].stations[-1])
+        ways.append(_connect(path, shadow, here, label, home, left_at))
+    return join(path, ways, (note,) if note else ())
+
+
+def _drawable(rows: Rows, shadow: Shadow, judge: Judge) -> list[Rows]:
+    """The parts of the path that are drawn in one go, each with its sides."""
+    points = project(rows.points)
+    inside = shadow.region.contains(points)
+    # Two layers: waypoint k as the end of one part and as the beginning of the next.
+    leaving, joining = np.zeros(len(rows), int), np.zeros(len(rows), int)
+    drawn, cut = ~inside, np.zeros(len(rows), bool)
+    for visit in shadow.visits(points):
+        span = slice(visit.first, visit.last + 1)
+        before, after = _sides_drawn(rows, visit, shadow, judge)
+        leaving[span], joining[span] = before, after
+        drawn[span] = (before != 0) | (after != 0)
+        both = np.flatnonzero((before != 0) & (after != 0) & (before != after))
+        cut[visit.first + both] = True
+    parts = []
+    k = 0
+    while k < len(rows):
+        if not drawn[k]:
+            k += 1
+            continue
+        first = k
+        while k + 1 < len(rows) and drawn[k + 1]:
+            k += 1
+            if cut[k]:
+                break
+        side = joining[first : k + 1].copy()
+        side[-1] = leaving[k]
+        parts.append(rows.part(first, k, side))
+        if not cut[k] or first == k:
+            k += 1
+    return parts
+
+
+def _sides_drawn(
+    rows: Rows, visit: Visit, shadow: Shadow, judge: Judge
+) -> tuple[IntArray, IntArray]:
+    """On which side each waypoint of a visit is drawn; 0 for not at all.
+
+    The arm keeps the side it came in by as far as it can stand so, and the side it goes
+    out by from as early as it can. Where both are possible, the sides change at the
+    waypoint nearest to the obstacle.
+
+    Returns:
+        Side as the end of a part and as the beginning of the next; they differ only at
+        the waypoint where the sides change.
+    """
+    points = rows.points[visit.first : visit.last + 1]
+    count = len(points)
+    entry, exit_ = visit.entry, visit.exit
+    if entry == 0 and exit_ == 0:
+        able = {side: int(judge(points, side).sum()) for side in (-1, 1)}
+        entry = exit_ = max(able, key=lambda side: able[side])
+    before, after = np.zeros(count, int), np.zeros(count, int)
+    if entry == exit_:
+        kept = np.where(judge(points, entry), entry, 0)
+        return kept, kept
+    n_before = _leading(judge(points, entry)) if entry else 0
+    n_after = _leading(judge(points, exit_)[::-1]) if exit_ else 0
+    first_after = count - n_after
+    if n_before > first_after:
+        gaps = np.linalg.norm(project(points) - shadow.region.centre, axis=1)
+        change = first_after + int(np.argmin(gaps[first_after:n_before]))
+        n_before, first_after = change + 1, change
+    before[:n_before] = entry
+    after[first_after:] = exit_
+    leaving = np.where(before != 0, before, after)
+    joining = np.where(after != 0, after, before)
+    return leaving, joining
+
+
+def _leading(able: BoolArray) -> int:
+    """How many entries are true from the beginning on."""
+    return len(able) if able.all() else int(np.argmin(able))
+
+
+def _connect(
+    path: DesiredPath,
+    shadow: Shadow,
+    here: FloatArray,
+    label: int,
+    piece: Rows,
+    station: float,
+) -> Rows:
+    """The shortest way off the path that leaves and arrives on the right sides."""
+    begin, end = here[1:], piece.points[0, 1:]
+    region = shadow.region
+    lines = [region.walk(begin, end, 1), region.walk(begin, end, -1)]
+    straight = np.stack([begin, end])
+    if (
+        region.core_distance(straight[None])[0]
+        >= region.radius - TOLERANCES.on_boundary
+    ):
+        lines.insert(0, straight)
+    lines.sort(
+        key=lambda line: float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+    )
+    for line in lines:
+        way = off_path_rows(
+            path, line, float(here[0]), float(piece.points[0, 0]), station
+        )
+        side = _sides_on_way(way, shadow, label, int(piece.side[0]))
+        if side is not None:
+            return way.part(0, len(way) - 1, side)
+    reason = "the tip cannot get round it with the arm on the side it needs"
+    raise PathBlocked(obstacle=region.name, reason=reason)
+
+
+def _sides_on_way(
+    way: Rows, shadow: Shadow, label: int, target: int
+) -> IntArray | None:
+    """The arm's side along a way; None where it would have to change in the shadow."""
+    points = project(way.points)
+    side = np.zeros(len(way), int)
+    for visit in shadow.visits(points):
+        needs = {visit.entry, visit.exit}
+        if visit.first == 0:
+            needs.add(label)
+        if visit.last == len(way) - 1:
+            needs.add(target)
+        needs.discard(0)
+        if len(needs) > 1:
+            return None
+        side[visit.first : visit.last + 1] = needs.pop() if needs else 1
+    return side

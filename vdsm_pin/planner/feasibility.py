@@ -1,0 +1,51 @@
+"""Step 1: can the arm reach the desired path at all (paper, 3.2, Eq. 4)?
+
+Two radii about the rail matter. Eq. 4 bends every joint to its limit, so the arm curls
+up until its links stand square to the rail: no arm reaches farther. The method itself
+keeps the arm straight where nothing is in the way, so its first joint alone must lean
+as far as the tip is out; this radius is smaller. A tip between the two passes the
+paper's test and breaks the limit of psi_1 in its method. Both are tested.
+"""
+
+import numpy as np
+
+from vdsm_pin.errors import OutOfReach
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.problem import DesiredPath
+
+
+def curled_reach(manipulator: Manipulator) -> float:
+    """r_yz, the reach with every joint at its limit (Eq. 4); [m]."""
+    inclination = manipulator.max_link_angle * np.arange(1, manipulator.n_links + 1)
+    rise = np.sin(np.minimum(inclination, np.pi / 2.0))
+    return float(manipulator.link_lengths @ rise)
+
+
+def straight_reach(manipulator: Manipulator) -> float:
+    """The reach of the straight arm, whose only changed link angle is psi_1; [m]."""
+    return manipulator.total_length * float(np.sin(manipulator.max_link_angle))
+
+
+def check_feasibility(manipulator: Manipulator, path: DesiredPath) -> None:
+    """Refuse a path that leaves the reach.
+
+    The distance from the rail is convex along a straight side: the corners decide.
+
+    Args:
+        manipulator: The arm.
+        path: The desired path.
+
+    Raises:
+        OutOfReach: With the reach it exceeds; waypoint 0 is the start, i is corner i.
+    """
+    waypoints = np.vstack([path.start, path.points])
+    distances = np.hypot(waypoints[:, 1], waypoints[:, 2])
+    worst = int(np.argmax(distances))
+    distance = float(distances[worst])
+    curled, straight = curled_reach(manipulator), straight_reach(manipulator)
+    if distance > curled:
+        reason = "every joint at its limit, Eq. 4"
+        raise OutOfReach(sample=worst, distance=distance, reach=curled, reason=reason)
+    if distance > straight:
+        reason = f"straight arm; curled up it would reach {curled:.6f} m"
+        raise OutOfReach(sample=worst, distance=distance, reach=straight, reason=reason)

@@ -1,0 +1,37 @@
+"""Step 5: the joints' projected paths round an obstacle (paper, 4.3, Eq. 8-10)."""
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.planner.danger_region import DangerRegion
+
+
+def slide_joints(
+    manipulator: Manipulator,
+    tip: FloatArray,
+    region: DangerRegion,
+    directions: FloatArray,
+) -> FloatArray:
+    """Joints in the danger region slide onto its boundary, from the tip to the base.
+
+    P'_i = k_{i,i+1} P_{i+1} (Eq. 8-10) is the place of joint i in proportion. Inside
+    the region it moves along the auxiliary line through P'_i, to the side on which the
+    arm passes, onto the boundary; outside it is P_i already.
+
+    Args:
+        manipulator: The arm with its ratios.
+        tip: Projected tip P_{N+1}, shape (n_samples, 2); [m].
+        region: The danger region, in the plane Y0Z0.
+        directions: Auxiliary lines, unit vectors towards the arm's side, shape
+            (n_samples, 2); [-].
+
+    Returns:
+        P_1..P_{N+1}, shape (n_samples, N + 1, 2); [m].
+    """
+    planar = np.zeros((len(tip), manipulator.n_links + 1, 2))
+    planar[:, -1] = tip
+    for i in range(manipulator.n_links, 1, -1):
+        reference = manipulator.ratio(i, i + 1) * planar[:, i]
+        planar[:, i - 1] = region.slide(reference, directions)
+    return planar

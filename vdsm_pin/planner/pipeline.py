@@ -1,0 +1,148 @@
+"""The paper's method from problem to plan: seven steps, one call each."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.cables import cable_lengths
+from vdsm_pin.errors import Infeasible, NoPlanFound, PathBlocked
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.avoidance import Avoidance, Straight, avoidances
+from vdsm_pin.planner.feasibility import check_feasibility
+from vdsm_pin.planner.lift import lift
+from vdsm_pin.planner.project import project
+from vdsm_pin.planner.records import LinkClearance, Plan
+from vdsm_pin.planner.scale import scale
+from vdsm_pin.planner.solve import solve
+from vdsm_pin.planner.tip_path import Route, subdivided
+from vdsm_pin.problem import Blocked, PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+
+SUBDIVISIONS: Final = 4
+"""Rounds of inserting waypoints; a motion still too fast after them has a jump."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What Steps 4 to 7 give for one way of avoiding the obstacle.
+
+    Args:
+        route: Step 4.
+        centres: Step 6, shape (n_samples, N + 1, 3); [m].
+        trajectory: Step 7.
+    """
+
+    route: Route
+    centres: FloatArray
+    trajectory: Trajectory
+
+
+def plan_paper(
+    problem: PlanningProblem, clearance: LinkClearance, margin: float
+) -> Plan:
+    """Plan by the paper's seven steps.
+
+    Args:
+        problem: What is asked.
+        clearance: Clearance of every link at given joint centres.
+        margin: Kept beyond the required clearance at every waypoint; [m].
+
+    Returns:
+        The plan; every limit is kept at every waypoint.
+
+    Raises:
+        Infeasible: With the reason, where the paper's rule has no plan.
+    """
+    check_feasibility(problem.manipulator, problem.path)
+    motion = _best_motion(problem, clearance, margin)
+    trajectory = motion.trajectory
+    cables = cable_lengths(problem.manipulator, trajectory.alpha, trajectory.theta)
+    return Plan(
+        problem,
+        "paper",
+        motion.route.tip_path,
+        motion.centres,
+        trajectory,
+        cables,
+        motion.route.notes,
+    )
+
+
+def _best_motion(
+    problem: PlanningProblem, clearance: LinkClearance, margin: float
+) -> Motion:
+    """The first motion that draws the whole path, else the one that draws most."""
+    required = problem.required_clearance + margin
+    straight = _motion(problem, Straight(problem))
+    if not problem.scene.obstacles or _least(clearance, straight) >= required:
+        return straight
+    best: Motion | None = None
+    missing, reason = np.inf, None
+    for avoidance in avoidances(problem, margin):
+        try:
+            motion = _motion(problem, avoidance)
+            least = _least(clearance, motion)
+            if not least >= required:
+                message = (
+                    f"the links come within {least:.6f} m of the obstacle, "
+                    f"{required:.6f} m are needed"
+                )
+                raise NoPlanFound(message)
+        except Infeasible as error:
+            reason = reason or error
+            continue
+        undrawn = float(np.diff(motion.route.undrawn, axis=1).sum())
+        if undrawn < missing:
+            best, missing = motion, undrawn
+        if missing == 0.0:
+            break
+    if best is None:
+        raise reason or NoPlanFound("the paper's rule offers no way round")
+    _refuse_gaps(problem, best)
+    return best
+
+
+def _motion(problem: PlanningProblem, avoidance: Avoidance) -> Motion:
+    """Steps 2 to 7 for one avoidance; rows are inserted where joints move fast."""
+    manipulator = problem.manipulator
+    route = avoidance.route()  # Step 4
+    for _ in range(SUBDIVISIONS):
+        points = route.tip_path.points
+        tip = project(points)  # Step 2
+        reference = scale(manipulator, tip)  # Step 3
+        planar = avoidance.joints(route, reference)  # Step 5
+        centres = lift(manipulator, planar, points[:, 0])  # Step 6
+        trajectory = solve(manipulator, route, centres)  # Step 7
+        steps = _joint_steps(trajectory)
+        if (steps <= TOLERANCES.planned_step).all():
+            return Motion(route, centres, trajectory)
+        pieces = np.ceil(steps / TOLERANCES.planned_step).astype(np.int64)
+        route = subdivided(problem.path, route, np.maximum(pieces, 1))
+    message = (
+        f"a joint turns by {np.rad2deg(steps.max()):.1f} deg at once near waypoint "
+        f"{int(np.argmax(steps))}: the paper's rule is not continuous there"
+    )
+    raise NoPlanFound(message)
+
+
+def _joint_steps(trajectory: Trajectory) -> FloatArray:
+    """Largest change of a joint angle per interval, shape (n_samples - 1,); [rad]."""
+    yaw = np.abs(np.diff(trajectory.alpha, axis=0)).max(axis=1)
+    pitch = np.abs(np.diff(trajectory.theta, axis=0)).max(axis=1)
+    return np.asarray(np.maximum(yaw, pitch))
+
+
+def _least(clearance: LinkClearance, motion: Motion) -> float:
+    return float(clearance(motion.centres).min())
+
+
+def _refuse_gaps(problem: PlanningProblem, motion: Motion) -> None:
+    if problem.path.blocked is Blocked.FAIL and len(motion.route.undrawn):
+        first, last = motion.route.undrawn[0]
+        reason = (
+            f"the desired path cannot be drawn from {first:.4f} m to {last:.4f} m, and "
+            "the problem allows no detour (blocked: fail)"
+        )
+        raise PathBlocked(obstacle=problem.scene.names[0], reason=reason)

@@ -1,0 +1,72 @@
+"""Step 7: joint angles and cable lengths from the joint centres (paper, section 5)."""
+
+import numpy as np
+
+from vdsm_pin.errors import LimitExceeded
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.kinematics import joint_angles, link_angles
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.planner.tip_path import Route
+from vdsm_pin.trajectory import Trajectory
+
+
+def solve(manipulator: Manipulator, route: Route, centres: FloatArray) -> Trajectory:
+    """The motion in joint space (Eq. 11-15), checked against every limit.
+
+    Args:
+        manipulator: The arm.
+        route: Step 4's route.
+        centres: Step 6's joint centres, shape (n_samples, N + 1, 3); [m].
+
+    Returns:
+        The trajectory.
+
+    Raises:
+        LimitExceeded: If psi, theta, alpha or x0 leaves its range anywhere.
+    """
+    alpha, theta = joint_angles(manipulator, centres)
+    x0 = centres[:, 0, 0]
+    check_limits(manipulator, x0, alpha, theta)
+    tip = route.tip_path
+    return Trajectory(tip.on_path, tip.path_m, x0, alpha, theta)
+
+
+def check_limits(
+    manipulator: Manipulator, x0: FloatArray, alpha: FloatArray, theta: FloatArray
+) -> None:
+    """Refuse a motion that leaves the psi cone, the theta/alpha box or the rail.
+
+    Args:
+        manipulator: The arm.
+        x0: Base positions, shape (n_samples,); [m].
+        alpha: Yaw angles, shape (n_samples, N); [rad].
+        theta: Pitch angles, shape (n_samples, N); [rad].
+
+    Raises:
+        LimitExceeded: With the worst sample, the joint, the value and the limit.
+    """
+    box, cone = manipulator.max_joint_angle, manipulator.max_link_angle
+    for name, values, limit in (
+        ("psi", link_angles(alpha, theta), cone),
+        ("|theta|", np.abs(theta), box),
+        ("|alpha|", np.abs(alpha), box),
+    ):
+        if not (values <= limit).all():
+            sample, joint = np.unravel_index(int(np.argmax(values)), values.shape)
+            raise LimitExceeded(
+                sample=int(sample),
+                quantity=f"{name} of joint {joint + 1}",
+                value=float(np.rad2deg(values[sample, joint])),
+                limit=float(np.rad2deg(limit)),
+                unit="deg",
+            )
+    low, high = manipulator.base_range
+    for worst, limit, kept in (
+        (int(np.argmin(x0)), low, bool((x0 >= low).all())),
+        (int(np.argmax(x0)), high, bool((x0 <= high).all())),
+    ):
+        if not kept:
+            value = float(x0[worst])
+            raise LimitExceeded(
+                sample=worst, quantity="x0", value=value, limit=limit, unit="m"
+            )

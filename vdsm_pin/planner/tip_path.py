@@ -1,0 +1,235 @@
+"""Step 4: the route of the tip (paper, 4.2), as far as no obstacle is met.
+
+The tip goes from its start onto the desired path, draws it, and returns where the path
+is closed. Off the path it steps back along -X, least at the ends and most at mid-way.
+`detours.py` adds the way round an obstacle.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.planner.records import TipPath
+from vdsm_pin.problem import DesiredPath
+from vdsm_pin.tolerances import TOLERANCES
+
+
+@dataclass(frozen=True)
+class Route:
+    """The tip's route and the side on which the arm passes the obstacle.
+
+    Args:
+        tip_path: The route.
+        side: 1 where the arm passes the obstacle on the side of the larger polar
+            angle about P_1, -1 on the other, 0 where there is none, (n_samples,).
+        undrawn: Stretches of the desired path left out, arc lengths from and to,
+            shape (k, 2); [m].
+        notes: What the user should know, one sentence each.
+    """
+
+    tip_path: TipPath
+    side: IntArray
+    undrawn: FloatArray
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        object.__setattr__(self, "side", frozen(self.side, np.int64))
+        object.__setattr__(self, "undrawn", frozen(self.undrawn))
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Consecutive waypoints, before they are joined to a route.
+
+    Args:
+        points: Shape (n, 3); [m].
+        stations: Arc length along the desired path, shape (n,); [m].
+        on_path: Whether these rows draw the path.
+        side: As in `Route`, shape (n,).
+    """
+
+    points: FloatArray
+    stations: FloatArray
+    on_path: bool
+    side: IntArray
+
+    def __len__(self) -> int:
+        """Number of waypoints."""
+        return len(self.points)
+
+    def part(self, first: int, last: int, side: IntArray) -> "Rows":
+        """Waypoints first to last (included), with their sides."""
+        rows = slice(first, last + 1)
+        return Rows(self.points[rows], self.stations[rows], self.on_path, side)
+
+
+def drawn_rows(path: DesiredPath, first: float) -> Rows:
+    """The whole desired path at its spacing, corners included.
+
+    Args:
+        path: What to draw.
+        first: Arc length at which a closed path is begun; 0 for an open one; [m].
+
+    Returns:
+        Waypoints; stations run from `first` to `first` + length, so a closed path
+        passes its own length on the way.
+    """
+    corners = path.corner_stations
+    if path.closed:
+        corners = np.concatenate([corners, corners[1:] + path.length])
+    last = first + path.length
+    inner = corners[(corners > first) & (corners < last)]
+    knots = np.concatenate([[first], inner, [last] if last > first else []])
+    counts = np.ceil(np.diff(knots) / path.spacing).astype(int)
+    parts = [
+        np.linspace(a, b, n, endpoint=False)
+        for a, b, n in zip(knots[:-1], knots[1:], counts, strict=True)
+    ]
+    stations = np.concatenate([*parts, knots[-1:]])
+    return rows_at(path, stations)
+
+
+def rows_at(path: DesiredPath, stations: FloatArray) -> Rows:
+    """Waypoints on the desired path at arc lengths from 0 to twice its length."""
+    wrapped = np.where(stations > path.length, stations - path.length, stations)
+    side = np.zeros(len(stations), np.int64)
+    return Rows(path.at(wrapped), stations, True, side)
+
+
+def off_path_rows(
+    path: DesiredPath, line: FloatArray, from_x: float, to_x: float, station: float
+) -> Rows:
+    """Waypoints of a way off the path, its two ends included.
+
+    Args:
+        path: For its spacing and retreat.
+        line: Projected way, a polyline of shape (m, 2), m >= 2; [m].
+        from_x: x of the tip at the beginning; [m].
+        to_x: x of the tip at the end; [m].
+        station: Arc length at which the path was left, or where it begins; [m].
+
+    Returns:
+        Waypoints, an odd number of them, so that one is at mid-way.
+    """
+    sides = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    walked = np.concatenate([[0.0], np.cumsum(sides)])
+    length = float(walked[-1])
+    # A way shorter than one row leaves nothing to step back from.
+    retreat = path.retreat if length > path.spacing else 0.0
+    # No waypoint moves faster than this over the unit interval.
+    fastest = float(np.hypot(length, abs(to_x - from_x) + np.pi * retreat))
+    n_rows = 2 * int(np.ceil(fastest / (2.0 * path.spacing))) + 1
+    part = np.linspace(0.0, 1.0, n_rows)
+    points = np.zeros((n_rows, 3))
+    points[:, 0] = from_x + part * (to_x - from_x) - retreat * np.sin(np.pi * part)
+    for column in (0, 1):
+        points[:, 1 + column] = np.interp(part * length, walked, line[:, column])
+    stations = np.full(n_rows, station)
+    return Rows(points, stations, False, np.zeros(n_rows, np.int64))
+
+
+def nearest_station(path: DesiredPath) -> float:
+    """The "shortest distance" scheme: the point of the path nearest to the start.
+
+    An open path is drawn from its first corner, whatever the scheme.
+    """
+    if not path.closed or path.length == 0.0:
+        return 0.0
+    begins, ends = path.corners[:-1], path.corners[1:]
+    along = ends - begins
+    squared = np.einsum("ij,ij->i", along, along)
+    towards = np.einsum("ij,ij->i", path.start - begins, along)
+    part = np.clip(towards / np.where(squared > 0.0, squared, 1.0), 0.0, 1.0)
+    gaps = np.linalg.norm(begins + part[:, None] * along - path.start, axis=1)
+    side = int(np.argmin(gaps))
+    begin = path.corner_stations[side]
+    return float(begin + part[side] * np.sqrt(squared[side]))
+
+
+def straight_route(path: DesiredPath) -> Route:
+    """The route where no obstacle is met: to the path, along it, and back."""
+    first = nearest_station(path)
+    drawn = drawn_rows(path, first)
+    there = _straight(path, path.start, drawn.points[0], first)
+    parts = [there, drawn]
+    if path.closed:
+        parts.append(_straight(path, drawn.points[-1], path.start, first))
+    return join(path, parts)
+
+
+def _straight(
+    path: DesiredPath, begin: FloatArray, end: FloatArray, station: float
+) -> Rows:
+    line = np.stack([begin[1:], end[1:]])
+    return off_path_rows(path, line, float(begin[0]), float(end[0]), station)
+
+
+def join(path: DesiredPath, parts: list[Rows], notes: tuple[str, ...] = ()) -> Route:
+    """Put ways together; a waypoint shared by two of them counts as drawn."""
+    kept = []
+    for k, rows in enumerate(parts):
+        if rows.on_path:
+            kept.append(rows)
+            continue
+        begin = 1 if k > 0 else 0
+        end = len(rows) - (1 if k + 1 < len(parts) else 0)
+        kept.append(rows.part(begin, end - 1, rows.side[begin:end]))
+    stations = np.concatenate([rows.stations for rows in kept])
+    stations = np.where(stations > path.length, stations - path.length, stations)
+    on_path = np.concatenate([np.full(len(rows), rows.on_path) for rows in kept])
+    points = np.concatenate([rows.points for rows in kept])
+    side = np.concatenate([rows.side for rows in kept])
+    undrawn = _undrawn(path, [rows for rows in kept if rows.on_path])
+    route = Route(TipPath(points, on_path, stations), side, undrawn, notes)
+    gaps = tuple(
+        f"the desired path is not drawn from {a:.4f} m to {b:.4f} m" for a, b in undrawn
+    )
+    return replace(route, notes=(*gaps, *notes))
+
+
+def _undrawn(path: DesiredPath, drawn: list[Rows]) -> FloatArray:
+    """Stretches no drawn part covers, shape (k, 2); [m]."""
+    covered = []
+    for rows in drawn:
+        first, last = float(rows.stations[0]), float(rows.stations[-1])
+        if last <= path.length:
+            covered.append((first, last))
+        elif first >= path.length:
+            covered.append((first - path.length, last - path.length))
+        else:
+            covered += [(first, path.length), (0.0, last - path.length)]
+    gaps, reached = [], 0.0
+    for first, last in [*sorted(covered), (path.length, path.length)]:
+        if first - reached > TOLERANCES.on_path_length:
+            gaps.append((reached, first))
+        reached = max(reached, last)
+    return np.array(gaps).reshape(-1, 2)
+
+
+def subdivided(path: DesiredPath, route: Route, pieces: IntArray) -> Route:
+    """The same route with more waypoints.
+
+    Args:
+        path: The desired path, on which drawn waypoints stay.
+        route: The route.
+        pieces: Into how many pieces each interval is cut, shape (n_samples - 1,).
+    """
+    tip = route.tip_path
+    interval = np.repeat(np.arange(len(pieces)), pieces)
+    firsts = np.cumsum(pieces) - pieces
+    part = (np.arange(len(interval)) - firsts[interval]) / pieces[interval]
+    begin, end = np.append(interval, len(pieces)), np.append(interval + 1, len(pieces))
+    part = np.append(part, 0.0)
+    points = tip.points[begin] + part[:, None] * (tip.points[end] - tip.points[begin])
+    after = tip.path_m[end]
+    # A closed path passes its first point: stations go on from length to 0.
+    after = np.where(after < tip.path_m[begin], after + path.length, after)
+    stations = tip.path_m[begin] + part * (after - tip.path_m[begin])
+    on_path = np.where(part > 0.0, tip.on_path[begin] & tip.on_path[end], False)
+    on_path |= (part == 0.0) & tip.on_path[begin]
+    side = np.where(route.side[begin] != 0, route.side[begin], route.side[end])
+    stations = np.where(on_path | (part == 0.0), stations, tip.path_m[begin])
+    stations = np.where(stations > path.length, stations - path.length, stations)
+    return replace(route, tip_path=TipPath(points, on_path, stations), side=side)
