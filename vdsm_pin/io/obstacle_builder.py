@@ -184,9 +184,10 @@ class ObstacleBuilder:
     def _check_simple(self, polygon: FloatArray, at: Location) -> None:
         import shapely
 
-        shape = shapely.Polygon(polygon) if len(polygon) > 2 else None
-        if shape is None or not shape.area > 0.0:
+        hull = shapely.MultiPoint(polygon).convex_hull
+        if not hull.area > 0.0:
             raise self.document.invalid(at, "encloses no area")
+        shape = shapely.Polygon(polygon)
         if not shape.is_valid:
             reason = shapely.is_valid_reason(shape)
             problem = f"crosses or touches itself ({reason}); expected a simple polygon"

@@ -48,7 +48,10 @@ _NAMES: Final = {
 
 
 def first_error(error: ValidationError, document: YamlDocument) -> InvalidFile:
-    """The error nearest to the top of the file.
+    """The error that most likely explains the others.
+
+    A wrong version comes first and a missing key last, since a misspelt key is missing
+    too; else the one nearest to the top of the file.
 
     Args:
         error: All that pydantic found.
@@ -61,7 +64,13 @@ def first_error(error: ValidationError, document: YamlDocument) -> InvalidFile:
         (_location(details, document.data), details)
         for details in error.errors(include_url=False)
     ]
-    at, details = min(found, key=lambda pair: document.line(pair[0]) or 0)
+
+    def rank(pair: tuple[Location, ErrorDetails]) -> tuple[bool, bool, int]:
+        at, kind = pair[0], pair[1]["type"]
+        missing = kind == "missing"
+        return at != ("vdsm_problem",) or missing, missing, document.line(at) or 0
+
+    at, details = min(found, key=rank)
     more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
     return document.invalid(at, _problem(details, at) + more)
 

@@ -41,8 +41,8 @@ class YamlDocument:
     Args:
         file: The file as the user named it.
         data: Maps with text keys, lists, text, numbers, booleans, null.
-        lines: Line of every value of a map and of every map or list in a list, by its
-            location: the keys and indices that lead to it.
+        lines: Line of every value by its location, the keys and indices that lead to
+            it; items on the line of their list are left out.
     """
 
     file: object
@@ -144,9 +144,10 @@ class _Builder:
         if event.tag is not None:
             problem = f"has the tag {event.tag!r}; a problem file holds plain data only"
             raise self._invalid(event, problem)
+        if self.lines.get(at[:-1]) != _line(event):
+            self.lines.setdefault(at, _line(event))
         if isinstance(event, yaml.ScalarEvent):
             return _scalar(event.value) if event.implicit[0] else str(event.value)
-        self.lines.setdefault(at, _line(event))
         mapping = isinstance(event, yaml.MappingStartEvent)
         return self._mapping(at) if mapping else self._sequence(at)
 

@@ -1,0 +1,340 @@
+"""Bad problem files: one sentence with file, field, line, value and expectation."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from problem_texts import EVERYTHING, TETRAHEDRON, binary_stl, edited
+
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.io import problem_file, source, yaml_reader
+from vdsm_pin.io.problem_file import built_in_text, read_problem
+
+OBS1 = built_in_text("paper/obs1")
+PILLAR = {
+    "name": "pillar",
+    "shape": "cylinder",
+    "axis": "x",
+    "center": [1563, 700, 600],
+    "radius": 200,
+    "length": 9000,
+}
+BAR = {"name": "bar", "shape": "prism", "axis": "x", "from": 0, "to": 10}
+ARM = {
+    "link_lengths": [500, 500, 500, 500, 500, 500],
+    "link_radius": 60,
+    "max_link_angle_deg": 40,
+    "max_joint_angle_deg": 40,
+}
+STRAIGHT = {"x0": 0, "alpha_deg": [0] * 8, "theta_deg": [0] * 8}
+NAN, INF = float("nan"), float("inf")
+
+
+def refusal(path: Path) -> str:
+    """What reading the file says; names the file once and fits on one line."""
+    with pytest.raises(InvalidFile) as caught:
+        read_problem(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert "\n" not in message
+    assert len(message) - len(str(path)) < 400
+    return message.removeprefix(f"{path}: ")
+
+
+def refused_text(folder: Path, text: str | bytes) -> str:
+    path = folder / "p.yaml"
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    return refusal(path)
+
+
+ONE_VALUE: list[tuple[tuple[Any, ...], Any, str]] = [
+    (("length_unit",), ..., "length_unit (line 1): is missing; expected: Unit of"),
+    (("length_unit",), "cm", "length_unit (line 3): is 'cm', expected 'mm' or 'm'"),
+    (("length_unit",), 1, "length_unit (line 3): is 1, expected 'mm' or 'm'"),
+    (("vdsm_problem",), 2, "vdsm_problem (line 1): is 2, expected 1"),
+    (("vdsm_problem",), True, "vdsm_problem (line 1): is 'true', expected 1"),
+    (("name",), "../up", "name (line 2): is '../up', expected letters"),
+    (("name",), "a/b", "name (line 2): is 'a/b', expected letters"),
+    (("colour",), "red", "colour (line 43): is not a known key; known: vdsm_problem"),
+    (("manipulator",), "hrm9", "manipulator (line 4): is 'hrm9'; known: hrm8"),
+    (
+        ("manipulator",),
+        8,
+        "manipulator (line 4): is 8, expected the name of a built-in",
+    ),
+    (("obstacles",), None, "obstacles (line 5): is empty, expected a list"),
+    (("obstacles",), {}, "obstacles (line 5): is a mapping, expected a list"),
+    (("obstacles", 0), 7, "obstacles[0] (line 6): is 7, expected a mapping"),
+    (("obstacles", 0, "name"), ..., "obstacles[0].name (line 6): is missing"),
+    (("obstacles", 0, "name"), "", "obstacles[0].name (line 6): is '', expected"),
+    (("obstacles", 0, "shape"), "cone", "obstacles[0].shape (line 7): is 'cone'"),
+    (("obstacles", 0, "shape"), ..., "obstacles[0].shape (line 6): is missing"),
+    (("obstacles", 0, "radius"), -200, "obstacles[0].radius (line 13): is -200, expec"),
+    (("obstacles", 0, "radius"), 0, "radius (line 13): is 0, expected above 0"),
+    (("obstacles", 0, "radius"), NAN, "radius (line 13): is nan, expected a finite"),
+    (("obstacles", 0, "radius"), INF, "radius (line 13): is inf, expected a finite"),
+    (
+        ("obstacles", 0, "radius"),
+        "200",
+        "radius (line 13): is '200', expected a number",
+    ),
+    (("obstacles", 0, "radius"), True, "radius (line 13): is true, expected a number"),
+    (("obstacles", 0, "radius"), None, "radius (line 13): is empty, expected a number"),
+    (
+        ("obstacles", 0, "radius"),
+        [200],
+        "radius (line 13): is [200], expected a number",
+    ),
+    (("obstacles", 0, "radius"), 1e13, "is 10000000000000.0, expected 1e+12 or less"),
+    (("obstacles", 0, "radius"), 1e-321, "obstacles[0] (line 6): obstacle 'pillar': r"),
+    (("obstacles", 0, "length"), 9e6, "'pillar' reaches 4.50176e+06 mm from the base"),
+    (
+        ("obstacles", 0, "center", 1),
+        NAN,
+        "center[1] (line 11): is nan, expected a finit",
+    ),
+    (("obstacles", 0, "axis"), "w", "axis (line 8): is 'w', expected 'x', 'y' or 'z'"),
+    (("obstacles", 0, "axis"), 3, "axis (line 8): is 3, expected x, y, z or a list"),
+    (("obstacles", 0, "axis"), [0, 0, 0], "which has no direction"),
+    (("obstacles", 0, "axis"), [1, 0], "axis (line 8): is [1, 0], expected at least 3"),
+    (("obstacles", 0, "colour"), 1, "is not a known key; known: name, axis, center"),
+    (
+        ("obstacles",),
+        [PILLAR, PILLAR | {"center": [0, 0, 900]}],
+        "obstacles[1].name (line 15): is 'pillar', which obstac",
+    ),
+    (("tip_path",), ..., "tip_path (line 1): is missing; expected: What the tip"),
+    (("tip_path", "points"), [], "tip_path.points (line 20): is [], expected at least"),
+    (("tip_path", "points"), ..., "tip_path.points (line 15): is missing"),
+    (("tip_path", "points", 1), [1, 2], "points[1] (line 24): is [1, 2], expected at"),
+    (("tip_path", "points", 1, 2), "a", "points[1][2] (line 26): is 'a', expected a n"),
+    (("tip_path", "points", 1, 2), 2e5, "points[1] (line 24): lies 200027 mm from the"),
+    (("tip_path", "spacing"), 0, "tip_path.spacing (line 37): is 0, expected above 0"),
+    (
+        ("tip_path", "spacing"),
+        0.001,
+        "cuts 6200 mm of path into more than 5000000 rows",
+    ),
+    (("tip_path", "spacing"), 1e-300, "more than 5000000 rows"),
+    (("tip_path", "retreat"), -1, "retreat (line 39): is -1, expected 0 or more"),
+    (("tip_path", "approach"), "no", "expected 'shortest', 'equidistant' or 'nearest_"),
+    (("tip_path", "blocked"), True, "blocked (line 40): is true, expected 'detour' or"),
+    (
+        ("tip_path", "closed"),
+        "yes",
+        "closed (line 36): is 'yes', expected true or fals",
+    ),
+    (("tip_path", "required_coverage"), 1.5, "is 1.5, expected 1 or less"),
+    (("tip_path", "order"), "any", "is 'any', expected 'as_given' or 'free'"),
+    (("required_clearance",), -1, "required_clearance (line 42): is -1, expected 0 or"),
+    (("required_clearance",), ..., "required_clearance (line 1): is missing"),
+    (("base",), {"rpy": [0, 0, 0]}, "base.rpy (line 44): is not a known key; known: p"),
+    (("tip_path", "start"), 3126, "is 3126, expected 3 numbers or a mapping with joi"),
+    (
+        ("tip_path", "start"),
+        [3126, 4000, 0],
+        "lies 4000 mm from the rail, the arm is 3",
+    ),
+    (("tip_path", "start"), [3126, 2200, 0], "needs a link angle psi of 44.73 deg"),
+    (("tip_path", "start"), [9126, 0, 0], "base of the straight arm at x0 = 6000 mm"),
+    (("tip_path", "start"), {"joints": STRAIGHT | {"x0": 5001}}, "joints.x0 (line 18)"),
+    (
+        ("tip_path", "start"),
+        {"joints": STRAIGHT | {"alpha_deg": [0] * 7}},
+        "joints.alpha_deg (line 19): has 7 values, expected 8, one per joint",
+    ),
+    (
+        ("tip_path", "start"),
+        {"joints": STRAIGHT | {"theta_deg": [0] * 7 + [43]}},
+        "theta_deg[7] (line 36): is 43 deg, the joint's limit is 42.5 deg",
+    ),
+    (("manipulator",), ARM | {"link_lengths": [500]}, "expected at least 2 entries"),
+    (("manipulator",), ARM | {"link_lengths": [9] * 41}, "expected at most 40 entries"),
+    (
+        ("manipulator",),
+        ARM | {"link_lengths": [500, 0]},
+        "link_lengths[1] (line 7): is",
+    ),
+    (("manipulator",), ARM | {"max_link_angle_deg": 90}, "is 90, expected below 90"),
+    (
+        ("manipulator",),
+        ARM | {"base_range": [5, -5]},
+        "is [5.0, -5.0], expected the sm",
+    ),
+    (
+        ("manipulator",),
+        ARM | {"link_lengths": [500, 120, 500]},
+        "link_lengths[1] (line 7): is 120 mm, expected above 120 mm",
+    ),
+    (
+        ("manipulator",),
+        ARM | {"cables": {"hole_radius": 60, "half_gap": 10}},
+        "cables.hole_radius (line 16): is 60, expected below the body radius 60",
+    ),
+    (
+        ("manipulator",),
+        ARM | {"cables": {"hole_radius": 50, "half_gap": 250}},
+        "cables.half_gap (line 17): is 250, expected below half the shortest link 500",
+    ),
+    (
+        ("manipulator",),
+        ARM
+        | {"cables": {"hole_radius": 5, "half_gap": 5, "hole_angles_deg": [[0, 1, 2]]}},
+        "hole_angles_deg (line 18): has 1 rows, expected 6, one per link",
+    ),
+    (
+        ("obstacles",),
+        [BAR | {"polygon": [[0, 0], [10, 10], [10, 0], [0, 10]]}],
+        "polygon (line 11): crosses or touches itself (Self-intersection[5 5])",
+    ),
+    (
+        ("obstacles",),
+        [BAR | {"polygon": [[0, 0], [10, 10], [5, 5]]}],
+        "obstacles[0].polygon (line 11): encloses no area",
+    ),
+    (
+        ("obstacles",),
+        [BAR | {"polygon": [[0, 0], [10, 10]]}],
+        "expected at least 3 entries",
+    ),
+    (
+        ("obstacles",),
+        [BAR | {"polygon": [[0, 0], [10, 0], [0, 10]], "to": -1}],
+        "obstacles[0].to (line 10): is -1, expected above from = 0",
+    ),
+]
+
+
+@pytest.mark.parametrize(("location", "value", "expected"), ONE_VALUE)
+def test_one_wrong_value_is_refused_in_one_sentence(
+    tmp_path: Path, location: tuple[Any, ...], value: Any, expected: str
+) -> None:
+    assert expected in refused_text(tmp_path, edited(OBS1, location, value))
+
+
+NOT_PLAIN_YAML = [
+    (b"", "is empty"),
+    (b"\n", "holds no data"),
+    (b"# nothing\n", "holds no data"),
+    (b"- 1\n", "line 1: is [1], expected a mapping"),
+    (b"vdsm_problem: 1\nname: \xff\n", "line 2: is not UTF-8 text (byte 0xff)"),
+    ("vdsm_problem: 1\n".encode("utf-16"), "line 1: is not UTF-8 text (byte 0xff)"),
+    (b"a: \x01\n", "is not YAML: unacceptable character"),
+    (b"a: [1, 2\n", "is not YAML: did not find expected ',' or ']'"),
+    (b"a: 1\n---\nb: 2\n", "line 2: a second document starts here"),
+    (b"a: 1\nb: 1\na: 2\n", "line 3: the key 'a' appears twice"),
+    (b"{a: 1}: 2\n", "line 1: a key is not plain text"),
+    (b"a: !!python/object/apply:os.system [date]\n", "line 1: has the tag"),
+    (b"a: !!binary R0lG\n", "line 1: has the tag"),
+    (b"a: &b 1\nc: *b\n", "line 2: is an alias (*b); write the value out"),
+    (b"a: &a [*a]\n", "line 1: is an alias (*a)"),
+    (b"<<: {vdsm_problem: 1}\n", "is not a known key"),
+    (b"a: " + b"[" * 100_000, "line 1: nests deeper than 32 levels"),
+    (b"a: " + b"{b: " * 100_000, "line 1: nests deeper than 32 levels"),
+    (b"x: " + b"9" * 5_000 + b"\n", "is not a known key"),
+]
+
+
+@pytest.mark.parametrize(("content", "expected"), NOT_PLAIN_YAML)
+def test_what_is_not_one_plain_document_is_refused(
+    tmp_path: Path, content: bytes, expected: str
+) -> None:
+    assert expected in refused_text(tmp_path, content)
+
+
+def test_laughter_does_not_multiply(tmp_path: Path) -> None:
+    lines = ["a0: &a0 [lol, lol]"]
+    lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 12)]
+    assert "is an alias (*a0)" in refused_text(tmp_path, "\n".join(lines))
+
+
+def test_values_without_end_are_not_read_to_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(yaml_reader, "MAX_VALUES", 1000)
+    message = refused_text(tmp_path, b"a:\n" + b"- 1\n" * 1001)
+    assert message == "line 998: holds more than 1000 values"
+
+
+def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
+    assert refusal(tmp_path).startswith("is a folder, expected a file")
+    assert refusal(tmp_path / "none.yaml").startswith("does not exist; built-in prob")
+    assert "File name too long" in refusal(Path("a" * 5000))
+    os.mkfifo(tmp_path / "pipe")
+    assert refusal(tmp_path / "pipe").startswith("is not a regular file")
+
+
+def test_a_file_of_any_size_does_not_fill_the_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(problem_file, "MAX_PROBLEM_BYTES", 1000)
+    assert "is larger than" in refused_text(tmp_path, b"#" * 1001)
+    huge = tmp_path / "huge.yaml"
+    with huge.open("wb") as stream:
+        stream.truncate(1 << 40)  # sparse: takes no room on the disk
+    assert "is larger than" in refusal(huge)
+    with pytest.raises(InvalidFile, match="is larger than"):
+        source.read_bytes(huge, limit=10)
+
+
+def mesh_problem(folder: Path, mesh: bytes | None, **fields: Any) -> Path:
+    part = {"name": "part", "shape": "mesh", "file": "part.stl"} | fields
+    if mesh is not None:
+        (folder / "part.stl").write_bytes(mesh)
+    path = folder / "p.yaml"
+    path.write_text(edited(OBS1, ("obstacles",), [part]))
+    return path
+
+
+def test_missing_and_damaged_meshes_name_file_and_field(tmp_path: Path) -> None:
+    message = refusal(mesh_problem(tmp_path, None))
+    assert message == "obstacles[0].file (line 8): 'part.stl': does not exist"
+    good = binary_stl(TETRAHEDRON)
+    message = refusal(mesh_problem(tmp_path, good[:-1]))
+    assert "'part.stl': is damaged: its header promises 4 triangles" in message
+    message = refusal(mesh_problem(tmp_path, good, file="."))
+    assert "'.': has the ending '', expected .stl or .obj" in message
+
+
+@pytest.mark.parametrize(("unit", "size"), [("mm", 500.0), ("m", 0.5)])
+@pytest.mark.parametrize(("off", "suggested"), [(1e3, "0.001"), (1e-3, "1000")])
+def test_a_mesh_in_the_wrong_unit_is_refused_with_the_right_scale(
+    tmp_path: Path, unit: str, size: float, off: float, suggested: str
+) -> None:
+    path = mesh_problem(tmp_path, binary_stl(TETRAHEDRON * size * off))
+    text = path.read_text()
+    if unit == "m":
+        text = edited(text, ("length_unit",), "m")
+        text = edited(text, ("tip_path", "start"), [3.126, 0, 0])
+        text = edited(text, ("tip_path", "points"), [[3.126, 0, 0]])
+    path.write_text(text)
+    message = refusal(path)
+    assert f"try scale: {suggested}, else" in message
+    path.write_text(edited(text, ("obstacles", 0, "scale"), float(suggested)))
+    (mesh,) = read_problem(path).problem.scene.obstacles
+    (size_found,) = {float(np.ptp(mesh.vertices[:, i])) for i in range(3)}
+    assert size_found == pytest.approx(0.5, rel=1e-6)
+
+
+def test_the_mesh_size_check_can_be_switched_off(tmp_path: Path) -> None:
+    path = mesh_problem(tmp_path, binary_stl(TETRAHEDRON), check_size=False)
+    (mesh,) = read_problem(path).problem.scene.obstacles
+    assert mesh.vertices.max() == 0.001
+
+
+def test_the_first_of_several_errors_is_told_and_the_others_counted(
+    tmp_path: Path,
+) -> None:
+    text = edited(edited(OBS1, ("length_unit",), "cm"), ("obstacles", 0, "radius"), 0)
+    message = refused_text(tmp_path, text)
+    assert message.startswith("length_unit (line 3)")
+    assert message.endswith("(and 1 more)")
+
+
+def test_lines_are_those_of_the_file_not_of_the_data(tmp_path: Path) -> None:
+    text = EVERYTHING.replace("radius: 200", "radius: -200")
+    lines = text.splitlines()
+    (line,) = [i for i, content in enumerate(lines, 1) if "-200," in content]
+    assert f"radius (line {line})" in refused_text(tmp_path, text)
