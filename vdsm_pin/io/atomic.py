@@ -3,7 +3,7 @@
 import os
 import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from vdsm_pin.errors import InvalidFile
@@ -27,10 +27,10 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         InvalidFile: If the folder cannot be made or the file not be written.
     """
     final = Path(path)
-    if final.is_dir():
-        raise InvalidFile(file=path, problem="is a folder, expected a file")
     temporary = final.with_name(f".{final.name[:80]}.{secrets.token_hex(8)}.part")
     try:
+        if final.is_dir():
+            raise InvalidFile(file=path, problem="is a folder, expected a file")
         final.parent.mkdir(parents=True, exist_ok=True)
         yield temporary
         _flush(temporary)
@@ -40,7 +40,8 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         reason = error.strerror or str(error)
         raise InvalidFile(file=path, problem=f"cannot be written: {reason}") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # told above already, or nothing to remove
+            temporary.unlink()
 
 
 def write_text(path: str | Path, text: str) -> None:

@@ -26,9 +26,13 @@ def json_text(value: object, *, indent: int | None = 2) -> str:
 
     Raises:
         TypeError: If a value is of another kind.
-        ValueError: If a reason would overwrite a key.
+        ValueError: If a reason would overwrite a key, or has no map to stand in.
     """
-    plain = _plain(value, [])
+    reasons: list[str] = []
+    plain = _plain(value, reasons)
+    if reasons:
+        message = f"a number is {reasons[0]} and no map around it can say so"
+        raise ValueError(message)
     separators = (",", ": ") if indent is not None else (",", ":")
     return (
         json.dumps(

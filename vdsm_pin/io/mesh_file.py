@@ -5,6 +5,7 @@ that a proof about these triangles is a proof about the file.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
@@ -138,6 +139,7 @@ def _text_stl_corners(content: bytes, path: Path) -> FloatArray:
 def _obj_corners(text: str, path: Path) -> FloatArray:
     vertices: list[list[float]] = []
     faces: list[tuple[int, int, int]] = []
+    polygons: list[tuple[int, slice]] = []
     for number, line in enumerate(text.splitlines(), 1):
         words = line.split("#", 1)[0].split()
         if not words:
@@ -146,14 +148,30 @@ def _obj_corners(text: str, path: Path) -> FloatArray:
             vertices.append(_numbers(words[1:4], 3, path, number))
         elif words[0] == "f":
             face = [_index(word, len(vertices), path, number) for word in words[1:]]
-            if len(face) != 3:
-                problem = f"a face has {len(face)} corners, expected triangles only"
+            if len(face) < 3:
+                problem = f"a face has {len(face)} corners, expected 3 or more"
                 raise InvalidFile(file=path, where=f"line {number}", problem=problem)
-            faces.append((face[0], face[1], face[2]))
+            fan = [(face[0], b, c) for b, c in pairwise(face[1:])]
+            polygons.append((number, slice(len(faces), len(faces) + len(fan))))
+            faces += fan
     if not faces:
         return np.zeros((0, 3, 3))
     corners: FloatArray = np.array(vertices, dtype=np.float64)[np.array(faces)]
+    _check_fans(corners, polygons, path)
     return corners
+
+
+def _check_fans(
+    corners: FloatArray, polygons: list[tuple[int, slice]], path: Path
+) -> None:
+    """A fan about the first corner fills a face only if the face is convex."""
+    for number, part in polygons:
+        if part.stop - part.start > 1:
+            sides = np.diff(corners[part], axis=1)
+            normals = np.cross(sides[:, 0], sides[:, 1])
+            if not (normals @ normals[0] >= 0.0).all():
+                problem = "the face is not convex; expected triangles or convex faces"
+                raise InvalidFile(file=path, where=f"line {number}", problem=problem)
 
 
 def _index(word: str, count: int, path: Path, number: int) -> int:

@@ -1,0 +1,143 @@
+"""Mesh files: the same triangles from every format, and damage named."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from problem_texts import TETRAHEDRON, binary_stl
+
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.io.mesh_file import is_closed, read_mesh
+
+
+def text_stl(corners: np.ndarray, name: str = "part") -> str:
+    lines = [f"solid {name}"]
+    for triangle in corners.tolist():
+        lines += [" facet normal 0 0 0", "  outer loop"]
+        lines += [f"   vertex {x!r} {y!r} {z!r}" for x, y, z in triangle]
+        lines += ["  endloop", " endfacet"]
+    return "\n".join([*lines, f"endsolid {name}", ""])
+
+
+def obj(corners: np.ndarray) -> str:
+    points = corners.reshape(-1, 3).tolist()
+    lines = ["# made by a test", "o part"]
+    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in points]
+    lines += [
+        f"f {3 * i + 1}/1 {3 * i + 2}//2 {3 * i + 3}" for i in range(len(corners))
+    ]
+    return "\n".join([*lines, ""])
+
+
+def write(folder: Path, name: str, content: str | bytes) -> Path:
+    path = folder / name
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path
+
+
+FORMATS = (("a.stl", binary_stl), ("b.STL", text_stl), ("c.obj", obj))
+
+
+@pytest.mark.parametrize(("name", "write_as"), FORMATS)
+def test_every_format_gives_the_files_triangles_in_order(
+    tmp_path: Path, name: str, write_as: object
+) -> None:
+    corners = (
+        np.random.default_rng(1).normal(size=(50, 3, 3)).astype("f4").astype(float)
+    )
+    mesh = read_mesh(write(tmp_path, name, write_as(corners)))
+    np.testing.assert_array_equal(mesh.vertices[mesh.triangles], corners)
+    assert not mesh.watertight
+
+
+@pytest.mark.parametrize(("name", "write_as"), FORMATS)
+def test_a_closed_solid_is_watertight_and_one_with_a_hole_is_not(
+    tmp_path: Path, name: str, write_as: object
+) -> None:
+    mesh = read_mesh(write(tmp_path, name, write_as(TETRAHEDRON)))
+    assert mesh.watertight
+    assert mesh.vertices.shape == (4, 3)
+    assert not read_mesh(write(tmp_path, name, write_as(TETRAHEDRON[:3]))).watertight
+
+
+def test_the_second_library_agrees_on_its_own_solids(tmp_path: Path) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    for solid in (trimesh.creation.icosphere(2), trimesh.creation.annulus(0.5, 1, 1)):
+        for kind in ("stl", "stl_ascii", "obj"):
+            name = f"solid.{kind.removesuffix('_ascii')}"
+            content = solid.export(file_type=kind)
+            mesh = read_mesh(write(tmp_path, name, content))
+            assert mesh.watertight
+            assert len(mesh.triangles) == len(solid.faces)
+            corners = mesh.vertices[mesh.triangles]
+            np.testing.assert_allclose(corners, solid.triangles, atol=1e-6)
+
+
+def test_negative_obj_indices_count_from_the_end(tmp_path: Path) -> None:
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n"
+    mesh = read_mesh(write(tmp_path, "a.obj", text))
+    corners = mesh.vertices[mesh.triangles][0].tolist()
+    assert corners == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+
+
+def test_convex_obj_faces_of_any_size_are_filled(tmp_path: Path) -> None:
+    turns = np.linspace(0, 2 * np.pi, 7)[:-1]
+    lines = [f"v {np.cos(t)!s} {np.sin(t)!s} 0" for t in turns]
+    text = "\n".join([*lines, "f 1 2 3 4 5 6", ""])
+    mesh = read_mesh(write(tmp_path, "a.obj", text))
+    sides = np.diff(mesh.vertices[mesh.triangles], axis=1)
+    areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
+    assert len(areas) == 4
+    assert areas.sum() == pytest.approx(1.5 * np.sqrt(3), abs=1e-14)
+
+
+def test_degenerate_triangles_are_not_watertight() -> None:
+    assert not is_closed(np.array([[0, 0, 1], [0, 1, 0]]))
+
+
+def test_a_binary_file_that_begins_with_solid_is_binary(tmp_path: Path) -> None:
+    content = b"solid".ljust(80, b" ") + binary_stl(TETRAHEDRON)[80:]
+    assert read_mesh(write(tmp_path, "a.stl", content)).watertight
+
+
+NAN = np.where(np.arange(36).reshape(4, 3, 3) == 20, np.nan, TETRAHEDRON)
+
+
+DART = "v 0 0 0\nv 2 1 0\nv 0 2 0\nv 1 1 0\nf 1 2 3 4\n"
+DAMAGE = [
+    ("a.stl", b"", "is empty"),
+    ("a.stl", b"\x01" * 50, "is neither text nor binary STL: only 50 bytes"),
+    ("a.stl", binary_stl(TETRAHEDRON)[:-7], "damaged: its header promises 4 tria"),
+    ("a.stl", binary_stl(TETRAHEDRON[:0]), "has no triangle"),
+    ("a.stl", binary_stl(NAN), "triangle 3: has a coordinate that is not a finite"),
+    ("a.stl", "solid a\nendsolid a\n", "has no triangle"),
+    ("a.stl", text_stl(TETRAHEDRON)[:400], "is truncated"),
+    ("a.stl", text_stl(TETRAHEDRON).replace("1.0", "one"), "expected 3 numbers"),
+    (
+        "a.stl",
+        "solid\nouter loop\nvertex 0 0 0\nendloop\nendsolid",
+        "has 1 corners",
+    ),
+    ("a.stl", "solid \xff".encode("latin-1"), "line 1: is not UTF-8 text"),
+    ("a.obj", "v 0 0\n", "line 1: found '0 0', expected 3 numbers"),
+    ("a.obj", "v 0 0 0\nf 1 1 2\n", "line 2: the face corner '2' names none of"),
+    ("a.obj", "v 0 0 0\nf 1 1 0\n", "line 2: the face corner '0' names none of"),
+    ("a.obj", "v 0 0 0\nf 1 1\n", "line 2: a face has 2 corners, expected 3 or more"),
+    ("a.obj", DART, "line 5: the face is not convex"),
+    ("a.obj", "v 0 0 inf\nf 1 1 1\n", "triangle 1: has a coordinate that is not"),
+    ("a.obj", "hello\n", "has no triangle"),
+    ("a.ply", "ply\n", "has the ending '.ply', expected .stl or .obj"),
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "expected"), DAMAGE, ids=[case[2] for case in DAMAGE]
+)
+def test_damage_is_named(
+    tmp_path: Path, name: str, content: str | bytes, expected: str
+) -> None:
+    path = write(tmp_path, name, content)
+    with pytest.raises(InvalidFile) as caught:
+        read_mesh(path)
+    assert expected in str(caught.value)
+    assert str(caught.value).startswith(str(path))
