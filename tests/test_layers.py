@@ -27,6 +27,7 @@ LAYERS = {
     "refinement": 11,
     "report": 12,
     "visualization": 12,
+    "workflow": 13,
     "batch": 13,
     "certificate_checker": 13,
     "cli": 14,

@@ -45,6 +45,9 @@ class Tolerances:
     changed_angle: float = 8.726646259971648e-4
     """A link angle above this counts as changed: 0.05 deg; [rad]."""
 
+    least_bracket: float = 1e-6
+    """Width to which the bracket of the least clearance is narrowed; [m]."""
+
     coal_gjk: float = 1e-8
     """Coal's gjk_tolerance: 1e-6 is 1.5e-6 m unsafe, 1e-12 returns NaN; [m]."""
 
@@ -94,6 +97,9 @@ class Tolerances:
 
     5 deg is asked for; the reserve covers the rounding of a CSV many times over.
     """
+
+    result_change: float = 1e-6
+    """Difference of two results below which `vdsm diff` calls them equal; SI."""
 
 
 TOLERANCES: Final = Tolerances()

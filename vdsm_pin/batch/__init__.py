@@ -1,0 +1,1 @@
+"""Many problems: processes, resuming, summary."""

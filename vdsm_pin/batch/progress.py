@@ -1,0 +1,68 @@
+"""Progress of a batch: a bar on a terminal, plain lines elsewhere."""
+
+import sys
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from vdsm_pin.batch.task import Done
+from vdsm_pin.report.words import outcome, quantity
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as Bar
+
+
+class Progress:
+    """Says which problem ended, and how.
+
+    Args:
+        total: Number of problems.
+    """
+
+    def __init__(self, total: int) -> None:
+        self._total, self._count = total, 0
+        self._bar: Bar | None = None
+
+    def __enter__(self) -> Self:
+        """Start the bar where there is a terminal."""
+        if sys.stdout.isatty():
+            from rich.progress import Progress as Bar
+
+            self._bar = Bar(transient=True)
+            self._bar.add_task("batch", total=self._total)
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Take the bar away."""
+        if self._bar is not None:
+            self._bar.stop()
+
+    def show(self, done: Done) -> None:
+        """One problem that ended."""
+        self._count += 1
+        row, known = done.row, outcome(done.row.outcome)
+        width = len(str(self._total))
+        head = f"[{self._count:>{width}}/{self._total}]"
+        verdict = f"{known.mark} {known.word:<10}"
+        tail = row.reason
+        if known.passed:
+            clearance = quantity(row.min_clearance_lower_m, "m")
+            angle = quantity(row.max_link_angle_rad, "rad")
+            tail = f"clearance {clearance}, largest link angle {angle}"
+        kept = " (kept)" if done.kept else ""
+        if self._bar is None:
+            sys.stdout.write(f"{head} {verdict} {row.folder}{kept}  {tail}\n")
+            sys.stdout.flush()
+            return
+        from rich.text import Text
+
+        line = Text.assemble(
+            head + " ", (verdict, known.colour), f" {row.folder}{kept}  ", (tail, "dim")
+        )
+        self._bar.console.print(line)
+        self._bar.advance(self._bar.task_ids[0])

@@ -1,0 +1,201 @@
+"""The batch command: tasks out, folders moved into place, summaries written."""
+
+import fcntl
+import json
+import shutil
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Final
+
+from vdsm_pin.batch.pool import Ended, run_tasks
+from vdsm_pin.batch.progress import Progress
+from vdsm_pin.batch.task import (
+    MANIFEST,
+    TIMING,
+    Done,
+    Task,
+    failed_row,
+    folder_names,
+    perform,
+    write_manifest,
+)
+from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
+from vdsm_pin.io.atomic import atomic_path, write_text
+from vdsm_pin.io.problem_file import built_in_names
+from vdsm_pin.planner.strategies import strategy
+from vdsm_pin.report.files import BatchRow
+from vdsm_pin.report.folder import check_output_folder
+from vdsm_pin.report.html import write_index
+from vdsm_pin.report.junit import junit_text
+from vdsm_pin.report.tables import write_summary
+
+SUMMARY: Final = "summary.csv"
+_ASIDE: Final = ".unfinished"
+_LOCK: Final = ".lock"
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What the user asked for.
+
+    Args:
+        problems: Built-in names, problem files, folders; none means the built-ins.
+        folder: Where the results go.
+        strategy: Name of the strategy.
+        jobs: Number of processes.
+        resume: Whether finished and intact results stay.
+        time_limit: For each problem; [s].
+    """
+
+    problems: tuple[str, ...]
+    folder: Path
+    strategy: str
+    jobs: int = 1
+    resume: bool = False
+    time_limit: float | None = None
+
+
+class Interrupted(VdsmError):
+    """The user stopped a batch; what was finished is kept."""
+
+
+def run_batch(batch: Batch) -> tuple[BatchRow, ...]:
+    """Do a batch.
+
+    Returns:
+        One row per problem.
+
+    Raises:
+        InvalidInput: If the folder, a name or the strategy is wrong.
+        Interrupted: On Ctrl-C or SIGTERM, after everything finished is written down.
+    """
+    strategy(batch.strategy)
+    check_output_folder(batch.folder)
+    tasks = _tasks(batch)
+    batch.folder.mkdir(parents=True, exist_ok=True)
+    with _locked(batch.folder), _terminable():
+        shutil.rmtree(batch.folder / _ASIDE, ignore_errors=True)
+        rows: list[BatchRow] = []
+        stopped = False
+        with Progress(len(tasks)) as progress:
+            try:
+                for ended in run_tasks(
+                    tasks, perform, jobs=batch.jobs, time_limit=batch.time_limit
+                ):
+                    done = _settle(ended)
+                    rows.append(done.row)
+                    progress.show(done)
+            except KeyboardInterrupt:
+                stopped = True
+        shutil.rmtree(batch.folder / _ASIDE, ignore_errors=True)
+        _write_summaries(batch.folder, rows)
+    if stopped:
+        message = f"stopped; {len(rows)} of {len(tasks)} problems are finished"
+        raise Interrupted(message + ", --resume does the rest")
+    return tuple(rows)
+
+
+def expanded(problems: tuple[str, ...]) -> tuple[str, ...]:
+    """Every problem once, in one order whatever order they came in.
+
+    Raises:
+        InvalidFile: If a folder holds no problem file.
+    """
+    found: set[str] = set()
+    for name in problems or built_in_names():
+        if not Path(name).is_dir() or name in built_in_names():
+            found.add(name)
+            continue
+        inside = [p for p in Path(name).iterdir() if p.suffix in (".yaml", ".yml")]
+        if not inside:
+            raise InvalidFile(file=name, problem="holds no .yaml file")
+        found.update(str(path) for path in inside)
+    return tuple(sorted(found))
+
+
+def _tasks(batch: Batch) -> list[Task]:
+    """The tasks.
+
+    Raises:
+        InvalidFile: If a folder to be written holds something else.
+    """
+    names = folder_names(expanded(batch.problems))
+    tasks = []
+    for problem, name in names.items():
+        final = batch.folder / name
+        if final.exists() and not (final / MANIFEST).is_file():
+            what = "exists and is not a result of a batch; nothing was overwritten"
+            raise InvalidFile(file=final, problem=what)
+        aside = batch.folder / _ASIDE / name
+        tasks.append(Task(problem, batch.strategy, name, final, aside, batch.resume))
+    return tasks
+
+
+def _settle(ended: Ended[Task, Done]) -> Done:
+    """Move what a worker wrote into place, or write down that it was lost."""
+    task, done = ended.task, ended.result
+    if done is not None and done.kept:
+        return done
+    if done is None:
+        shutil.rmtree(task.aside, ignore_errors=True)
+        done = Done(failed_row(task, ended.outcome, ended.reason), kept=False)
+        write_manifest(task, done.row, "")
+    if task.final.exists():
+        task.final.rename(task.aside.with_name(f"{task.folder}.replaced"))
+    task.aside.rename(task.final)
+    return done
+
+
+def _write_summaries(folder: Path, rows: list[BatchRow]) -> None:
+    ordered = sorted(rows, key=lambda row: row.folder)
+    with atomic_path(folder / SUMMARY) as path:
+        write_summary(path, ordered)
+    write_text(folder / "junit.xml", junit_text(ordered))
+    with atomic_path(folder / "index.html") as path:
+        write_index(path, ordered)
+    seconds = {row.folder: _seconds(folder / row.folder) for row in ordered}
+    known = {name: value for name, value in seconds.items() if value is not None}
+    script = f"window.vdsmTiming = {json.dumps(known, indent=1)};\n"
+    write_text(folder / "timing.js", script)
+
+
+def _seconds(folder: Path) -> float | None:
+    try:
+        content = json.loads((folder / TIMING).read_text(encoding="utf-8"))
+        return float(content["seconds"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """One batch at a time in a folder; the lock ends with the process.
+
+    Raises:
+        InvalidInput: If another batch is at work there.
+    """
+    with (folder / _LOCK).open("w", encoding="utf-8") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            message = f"{folder}: another batch is writing there"
+            raise InvalidInput(message) from error
+        yield
+
+
+@contextmanager
+def _terminable() -> Iterator[None]:
+    """SIGTERM ends a batch the way Ctrl-C does."""
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -1,0 +1,162 @@
+"""One problem of a batch inside a worker: plan, verify, write its folder aside."""
+
+import hashlib
+import json
+import shlex
+import shutil
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from pydantic import ValidationError
+
+from vdsm_pin.errors import Infeasible, VdsmError
+from vdsm_pin.io.problem_file import ProblemFile, read_problem
+from vdsm_pin.report.facts import batch_row
+from vdsm_pin.report.files import BatchRow, ManifestFile
+from vdsm_pin.report.run_record import sha256_of, versions
+from vdsm_pin.workflow import TRAJECTORY, Order, plan_to_folder, verify_to_folder
+
+MANIFEST: Final = "manifest.json"
+TIMING: Final = "timing.json"
+"""Seconds of one problem; the only file that differs from run to run."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One problem to do.
+
+    Args:
+        problem: Built-in name or path, as the user gave it.
+        strategy: Name of the strategy.
+        folder: Name of its folder.
+        final: Where the folder shall be.
+        aside: Where the worker writes it.
+        resume: Whether a finished and intact folder may stay.
+    """
+
+    problem: str
+    strategy: str
+    folder: str
+    final: Path
+    aside: Path
+    resume: bool
+
+    @property
+    def settings(self) -> dict[str, str]:
+        """What a finished folder must agree with to be kept."""
+        return {"strategy": self.strategy} | versions()
+
+    @property
+    def command(self) -> str:
+        """A command that repeats exactly this problem."""
+        words = ["vdsm", "batch", self.problem, "--strategy", self.strategy]
+        return shlex.join([*words, "--out", "out"])
+
+
+@dataclass(frozen=True)
+class Done:
+    """What a worker hands back.
+
+    Args:
+        row: The summary's row.
+        kept: Whether an earlier result stays; else `aside` holds a new one.
+    """
+
+    row: BatchRow
+    kept: bool
+
+
+def perform(task: Task) -> Done:
+    """Do one problem; whatever goes wrong becomes its row."""
+    started = time.perf_counter()
+    shutil.rmtree(task.aside, ignore_errors=True)
+    digest = ""
+    try:
+        source = read_problem(task.problem)
+        digest = source.sha256
+        if task.resume:
+            kept = finished(task, digest)
+            if kept is not None:
+                return Done(kept, kept=True)
+        row = _plan_and_verify(task, source)
+    except Infeasible as error:
+        row = failed_row(task, "infeasible", str(error))
+    except VdsmError as error:
+        row = failed_row(task, "error", str(error))
+    except Exception as error:  # noqa: BLE001  a batch outlives any one problem
+        row = failed_row(task, "error", f"{type(error).__name__}: {error}")
+    if not row.waypoints:
+        shutil.rmtree(task.aside, ignore_errors=True)
+    write_manifest(task, row, digest)
+    seconds = {"seconds": round(time.perf_counter() - started, 3)}
+    (task.aside / TIMING).write_text(json.dumps(seconds) + "\n", encoding="utf-8")
+    return Done(row, kept=False)
+
+
+def failed_row(task: Task, outcome: str, reason: str) -> BatchRow:
+    """The row of a problem without a verified motion."""
+    return BatchRow.model_validate(
+        {
+            "folder": task.folder,
+            "problem": task.problem,
+            "strategy": task.strategy,
+            "outcome": outcome,
+            "reason": reason,
+        }
+    )
+
+
+def write_manifest(task: Task, row: BatchRow, digest: str) -> None:
+    """Write manifest.json, which makes the folder a finished one."""
+    task.aside.mkdir(parents=True, exist_ok=True)
+    files = {path.name: sha256_of(path) for path in sorted(task.aside.iterdir())}
+    manifest = ManifestFile(
+        problem_sha256=digest, settings=task.settings, row=row, files=files
+    )
+    (task.aside / MANIFEST).write_text(manifest.text(), encoding="utf-8")
+
+
+def finished(task: Task, digest: str) -> BatchRow | None:
+    """The row of a folder that is finished, intact and still wanted, else None."""
+    try:
+        text = (task.final / MANIFEST).read_text(encoding="utf-8")
+        manifest = ManifestFile.model_validate_json(text)
+        intact = all(
+            sha256_of(task.final / name) == expected
+            for name, expected in manifest.files.items()
+        )
+    except (OSError, ValidationError, UnicodeDecodeError):
+        return None
+    same = (manifest.problem_sha256, manifest.settings) == (digest, task.settings)
+    wanted = manifest.row.outcome not in ("error", "timeout")
+    return manifest.row if intact and same and wanted else None
+
+
+def folder_names(problems: tuple[str, ...]) -> dict[str, str]:
+    """A folder name for each problem, whatever order they come in."""
+    plain = {problem: _plain_name(problem) for problem in problems}
+    names = list(plain.values())
+    return {
+        problem: name if names.count(name) == 1 else f"{name}-{_short_hash(problem)}"
+        for problem, name in plain.items()
+    }
+
+
+def _plain_name(problem: str) -> str:
+    path = Path(problem)
+    stem = path.stem if path.suffix in (".yaml", ".yml") else problem.strip("/")
+    kept = "".join(c if c.isalnum() or c in "-_." else "-" for c in stem).strip(".-")
+    return kept or "problem"
+
+
+def _short_hash(problem: str) -> str:
+    return hashlib.sha256(problem.encode()).hexdigest()[:8]
+
+
+def _plan_and_verify(task: Task, source: ProblemFile) -> BatchRow:
+    plan_to_folder(source, task.strategy, task.aside, task.command)
+    order = Order(source, task.aside / TRAJECTORY, task.aside, task.command)
+    file = verify_to_folder(order)
+    return batch_row(task.folder, task.strategy, file)

@@ -1,0 +1,320 @@
+"""The `vdsm` command: arguments, exit codes and nothing else.
+
+Modules are imported inside the commands, so that `vdsm --help` answers at once.
+"""
+
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Final, NoReturn
+
+import typer
+
+from vdsm_pin.errors import InvalidInput, VdsmError
+
+PASSED: Final = 0
+NOT_PASSED: Final = 1
+BAD_INPUT: Final = 2
+INTERRUPTED: Final = 130
+
+# Without rich markup the help page is plain text and opens twice as fast.
+app = typer.Typer(
+    rich_markup_mode=None,
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Plan motions of hyper-redundant arms and prove that they are collision-free.",
+    epilog="Exit status: 0 certified; 1 refuted, undecided or infeasible; 2 bad input.",
+)
+
+Problem = Annotated[
+    str, typer.Argument(metavar="PROBLEM", help="A built-in name or a problem file.")
+]
+OutFolder = Annotated[Path, typer.Option("--out", help="Folder for the results.")]
+Strategy = Annotated[str, typer.Option(help="paper, fewest or clearest.")]
+Trajectory = Annotated[Path, typer.Option(help="A trajectory.csv.")]
+DEFAULT_STRATEGY: Final = "paper"
+
+
+def _examples(*lines: str) -> str:
+    """Examples for a help page; the first line keeps click from joining them."""
+    return "\n".join(["\b", "Examples:", *(f"  {line}" for line in lines)])
+
+
+@app.command(
+    epilog=_examples(
+        "vdsm plan paper/obs1 --out out/obs1",
+    ),
+)
+def plan(
+    context: typer.Context,
+    problem: Problem,
+    out: OutFolder,
+    strategy: Strategy = DEFAULT_STRATEGY,
+) -> None:
+    """Plan a motion.
+
+    Writes trajectory.csv and plan.json, or nothing where there is no certified plan.
+    """
+    from vdsm_pin.io.problem_file import read_problem
+    from vdsm_pin.report.folder import check_output_folder
+    from vdsm_pin.report.terminal import show_plan
+    from vdsm_pin.workflow import plan_to_folder
+
+    check_output_folder(out)
+    file = plan_to_folder(read_problem(problem), strategy, out, context.obj)
+    show_plan(file, out)
+
+
+@app.command(
+    epilog=_examples(
+        "vdsm verify paper/obs1 --trajectory out/obs1/trajectory.csv --out out/obs1",
+    ),
+)
+def verify(
+    context: typer.Context,
+    problem: Problem,
+    trajectory: Trajectory,
+    out: OutFolder,
+    joint_error_deg: Annotated[
+        float, typer.Option(min=0.0, help="Largest error of every joint angle [deg].")
+    ] = 0.0,
+    base_error_mm: Annotated[
+        float, typer.Option(min=0.0, help="Largest error of the base [mm].")
+    ] = 0.0,
+    obstacle_error_mm: Annotated[
+        float, typer.Option(min=0.0, help="Largest error of the obstacles [mm].")
+    ] = 0.0,
+    certificate: Annotated[
+        Path | None, typer.Option(help="Write the proof to this file.")
+    ] = None,
+) -> None:
+    """Verify a trajectory of any planner.
+
+    Writes report.html, verification.json, clearance.csv, link_angles.csv, cables.csv.
+    """
+    from vdsm_pin.io.problem_file import read_problem
+    from vdsm_pin.report.folder import check_output_file, check_output_folder
+    from vdsm_pin.report.terminal import show_verification
+    from vdsm_pin.report.words import outcome
+    from vdsm_pin.workflow import Order, error_box, verify_to_folder
+
+    check_output_folder(out)
+    if certificate is not None:
+        check_output_file(certificate)
+    errors = error_box(joint_error_deg, base_error_mm, obstacle_error_mm)
+    file = verify_to_folder(
+        Order(read_problem(problem), trajectory, out, context.obj, errors, certificate)
+    )
+    show_verification(file, out)
+    raise typer.Exit(PASSED if outcome(file.verdict).passed else NOT_PASSED)
+
+
+@app.command(
+    epilog=_examples(
+        "vdsm batch --out out/demo",
+        "vdsm batch problems/*.yaml --out out/night --jobs 8 --time-limit 60 --resume",
+    ),
+)
+def batch(
+    out: OutFolder,
+    problems: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[PROBLEM]...",
+            help="Built-in names, problem files or folders of them; the built-in "
+            "problems if there is none.",
+        ),
+    ] = None,
+    strategy: Strategy = DEFAULT_STRATEGY,
+    jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Skip what is finished and intact.")
+    ] = False,
+    time_limit: Annotated[
+        float | None, typer.Option(min=0.001, help="Seconds per problem.")
+    ] = None,
+) -> None:
+    """Plan and verify many problems.
+
+    Each gets a folder with its report; summary.csv, junit.xml and index.html show all.
+    """
+    from vdsm_pin.batch.run import Batch, Interrupted, run_batch
+    from vdsm_pin.report.words import outcome
+
+    asked = Batch(
+        problems=tuple(problems or ()),
+        folder=out,
+        strategy=strategy,
+        jobs=jobs,
+        resume=resume,
+        time_limit=time_limit,
+    )
+    try:
+        rows = run_batch(asked)
+    except Interrupted as error:
+        typer.echo(f"vdsm: {error}", err=True)
+        raise typer.Exit(INTERRUPTED) from error
+    passed = sum(outcome(row.outcome).passed for row in rows)
+    typer.echo(f"{passed} of {len(rows)} certified; see {out / 'index.html'}")
+    raise typer.Exit(PASSED if passed == len(rows) else NOT_PASSED)
+
+
+@app.command(
+    epilog=_examples(
+        "vdsm view paper/obs1 --trajectory out/obs1/trajectory.csv",
+        "vdsm view paper/obs1 --html obs1.html",
+    ),
+)
+def view(
+    problem: Problem,
+    trajectory: Annotated[
+        Path | None, typer.Option(help="A trajectory.csv; without it the start.")
+    ] = None,
+    html: Annotated[
+        Path | None, typer.Option(help="Write one offline page and end.")
+    ] = None,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port to serve on; 0 for any.")
+    ] = 7000,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Reload when a file changes.")
+    ] = False,
+) -> None:
+    """Show a motion in 3D in the browser."""
+    from vdsm_pin.visualization import serve, write_page
+
+    if html is not None:
+        write_page(html, problem, trajectory)
+        typer.echo(f"wrote {html}")
+        return
+    serve(problem, trajectory, port=port, watch=watch, announce=typer.echo)
+
+
+@app.command(
+    epilog=_examples(
+        "vdsm problems",
+        "vdsm problems --show paper/obs1 > mine.yaml",
+    ),
+)
+def problems(
+    show: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Print this problem's file.")
+    ] = None,
+) -> None:
+    """List the built-in problems, or print one."""
+    from vdsm_pin.io.problem_file import built_in_names, built_in_text
+
+    if show is not None:
+        typer.echo(built_in_text(show), nl=False)
+        return
+    for name in built_in_names():
+        typer.echo(name)
+
+
+@app.command(
+    epilog=_examples(
+        "vdsm schema verification",
+    ),
+)
+def schema(
+    name: Annotated[
+        str, typer.Argument(help="problem, plan, verification or manifest.")
+    ] = "problem",
+) -> None:
+    """Print the JSON Schema of a file."""
+    from vdsm_pin.report.files import PROBLEM, schema, schema_text
+
+    if name == PROBLEM:
+        from vdsm_pin.io.problem_file import problem_schema
+
+        typer.echo(schema_text(problem_schema()), nl=False)
+        return
+    typer.echo(schema_text(schema(name)), nl=False)
+
+
+@app.command(
+    epilog=_examples(
+        "vdsm urdf hrm8 --out hrm8.urdf",
+    ),
+)
+def urdf(
+    name: Annotated[str, typer.Argument(help="A built-in arm.")],
+    out: Annotated[Path, typer.Option("--out", help="The URDF file.")],
+) -> None:
+    """Write the URDF of a built-in arm."""
+    from vdsm_pin.io.atomic import atomic_path
+    from vdsm_pin.manipulator import built_in
+    from vdsm_pin.report.folder import check_output_file
+    from vdsm_pin.urdf_writer import urdf_text
+
+    text = urdf_text(built_in(name))
+    check_output_file(out)
+    with atomic_path(out) as path:
+        path.write_text(text, encoding="utf-8")
+
+
+@app.command(
+    "check-certificate",
+    epilog=_examples(
+        "vdsm check-certificate obs1.cert obs1.yaml out/obs1/trajectory.csv",
+    ),
+)
+def check_certificate(
+    certificate: Annotated[Path, typer.Argument(metavar="FILE")],
+    problem: Annotated[Path, typer.Argument(metavar="PROBLEM")],
+    trajectory: Annotated[Path, typer.Argument(metavar="TRAJECTORY")],
+) -> None:
+    """Recheck a certificate.
+
+    The checker is a second program that shares no code with the verifier.
+    """
+    from vdsm_pin.certificate_checker import main as check
+
+    raise typer.Exit(check([str(certificate), str(problem), str(trajectory)]))
+
+
+@app.command(
+    epilog=_examples(
+        "vdsm diff out/monday out/tuesday",
+    ),
+)
+def diff(
+    old: Annotated[Path, typer.Argument(metavar="OLD")],
+    new: Annotated[Path, typer.Argument(metavar="NEW")],
+) -> None:
+    """Compare two result folders.
+
+    Exit status 1 if anything got worse.
+    """
+    from vdsm_pin.report.diff import compare_folders, diff_lines
+
+    changes = compare_folders(old, new)
+    for line in diff_lines(changes):
+        typer.echo(line)
+    worse = any(change.worse for change in changes)
+    raise typer.Exit(NOT_PASSED if worse else PASSED)
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run the command; every error raised on purpose becomes one message."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        app(given, prog_name="vdsm", obj=shlex.join(["vdsm", *given]))
+    except InvalidInput as error:
+        _fail(error, BAD_INPUT)
+    except VdsmError as error:
+        _fail(error, NOT_PASSED)
+    except BrokenPipeError:
+        sys.stderr.close()  # the reader of our output is gone, and so is the need
+        sys.exit(NOT_PASSED)
+    except OSError as error:
+        _fail(error, BAD_INPUT)
+    sys.exit(PASSED)
+
+
+def _fail(error: Exception, status: int) -> NoReturn:
+    typer.echo(f"vdsm: {error}", err=True)
+    sys.exit(status)

@@ -1,0 +1,195 @@
+"""What the plots of a report show: series against the row number, with their limits."""
+
+import base64
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.kinematics import link_angles
+from vdsm_pin.report.facts import cables, changed_angles
+from vdsm_pin.report.palette import link_colours, oklch
+from vdsm_pin.report.thinning import Thinned
+from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.records import Verification
+
+_DASHES: Final = ("", "7 3", "2 3")
+_INK: Final = "currentColor"
+
+
+def packed(values: Any, dtype: str = "<f4") -> str:
+    """An array as base64 of its little-endian bytes, as the page reads it."""
+    return base64.b64encode(np.ascontiguousarray(values, dtype).tobytes()).decode()
+
+
+def charts(verification: Verification, shown: Thinned) -> list[dict[str, Any]]:
+    """Every plot of the report, in order; angles in degrees, lengths in mm."""
+    return [
+        _link_angle_chart(verification, shown),
+        _base_chart(verification, shown),
+        *_clearance_charts(verification, shown),
+        _changed_chart(verification, shown),
+        *_joint_charts(verification, shown),
+        _cable_chart(verification, shown),
+    ]
+
+
+def _series(name: str, colour: str, values: FloatArray, **more: Any) -> dict[str, Any]:
+    return {"name": name, "colour": colour, "values": packed(values), **more}
+
+
+def _per_joint(symbol: str, values: FloatArray) -> list[dict[str, Any]]:
+    colours = link_colours(values.shape[1])
+    return [
+        _series(f"{symbol}{i + 1}", colours[i], np.degrees(values[:, i]))
+        for i in range(values.shape[1])
+    ]
+
+
+def _limit(label: str, value: float) -> dict[str, Any]:
+    return {"label": label, "value": value}
+
+
+def _link_angle_chart(verification: Verification, shown: Thinned) -> dict[str, Any]:
+    rows = verification.trajectory
+    psi = link_angles(rows.alpha[shown.rows], rows.theta[shown.rows])
+    cone = math.degrees(verification.problem.manipulator.max_link_angle)
+    return {
+        "id": "psi",
+        "title": "Link angles ψ",
+        "note": "Angle between neighbouring links at each joint.",
+        "unit": "°",
+        "axis": "ψ [°]",
+        "floor": 0.0,
+        "limits": [_limit(f"cone {cone:g}°", cone)],
+        "series": _per_joint("ψ", psi),
+    }
+
+
+def _base_chart(verification: Verification, shown: Thinned) -> dict[str, Any]:
+    x0 = verification.trajectory.x0[shown.rows] * MM_PER_M
+    low, high = (v * MM_PER_M for v in verification.problem.manipulator.base_range)
+    return {
+        "id": "x0",
+        "title": "Base position x₀",
+        "note": f"Along the rail, which ends at {low:g} and {high:g} mm.",
+        "unit": " mm",
+        "axis": "x₀ [mm]",
+        "limits": [_limit("rail end", low), _limit("rail end", high)],
+        "far_limits": True,
+        "series": [_series("x₀", _INK, x0)],
+    }
+
+
+def _clearance_charts(
+    verification: Verification, shown: Thinned
+) -> list[dict[str, Any]]:
+    profile, scene = verification.profile, verification.problem.scene
+    required = verification.problem.required_clearance * MM_PER_M
+    if not scene.names:
+        return []
+    common = {
+        "unit": " mm",
+        "axis": "clearance [mm]",
+        "scale": "asinh",
+        "limits": [_limit(f"required {required:g} mm", required)],
+    }
+    count = len(scene.names)
+    hues = [oklch(0.62, 0.13, 30.0 + 360.0 * i / count) for i in range(count)]
+    links = [f"link {i + 1}" for i in range(profile.link_lower.shape[1])]
+    note = "Solid: proved lower bound. Dashed: proved upper bound."
+    return [
+        common
+        | {
+            "id": "clearance-link",
+            "title": "Clearance of each link",
+            "note": f"To the nearest obstacle. {note}",
+            "series": _brackets(
+                links,
+                link_colours(len(links)),
+                shown.least(profile.link_lower),
+                shown.least(profile.link_upper),
+            ),
+        },
+        common
+        | {
+            "id": "clearance-obstacle",
+            "title": "Clearance from each obstacle",
+            "note": f"Of the nearest link. {note}",
+            "series": _brackets(
+                list(scene.names),
+                tuple(hues),
+                shown.least(profile.obstacle_lower),
+                shown.least(profile.obstacle_upper),
+            ),
+        },
+    ]
+
+
+def _brackets(
+    names: list[str], colours: tuple[str, ...], lower: FloatArray, upper: FloatArray
+) -> list[dict[str, Any]]:
+    return [
+        _series(
+            name,
+            colours[i],
+            lower[:, i] * MM_PER_M,
+            upper=packed(upper[:, i] * MM_PER_M),
+            step=True,
+        )
+        for i, name in enumerate(names)
+    ]
+
+
+def _changed_chart(verification: Verification, shown: Thinned) -> dict[str, Any]:
+    count = changed_angles(verification.trajectory).sum(axis=1)[shown.rows]
+    return {
+        "id": "changed",
+        "title": "Changed link angles",
+        "note": "Number of link angles above 0.05°; fewer are easier to drive.",
+        "unit": "",
+        "axis": "count",
+        "floor": 0.0,
+        "whole": True,
+        "limits": [],
+        "series": [_series("changed", _INK, count.astype(np.float64))],
+    }
+
+
+def _joint_charts(verification: Verification, shown: Thinned) -> list[dict[str, Any]]:
+    rows = verification.trajectory
+    box = math.degrees(verification.problem.manipulator.max_joint_angle)
+    limits = [_limit(f"+{box:g}°", box), _limit(f"−{box:g}°", -box)]
+    pairs = (("theta", "θ", "pitch", rows.theta), ("alpha", "α", "yaw", rows.alpha))
+    return [
+        {
+            "id": name,
+            "title": f"{kind.capitalize()} angles {symbol}",
+            "note": f"The {kind} of each universal joint.",
+            "unit": "°",
+            "axis": f"{symbol} [°]",
+            "limits": limits,
+            "far_limits": True,
+            "series": _per_joint(symbol, values[shown.rows]),
+        }
+        for name, symbol, kind, values in pairs
+    ]
+
+
+def _cable_chart(verification: Verification, shown: Thinned) -> dict[str, Any]:
+    lengths = cables(verification)[shown.rows] * MM_PER_M
+    colours = link_colours(lengths.shape[1])
+    return {
+        "id": "cables",
+        "title": "Cable lengths",
+        "note": "Three driving cables a, b, c for each link.",
+        "unit": " mm",
+        "axis": "length [mm]",
+        "limits": [],
+        "series": [
+            _series(f"l{i + 1}{hole}", colours[i], lengths[:, i, j], dash=_DASHES[j])
+            for i in range(lengths.shape[1])
+            for j, hole in enumerate("abc")
+        ],
+    }

@@ -1,0 +1,135 @@
+"""What changed between two result folders: better, worse, newly refuted."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from pydantic import ValidationError
+
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.report.facts import batch_row
+from vdsm_pin.report.files import BatchRow, VerificationFile
+from vdsm_pin.report.tables import read_summary
+from vdsm_pin.report.words import outcome, percent, quantity
+from vdsm_pin.tolerances import TOLERANCES
+
+_ORDER: Final = ("error", "timeout", "refuted", "undecided", "infeasible", "certified")
+_RANK: Final = {word: rank for rank, word in enumerate(_ORDER)}
+
+
+@dataclass(frozen=True)
+class Change:
+    """One thing that differs.
+
+    Args:
+        problem: Folder of the problem.
+        what: What differs, in words.
+        worse: Whether it got worse.
+    """
+
+    problem: str
+    what: str
+    worse: bool
+
+
+@dataclass(frozen=True)
+class _Measure:
+    """A number of a row, its name, its unit, and whether more of it is better."""
+
+    field: str
+    name: str
+    unit: str
+    more_is_better: bool
+
+
+_MEASURES: Final = (
+    _Measure("min_clearance_lower_m", "smallest proved clearance", "m", True),
+    _Measure("coverage", "coverage of the desired path", "%", True),
+    _Measure("joint_error_rad", "largest proved joint error", "rad", True),
+    _Measure("changed_angles_mean_on_path", "changed link angles", "-", False),
+)
+
+
+def compare_folders(old: Path, new: Path) -> tuple[Change, ...]:
+    """Everything that differs, problem by problem, in the order of names.
+
+    Args:
+        old: A folder of `vdsm batch` or of `vdsm verify`.
+        new: Another one.
+
+    Raises:
+        InvalidFile: If a folder holds neither kind of result.
+    """
+    before, after = _rows(old), _rows(new)
+    changes: list[Change] = []
+    for name in sorted(before.keys() | after.keys()):
+        if name not in after:
+            changes.append(Change(name, "is missing from the new results", True))
+        elif name not in before:
+            word = after[name].outcome
+            changes.append(Change(name, f"is new: {word}", not outcome(word).passed))
+        else:
+            changes += _compare(name, before[name], after[name])
+    return tuple(changes)
+
+
+def diff_lines(changes: Sequence[Change]) -> list[str]:
+    """The changes as lines for a person: worse first."""
+    if not changes:
+        return ["no difference"]
+    ordered = sorted(changes, key=lambda change: not change.worse)
+    lines = [
+        f"{'▼ worse ' if change.worse else '▲ better'}  {change.problem}: {change.what}"
+        for change in ordered
+    ]
+    worse = sum(change.worse for change in changes)
+    return [*lines, f"{worse} worse, {len(changes) - worse} better"]
+
+
+def _compare(name: str, old: BatchRow, new: BatchRow) -> list[Change]:
+    if old.outcome != new.outcome:
+        worse = _RANK[new.outcome] < _RANK[old.outcome]
+        newly = "newly refuted: " if new.outcome == "refuted" else ""
+        what = f"{newly}{old.outcome} → {new.outcome} ({new.reason})"
+        return [Change(name, what, worse)]
+    changes = []
+    for measure in _MEASURES:
+        change = _measured(name, measure, old, new)
+        if change is not None:
+            changes.append(change)
+    return changes
+
+
+def _measured(
+    name: str, measure: _Measure, old: BatchRow, new: BatchRow
+) -> Change | None:
+    first, second = getattr(old, measure.field), getattr(new, measure.field)
+    if first is None and second is None:
+        return None
+    what = f"{measure.name} {_shown(first, measure)} → {_shown(second, measure)}"
+    if first is None or second is None:
+        return Change(name, what, second is None)
+    gain = second - first if measure.more_is_better else first - second
+    if abs(gain) <= TOLERANCES.result_change:
+        return None
+    return Change(name, what, gain < 0.0)
+
+
+def _shown(value: float | None, measure: _Measure) -> str:
+    return percent(value) if measure.unit == "%" else quantity(value, measure.unit)
+
+
+def _rows(folder: Path) -> dict[str, BatchRow]:
+    summary, single = folder / "summary.csv", folder / "verification.json"
+    try:
+        if summary.is_file():
+            return {row.folder: row for row in read_summary(summary)}
+        if single.is_file():
+            file = VerificationFile.model_validate_json(single.read_bytes())
+            return {file.problem: batch_row(file.problem, "", file)}
+    except (OSError, ValidationError, ValueError) as error:
+        first = str(error).splitlines()[0]
+        raise InvalidFile(file=folder, problem=f"cannot be read: {first}") from error
+    what = "holds neither summary.csv nor verification.json"
+    raise InvalidFile(file=folder, problem=what)

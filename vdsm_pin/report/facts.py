@@ -1,0 +1,226 @@
+"""Records to file models: one place where a verification becomes words and rows."""
+
+import math
+
+import numpy as np
+
+from vdsm_pin.cables import cable_lengths
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.kinematics import link_angles
+from vdsm_pin.planner.records import Plan
+from vdsm_pin.report.files import (
+    BatchRow,
+    CheckRow,
+    ClosestRow,
+    ErrorBoxRow,
+    Hashes,
+    MinClearance,
+    MotionFacts,
+    PlanFile,
+    Point,
+    VerificationFile,
+)
+from vdsm_pin.report.run_record import RunRecord, machine, tolerances, versions
+from vdsm_pin.report.words import check_title, quantity
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.records import (
+    Check,
+    ClosestApproach,
+    Verdict,
+    Verification,
+)
+
+
+def finite(value: float) -> float | None:
+    """The value, or None where it is NaN or infinite."""
+    return float(value) if math.isfinite(value) else None
+
+
+def changed_angles(trajectory: Trajectory) -> BoolArray:
+    """Which link angles differ from zero by more than 0.05 deg, (n_samples, N)."""
+    psi = link_angles(trajectory.alpha, trajectory.theta)
+    return np.asarray(psi > TOLERANCES.changed_angle)
+
+
+def motion_facts(trajectory: Trajectory) -> MotionFacts:
+    """Extremes over the rows of a trajectory."""
+    psi = link_angles(trajectory.alpha, trajectory.theta)
+    changed = changed_angles(trajectory).sum(axis=1)
+    on_path = changed[trajectory.on_path]
+    return MotionFacts(
+        waypoints=trajectory.n_samples,
+        on_path_waypoints=int(trajectory.on_path.sum()),
+        max_link_angle_rad=tuple(float(value) for value in psi.max(axis=0)),
+        x0_min_m=float(trajectory.x0.min()),
+        x0_max_m=float(trajectory.x0.max()),
+        changed_angle_threshold_rad=TOLERANCES.changed_angle,
+        changed_angles_mean_on_path=float(on_path.mean()) if on_path.size else None,
+        changed_angles_max=int(changed.max()),
+    )
+
+
+def in_file_frame(verification: Verification, point: FloatArray) -> Point | None:
+    """A point of the base frame in the frame of the problem file; [m]."""
+    pose = verification.problem.T_world_base
+    moved = pose[:3, :3] @ point + pose[:3, 3]
+    if not np.isfinite(moved).all():
+        return None
+    return float(moved[0]), float(moved[1]), float(moved[2])
+
+
+def check_row(check: Check) -> CheckRow:
+    """One check as its row."""
+    return CheckRow(
+        name=check.name,
+        verdict=check.verdict.value,
+        count=check.count,
+        worst=finite(check.worst),
+        limit=finite(check.limit),
+        unit=check.unit,
+        where=check.where,
+    )
+
+
+def closest_row(verification: Verification, approach: ClosestApproach) -> ClosestRow:
+    """One closest approach as its row."""
+    return ClosestRow(
+        waypoint=approach.interval,
+        time=approach.time,
+        link=approach.pair.link,
+        obstacle=approach.pair.label,
+        lower=finite(approach.lower),
+        upper=finite(approach.upper),
+        station=finite(approach.station),
+        link_point=in_file_frame(verification, approach.link_point),
+        other_point=in_file_frame(verification, approach.other_point),
+    )
+
+
+def min_clearance(verification: Verification) -> MinClearance | None:
+    """The smallest clearance over all pairs; None where no pair exists."""
+    if not verification.closest:
+        return None
+    first = verification.closest[0]
+    return MinClearance(
+        lower=finite(min(row.lower for row in verification.closest)),
+        upper=finite(min(row.upper for row in verification.closest)),
+        link=first.pair.link,
+        obstacle=first.pair.label,
+        waypoint=first.interval,
+    )
+
+
+def reason(verification: Verification) -> str:
+    """The verdict in one sentence."""
+    if verification.verdict is Verdict.CERTIFIED:
+        return _certified_sentence(verification)
+    bad = [c for c in verification.checks if c.verdict is verification.verdict]
+    if not bad:
+        return "No check was carried out, so nothing is proved."
+    first = bad[0]
+    found = f"{check_title(first.name)} is {quantity(first.worst, first.unit)}"
+    if not math.isnan(first.limit):
+        found += f" against a limit of {quantity(first.limit, first.unit)}"
+    if first.where:
+        found += f" ({first.where})"
+    others = f", and {len(bad) - 1} more" if len(bad) > 1 else ""
+    if verification.verdict is Verdict.REFUTED:
+        return f"The motion breaks {len(bad)} of its checks: {found}{others}."
+    return f"The proof is not complete: {found}{others}. This counts as not passed."
+
+
+def _certified_sentence(verification: Verification) -> str:
+    count = len(verification.checks)
+    smallest = min_clearance(verification)
+    if smallest is None:
+        return f"All {count} checks passed over the whole motion; nothing is near it."
+    required = quantity(verification.problem.required_clearance, "m")
+    return (
+        f"All {count} checks passed; at every instant of the motion the arm keeps at "
+        f"least {quantity(smallest.lower, 'm')} of clearance, {required} are required."
+    )
+
+
+def hashes(record: RunRecord) -> Hashes:
+    """The hashes of a run."""
+    return Hashes(
+        problem_sha256=record.problem_sha256,
+        trajectory_sha256=record.trajectory_sha256,
+        urdf_sha256=record.urdf_sha256,
+    )
+
+
+def verification_file(
+    verification: Verification, record: RunRecord
+) -> VerificationFile:
+    """verification.json of one verification."""
+    errors = verification.errors
+    return VerificationFile(
+        problem=verification.problem.name,
+        verdict=verification.verdict.value,
+        reason=reason(verification),
+        checks=tuple(check_row(check) for check in verification.checks),
+        min_clearance_m=min_clearance(verification),
+        required_clearance_m=verification.problem.required_clearance,
+        closest=tuple(closest_row(verification, row) for row in verification.closest),
+        coverage=finite(verification.coverage),
+        path_length_m=verification.problem.path.length,
+        undrawn_m=tuple((float(a), float(b)) for a, b in verification.undrawn),
+        errors=ErrorBoxRow(
+            joint_rad=errors.joint, base_m=errors.base, obstacle_m=errors.obstacle
+        ),
+        joint_error_rad=finite(verification.joint_error),
+        motion=motion_facts(verification.trajectory),
+        hashes=hashes(record),
+        versions=versions(),
+        machine=machine(),
+        tolerances=tolerances(),
+        command=record.command,
+    )
+
+
+def plan_file(
+    plan: Plan, verification: Verification, rounds: int, record: RunRecord
+) -> PlanFile:
+    """plan.json of one plan and the verification it was accepted with."""
+    return PlanFile(
+        problem=plan.problem.name,
+        strategy=plan.strategy,
+        verdict=verification.verdict.value,
+        notes=plan.notes,
+        rounds=rounds,
+        coverage=finite(verification.coverage),
+        motion=motion_facts(plan.trajectory),
+        hashes=hashes(record),
+        versions=versions(),
+        command=record.command,
+    )
+
+
+def batch_row(folder: str, strategy: str, file: VerificationFile) -> BatchRow:
+    """The row of one verified problem."""
+    smallest, motion = file.min_clearance_m, file.motion
+    return BatchRow(
+        folder=folder,
+        problem=file.problem,
+        strategy=strategy,
+        outcome=file.verdict,
+        min_clearance_lower_m=smallest.lower if smallest else None,
+        min_clearance_upper_m=smallest.upper if smallest else None,
+        closest=f"link {smallest.link}, {smallest.obstacle}" if smallest else "",
+        coverage=file.coverage,
+        max_link_angle_rad=max(motion.max_link_angle_rad),
+        changed_angles_mean_on_path=motion.changed_angles_mean_on_path,
+        joint_error_rad=file.joint_error_rad,
+        x0_min_m=motion.x0_min_m,
+        x0_max_m=motion.x0_max_m,
+        waypoints=motion.waypoints,
+        reason=file.reason,
+    )
+
+
+def cables(verification: Verification) -> FloatArray:
+    """Cable lengths of every row, shape (n_samples, N, 3); [m]."""
+    rows = verification.trajectory
+    return cable_lengths(verification.problem.manipulator, rows.alpha, rows.theta)

@@ -1,0 +1,132 @@
+"""HTML pages: report.html, the 3D view, index.html; each is one file, no request."""
+
+from collections.abc import Sequence
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Final
+
+import jinja2
+
+from vdsm_pin import __version__
+from vdsm_pin.errors import VerificationFailed
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.report.files import BatchRow, PlanFile, Point, VerificationFile
+from vdsm_pin.report.page_data import report_data, view_data
+from vdsm_pin.report.words import (
+    MISSING,
+    OUTCOMES,
+    check_title,
+    outcome,
+    percent,
+    quantity,
+)
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.records import Verification
+
+_TEMPLATES: Final = Path(__file__).parent / "templates"
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(_TEMPLATES),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {
+        "quantity": quantity,
+        "percent": percent,
+        "title_of": check_title,
+        "outcome": outcome,
+        "point": _point,
+    }
+    environment.globals |= {
+        "asset": _asset,
+        "meshcat": _meshcat,
+        "outcomes": OUTCOMES,
+        "vdsm_version": __version__,
+    }
+    return environment
+
+
+@cache
+def _asset(name: str) -> str:
+    return (_TEMPLATES / name).read_text(encoding="utf-8")
+
+
+@cache
+def _meshcat() -> str:
+    """Meshcat's viewer, the script that draws in 3D."""
+    spec = find_spec("meshcat")  # finds the package without importing it
+    if spec is None or spec.origin is None:
+        message = "meshcat is not installed, so no 3D page can be written"
+        raise VerificationFailed(message)
+    script = Path(spec.origin).parent / "viewer" / "dist" / "main.min.js"
+    return script.read_text(encoding="utf-8").replace("</script", "<\\/script")
+
+
+def _point(point: Point | None) -> str:
+    """A point in mm."""
+    if point is None:
+        return MISSING
+    return ", ".join(f"{value * MM_PER_M:.1f}".replace("-", "−") for value in point)
+
+
+def _rendered(template: str, **values: Any) -> str:
+    return _environment().get_template(template).render(**values)
+
+
+def write_report(
+    path: Path,
+    verification: Verification,
+    file: VerificationFile,
+    plan: PlanFile | None = None,
+) -> None:
+    """report.html of one verification.
+
+    Args:
+        path: The file.
+        verification: The records, for the plots and the scene.
+        file: The same as words and rows.
+        plan: How the trajectory was planned, where that is known.
+    """
+    data = report_data(verification)
+    page = _rendered(
+        "report.html.j2",
+        file=file,
+        plan=plan,
+        problem=verification.problem,
+        data=data.text,
+        charts=data.charts,
+        complete=data.complete,
+    )
+    path.write_text(page, encoding="utf-8")
+
+
+def view_page(problem: PlanningProblem, trajectory: Trajectory, live: str = "") -> str:
+    """The 3D view as one page.
+
+    Args:
+        problem: Scene and arm.
+        trajectory: The motion to play.
+        live: State of the files shown; with it the page asks its server for changes.
+    """
+    data = view_data(problem, trajectory)
+    return _rendered("view.html.j2", problem=problem, data=data, live=live)
+
+
+def message_page(message: str, live: str) -> str:
+    """A page that says what is wrong, until the files are right again."""
+    return _rendered("message.html.j2", message=message, live=live)
+
+
+def write_index(path: Path, rows: Sequence[BatchRow]) -> None:
+    """index.html of a batch; durations stand in timing.js beside it."""
+    counts = {word: sum(row.outcome == word for row in rows) for word in OUTCOMES}
+    passed = sum(count for word, count in counts.items() if outcome(word).passed)
+    page = _rendered("index.html.j2", rows=rows, counts=counts, passed=passed)
+    path.write_text(page, encoding="utf-8")

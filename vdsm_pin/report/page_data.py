@@ -1,0 +1,122 @@
+"""What a page's scripts read: the scene, the motion, the plots, as one JSON value."""
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.report.charts import charts, packed
+from vdsm_pin.report.palette import link_colours
+from vdsm_pin.report.solids import surface
+from vdsm_pin.report.thinning import Thinned, thinned
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.records import ClosestApproach, Verification
+
+
+def scene_data(problem: PlanningProblem) -> dict[str, Any]:
+    """The arm, the obstacles and the desired path; base frame, [m]."""
+    arm = problem.manipulator
+    extent = arm.total_length
+    solids = []
+    for obstacle in problem.scene.obstacles:
+        skin = surface(obstacle, extent)
+        solids.append(
+            {
+                "name": obstacle.name,
+                "vertices": packed(skin.vertices),
+                "triangles": packed(skin.triangles, "<u4"),
+                "round": skin.round,
+            }
+        )
+    return {
+        "lengths": arm.link_lengths.tolist(),
+        "radius": arm.link_radius,
+        "colours": list(link_colours(arm.n_links)),
+        "pose": problem.T_world_base.ravel().tolist(),
+        "obstacles": solids,
+        "path": packed(problem.path.corners),
+        "start": problem.path.start.tolist(),
+    }
+
+
+def motion_data(trajectory: Trajectory, shown: Thinned) -> dict[str, Any]:
+    """The joint values of the rows shown; the page computes the poses from them."""
+    rows = shown.rows
+    return {
+        "nSamples": trajectory.n_samples,
+        "complete": shown.complete,
+        "rows": packed(rows, "<i4"),
+        "onPath": packed(trajectory.on_path[rows], "u1"),
+        "pathM": packed(trajectory.path_m[rows]),
+        "x0": packed(trajectory.x0[rows]),
+        "alpha": packed(trajectory.alpha[rows]),
+        "theta": packed(trajectory.theta[rows]),
+    }
+
+
+def closest_data(approach: ClosestApproach) -> dict[str, Any]:
+    """Where and when one closest approach happens; base frame, [m]."""
+    return {
+        "time": approach.interval + approach.time,
+        "link": approach.pair.link,
+        "other": approach.pair.label,
+        "linkPoint": _point(approach.link_point),
+        "otherPoint": _point(approach.other_point),
+    }
+
+
+@dataclass(frozen=True)
+class PageData:
+    """What a page is made of.
+
+    Args:
+        text: Everything its scripts read, as JSON that is safe inside HTML.
+        charts: Identifier, title and note of every plot.
+        complete: Whether every row of the motion is shown.
+    """
+
+    text: str
+    charts: tuple[dict[str, Any], ...]
+    complete: bool
+
+
+def report_data(verification: Verification) -> PageData:
+    """The data of a report."""
+    intervals = np.array([row.interval for row in verification.closest], dtype=np.int64)
+    shown = thinned(verification.trajectory, np.concatenate([intervals, intervals + 1]))
+    plots = charts(verification, shown)
+    text = _embedded(
+        {
+            "scene": scene_data(verification.problem),
+            "motion": motion_data(verification.trajectory, shown),
+            "closest": [closest_data(row) for row in verification.closest],
+            "charts": plots,
+        }
+    )
+    return PageData(text, tuple(plots), shown.complete)
+
+
+def view_data(problem: PlanningProblem, trajectory: Trajectory) -> str:
+    """The data of a 3D view; without a verification nothing is claimed."""
+    shown = thinned(trajectory, np.zeros(0, dtype=np.int64))
+    return _embedded(
+        {
+            "scene": scene_data(problem),
+            "motion": motion_data(trajectory, shown),
+            "closest": [],
+            "charts": [],
+        }
+    )
+
+
+def _point(point: FloatArray) -> list[float] | None:
+    return point.tolist() if np.isfinite(point).all() else None
+
+
+def _embedded(data: dict[str, Any]) -> str:
+    """JSON with `<` escaped: no name of an obstacle can end the script element."""
+    text = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c")

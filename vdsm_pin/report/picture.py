@@ -1,0 +1,79 @@
+"""A small still picture of a problem and its arm, as SVG, for the index of a batch."""
+
+from typing import Final
+
+import numpy as np
+from shapely import MultiPoint, Polygon
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.report.palette import link_colours
+from vdsm_pin.report.solids import surface
+from vdsm_pin.scene import HalfSpace
+from vdsm_pin.verification.records import Verification
+
+_WIDTH, _HEIGHT = 240.0, 160.0
+_MARGIN: Final = 12.0
+_MOST_POINTS: Final = 150  # of a drawn line
+
+
+def _view(points: FloatArray) -> FloatArray:
+    """Seen from the side, the front and above, (n, 3) to (n, 2); y points down."""
+    x, y, z = points.T
+    return np.column_stack([0.88 * x - 0.36 * y, -0.92 * z - 0.2 * y - 0.12 * x])
+
+
+def picture(verification: Verification) -> str:
+    """The arm at the moment of its smallest clearance, in its scene."""
+    problem, rows = verification.problem, verification.trajectory
+    arm = problem.manipulator
+    k = verification.closest[0].interval if verification.closest else 0
+    one = slice(k, k + 1)
+    centres = joint_centres(arm, rows.x0[one], rows.alpha[one], rows.theta[one])[0]
+    seen, path = _view(centres), _view(_thin(problem.path.corners))
+    everything = np.vstack([seen, path])
+    low, span = everything.min(axis=0), np.ptp(everything, axis=0)
+    room = np.array([_WIDTH, _HEIGHT]) - 2.0 * _MARGIN
+    scale = float(np.min(room / np.maximum(span, arm.link_radius)))
+    shift = _MARGIN + (room - scale * span) / 2.0 - scale * low
+
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}">'
+    ]
+    parts += [
+        f'<polygon points="{_text(scale * outline + shift)}" fill="#c9d0da" '
+        'fill-opacity=".7" stroke="#8791a0"/>'
+        for outline in _outlines(verification)
+    ]
+    line = _text(scale * path + shift)
+    parts.append(
+        f'<polyline points="{line}" fill="none" stroke="#d9480f" stroke-width="1.5"/>'
+    )
+    width = max(3.0, 2.0 * arm.link_radius * scale)
+    body = scale * seen + shift
+    parts += [
+        f'<polyline points="{_text(body[i : i + 2])}" stroke="{colour}" '
+        f'stroke-width="{width:.1f}" stroke-linecap="round"/>'
+        for i, colour in enumerate(link_colours(arm.n_links))
+    ]
+    return "".join([*parts, "</svg>\n"])
+
+
+def _outlines(verification: Verification) -> list[FloatArray]:
+    found = []
+    for obstacle in verification.problem.scene.obstacles:
+        if isinstance(obstacle, HalfSpace):
+            continue  # covers all or nothing of a flat picture
+        hull = MultiPoint(_view(surface(obstacle, 1.0).vertices)).convex_hull
+        if isinstance(hull, Polygon):
+            found.append(np.asarray(hull.exterior.coords)[:-1])
+    return found
+
+
+def _thin(points: FloatArray) -> FloatArray:
+    chosen = np.linspace(0, len(points) - 1, min(len(points), _MOST_POINTS))
+    return points[np.unique(chosen.astype(np.int64))]
+
+
+def _text(points: FloatArray) -> str:
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in points)

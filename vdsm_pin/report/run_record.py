@@ -1,0 +1,64 @@
+"""What a report says about the run itself: inputs, versions, machine, command."""
+
+import hashlib
+import os
+import platform
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Final
+
+from vdsm_pin import __version__
+from vdsm_pin.tolerances import TOLERANCES
+
+_LIBRARIES: Final = ("pin", "coal", "numpy", "numba", "yourdfpy", "meshcat")
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """Everything needed to repeat a run.
+
+    Args:
+        command: The exact command line.
+        problem_file: The problem as the user named it.
+        problem_sha256: Of the problem file and the meshes it names.
+        trajectory_sha256: Of the trajectory file; empty before there is one.
+        urdf_sha256: Of the URDF the verification loaded.
+    """
+
+    command: str
+    problem_file: str
+    problem_sha256: str
+    trajectory_sha256: str = ""
+    urdf_sha256: str = ""
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Versions of everything a number in the report may depend on."""
+    known = {"vdsm-pin": __version__, "python": platform.python_version()}
+    for name in _LIBRARIES:
+        try:
+            known[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            known[name] = "not installed"
+    return known
+
+
+@cache
+def machine() -> str:
+    """The machine in one line: system, architecture, number of processors."""
+    system = f"{platform.system()} {platform.machine()}"
+    return f"{system}, {os.cpu_count() or 1} processors"
+
+
+def tolerances() -> dict[str, float]:
+    """Every tolerance in force, by name; SI."""
+    return {name: float(value) for name, value in asdict(TOLERANCES).items()}
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file's bytes, read in blocks."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,138 @@
+// The motion: joint values row by row, and the one moment that everything on the page
+// shows. Time is counted in rows: 12.5 is half-way between rows 12 and 13.
+"use strict";
+
+function unpack(text, Type) {
+  const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
+  return new Type(bytes.buffer);
+}
+
+class Motion {
+  constructor(data, lengths) {
+    this.rows = unpack(data.rows, Int32Array);
+    this.onPath = unpack(data.onPath, Uint8Array);
+    this.pathM = unpack(data.pathM, Float32Array);
+    this.x0 = unpack(data.x0, Float32Array);
+    this.alpha = unpack(data.alpha, Float32Array);
+    this.theta = unpack(data.theta, Float32Array);
+    this.lengths = lengths;
+    this.end = this.rows[this.rows.length - 1];
+    this.time = 0;
+    this.playing = false;
+    this.seconds = Math.min(40, Math.max(8, data.nSamples / 40));
+    this.listeners = [];
+  }
+
+  // Call `listener(time)` now and whenever the moment changes.
+  listen(listener) {
+    this.listeners.push(listener);
+    listener(this.time);
+  }
+
+  go(time) {
+    this.time = Math.min(this.end, Math.max(0, time));
+    for (const listener of this.listeners) listener(this.time);
+  }
+
+  play(on) {
+    if (on === this.playing) return;
+    this.playing = on;
+    if (on) {
+      if (this.time >= this.end) this.time = 0;
+      let before = performance.now();
+      const tick = (now) => {
+        if (!this.playing) return;
+        const next = this.time + ((now - before) / 1000) * (this.end / this.seconds);
+        before = now;
+        this.go(next);
+        if (next >= this.end) this.play(false);
+        else requestAnimationFrame(tick);
+      };
+      requestAnimationFrame(tick);
+    }
+    this.go(this.time);
+  }
+
+  // Index of the row shown at or before a time, and how far it is to the next.
+  place(time) {
+    let low = 0;
+    let high = this.rows.length - 1;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (this.rows[middle] <= time) low = middle;
+      else high = middle;
+    }
+    if (high === low) return [low, 0];
+    return [low, (time - this.rows[low]) / (this.rows[high] - this.rows[low])];
+  }
+
+  // Joint centres O_1..O_{N+1} at a time: rows are joined by straight lines in joint
+  // space, as the proof has it. Each link turns by yaw alpha, then by pitch theta.
+  centres(time) {
+    const [k, share] = this.place(time);
+    const n = this.lengths.length;
+    const next = Math.min(k + 1, this.rows.length - 1);
+    const mix = (values, i, size) =>
+      values[k * size + i] * (1 - share) + values[next * size + i] * share;
+    let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = [1, 0, 0, 0, 1, 0, 0, 0, 1];
+    const points = [[mix(this.x0, 0, 1), 0, 0]];
+    for (let i = 0; i < n; i++) {
+      const a = mix(this.alpha, i, n);
+      const t = mix(this.theta, i, n);
+      const [ca, sa, ct, st] = [Math.cos(a), Math.sin(a), Math.cos(t), Math.sin(t)];
+      const [ux, uy, uz] = [ca * xx + sa * yx, ca * xy + sa * yy, ca * xz + sa * yz];
+      [yx, yy, yz] = [ca * yx - sa * xx, ca * yy - sa * xy, ca * yz - sa * xz];
+      [xx, xy, xz] = [ct * ux - st * zx, ct * uy - st * zy, ct * uz - st * zz];
+      [zx, zy, zz] = [st * ux + ct * zx, st * uy + ct * zy, st * uz + ct * zz];
+      const [px, py, pz] = points[i];
+      const length = this.lengths[i];
+      points.push([px + length * xx, py + length * xy, pz + length * xz]);
+    }
+    return points;
+  }
+
+  // Stretches of time off the desired path, as [from, to].
+  detours() {
+    const found = [];
+    for (let k = 0; k + 1 < this.rows.length; k++) {
+      if (this.onPath[k] && this.onPath[k + 1]) continue;
+      const last = found[found.length - 1];
+      if (last && last[1] === this.rows[k]) last[1] = this.rows[k + 1];
+      else found.push([this.rows[k], this.rows[k + 1]]);
+    }
+    return found;
+  }
+}
+
+// Play button, slider and readout of one page.
+function bindControls(motion, root) {
+  const slider = root.querySelector("[data-slider]");
+  const button = root.querySelector("[data-play]");
+  const readout = root.querySelector("[data-readout]");
+  slider.max = motion.end;
+  slider.addEventListener("input", () => {
+    motion.play(false);
+    motion.go(Number(slider.value));
+  });
+  button.addEventListener("click", () => motion.play(!motion.playing));
+  document.addEventListener("keydown", (event) => {
+    if (event.target.closest("input, button, a, summary, select")) return;
+    if (event.key === " ") motion.play(!motion.playing);
+    else if (event.key === "ArrowRight") motion.go(Math.floor(motion.time) + 1);
+    else if (event.key === "ArrowLeft") motion.go(Math.ceil(motion.time) - 1);
+    else return;
+    event.preventDefault();
+  });
+  motion.listen((time) => {
+    slider.value = time;
+    const [k] = motion.place(time);
+    const where = motion.onPath[k]
+      ? `at ${(motion.pathM[k] * 1000).toFixed(0)} mm of the path`
+      : "off the path";
+    const text = `waypoint ${time.toFixed(1)} of ${motion.end}, ${where}`;
+    readout.textContent = text;
+    slider.setAttribute("aria-valuetext", text);
+    button.textContent = motion.playing ? "❚❚ Pause" : "▶ Play";
+    button.setAttribute("aria-pressed", String(motion.playing));
+  });
+}

@@ -1,0 +1,41 @@
+// Puts a page together: data, motion, 3D view, plots, buttons.
+"use strict";
+
+(function () {
+  const data = JSON.parse(document.getElementById("data").textContent);
+  const motion = new Motion(data.motion, data.scene.lengths);
+  const pane = document.getElementById("view");
+  const view = makeView(pane, data.scene, motion, data.closest);
+  bindControls(motion, document);
+
+  const figures = document.querySelectorAll("[data-chart]");
+  const plots = [...figures].map((figure) => {
+    const chart = data.charts.find((one) => one.id === figure.dataset.chart);
+    return new Plot(figure, chart, motion);
+  });
+
+  // Jump to a closest approach and mark its two points.
+  for (const button of document.querySelectorAll("[data-approach]"))
+    button.addEventListener("click", () => {
+      const approach = data.closest[Number(button.dataset.approach)];
+      motion.play(false);
+      if (view) view.showWitness(approach);
+      motion.go(approach.time);
+      if (button.dataset.scroll !== undefined)
+        pane.scrollIntoView({ behavior: "smooth", block: "center" });
+    });
+  for (const button of document.querySelectorAll("[data-look]"))
+    button.addEventListener("click", () => view && view.look(button.dataset.look));
+  for (const box of document.querySelectorAll("[data-toggle]"))
+    box.addEventListener("change", () => view && view.toggle(box.dataset.toggle, box.checked));
+
+  // Paper has no WebGL: a still picture takes the canvas's place.
+  window.addEventListener("beforeprint", () => {
+    const still = document.getElementById("still");
+    if (view && still) still.src = view.picture();
+    document.querySelectorAll("details").forEach((one) => (one.open = true));
+  });
+
+  if (data.closest.length) motion.go(data.closest[0].time);
+  window.vdsm = { motion, view, plots, data };
+})();

@@ -1,0 +1,91 @@
+"""What the terminal shows: the same words and numbers as the reports."""
+
+import sys
+from pathlib import Path
+
+import typer
+
+from vdsm_pin.report.files import CheckRow, PlanFile, VerificationFile
+from vdsm_pin.report.words import check_title, outcome, percent, quantity
+
+
+def show_plan(file: PlanFile, folder: Path) -> None:
+    """One plan in a few lines."""
+    motion = file.motion
+    typer.echo(_headline(file.verdict, f"{file.problem}, planned by {file.strategy!r}"))
+    changed = motion.changed_angles_mean_on_path
+    mean = "none" if changed is None else f"{changed:.2f} on average"
+    rows = (
+        ("waypoints", f"{motion.waypoints}, {motion.on_path_waypoints} on the path"),
+        ("coverage", percent(file.coverage)),
+        ("largest link angle", quantity(max(motion.max_link_angle_rad), "rad")),
+        ("changed link angles", f"{mean}, {motion.changed_angles_max} at most"),
+        (
+            "base",
+            f"{quantity(motion.x0_min_m, 'm')} to {quantity(motion.x0_max_m, 'm')}",
+        ),
+    )
+    for name, value in rows:
+        typer.echo(f"  {name:<20} {value}")
+    for note in file.notes:
+        typer.echo(f"  note: {note}")
+    typer.echo(f"  files in {folder}")
+
+
+def show_verification(file: VerificationFile, folder: Path) -> None:
+    """One verification: the verdict, why, and every check."""
+    typer.echo(_headline(file.verdict, file.problem))
+    typer.echo(f"  {file.reason}")
+    if sys.stdout.isatty():
+        _rich_checks(file)
+    else:
+        _plain_checks(file.checks)
+    if file.joint_error_rad is not None:
+        error = quantity(file.joint_error_rad, "rad")
+        typer.echo(f"  survives joint errors of ±{error}")
+    typer.echo(f"  coverage {percent(file.coverage)} of the desired path")
+    typer.echo(f"  report: {folder / 'report.html'}")
+
+
+def _headline(word: str, subject: str) -> str:
+    known = outcome(word)
+    colour = known.colour if sys.stdout.isatty() else None
+    return typer.style(f"{known.mark} {word}", fg=colour, bold=True) + f"  {subject}"
+
+
+def _cells(check: CheckRow) -> tuple[str, str, str, str, str]:
+    known = outcome(check.verdict)
+    return (
+        check_title(check.name),
+        quantity(check.worst, check.unit),
+        quantity(check.limit, check.unit),
+        str(check.count),
+        f"{known.mark} {known.word}",
+    )
+
+
+def _plain_checks(checks: tuple[CheckRow, ...]) -> None:
+    titles = ("check", "worst", "limit", "count", "verdict")
+    rows = [titles, *(_cells(check) for check in checks)]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(titles))]
+    for row in rows:
+        left = f"{row[0]:<{widths[0]}}"
+        middle = "  ".join(f"{row[i]:>{widths[i]}}" for i in (1, 2, 3))
+        typer.echo(f"  {left}  {middle}  {row[4]}")
+
+
+def _rich_checks(file: VerificationFile) -> None:
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=SIMPLE_HEAD, pad_edge=False)
+    table.add_column("check")
+    for title in ("worst", "limit", "count"):
+        table.add_column(title, justify="right")
+    table.add_column("verdict")
+    for check in file.checks:
+        *cells, verdict = _cells(check)
+        colour = outcome(check.verdict).colour
+        table.add_row(*cells, f"[{colour}]{verdict}[/]")
+    Console().print(table)

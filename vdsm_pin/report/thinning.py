@@ -1,0 +1,55 @@
+"""Which rows a page shows: all of them, or few enough and every remarkable one."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.trajectory import Trajectory
+
+MOST_ROWS: Final = 2_000
+"""Rows of a motion that a page shows at most, besides remarkable ones."""
+
+_MOST_CHANGES: Final = 500  # changes between path and detour that are kept
+
+
+@dataclass(frozen=True)
+class Thinned:
+    """The rows shown.
+
+    Args:
+        rows: Their numbers, rising, first and last included, shape (k,).
+        n_samples: Rows of the whole motion.
+    """
+
+    rows: IntArray
+    n_samples: int
+
+    @property
+    def complete(self) -> bool:
+        """Whether every row is shown."""
+        return len(self.rows) == self.n_samples
+
+    def least(self, intervals: FloatArray) -> FloatArray:
+        """Least value between neighbouring rows shown, (n_intervals, m) to (k', m)."""
+        if len(self.rows) < 2:
+            return intervals
+        return np.asarray(np.minimum.reduceat(intervals, self.rows[:-1], axis=0))
+
+
+def thinned(trajectory: Trajectory, keep: IntArray) -> Thinned:
+    """Choose the rows to show.
+
+    Args:
+        trajectory: The whole motion.
+        keep: Rows that must be among them; rows outside the motion are dropped.
+    """
+    n = trajectory.n_samples
+    if n <= MOST_ROWS:
+        return Thinned(np.arange(n), n)
+    even = np.linspace(0, n - 1, MOST_ROWS).astype(np.int64)
+    changes = np.flatnonzero(np.diff(trajectory.on_path.astype(np.int64)))
+    changes = changes[:_MOST_CHANGES]
+    chosen = np.concatenate([even, changes, changes + 1, keep])
+    return Thinned(np.unique(chosen[(chosen >= 0) & (chosen < n)]), n)

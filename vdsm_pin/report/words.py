@@ -1,0 +1,105 @@
+"""One vocabulary for terminal, JSON, HTML and JUnit: words, marks, units for people."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from vdsm_pin.units import MM_PER_M
+
+MISSING: Final = "not available"
+"""What stands where there is no evidence; never a pass."""
+
+_SMALLEST_FIXED: Final = 1e-3  # below this, three decimals would print 0.000
+_SHARE_DIGITS: Final = 9
+_DISPLAY_UNITS: Final[Mapping[str, tuple[float, str]]] = MappingProxyType(
+    {"m": (MM_PER_M, " mm"), "rad": (math.degrees(1.0), "°"), "-": (1.0, "")}
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How one outcome is named and marked everywhere.
+
+    Args:
+        word: The word in JSON, terminal and HTML.
+        mark: A sign that does not need colour.
+        colour: Colour on a terminal.
+        passed: Whether it counts as passed.
+        meaning: One sentence for the reader who does not know the tool.
+    """
+
+    word: str
+    mark: str
+    colour: str
+    passed: bool
+    meaning: str
+
+
+OUTCOMES: Final[Mapping[str, Outcome]] = MappingProxyType(
+    {
+        outcome.word: outcome
+        for outcome in (
+            Outcome("certified", "✓", "green", True, "Proved for the whole motion."),
+            Outcome("refuted", "✗", "red", False, "A violation was found."),
+            Outcome(
+                "undecided",
+                "?",
+                "yellow",
+                False,
+                "Neither proved nor refuted within the budget; counts as not passed.",
+            ),
+            Outcome(
+                "infeasible", "∅", "magenta", False, "The planner has no plan for it."
+            ),
+            Outcome("error", "!", "red", False, "The input or the run was broken."),
+            Outcome(
+                "timeout", "⧖", "yellow", False, "The time limit ended before a result."
+            ),
+        )
+    }
+)
+"""Every outcome of a check, a verification or a problem of a batch."""
+
+
+def outcome(word: str) -> Outcome:
+    """The outcome of that word; an unknown word is shown and never counts as passed."""
+    unknown = Outcome(word, "?", "yellow", False, "Unknown outcome.")
+    return OUTCOMES.get(word, unknown)
+
+
+def quantity(value: float | None, unit: str) -> str:
+    """A value with its unit as people read it: mm and degrees.
+
+    Args:
+        value: In SI; None or NaN where there is none.
+        unit: "m", "rad" or "-"; any other unit is printed as it is.
+
+    Returns:
+        For instance "3.500 mm", "42.500°", "1.2e-10 mm" or "not available".
+    """
+    if value is None or math.isnan(value):
+        return MISSING
+    factor, suffix = _DISPLAY_UNITS.get(unit, (1.0, f" {unit}"))
+    shown = value * factor
+    if math.isinf(shown):
+        return ("+" if shown > 0.0 else "−") + "∞" + suffix
+    if unit == "-" and float(shown).is_integer():
+        return f"{shown:.0f}"
+    fixed = shown == 0.0 or abs(shown) >= _SMALLEST_FIXED
+    text = f"{shown:.3f}" if fixed else f"{shown:.1e}"
+    return text.replace("-", "−", 1) + suffix if text[0] == "-" else text + suffix
+
+
+def percent(share: float | None) -> str:
+    """A share from 0 to 1 in percent, rounded down: 100 % means nothing is missing."""
+    if share is None or math.isnan(share):
+        return MISSING
+    whole = round(share, _SHARE_DIGITS)  # rounding noise of a sum is not a gap
+    return f"{math.floor(whole * 1000.0) / 10.0:.1f} %"
+
+
+def check_title(name: str) -> str:
+    """A check's name as a heading: underscores become spaces."""
+    return name.replace("_", " ")

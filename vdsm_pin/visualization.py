@@ -1,0 +1,191 @@
+"""The 3D view of a problem and its motion: an offline page, or a local server.
+
+The page is drawn by Meshcat's viewer. The server needs no display and no second
+process: it hands the page out, and tells it when a file has changed.
+"""
+
+import hashlib
+import time
+from collections.abc import Callable
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Final
+from urllib.parse import parse_qs, urlsplit
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidInput, VdsmError
+from vdsm_pin.io.atomic import write_text
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.io.trajectory_file import read_trajectory
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.report.folder import check_output_file
+from vdsm_pin.report.html import message_page, view_page
+from vdsm_pin.trajectory import Trajectory
+
+HOST: Final = "127.0.0.1"
+_LONGEST_WAIT: Final = 20.0  # seconds a page waits for one answer
+_LOOK: Final = 0.25  # seconds between looks at the files
+
+
+def at_start(problem: PlanningProblem) -> Trajectory:
+    """The arm where it begins, as a motion of one row."""
+    arm, joints = problem.manipulator, problem.path.start_joints
+    if joints is None:
+        joints = np.zeros(1 + 2 * arm.n_links)
+        joints[0] = problem.path.start[0] - arm.total_length
+    angles = joints[1:].reshape(1, arm.n_links, 2)
+    zero = np.zeros(1)
+    return Trajectory(
+        zero.astype(bool), zero, joints[:1], angles[:, :, 0], angles[:, :, 1]
+    )
+
+
+def page(problem: str, trajectory: Path | None, live: str = "") -> str:
+    """The page of a problem, by its name or path.
+
+    Raises:
+        InvalidInput: If a file is bad.
+    """
+    task = read_problem(problem).problem
+    if trajectory is None:
+        return view_page(task, at_start(task), live)
+    return view_page(task, read_trajectory(trajectory, task.manipulator), live)
+
+
+def write_page(path: Path, problem: str, trajectory: Path | None) -> None:
+    """Write the view as one offline page.
+
+    Raises:
+        InvalidInput: If a file is bad or the page cannot be written.
+    """
+    check_output_file(path)
+    write_text(path, page(problem, trajectory))
+
+
+class ViewServer(ThreadingHTTPServer):
+    """Serves one page to this machine.
+
+    Args:
+        problem: Built-in name or path.
+        trajectory: The motion; None for the arm at the start.
+        port: To listen on; 0 for any free one.
+        watch: Whether the page reloads when a file changes.
+
+    Raises:
+        InvalidInput: If a file is bad or the port is taken.
+    """
+
+    daemon_threads = True
+
+    def __init__(
+        self, problem: str, trajectory: Path | None, port: int, watch: bool
+    ) -> None:
+        self._problem, self._trajectory = problem, trajectory
+        files = [read_problem(problem).path, trajectory]
+        self._files = [path for path in files if path is not None]
+        self.watch, self.ended = watch, False
+        self._seen, self._page = "", ""
+        page(problem, trajectory)  # bad files are refused before a page is promised
+        try:
+            super().__init__((HOST, port), _Handler)
+        except OSError as error:
+            message = f"port {port} cannot be used: {error.strerror or error}"
+            raise InvalidInput(message) from error
+
+    @property
+    def url(self) -> str:
+        """Where the page is."""
+        return f"http://{HOST}:{self.server_address[1]}/"
+
+    def state(self) -> str:
+        """A word that changes when a file does."""
+        facts = []
+        for path in self._files:
+            try:
+                status = path.stat()
+                facts.append((status.st_mtime_ns, status.st_size))
+            except OSError:
+                facts.append((0, 0))
+        return hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
+
+    def current_page(self) -> str:
+        """The page of the files as they are now, or what is wrong with them."""
+        state = self.state()
+        if state != self._seen:
+            live = state if self.watch else ""
+            try:
+                self._page = page(self._problem, self._trajectory, live)
+            except VdsmError as error:
+                self._page = message_page(str(error), live)
+            self._seen = state
+        return self._page
+
+    def changed_since(self, seen: str) -> bool:
+        """Wait for a change of the files, but not for ever."""
+        until = time.monotonic() + _LONGEST_WAIT
+        while time.monotonic() < until and not self.ended:
+            if self.state() != seen:
+                return True
+            time.sleep(_LOOK)
+        return False
+
+    def server_close(self) -> None:
+        """Let go of the port and of the pages that wait."""
+        self.ended = True
+        super().server_close()
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """Answers the two addresses there are."""
+
+    server: ViewServer
+
+    def do_GET(self) -> None:
+        """The page, or whether it is out of date."""
+        address = urlsplit(self.path)
+        if address.path == "/":
+            self._answer("text/html; charset=utf-8", self.server.current_page())
+        elif address.path == "/changed":
+            seen = parse_qs(address.query).get("seen", [""])[0]
+            answer = "yes" if self.server.changed_since(seen) else "no"
+            self._answer("text/plain; charset=utf-8", answer)
+        else:
+            self.send_error(HTTPStatus.NOT_FOUND)
+
+    def _answer(self, kind: str, text: str) -> None:
+        body = text.encode("utf-8")
+        try:
+            self.send_response(HTTPStatus.OK)
+            self.send_header("Content-Type", kind)
+            self.send_header("Content-Length", str(len(body)))
+            self.send_header("Cache-Control", "no-store")
+            self.end_headers()
+            self.wfile.write(body)
+        except ConnectionError:
+            self.close_connection = True  # the reader went away
+
+    def log_message(self, format: str, *arguments: object) -> None:
+        """Requests are not worth a line."""
+
+
+def serve(
+    problem: str,
+    trajectory: Path | None,
+    *,
+    port: int,
+    watch: bool,
+    announce: Callable[[str], object],
+) -> None:
+    """Serve the view until Ctrl-C.
+
+    Raises:
+        InvalidInput: If a file is bad or the port is taken.
+    """
+    with ViewServer(problem, trajectory, port, watch) as server:
+        announce(f"{server.url}  (Ctrl-C ends)")
+        try:
+            server.serve_forever(poll_interval=_LOOK)
+        except KeyboardInterrupt:
+            announce("closed")

@@ -1,0 +1,145 @@
+"""One problem from file to result folder: what `plan`, `verify` and `batch` share.
+
+Nothing is judged here: problems are read, planned, verified and written down.
+"""
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from pydantic import ValidationError
+
+from vdsm_pin.errors import NoPlanFound
+from vdsm_pin.io.problem_file import ProblemFile
+from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
+from vdsm_pin.refinement import plan_and_verify
+from vdsm_pin.report.facts import plan_file, verification_file
+from vdsm_pin.report.files import PlanFile, VerificationFile
+from vdsm_pin.report.folder import staged
+from vdsm_pin.report.html import write_report
+from vdsm_pin.report.run_record import RunRecord, sha256_of
+from vdsm_pin.report.tables import ClearanceCsv, write_cables, write_link_angles
+from vdsm_pin.robot_model import RobotModel, load_robot
+from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.records import ErrorBox, Verdict
+from vdsm_pin.verification.verify import verify
+
+TRAJECTORY: Final = "trajectory.csv"
+PLAN: Final = "plan.json"
+VERIFICATION: Final = "verification.json"
+REPORT: Final = "report.html"
+
+
+@dataclass(frozen=True)
+class Order:
+    """What to verify and what to write besides the folder.
+
+    Args:
+        source: The problem as it was read.
+        trajectory: The trajectory file.
+        folder: Where the results go.
+        command: The exact command line, for the report.
+        errors: The error box the proof shall cover.
+        certificate: Where the certificate goes; None for none.
+    """
+
+    source: ProblemFile
+    trajectory: Path
+    folder: Path
+    command: str
+    errors: ErrorBox = field(default_factory=ErrorBox)
+    certificate: Path | None = None
+
+
+def error_box(joint_deg: float, base_mm: float, obstacle_mm: float) -> ErrorBox:
+    """The error box from what a user types."""
+    return ErrorBox(
+        joint=math.radians(joint_deg),
+        base=base_mm / MM_PER_M,
+        obstacle=obstacle_mm / MM_PER_M,
+    )
+
+
+def plan_to_folder(
+    source: ProblemFile, strategy: str, folder: Path, command: str
+) -> PlanFile:
+    """Plan, and write trajectory.csv and plan.json only if the plan is certified.
+
+    Raises:
+        Infeasible: If there is no certified plan.
+        InvalidInput: If the folder cannot be written.
+    """
+    robot = load_robot(source.problem.manipulator)
+    refinement = plan_and_verify(source.problem, strategy, robot)
+    if refinement.verification.verdict is not Verdict.CERTIFIED:
+        message = (
+            f"strategy {strategy!r} found a motion, but after "
+            f"{len(refinement.rounds)} rounds its verdict is "
+            f"{refinement.verification.verdict.value}"
+        )
+        raise NoPlanFound(message)
+    with staged(folder) as aside:
+        write_trajectory(aside / TRAJECTORY, refinement.plan.trajectory)
+        record = RunRecord(
+            command=command,
+            problem_file=str(source.path),
+            problem_sha256=source.sha256,
+            trajectory_sha256=sha256_of(aside / TRAJECTORY),
+            urdf_sha256=robot.urdf_sha256,
+        )
+        file = plan_file(
+            refinement.plan, refinement.verification, len(refinement.rounds), record
+        )
+        (aside / PLAN).write_text(file.text(), encoding="utf-8")
+    return file
+
+
+def verify_to_folder(order: Order) -> VerificationFile:
+    """Verify a trajectory file and write every result of it.
+
+    Raises:
+        InvalidInput: If a file is bad or the folder cannot be written.
+        VerificationFailed: If a check could not be carried out.
+    """
+    problem = order.source.problem
+    robot = load_robot(problem.manipulator)
+    trajectory = read_trajectory(order.trajectory, problem.manipulator)
+    record = _record(order, robot)
+    with staged(order.folder) as aside:
+        with ClearanceCsv(aside / "clearance.csv", problem) as clearance:
+            verification = verify(
+                problem,
+                trajectory,
+                robot,
+                errors=order.errors,
+                sinks=(clearance,),
+                joint_error=True,
+            )
+        write_link_angles(aside / "link_angles.csv", verification)
+        write_cables(aside / "cables.csv", verification)
+        file = verification_file(verification, record)
+        (aside / VERIFICATION).write_text(file.text(), encoding="utf-8")
+        write_report(aside / REPORT, verification, file, planned_by(order.trajectory))
+    return file
+
+
+def planned_by(trajectory: Path) -> PlanFile | None:
+    """plan.json beside a trajectory, if it belongs to exactly this trajectory."""
+    beside = trajectory.with_name(PLAN)
+    try:
+        plan = PlanFile.model_validate_json(beside.read_text(encoding="utf-8"))
+    except (OSError, ValidationError, UnicodeDecodeError):
+        return None
+    same = plan.hashes.trajectory_sha256 == sha256_of(trajectory)
+    return plan if same else None
+
+
+def _record(order: Order, robot: RobotModel) -> RunRecord:
+    return RunRecord(
+        command=order.command,
+        problem_file=str(order.source.path),
+        problem_sha256=order.source.sha256,
+        trajectory_sha256=sha256_of(order.trajectory),
+        urdf_sha256=robot.urdf_sha256,
+    )
