@@ -166,7 +166,7 @@ def read_robot(manipulator: Manipulator, text: str) -> RobotModel:
     T_link_capsule = np.tile(np.eye(4), (lengths.size, 1, 1))
     T_link_capsule[:, :3, :3] = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
     T_link_capsule[:, 0, 3] = lengths / 2.0
-    tip = model.frames[_frame_id(model, "tip")]
+    tip = model.frames[_frame_id(model, "tip")].placement
     return RobotModel(
         manipulator=manipulator,
         urdf_sha256=hashlib.sha256(text.encode()).hexdigest(),
@@ -174,7 +174,7 @@ def read_robot(manipulator: Manipulator, text: str) -> RobotModel:
         data=model.createData(),
         capsules=capsules,
         T_link_capsule=frozen(T_link_capsule),
-        p_link_tip=frozen(tip.placement.translation),
+        p_link_tip=frozen(tip.translation),
     )
 
 
@@ -186,7 +186,7 @@ def _frame_id(model: Any, name: str) -> int:
 
 
 def _check_joints(manipulator: Manipulator, model: Any) -> None:
-    """Hold Pinocchio's joints against x0, alpha1, theta1, .. and their limits."""
+    """Hold Pinocchio's joints against x0, alpha1, theta1, .., places and limits."""
     n_links = manipulator.n_links
     angles = [f"{kind}{i + 1}" for i in range(n_links) for kind in ("alpha", "theta")]
     expected = ["universe", "x0", *angles]
@@ -194,43 +194,57 @@ def _check_joints(manipulator: Manipulator, model: Any) -> None:
         message = f"Pinocchio's joints are {list(model.names)}, expected {expected}"
         raise VerificationFailed(message)
     box = np.full(2 * n_links, manipulator.max_joint_angle)
-    lower = np.concatenate([[manipulator.base_range[0]], -box])
-    upper = np.concatenate([[manipulator.base_range[1]], box])
+    low, high = manipulator.base_range
     if not (
-        model.nq == 1 + 2 * n_links
-        and (model.lowerPositionLimit == lower).all()
-        and (model.upperPositionLimit == upper).all()
+        np.array_equal(model.lowerPositionLimit, [low, *-box])
+        and np.array_equal(model.upperPositionLimit, [high, *box])
     ):
         message = "Pinocchio's joint limits are not those of the arm"
         raise VerificationFailed(message)
+    offsets = [0.0, *manipulator.link_lengths]
+    yaws = [model.jointPlacements[model.getJointId(name)] for name in angles[::2]]
+    tip = model.frames[_frame_id(model, "tip")].placement
+    for i, placement in enumerate([*yaws, tip]):
+        if list(placement.translation) != [offsets[i], 0.0, 0.0]:
+            message = (
+                f"Pinocchio puts joint centre O{i + 1} at {placement.translation} in "
+                f"its parent frame, expected ({offsets[i]}, 0, 0) m"
+            )
+            raise VerificationFailed(message)
 
 
 def _check_bodies(manipulator: Manipulator, model: Any, bodies: Any) -> None:
     """Hold the shapes Pinocchio loaded against one rod and two balls per link."""
-    import coal
-
-    found = sorted(
-        (body.parentJoint, type(body.geometry) is coal.Cylinder)
-        for body in bodies.geometryObjects
-    )
-    joints = [model.getJointId(f"theta{i + 1}") for i in range(manipulator.n_links)]
-    expected = [(j, rod) for j in joints for rod in (False, False, True)]
-    sizes = [
-        (body.geometry.radius, 2.0 * getattr(body.geometry, "halfLength", 0.0))
-        for body in bodies.geometryObjects
-    ]
-    radii_kept = all(radius == manipulator.link_radius for radius, _ in sizes)
-    lengths = sorted(length for _, length in sizes if length > 0.0)
-    if (
-        found != expected
-        or not radii_kept
-        or lengths != sorted(manipulator.link_lengths.tolist())
-    ):
+    found = sorted(_described(body) for body in bodies.geometryObjects)
+    radius = manipulator.link_radius
+    expected = []
+    for i, length in enumerate(manipulator.link_lengths.tolist(), start=1):
+        joint = model.getJointId(f"theta{i}")
+        expected += [(joint, x, radius, 0.0) for x in (0.0, length)]
+        expected.append((joint, length / 2.0, radius, length))
+    if found != sorted(expected):
         message = (
             f"Pinocchio loaded {len(found)} collision shapes, expected a cylinder and "
             f"two spheres for each of {manipulator.n_links} links in the arm's sizes"
         )
         raise VerificationFailed(message)
+
+
+def _described(body: Any) -> tuple[int, float, float, float]:
+    """Joint, place along the link, radius and length of a ball or rod; NaN if neither.
+
+    A rod's axis must lie along the link.
+    """
+    import coal
+
+    shape, placement = body.geometry, body.placement
+    upright = abs(placement.rotation[0, 2]) == 1.0
+    place = float(placement.translation[0])
+    if type(shape) is coal.Sphere:
+        return body.parentJoint, place, shape.radius, 0.0
+    if type(shape) is coal.Cylinder and upright:
+        return body.parentJoint, place, shape.radius, 2.0 * shape.halfLength
+    return body.parentJoint, place, float("nan"), float("nan")
 
 
 def _live_poses(model: Any, data: Any, n_links: int) -> FloatArray:

@@ -1,0 +1,195 @@
+"""Three roads to the joint centres, and a reader that notices what got lost."""
+
+import hashlib
+import io
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import yourdfpy
+
+from vdsm_pin.errors import InvalidInput, UnknownName, VerificationFailed
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
+from vdsm_pin.robot_model import load_robot, read_robot
+from vdsm_pin.urdf_writer import urdf_text
+
+HRM8 = built_in("hrm8")
+AGREEMENT = 1e-12
+
+
+def random_arm(rng: np.random.Generator, n_links: int) -> Manipulator:
+    lengths = rng.uniform(0.05, 0.8, n_links)
+    radius = float(rng.uniform(0.01, 0.09))
+    cables = CableLayout(0.9 * radius, 0.9 * radius, paper_hole_angles(n_links))
+    limit = float(rng.uniform(0.2, 1.2))
+    return Manipulator("any", lengths, radius, limit, limit, (-2.0, 1.0), cables)
+
+
+def random_joints(
+    rng: np.random.Generator, arm: Manipulator, n: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Half uniform, a quarter on the limits, a quarter within 1e-7 of zero.
+
+    They alternate: trimesh, which keeps yourdfpy's transforms, ignores a change of less
+    than 1e-8, so that tiny configurations in a row would not be computed at all.
+    """
+    box = arm.max_joint_angle
+    angles = rng.uniform(-box, box, (2, n, arm.n_links))
+    angles[:, 1::4] = box * rng.choice([-1.0, 0.0, 1.0], angles[:, 1::4].shape)
+    angles[:, 3::4] = rng.uniform(-1e-7, 1e-7, angles[:, 3::4].shape)
+    return rng.uniform(*arm.base_range, n), angles[0], angles[1]
+
+
+def yourdfpy_centres(
+    arm: Manipulator, x0: np.ndarray, alpha: np.ndarray, theta: np.ndarray
+) -> np.ndarray:
+    """Joint centres from the joint transforms that yourdfpy computes.
+
+    Its `get_transform` multiplies them up at 0.5 ms a frame; here that is done for all
+    samples at once.
+    """
+    robot = yourdfpy.URDF.load(io.BytesIO(urdf_text(arm).encode()), load_meshes=False)
+    assert robot.validate()
+    names = [
+        f"{kind}{i}" for i in range(1, arm.n_links + 1) for kind in ("yaw", "link")
+    ]
+    chain = ["rail", "base", *names, "tip"]
+    edges = list(pairwise(chain))
+    data = robot.scene.graph.transforms.edge_data
+    q = np.zeros((x0.size, 1 + 2 * arm.n_links))
+    q[:, 0], q[:, 1::2], q[:, 2::2] = x0, alpha, theta
+    steps = np.zeros((x0.size, len(edges), 4, 4))
+    for k in range(x0.size):
+        robot.update_cfg(q[k])
+        steps[k] = [data[edge]["matrix"] for edge in edges]
+    robot.update_cfg(q[0])
+    tip = robot.get_transform("tip")
+    poses = [steps[:, 0]]
+    for i in range(1, len(edges)):
+        poses.append(poses[-1] @ steps[:, i])
+    np.testing.assert_allclose(poses[-1][0], tip, rtol=0, atol=AGREEMENT)
+    centres = [pose[:, :3, 3] for pose in [*poses[2::2], poses[-1]]]
+    return np.stack(centres, axis=1)
+
+
+def test_pinocchio_yourdfpy_and_the_closed_form_agree_at_10000_configurations() -> None:
+    joints = random_joints(np.random.default_rng(11), HRM8, 10_000)
+    ours = joint_centres(HRM8, *joints)
+    pinocchio = load_robot(HRM8).joint_centres(*joints)
+    np.testing.assert_allclose(pinocchio, ours, rtol=0, atol=AGREEMENT)
+    third = yourdfpy_centres(HRM8, *joints)
+    np.testing.assert_allclose(third, ours, rtol=0, atol=AGREEMENT)
+
+
+@pytest.mark.parametrize("n_links", [2, 3, 5, 12, 40])
+def test_they_agree_on_any_arm(n_links: int) -> None:
+    rng = np.random.default_rng(n_links)
+    arm = random_arm(rng, n_links)
+    joints = random_joints(rng, arm, 300)
+    ours = joint_centres(arm, *joints)
+    pinocchio = load_robot(arm).joint_centres(*joints)
+    np.testing.assert_allclose(pinocchio, ours, rtol=0, atol=AGREEMENT)
+    few = tuple(values[:12] for values in joints)
+    third = yourdfpy_centres(arm, *few)
+    np.testing.assert_allclose(third, ours[:12], rtol=0, atol=AGREEMENT)
+
+
+def test_link_frames_point_along_the_links() -> None:
+    x0, alpha, theta = random_joints(np.random.default_rng(2), HRM8, 50)
+    poses = load_robot(HRM8).link_poses(x0, alpha, theta)
+    centres = joint_centres(HRM8, x0, alpha, theta)
+    along = np.diff(centres, axis=1) / HRM8.link_lengths[:, None]
+    np.testing.assert_allclose(poses.rotations[..., 0], along, atol=1e-14)
+    identity = poses.rotations @ poses.rotations.swapaxes(2, 3)
+    np.testing.assert_allclose(
+        identity, np.broadcast_to(np.eye(3), identity.shape), atol=1e-14
+    )
+    np.testing.assert_allclose(np.linalg.det(poses.rotations), 1.0, atol=1e-14)
+
+
+def test_capsules_lie_between_the_joint_centres() -> None:
+    robot = load_robot(HRM8)
+    for capsule, pose, length in zip(
+        robot.capsules, robot.T_link_capsule, HRM8.link_lengths, strict=True
+    ):
+        half = pose[:3, 2] * capsule.halfLength
+        np.testing.assert_allclose(pose[:3, 3] - half, [0, 0, 0], atol=1e-16)
+        np.testing.assert_allclose(pose[:3, 3] + half, [length, 0, 0], atol=1e-16)
+        assert capsule.radius == HRM8.link_radius
+
+
+def test_answers_of_one_call_survive_the_next() -> None:
+    robot = load_robot(HRM8)
+    rng = np.random.default_rng(4)
+    first = robot.link_poses(*random_joints(rng, HRM8, 9))
+    kept = first.origins.copy()
+    robot.link_poses(*random_joints(rng, HRM8, 9))
+    np.testing.assert_array_equal(first.origins, kept)
+
+
+def test_hash_is_of_the_document() -> None:
+    text = urdf_text(HRM8)
+    assert load_robot(HRM8).urdf_sha256 == hashlib.sha256(text.encode()).hexdigest()
+
+
+def test_an_unknown_frame_is_no_number() -> None:
+    robot = load_robot(HRM8)
+    assert robot.model.frames[robot.frame_id("link3")].name == "link3"
+    with pytest.raises(UnknownName, match=r"unknown frame 'link9'.*tip_mount"):
+        robot.frame_id("link9")
+
+
+def test_angles_of_another_arm_are_refused() -> None:
+    with pytest.raises(InvalidInput, match=r"\(4, 7\).*expected \(4, 8\)"):
+        load_robot(HRM8).joint_centres(np.zeros(4), np.zeros((4, 7)), np.zeros((4, 7)))
+
+
+def other_arm(**changes: object) -> Manipulator:
+    fields = {name: getattr(HRM8, name) for name in Manipulator.__dataclass_fields__}
+    return Manipulator(**(fields | changes))
+
+
+def without_a_collision_shape() -> str:
+    text = urdf_text(HRM8)
+    start = text.index('<collision name="link4_body">')
+    end = text.index("</collision>", start) + len("</collision>")
+    return text[:start] + text[end:]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            urdf_text(HRM8).replace(
+                '<cylinder radius="0.0615" length="0.486" />\n      </geometry>\n'
+                "    </collision>",
+                '<cylinder radius="0.0615" length="0.487" />\n      </geometry>\n'
+                "    </collision>",
+            ),
+            "in the arm's sizes",
+        ),
+        (without_a_collision_shape(), "loaded 23 collision shapes"),
+        (urdf_text(other_arm(link_radius=0.06)), "in the arm's sizes"),
+        (
+            urdf_text(other_arm(link_lengths=HRM8.link_lengths[::-1])),
+            r"joint centre O2 at .*expected \(0.486, 0, 0\) m",
+        ),
+        (urdf_text(other_arm(max_joint_angle=0.7)), "joint limits are not those"),
+        (urdf_text(other_arm(base_range=(-5.0, 4.0))), "joint limits are not those"),
+        (
+            urdf_text(random_arm(np.random.default_rng(1), 7)),
+            "joints are .* expected",
+        ),
+        (urdf_text(HRM8).replace('"alpha3"', '"beta3"'), "joints are .*beta3"),
+    ],
+)
+def test_a_document_of_another_arm_is_refused(text: str, message: str) -> None:
+    with pytest.raises(VerificationFailed, match=message):
+        read_robot(HRM8, text)
+
+
+def test_a_broken_document_is_refused_before_pinocchio_sees_it() -> None:
+    text = urdf_text(HRM8).replace('<parent link="base" />', '<parent link="b" />')
+    with pytest.raises(InvalidInput, match="parent link 'b' does not exist"):
+        read_robot(HRM8, text)
