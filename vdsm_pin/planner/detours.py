@@ -177,17 +177,17 @@ def detour_route(path: DesiredPath, region: DangerRegion, judge: Judge) -> Route
         raise PathBlocked(
             obstacle=region.name, reason="no point of the path can be drawn"
         )
+    start = _End(path.start, 0, path.start[None, 1:])
     ways: list[Rows] = []
-    here, label = path.start, 0
+    here = start
     for piece in pieces:
-        left_at = ways[-1].stations[-1] if ways else piece.stations[0]
-        way = _connect(path, shadow, here, label, piece, float(left_at))
-        ways += [way, piece]
-        here, label = piece.points[-1], int(piece.side[-1])
+        left_at = float(ways[-1].stations[-1] if ways else piece.stations[0])
+        there = _end(piece, shadow, last=False)
+        ways += [_connect(path, shadow, here, there, left_at, judge), piece]
+        here = _end(piece, shadow, last=True)
     if path.closed:
-        home = Rows(path.start[None], np.zeros(1), False, np.zeros(1, np.int64))
         left_at = float(ways[-1].stations[-1])
-        ways.append(_connect(path, shadow, here, label, home, left_at))
+        ways.append(_connect(path, shadow, here, start, left_at, judge))
     return join(path, ways, (note,) if note else ())
 
 
@@ -266,52 +266,90 @@ def _leading(able: BoolArray) -> int:
     return len(able) if able.all() else int(np.argmin(able))
 
 
+@dataclass(frozen=True)
+class _End:
+    """An end of a drawn part, seen by the way that joins it.
+
+    Args:
+        point: The tip there, shape (3,); [m].
+        side: The arm's side there; 0 if any.
+        retreat: The drawn waypoints from there to the first one out of the shadow,
+            projected, shape (m, 2), m >= 1; [m].
+    """
+
+    point: FloatArray
+    side: int
+    retreat: FloatArray
+
+
+def _end(rows: Rows, shadow: Shadow, last: bool) -> _End:
+    """The last or the first waypoint of a drawn part as an end."""
+    inwards = slice(None, None, -1) if last else slice(None)
+    points = project(rows.points)[inwards]
+    covered = shadow.covers(points)
+    out = len(points) - 1 if covered.all() else int(np.argmin(covered))
+    side = rows.side[inwards]
+    return _End(rows.points[inwards][0], int(side[0]), points[: out + 1])
+
+
 def _connect(
     path: DesiredPath,
     shadow: Shadow,
-    here: FloatArray,
-    label: int,
-    piece: Rows,
+    begin: _End,
+    end: _End,
     station: float,
+    judge: Judge,
 ) -> Rows:
-    """The shortest way off the path that leaves and arrives on the right sides."""
-    begin, end = here[1:], piece.points[0, 1:]
-    region = shadow.region
-    lines = [region.walk(begin, end, 1), region.walk(begin, end, -1)]
-    straight = np.stack([begin, end])
-    if (
-        region.core_distance(straight[None])[0]
-        >= region.radius - TOLERANCES.on_boundary
-    ):
-        lines.insert(0, straight)
-    lines.sort(
-        key=lambda line: float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
-    )
+    """The shortest way off the path that the arm can follow, sides kept in the shadow.
+
+    From either end the tip goes round the region at once; where the arm cannot follow,
+    it first goes back along the path it can draw, out of the shadow.
+    """
+    lines = []
+    for k, m in ((1, 1), (len(begin.retreat), 1), (1, len(end.retreat)), (-1, -1)):
+        out = begin.retreat[:k] if k > 0 else begin.retreat
+        back = (end.retreat[:m] if m > 0 else end.retreat)[::-1]
+        lines += [
+            np.concatenate([out, line, back])
+            for line in _ways_round(shadow.region, out[-1], back[0])
+        ]
+    lines.sort(key=lambda line: np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+    from_x, to_x = float(begin.point[0]), float(end.point[0])
     for line in lines:
-        way = off_path_rows(
-            path, line, float(here[0]), float(piece.points[0, 0]), station
-        )
-        side = _sides_on_way(way, shadow, label, int(piece.side[0]))
+        way = off_path_rows(path, line, from_x, to_x, station)
+        side = _sides_on_way(way, shadow, begin.side, end.side, judge)
         if side is not None:
             return way.part(0, len(way) - 1, side)
     reason = "the tip cannot get round it with the arm on the side it needs"
-    raise PathBlocked(obstacle=region.name, reason=reason)
+    raise PathBlocked(obstacle=shadow.region.name, reason=reason)
+
+
+def _ways_round(
+    region: DangerRegion, begin: FloatArray, end: FloatArray
+) -> list[FloatArray]:
+    """The straight line where it is clear, and the taut ways round either side."""
+    straight = np.stack([begin, end])
+    clear = region.core_distance(straight[None])[0] >= region.radius
+    ways = [region.walk(begin, end, sense) for sense in (1, -1)]
+    return [straight, *ways] if clear else ways
 
 
 def _sides_on_way(
-    way: Rows, shadow: Shadow, label: int, target: int
+    way: Rows, shadow: Shadow, leaving: int, arriving: int, judge: Judge
 ) -> IntArray | None:
-    """The arm's side along a way; None where it would have to change in the shadow."""
-    points = project(way.points)
+    """The arm's side along a way; None where it cannot follow or would change side."""
     side = np.zeros(len(way), int)
-    for visit in shadow.visits(points):
+    for visit in shadow.visits(project(way.points)):
         needs = {visit.entry, visit.exit}
         if visit.first == 0:
-            needs.add(label)
+            needs.add(leaving)
         if visit.last == len(way) - 1:
-            needs.add(target)
+            needs.add(arriving)
         needs.discard(0)
         if len(needs) > 1:
             return None
-        side[visit.first : visit.last + 1] = needs.pop() if needs else 1
+        span = slice(visit.first, visit.last + 1)
+        side[span] = needs.pop() if needs else 1
+        if not judge(way.points[span], int(side[visit.first])).all():
+            return None
     return side

@@ -1,0 +1,160 @@
+"""How joints get round the danger region on one side: chosen by trial (Step 5).
+
+The paper leaves two things open: the direction of the auxiliary line, and how far round
+the section the danger region is drawn. Both are tried on the waypoints wanted on that
+side. The vertical and the horizontal line, the paper's "positive cross", come first,
+then oblique ones; the region starts as the section grown by body, clearance and margin,
+and is grown on until the links between the joints, not only the joints, keep clear.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.planner.danger_region import DangerRegion
+from vdsm_pin.planner.joint_paths import slide_joints
+from vdsm_pin.planner.lift import rises_squared
+from vdsm_pin.planner.project import project
+from vdsm_pin.problem import PlanningProblem
+
+GROWTHS: Final = (0.0, 0.01, 0.02, 0.03, 0.04, 0.06, 0.09, 0.12)
+"""How far the region is grown for the links, as parts of the longest link; [-]."""
+
+OBLIQUE: Final = tuple(np.deg2rad([90.0, 75.0, 105.0, 60.0, 120.0]))
+"""Oblique lines, by their angle to the ray from P_1 through the obstacle; [rad]."""
+
+LARGEST_SWING: Final = float(np.deg2rad(15.0))
+"""A link that turns farther than this between two neighbouring waypoints has jumped:
+inserting waypoints would not make its motion continuous; [rad]."""
+
+COARSE: Final = 4
+"""Choices are compared on every fourth waypoint, then confirmed on all."""
+
+
+@dataclass(frozen=True)
+class SideRule:
+    """How joints get out of the danger region on one side.
+
+    Args:
+        region: What they slide on.
+        direction: The auxiliary line, a unit vector, shape (2,); [-].
+    """
+
+    region: DangerRegion
+    direction: FloatArray
+
+
+def choose_rule(
+    problem: PlanningProblem,
+    forbidden: DangerRegion,
+    shapes: list[DangerRegion],
+    side: int,
+    sequences: list[FloatArray],
+) -> SideRule:
+    """The first shape, line and growth that does all that is wanted, else the best."""
+    best: SideRule | None = None
+    best_score = -1.0
+    for rule in _trials(problem, shapes, side):
+        score = _score(problem, forbidden, rule, sequences)
+        if best is None or score > best_score:
+            best, best_score = rule, score
+        if score == 1.0:
+            break
+    assert best is not None
+    return best
+
+
+def _trials(
+    problem: PlanningProblem, shapes: list[DangerRegion], side: int
+) -> Iterator[SideRule]:
+    """Every rule that is tried, the paper's own first."""
+    longest = float(problem.manipulator.link_lengths.max())
+    for shape in shapes:
+        for direction in _lines(shape, side):
+            for growth in GROWTHS:
+                radius = shape.radius + growth * longest
+                region = DangerRegion(shape.name, shape.corners, radius)
+                if growth > 0.0 and region.contains(anchors(problem)).any():
+                    break
+                yield SideRule(region, direction)
+
+
+def _score(
+    problem: PlanningProblem,
+    forbidden: DangerRegion,
+    rule: SideRule,
+    sequences: list[FloatArray],
+) -> float:
+    """The part of the wanted waypoints reached without a break, 1 for all; [-]."""
+    reached = total = 0
+    for points in sequences:
+        for coarse in (True, False):
+            chosen = points[::COARSE] if coarse else points
+            able = stands(problem, forbidden, rule, chosen, neighbours=not coarse)
+            if not able.all():
+                break
+        first = len(able) if able.all() else int(np.argmin(able))
+        reached += min(first * (COARSE if coarse else 1), len(points))
+        total += len(points)
+    return reached / total if total else 1.0
+
+
+def _lines(region: DangerRegion, side: int) -> list[FloatArray]:
+    """Directions of the auxiliary lines, each turned to the side; [-]."""
+    centre = region.centre
+    bearing = np.arctan2(centre[1], centre[0])
+    across = side * np.array([-np.sin(bearing), np.cos(bearing)])
+    lines = [np.array([0.0, 1.0]), np.array([1.0, 0.0])]
+    lines = [line * (1.0 if line @ across > 0.0 else -1.0) for line in lines]
+    turned = bearing + side * np.array(OBLIQUE)
+    return lines + [np.array([np.cos(t), np.sin(t)]) for t in turned]
+
+
+def anchors(problem: PlanningProblem) -> FloatArray:
+    """What a danger region must leave free: the rail and the start, (2, 2); [m]."""
+    return np.stack([np.zeros(2), problem.path.start[1:]])
+
+
+def slid(manipulator: Manipulator, tip: FloatArray, rule: SideRule) -> FloatArray:
+    """Step 5 by one rule: tip (n, 2) to joints (n, N + 1, 2); [m]."""
+    directions = np.broadcast_to(rule.direction, tip.shape)
+    return slide_joints(manipulator, tip, rule.region, directions)
+
+
+def stands(
+    problem: PlanningProblem,
+    forbidden: DangerRegion,
+    rule: SideRule,
+    points: FloatArray,
+    neighbours: bool = True,
+) -> BoolArray:
+    """Whether links are long enough, limits and clearance kept, and no joint jumps.
+
+    Args:
+        problem: The arm and its limits.
+        forbidden: What the links keep out of.
+        rule: How the joints slide.
+        points: Tip positions, shape (n, 3); [m].
+        neighbours: Whether they follow each other as waypoints do.
+    """
+    manipulator = problem.manipulator
+    planar = slid(manipulator, project(points), rule)
+    squares = rises_squared(manipulator, planar)
+    able = (squares > 0.0).all(axis=1)
+    links = np.concatenate(
+        [np.sqrt(np.maximum(squares, 0.0))[..., None], np.diff(planar, axis=1)], axis=2
+    )
+    links /= manipulator.link_lengths[:, None]
+    cosine = np.einsum("nij,nij->ni", links[:, 1:], links[:, :-1])
+    limit = np.cos(min(manipulator.max_link_angle, manipulator.max_joint_angle))
+    able &= (cosine >= limit).all(axis=1) & (links[:, 0, 0] >= limit)
+    able &= forbidden.core_distance(planar) >= forbidden.radius
+    if not neighbours:
+        return np.asarray(able)
+    swing = np.abs(np.diff(links, axis=0)).max(axis=(1, 2), initial=0.0)
+    able[1:] &= swing <= LARGEST_SWING
+    return np.asarray(able)
