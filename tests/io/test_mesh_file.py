@@ -109,7 +109,7 @@ DAMAGE = [
     ("a.stl", b"\x01" * 50, "is neither text nor binary STL: only 50 bytes"),
     ("a.stl", binary_stl(TETRAHEDRON)[:-7], "damaged: its header promises 4 tria"),
     ("a.stl", binary_stl(TETRAHEDRON[:0]), "has no triangle"),
-    ("a.stl", binary_stl(NAN), "triangle 3: has a coordinate that is not a finite"),
+    ("a.stl", binary_stl(NAN), "triangle 3: has a coordinate that is not a number"),
     ("a.stl", "solid a\nendsolid a\n", "has no triangle"),
     ("a.stl", text_stl(TETRAHEDRON)[:400], "is truncated"),
     ("a.stl", text_stl(TETRAHEDRON).replace("1.0", "one"), "expected 3 numbers"),

@@ -13,6 +13,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.io.schema_types import LARGEST
 from vdsm_pin.io.source import decode, read_bytes
 
 MAX_MESH_BYTES: Final = 1 << 30
@@ -31,7 +32,7 @@ class MeshData:
     Args:
         vertices: Shape (n, 3), in the unit of the file.
         triangles: Vertex indices, shape (m, 3), m >= 1.
-        watertight: Whether every edge belongs to exactly two triangles.
+        watertight: Whether the triangles enclose an inside, see `is_closed`.
         content: The bytes of the file.
     """
 
@@ -66,12 +67,16 @@ def read_mesh(path: Path) -> MeshData:
 
 
 def is_closed(triangles: IntArray) -> bool:
-    """Whether every edge belongs to exactly two triangles, none of them degenerate."""
+    """Whether every edge belongs to an even number of triangles, none degenerate.
+
+    Then a ray from a point crosses the triangles an even number of times or an odd one,
+    whatever its direction: the triangles part space into an outside and an inside.
+    """
     edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     if (edges[:, 0] == edges[:, 1]).any():
         return False
     _, counts = np.unique(edges, axis=0, return_counts=True)
-    return bool((counts == 2).all())
+    return bool((counts % 2 == 0).all())
 
 
 def _check_corners(corners: FloatArray, path: Path) -> None:
@@ -80,10 +85,10 @@ def _check_corners(corners: FloatArray, path: Path) -> None:
     if len(corners) > MAX_TRIANGLES:
         problem = f"has {len(corners)} triangles, the most is {MAX_TRIANGLES}"
         raise InvalidFile(file=path, problem=problem)
-    finite = np.isfinite(corners).all(axis=(1, 2))
-    if not finite.all():
-        first = int(np.argmin(finite)) + 1
-        problem = "has a coordinate that is not a finite number"
+    good = (np.abs(corners) <= LARGEST).all(axis=(1, 2))
+    if not good.all():
+        first = int(np.argmin(good)) + 1
+        problem = f"has a coordinate that is not a number up to {LARGEST:g}"
         raise InvalidFile(file=path, where=f"triangle {first}", problem=problem)
 
 
@@ -157,6 +162,7 @@ def _obj_corners(text: str, path: Path) -> FloatArray:
     if not faces:
         return np.zeros((0, 3, 3))
     corners: FloatArray = np.array(vertices, dtype=np.float64)[np.array(faces)]
+    _check_corners(corners, path)
     _check_fans(corners, polygons, path)
     return corners
 
