@@ -20,6 +20,7 @@ from vdsm_pin.io.atomic import write_text
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.report.facts import straight_arm
 from vdsm_pin.report.folder import check_output_file
 from vdsm_pin.report.html import message_page, view_page
 from vdsm_pin.trajectory import Trajectory
@@ -31,12 +32,10 @@ _LOOK: Final = 0.25  # seconds between looks at the files
 
 def at_start(problem: PlanningProblem) -> Trajectory:
     """The arm where it begins, as a motion of one row."""
-    arm, joints = problem.manipulator, problem.path.start_joints
+    joints = problem.path.start_joints
     if joints is None:
-        joints = np.zeros(1 + 2 * arm.n_links)
-        joints[0] = problem.path.start[0] - arm.total_length
-    angles = joints[1:].reshape(1, arm.n_links, 2)
-    zero = np.zeros(1)
+        return straight_arm(problem)
+    angles, zero = joints[1:].reshape(1, -1, 2), np.zeros(1)
     return Trajectory(
         zero.astype(bool), zero, joints[:1], angles[:, :, 0], angles[:, :, 1]
     )

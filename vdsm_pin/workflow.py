@@ -22,6 +22,7 @@ from vdsm_pin.report.run_record import RunRecord, sha256_of
 from vdsm_pin.report.tables import ClearanceCsv, write_cables, write_link_angles
 from vdsm_pin.robot_model import RobotModel, load_robot
 from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.clearance import all_pairs
 from vdsm_pin.verification.records import ErrorBox, Verdict
 from vdsm_pin.verification.verify import verify
 
@@ -107,7 +108,8 @@ def verify_to_folder(order: Order) -> VerificationFile:
     trajectory = read_trajectory(order.trajectory, problem.manipulator)
     record = _record(order, robot)
     with staged(order.folder) as aside:
-        with ClearanceCsv(aside / "clearance.csv", problem) as clearance:
+        pairs = all_pairs(problem)
+        with ClearanceCsv(aside / "clearance.csv", problem, pairs) as clearance:
             verification = verify(
                 problem,
                 trajectory,

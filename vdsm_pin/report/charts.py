@@ -8,7 +8,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import link_angles
-from vdsm_pin.report.facts import cables, changed_angles
+from vdsm_pin.report.facts import cables, changed_angles, straight_arm
 from vdsm_pin.report.palette import link_colours, oklch
 from vdsm_pin.report.thinning import Thinned
 from vdsm_pin.units import MM_PER_M
@@ -108,8 +108,8 @@ def _clearance_charts(
             "series": _brackets(
                 links,
                 link_colours(len(links)),
-                shown.least(profile.link_lower),
-                shown.least(profile.link_upper),
+                shown.least(profile.link_lower, profile.first_interval),
+                shown.least(profile.link_upper, profile.first_interval),
             ),
         },
         common
@@ -120,8 +120,8 @@ def _clearance_charts(
             "series": _brackets(
                 list(scene.names),
                 tuple(hues),
-                shown.least(profile.obstacle_lower),
-                shown.least(profile.obstacle_upper),
+                shown.least(profile.obstacle_lower, profile.first_interval),
+                shown.least(profile.obstacle_upper, profile.first_interval),
             ),
         },
     ]
@@ -153,7 +153,7 @@ def _changed_chart(verification: Verification, shown: Thinned) -> dict[str, Any]
         "floor": 0.0,
         "whole": True,
         "limits": [],
-        "series": [_series("changed", _INK, count.astype(np.float64))],
+        "series": [_series("changed", _INK, count.astype(np.float64), step=True)],
     }
 
 
@@ -178,18 +178,20 @@ def _joint_charts(verification: Verification, shown: Thinned) -> list[dict[str, 
 
 
 def _cable_chart(verification: Verification, shown: Thinned) -> dict[str, Any]:
-    lengths = cables(verification)[shown.rows] * MM_PER_M
-    colours = link_colours(lengths.shape[1])
+    straight = cables(verification.problem, straight_arm(verification.problem))
+    lengths = cables(verification.problem, verification.trajectory)[shown.rows]
+    change = (lengths - straight) * MM_PER_M
+    colours = link_colours(change.shape[1])
     return {
         "id": "cables",
         "title": "Cable lengths",
-        "note": "Three driving cables a, b, c for each link.",
+        "note": "Change against the straight arm; cables a, b, c of each link.",
         "unit": " mm",
-        "axis": "length [mm]",
+        "axis": "change [mm]",
         "limits": [],
         "series": [
-            _series(f"l{i + 1}{hole}", colours[i], lengths[:, i, j], dash=_DASHES[j])
-            for i in range(lengths.shape[1])
+            _series(f"l{i + 1}{hole}", colours[i], change[:, i, j], dash=_DASHES[j])
+            for i in range(change.shape[1])
             for j, hole in enumerate("abc")
         ],
     }

@@ -8,6 +8,7 @@ from vdsm_pin.cables import cable_lengths
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.records import Plan
+from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.files import (
     BatchRow,
     CheckRow,
@@ -220,7 +221,14 @@ def batch_row(folder: str, strategy: str, file: VerificationFile) -> BatchRow:
     )
 
 
-def cables(verification: Verification) -> FloatArray:
+def cables(problem: PlanningProblem, rows: Trajectory) -> FloatArray:
     """Cable lengths of every row, shape (n_samples, N, 3); [m]."""
-    rows = verification.trajectory
-    return cable_lengths(verification.problem.manipulator, rows.alpha, rows.theta)
+    return cable_lengths(problem.manipulator, rows.alpha, rows.theta)
+
+
+def straight_arm(problem: PlanningProblem) -> Trajectory:
+    """The straight arm with its tip at the start's x, as a motion of one row."""
+    arm = problem.manipulator
+    base = np.array([problem.path.start[0] - arm.total_length])
+    zero, angles = np.zeros(1), np.zeros((1, arm.n_links))
+    return Trajectory(zero.astype(bool), zero, base, angles, angles)

@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 _CHROMA: Final = 0.135
-_LIGHTNESS: Final = (0.58, 0.68)  # alternating, so that neighbours differ without hue
+_LIGHTNESS: Final = (0.55, 0.64)  # alternating, so that neighbours differ without hue
 _FIRST_HUE, _LAST_HUE = 262.0, -20.0  # blue at the base, over green, to magenta
 
 

@@ -89,7 +89,7 @@ def write_link_angles(path: Path, verification: Verification) -> None:
 
 def write_cables(path: Path, verification: Verification) -> None:
     """cables.csv: the 3N cable lengths at every row."""
-    lengths = cables(verification)
+    lengths = cables(verification.problem, verification.trajectory)
     joints = range(1, lengths.shape[1] + 1)
     header = ["waypoint", *(f"l{j}{hole}_m" for j in joints for hole in _HOLES)]
     labels = [str(k) for k in range(len(lengths))]

@@ -31,11 +31,24 @@ class Thinned:
         """Whether every row is shown."""
         return len(self.rows) == self.n_samples
 
-    def least(self, intervals: FloatArray) -> FloatArray:
-        """Least value between neighbouring rows shown, (n_intervals, m) to (k', m)."""
+    def least(self, bins: FloatArray, first: IntArray) -> FloatArray:
+        """Least value between neighbouring rows shown.
+
+        Args:
+            bins: A profile's values, shape (n_bins, m).
+            first: The interval each bin begins with, rising from 0, shape (n_bins,).
+
+        Returns:
+            Shape (k - 1, m), or one row where one row is shown.
+        """
         if len(self.rows) < 2:
-            return intervals
-        return np.asarray(np.minimum.reduceat(intervals, self.rows[:-1], axis=0))
+            return bins.min(axis=0, keepdims=True)
+        start = np.searchsorted(first, self.rows[:-1], side="right") - 1
+        end = np.searchsorted(first, self.rows[1:], side="left")
+        padded = np.vstack([bins, np.full((1, bins.shape[1]), np.inf)])
+        edges = np.stack([start, end], axis=1).ravel()
+        least: FloatArray = np.minimum.reduceat(padded, edges, axis=0)[::2]
+        return least
 
 
 def thinned(trajectory: Trajectory, keep: IntArray) -> Thinned:

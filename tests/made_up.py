@@ -87,7 +87,9 @@ def verification(
     phase = np.linspace(0.0, 6.0, intervals)[:, None]
     links = 0.4 + 0.395 * np.sin(phase + np.arange(8))
     others = 0.4 + 0.395 * np.sin(phase + np.arange(len(names)) + 0.5)
-    profile = ClearanceProfile(links, 1.2 * links, others, 1.2 * others)
+    profile = ClearanceProfile(
+        links, 1.2 * links, others, 1.2 * others, np.arange(intervals)
+    )
     closest = tuple(
         ClosestApproach(
             interval=min(17 * i, intervals - 1),

@@ -1,0 +1,1 @@
+"""Its place puts tests/ on the path: helpers shared by test folders live there."""

@@ -1,0 +1,79 @@
+"""Oracle: rows that differ in exactly one known way."""
+
+from pathlib import Path
+
+import made_up
+import pytest
+
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.report.diff import compare_folders, diff_lines
+from vdsm_pin.report.facts import batch_row, verification_file
+from vdsm_pin.report.files import BatchRow
+from vdsm_pin.report.tables import write_summary
+from vdsm_pin.verification.records import Verdict
+
+FILE = verification_file(made_up.verification(), made_up.RECORD)
+ROW = batch_row("a", "paper", FILE)
+
+
+def folder(path: Path, *rows: BatchRow) -> Path:
+    path.mkdir()
+    write_summary(path / "summary.csv", rows)
+    return path
+
+
+def test_equal_folders_have_no_difference(tmp_path: Path) -> None:
+    old, new = folder(tmp_path / "old", ROW), folder(tmp_path / "new", ROW)
+    assert compare_folders(old, new) == ()
+    assert diff_lines(()) == ["no difference"]
+
+
+@pytest.mark.parametrize(
+    ("update", "worse"),
+    [
+        ({"outcome": "refuted"}, True),
+        ({"outcome": "undecided"}, True),
+        ({"min_clearance_lower_m": 0.0040}, True),
+        ({"min_clearance_lower_m": 0.0050}, False),
+        ({"min_clearance_lower_m": None}, True),
+        ({"coverage": 0.9}, False),
+        ({"coverage": 0.8}, True),
+        ({"changed_angles_mean_on_path": 1.0}, False),
+        ({"changed_angles_mean_on_path": 7.0}, True),
+        ({"joint_error_rad": 0.001}, True),
+    ],
+)
+def test_each_change_is_named_with_its_direction(
+    tmp_path: Path, update: dict[str, object], worse: bool
+) -> None:
+    old = folder(tmp_path / "old", ROW)
+    new = folder(tmp_path / "new", ROW.model_copy(update=update))
+    (change,) = compare_folders(old, new)
+    assert change.worse is worse
+    (back,) = compare_folders(new, old)
+    assert back.worse is not worse
+    assert ("newly refuted" in change.what) == (update.get("outcome") == "refuted")
+    assert len(diff_lines((change,))) == 2
+
+
+def test_missing_and_new_problems_show(tmp_path: Path) -> None:
+    other = ROW.model_copy(update={"folder": "b"})
+    old, new = folder(tmp_path / "old", ROW), folder(tmp_path / "new", other)
+    assert [change.worse for change in compare_folders(old, new)] == [True, False]
+
+
+def test_single_results_compare_too(tmp_path: Path) -> None:
+    for name, verdict in (("old", Verdict.CERTIFIED), ("new", Verdict.REFUTED)):
+        (tmp_path / name).mkdir()
+        file = verification_file(made_up.verification(verdict), made_up.RECORD)
+        (tmp_path / name / "verification.json").write_text(file.text())
+    (change,) = compare_folders(tmp_path / "old", tmp_path / "new")
+    assert change.worse
+
+
+def test_other_folders_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidFile, match="neither"):
+        compare_folders(tmp_path, tmp_path)
+    (tmp_path / "summary.csv").write_text("outcome\nsplendid\n")
+    with pytest.raises(InvalidFile, match="cannot be read"):
+        compare_folders(tmp_path, tmp_path)

@@ -1,0 +1,50 @@
+"""Oracle: what is on the disk afterwards."""
+
+from pathlib import Path
+
+import pytest
+
+from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.report.folder import check_output_file, check_output_folder, staged
+
+
+def test_files_arrive_together_and_others_stay(tmp_path: Path) -> None:
+    folder = tmp_path / "deep" / "out"
+    folder.mkdir(parents=True)
+    (folder / "mine.txt").write_text("mine")
+    (folder / "a").write_text("old")
+    with staged(folder) as aside:
+        (aside / "a").write_text("new")
+        (aside / "b").write_text("b")
+        assert (folder / "a").read_text() == "old"
+    assert {p.name for p in folder.iterdir()} == {"a", "b", "mine.txt"}
+    assert (folder / "a").read_text() == "new"
+
+
+def test_a_failure_leaves_everything_as_it_was(tmp_path: Path) -> None:
+    (tmp_path / "a").write_text("old")
+    with pytest.raises(KeyError), staged(tmp_path) as aside:
+        (aside / "a").write_text("half")
+        raise KeyError
+    assert [p.name for p in tmp_path.iterdir()] == ["a"]
+    assert (tmp_path / "a").read_text() == "old"
+
+
+def test_a_folder_where_a_file_must_go_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    with pytest.raises(InvalidInput, match="cannot write"), staged(tmp_path) as aside:
+        (aside / "a").write_text("new")
+    assert [p.name for p in tmp_path.iterdir()] == ["a"]
+
+
+def test_bad_places_are_refused_before_any_work(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("x")
+    with pytest.raises(InvalidFile, match="expected a folder"):
+        check_output_folder(file)
+    with pytest.raises(InvalidFile, match="expected a folder"):
+        check_output_folder(file / "below")
+    with pytest.raises(InvalidFile, match="expected a file"):
+        check_output_file(tmp_path)
+    check_output_folder(tmp_path / "new" / "deep")
+    check_output_file(tmp_path / "new.html")

@@ -1,0 +1,122 @@
+"""Oracles: an HTML parser, the records, and what a self-contained page may not hold."""
+
+import math
+from html.parser import HTMLParser
+from pathlib import Path
+
+import made_up
+import pytest
+
+from vdsm_pin.report.facts import batch_row, verification_file
+from vdsm_pin.report.files import BatchRow
+from vdsm_pin.report.html import message_page, view_page, write_index, write_report
+from vdsm_pin.scene import Scene
+from vdsm_pin.verification.records import Verdict, Verification
+
+
+class Page(HTMLParser):
+    """Text outside of scripts, and every address a page would load."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.loads: list[str] = []
+        self.words: list[str] = []
+        self.open: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.open.append(tag)
+        for name, value in attrs:
+            if name in ("src", "href", "srcset", "action") and value:
+                self.loads.append(value)
+
+    def handle_endtag(self, tag: str) -> None:
+        while self.open and self.open.pop() != tag:
+            pass
+
+    def handle_data(self, data: str) -> None:
+        if not {"script", "style"} & set(self.open):
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join(" ".join(self.words).split())
+
+
+def report(path: Path, verification: Verification) -> str:
+    file = verification_file(verification, made_up.RECORD)
+    write_report(path / "report.html", verification, file)
+    return (path / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_report_loads_nothing_and_stays_small(tmp_path: Path) -> None:
+    text = report(tmp_path, made_up.verification(n=1000))
+    assert len(text.encode()) < 6_000_000
+    assert Page(text).loads == ["data:,"]
+
+
+@pytest.mark.parametrize("verdict", list(Verdict))
+def test_the_verdict_comes_first_and_only_certified_is_green(
+    tmp_path: Path, verdict: Verdict
+) -> None:
+    text = report(tmp_path, made_up.verification(verdict))
+    page = Page(text)
+    words = [word.value for word in Verdict]
+    body = page.text.split("waypoints ·", 1)[1]
+    assert min(words, key=body.index) == verdict.value
+    assert f'class="banner verdict {verdict.value}"' in text
+    assert verification_file(made_up.verification(verdict), made_up.RECORD).reason in (
+        page.text
+    )
+
+
+def test_everything_a_reader_needs_is_there(tmp_path: Path) -> None:
+    text = Page(report(tmp_path, made_up.verification())).text
+    for needed in (
+        "4.100 mm", "±0.132°", "87.3 %", "link 1 to pillar", "forward kinematics",
+        "1000.000 mm", "vdsm verify made-up.yaml --trajectory 'a b.csv' --out out",
+        "1" * 64, "numpy", "coal agreement", "42.500°",
+    ):  # fmt: skip
+        assert needed in text, needed
+
+
+def test_missing_evidence_is_shown_as_missing(tmp_path: Path) -> None:
+    text = report(tmp_path, made_up.verification(scene=Scene(), joint_error=math.nan))
+    assert 'class="value missing">not available' in text
+    assert "nothing to keep clear of" in text
+
+
+def test_names_cannot_break_out_of_the_page(tmp_path: Path) -> None:
+    shapes = made_up.every_shape().obstacles
+    evil = type(shapes[1])("</script><b>", shapes[1].centre, 0.2)  # type: ignore
+    text = report(tmp_path, made_up.verification(scene=Scene((evil,))))
+    assert "</script><b>" not in text
+
+
+def test_a_motion_of_one_row_has_a_report(tmp_path: Path) -> None:
+    assert "made up" in report(tmp_path, made_up.verification(n=1))
+
+
+def test_the_view_loads_nothing_and_only_a_live_one_asks() -> None:
+    task, rows = made_up.problem(), made_up.trajectory(5)
+    still, live = view_page(task, rows), view_page(task, rows, "abc")
+    assert Page(still).loads == ["data:,"]
+    assert "fetch(" not in still.split("// Ask the server")[-1][-600:]
+    assert 'fetch("changed?seen=abc")' in live
+    assert "<b>" not in message_page("bad <b>", "").split("<body>")[1]
+
+
+def test_the_index_links_every_finished_problem(tmp_path: Path) -> None:
+    file = verification_file(made_up.verification(), made_up.RECORD)
+    good = batch_row("a-b", "paper", file)
+    lost = BatchRow.model_validate(
+        {"folder": "c", "problem": "<c>", "strategy": "paper", "outcome": "timeout"}
+    )
+    write_index(tmp_path / "index.html", [good, lost])
+    text = (tmp_path / "index.html").read_text(encoding="utf-8")
+    page = Page(text)
+    assert "1 of 2 problems certified" in page.text
+    assert set(page.loads) == {
+        "data:,", "a-b/picture.svg", "a-b/report.html", "timing.js",
+    }  # fmt: skip
+    assert "<c>" in page.text

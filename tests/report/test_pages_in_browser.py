@@ -1,0 +1,223 @@
+"""The pages in Chromium: no request leaves them, and what moves moves.
+
+Oracles: the pixels of a screenshot, the page's own state, Python's forward kinematics.
+Screenshots stay in test-output/.
+"""
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import made_up
+import numpy as np
+import pytest
+
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.report.facts import batch_row, verification_file
+from vdsm_pin.report.html import write_index, write_report
+from vdsm_pin.report.picture import picture
+
+CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium")
+SHOTS = Path(__file__).parents[2] / "test-output"
+SOFTWARE_GL = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]
+pytestmark = [
+    pytest.mark.display,
+    pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine"),
+]
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    sync_api = pytest.importorskip("playwright.sync_api")
+    with sync_api.sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(
+            executable_path=CHROMIUM, args=SOFTWARE_GL
+        )
+        yield chromium
+        chromium.close()
+
+
+class Watched:
+    """A page whose requests and errors are written down."""
+
+    def __init__(self, browser: Any, path: Path, **options: Any) -> None:
+        self.page = browser.new_page(**options)
+        self.requests: list[str] = []
+        self.errors: list[str] = []
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.goto(path.as_uri())
+
+    def shot(self, name: str) -> None:
+        SHOTS.mkdir(exist_ok=True)
+        self.page.screenshot(path=SHOTS / f"{name}.png")
+
+
+def pixels(page: Any) -> np.ndarray:
+    """The 3D pane as it is drawn, shape (n_pixels, 3)."""
+    matplotlib_image = pytest.importorskip("matplotlib.image")
+    shot = SHOTS / "pane.png"
+    page.locator("#view").screenshot(path=shot)
+    return np.asarray(matplotlib_image.imread(shot))[..., :3].reshape(-1, 3)
+
+
+@pytest.fixture(scope="module")
+def report(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Watched:
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    judged = made_up.verification()
+    write_report(path, judged, verification_file(judged, made_up.RECORD))
+    watched = Watched(browser, path, viewport={"width": 1400, "height": 950})
+    watched.page.wait_for_function("window.vdsm && window.vdsm.view")
+    return watched
+
+
+def time_of(watched: Watched) -> float:
+    return float(watched.page.evaluate("vdsm.motion.time"))
+
+
+def test_nothing_is_requested_and_nothing_fails(report: Watched) -> None:
+    report.shot("report")
+    assert len(report.requests) == 1
+    assert report.requests[0].startswith("file:")
+    assert report.errors == []
+
+
+def test_the_arm_is_seen_in_its_colours(report: Watched) -> None:
+    SHOTS.mkdir(exist_ok=True)
+    seen = pixels(report.page)
+    assert len(np.unique((seen * 255).astype(int), axis=0)) > 500
+    blue = (seen[:, 2] > seen[:, 0] + 0.3) & (seen[:, 2] > 0.5)
+    assert blue.mean() > 1e-3, "the first link is blue"
+
+
+def test_the_page_moves_the_arm_as_the_kinematics_say(report: Watched) -> None:
+    judged = made_up.verification()
+    rows, arm = judged.trajectory, judged.problem.manipulator
+    for time in (0.0, 10.5, 93.25, 199.0):
+        report.page.evaluate("time => vdsm.motion.go(time)", time)
+        k, share = int(time), time - int(time)
+        nxt = min(k + 1, rows.n_samples - 1)
+        mixed = [
+            (one[[k]] * (1.0 - share) + one[[nxt]] * share)
+            for one in (rows.x0, rows.alpha, rows.theta)
+        ]
+        tip = joint_centres(arm, *mixed)[0, -1]
+        shown = report.page.evaluate("vdsm.view.tipNow")
+        np.testing.assert_allclose(shown, tip, atol=1e-5)
+
+
+def test_slider_plot_and_play_move_one_moment(report: Watched) -> None:
+    page = report.page
+    page.locator("[data-slider]").fill("50")
+    assert time_of(report) == 50.0
+    before = pixels(page)
+    plot = page.locator("[data-chart=psi] svg")
+    box = plot.bounding_box()
+    plot.click(position={"x": 0.6 * box["width"], "y": 0.4 * box["height"]})
+    clicked = time_of(report)
+    inner = (0.6 * 640 - 58) / (640 - 58 - 14) * 199
+    assert clicked == pytest.approx(inner, abs=1.0)
+    assert float(page.locator("[data-slider]").input_value()) == pytest.approx(clicked)
+    assert not np.array_equal(before, pixels(page)), "the arm did not move"
+    page.locator("[data-play]").click()
+    page.wait_for_function(f"vdsm.motion.time > {clicked + 1}")
+    page.locator("[data-play]").click()
+    stopped = time_of(report)
+    page.wait_for_timeout(100)
+    assert time_of(report) == stopped
+    report.shot("report-played")
+
+
+def test_the_worst_moment_is_one_click_away(report: Watched) -> None:
+    report.page.evaluate("vdsm.motion.go(120)")
+    report.page.locator("button.worst").click()
+    assert time_of(report) == 0.25
+    assert report.page.evaluate("vdsm.view.witness.visible")
+
+
+def test_keys_play_and_step(report: Watched) -> None:
+    page = report.page
+    page.evaluate("document.activeElement.blur(); vdsm.motion.go(7)")
+    page.keyboard.press("ArrowRight")
+    assert time_of(report) == 8.0
+    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("ArrowLeft")
+    assert time_of(report) == 6.0
+    page.keyboard.press(" ")
+    page.wait_for_function("vdsm.motion.time > 6.5")
+    page.keyboard.press(" ")
+    assert page.evaluate("vdsm.motion.playing") is False
+
+
+def test_hovering_names_a_value(report: Watched) -> None:
+    page = report.page
+    plot = page.locator("[data-chart=x0] svg")
+    box = plot.bounding_box()
+    plot.hover(position={"x": 0.5 * box["width"], "y": 0.5 * box["height"]})
+    text = page.locator("[data-chart=x0] svg .hover text").text_content()
+    assert text.startswith("x₀: ")
+    assert "mm at" in text
+
+
+def test_dark_and_narrow_pages_work(browser: Any, tmp_path: Path) -> None:
+    judged = made_up.verification(n=40)
+    path = tmp_path / "report.html"
+    write_report(path, judged, verification_file(judged, made_up.RECORD))
+    size = {"width": 420, "height": 800}
+    watched = Watched(browser, path, viewport=size, color_scheme="dark")
+    watched.page.wait_for_function("window.vdsm && window.vdsm.view")
+    watched.shot("report-dark-narrow")
+    width = watched.page.evaluate("document.documentElement.scrollWidth")
+    assert width <= 420, "the page scrolls sideways"
+    assert watched.errors == []
+
+
+def test_an_index_of_a_thousand_problems_sorts_at_once(
+    browser: Any, tmp_path: Path
+) -> None:
+    judged = made_up.verification(n=5)
+    row = batch_row("x", "paper", verification_file(judged, made_up.RECORD))
+    rows = [
+        row.model_copy(
+            update={
+                "folder": f"p{i:04}",
+                "problem": f"problem {i}",
+                "min_clearance_lower_m": (i * 37 % 1000) / 1e4 if i % 5 else None,
+                "outcome": "certified" if i % 3 else "refuted",
+            }
+        )
+        for i in range(1000)
+    ]
+    for i in range(12):
+        (tmp_path / f"p{i:04}").mkdir()
+        (tmp_path / f"p{i:04}" / "picture.svg").write_text(picture(judged))
+    (tmp_path / "timing.js").write_text('window.vdsmTiming = {"p0003": 1.5};')
+    write_index(tmp_path / "index.html", rows)
+    watched = Watched(browser, tmp_path / "index.html")
+    page = watched.page
+    assert "1.50 s" in page.locator("tr[data-folder=p0003]").text_content()
+    took = page.evaluate(
+        "() => { const t = performance.now();"
+        "document.querySelector('[data-sort=\"3\"]').click();"
+        "document.body.offsetHeight; return performance.now() - t; }"
+    )
+    keys = page.evaluate(
+        "[...document.querySelectorAll('#problems tbody tr')]"
+        ".map(row => row.cells[3].dataset.key)"
+    )
+    filled = [float(key) for key in keys if key]
+    assert filled == sorted(filled)
+    assert keys[-200:] == [""] * 200, "missing values stand last"
+    assert took < 1000.0
+    page.locator("[data-only=refuted]").click()
+    shown = page.locator("#problems tbody tr:visible").count()
+    assert shown == sum(row.outcome == "refuted" for row in rows)
+    watched.shot("index")
+    assert watched.errors == []

@@ -1,0 +1,111 @@
+"""Oracles: the JSON Schema, and the records the files were made from."""
+
+import json
+import math
+
+import jsonschema
+import made_up
+import numpy as np
+import pytest
+
+from vdsm_pin.errors import UnknownName
+from vdsm_pin.planner.records import Plan, TipPath
+from vdsm_pin.report.facts import batch_row, plan_file, verification_file
+from vdsm_pin.report.files import (
+    SCHEMA_NAMES,
+    BatchRow,
+    ManifestFile,
+    VerificationFile,
+    schema,
+)
+from vdsm_pin.scene import Scene
+from vdsm_pin.verification.records import Check, Verdict, Verification
+
+
+def written(verification: Verification) -> VerificationFile:
+    return verification_file(verification, made_up.RECORD)
+
+
+@pytest.mark.parametrize("verdict", list(Verdict))
+@pytest.mark.parametrize("joint_error", [0.0, 0.01, math.nan])
+def test_verification_json_fits_its_schema(
+    verdict: Verdict, joint_error: float
+) -> None:
+    file = written(made_up.verification(verdict, joint_error=joint_error))
+    content = json.loads(file.text())
+    jsonschema.validate(content, schema("verification"))
+    assert content["verdict"] == verdict.value
+    assert VerificationFile.model_validate(content) == file
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(content | {"verdict": "sampled"}, schema("verification"))
+
+
+def test_plan_and_manifest_fit_their_schemas() -> None:
+    judged = made_up.verification()
+    rows = judged.trajectory
+    tip = TipPath(np.zeros((rows.n_samples, 3)), rows.on_path, rows.path_m)
+    zero = np.zeros((rows.n_samples, 8, 3))
+    plan = Plan(judged.problem, "paper", tip, zero, rows, zero, ("a note",))
+    file = plan_file(plan, judged, 2, made_up.RECORD)
+    jsonschema.validate(json.loads(file.text()), schema("plan"))
+    row = batch_row("made-up", "paper", written(judged))
+    manifest = ManifestFile(
+        problem_sha256="1", settings={"strategy": "paper"}, row=row, files={"a": "b"}
+    )
+    jsonschema.validate(json.loads(manifest.text()), schema("manifest"))
+    assert isinstance(row, BatchRow)
+
+
+def test_schemas_are_valid_themselves_and_unknown_ones_refused() -> None:
+    for name in SCHEMA_NAMES:
+        if name != "problem":
+            jsonschema.Draft202012Validator.check_schema(schema(name))
+    with pytest.raises(UnknownName, match="verification"):
+        schema("poem")
+
+
+def test_undefined_numbers_become_null_and_never_pass() -> None:
+    checks = (Check("clearance", Verdict.UNDECIDED, 0, math.nan, math.nan, "m"),)
+    judged = made_up.verification()
+    bare = Verification(
+        problem=judged.problem,
+        trajectory=judged.trajectory,
+        errors=judged.errors,
+        pairs=judged.pairs,
+        checks=checks,
+        closest=(),
+        profile=judged.profile,
+        coverage=math.nan,
+        undrawn=np.zeros((0, 2)),
+        joint_error=math.nan,
+    )
+    file = written(bare)
+    assert file.verdict == "undecided"
+    assert file.checks[0].worst is None
+    assert file.coverage is None
+    assert "not complete" in file.reason
+    assert "NaN" not in file.text()
+
+
+def test_the_reason_names_the_check_that_failed() -> None:
+    refuted = written(made_up.verification(Verdict.REFUTED))
+    assert "clearance is 4.100 mm against a limit of 3.500 mm" in refuted.reason
+    certified = written(made_up.verification())
+    assert "at least 4.100 mm" in certified.reason
+    free = written(made_up.verification(scene=Scene()))
+    assert free.min_clearance_m is None
+    assert free.verdict == "certified"
+
+
+def test_motion_facts_follow_the_rows() -> None:
+    judged = made_up.verification()
+    motion = written(judged).motion
+    rows = judged.trajectory
+    cosines = np.cos(rows.theta) * np.cos(rows.alpha)
+    psi = np.arccos(np.clip(cosines, -1.0, 1.0))
+    np.testing.assert_allclose(motion.max_link_angle_rad, psi.max(axis=0), atol=1e-7)
+    changed = (psi > np.deg2rad(0.05)).sum(axis=1)
+    assert motion.changed_angles_max == changed.max()
+    mean = motion.changed_angles_mean_on_path
+    assert mean == pytest.approx(changed[rows.on_path].mean())
+    assert (motion.x0_min_m, motion.x0_max_m) == (rows.x0.min(), rows.x0.max())

@@ -1,0 +1,68 @@
+"""Oracle: volumes in closed form; one wrongly turned triangle changes the sum."""
+
+import numpy as np
+import pytest
+from made_up import X, Y, every_shape
+
+from vdsm_pin.report.solids import Surface, surface
+from vdsm_pin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Sphere
+
+
+def volume(skin: Surface) -> float:
+    a, b, c = np.moveaxis(skin.vertices[skin.triangles], 1, 0)
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+CENTRE = np.array([0.3, -0.2, 1.1])
+TILTED = np.array([1.0, 2.0, -2.0]) / 3.0
+
+
+@pytest.mark.parametrize(
+    ("solid", "expected", "tolerance"),
+    [
+        (Sphere("s", CENTRE, 0.5), 4.0 / 3.0 * np.pi * 0.125, 0.02),
+        (Cylinder("c", CENTRE, TILTED, 0.7, 0.3), np.pi * 0.09 * 1.4, 0.01),
+        (
+            Capsule("k", CENTRE, TILTED, 0.7, 0.3),
+            np.pi * 0.09 * 1.4 + 4.0 / 3.0 * np.pi * 0.027,
+            0.02,
+        ),
+        (Box("b", CENTRE, np.eye(3), np.array([0.1, 0.2, 0.3])), 0.048, 1e-12),
+    ],
+)
+def test_surfaces_enclose_their_solid(
+    solid: Obstacle, expected: float, tolerance: float
+) -> None:
+    assert volume(surface(solid, 1.0)) == pytest.approx(expected, rel=tolerance)
+
+
+def test_a_prism_keeps_its_notch() -> None:
+    angle = next(o for o in every_shape().obstacles if o.name == "angle")
+    skin = surface(angle, 1.0)
+    spans = np.ptp(skin.vertices, axis=0)
+    np.testing.assert_allclose(spans, [0.5, 0.5, 0.6], atol=1e-12)
+    corners = skin.vertices[skin.triangles]
+    areas = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    walls, caps = 2.0 * 0.6, 2.0 * (0.25 - 0.09)
+    assert areas.sum() / 2.0 == pytest.approx(walls + caps)
+
+
+def test_a_half_space_is_drawn_on_its_plane() -> None:
+    skin = surface(HalfSpace("w", CENTRE, TILTED), 2.0)
+    np.testing.assert_allclose((skin.vertices - CENTRE) @ TILTED, 0.0, atol=1e-12)
+    a, b, c = skin.vertices[skin.triangles[0]]
+    assert np.cross(b - a, c - a) @ TILTED > 0.0
+
+
+def test_a_large_mesh_is_drawn_with_few_triangles() -> None:
+    n = 150
+    grid = np.stack(np.meshgrid(np.arange(n), np.arange(n)), axis=2).reshape(-1, 2)
+    points = np.column_stack([grid / n, np.zeros(len(grid))])
+    k = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
+    faces = np.vstack(
+        [np.stack([k, k + 1, k + n], 1), np.stack([k + 1, k + n + 1, k + n], 1)]
+    )
+    skin = surface(Mesh("m", points @ np.stack([X, Y, X + Y]), faces, False), 1.0)
+    assert 1_000 < len(skin.triangles) <= 20_000

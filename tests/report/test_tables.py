@@ -1,0 +1,69 @@
+"""Oracle: the tables read back by the csv module against the records."""
+
+import csv
+from pathlib import Path
+
+import made_up
+import numpy as np
+import pytest
+
+from vdsm_pin.report.facts import batch_row, cables, verification_file
+from vdsm_pin.report.tables import (
+    ClearanceCsv,
+    read_summary,
+    write_cables,
+    write_link_angles,
+    write_summary,
+)
+
+
+def read(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_clearance_rows_are_complete_and_in_order(tmp_path: Path) -> None:
+    judged = made_up.verification()
+    pairs = judged.pairs
+    with ClearanceCsv(tmp_path / "c.csv", judged.problem, pairs) as sink:
+        sink(made_up.chunk(0, 3, len(pairs)))
+        sink(made_up.chunk(3, 2, len(pairs)))
+    rows = read(tmp_path / "c.csv")
+    assert len(rows) == 5 * len(pairs)
+    assert [int(row["interval"]) for row in rows[:: len(pairs)]] == [0, 1, 2, 3, 4]
+    assert [row["obstacle"] for row in rows[: len(pairs)]] == [p.label for p in pairs]
+    first = made_up.chunk(0, 3, len(pairs))
+    lower = [float(row["lower_m"]) for row in rows[: 3 * len(pairs)]]
+    np.testing.assert_allclose(lower, first.lower.ravel(), rtol=1e-8)
+    assert {row["verdict"] for row in rows} == {"certified", "refuted", "undecided"}
+
+
+def test_obstacle_names_with_commas_stay_one_field(tmp_path: Path) -> None:
+    judged = made_up.verification()
+    pair = type(judged.pairs[0])(1, 'a, "b"')
+    with ClearanceCsv(tmp_path / "c.csv", judged.problem, [pair]) as sink:
+        sink(made_up.chunk(0, 1, 1))
+    assert read(tmp_path / "c.csv")[0]["obstacle"] == 'a, "b"'
+
+
+def test_angles_and_cables_have_a_row_per_waypoint(tmp_path: Path) -> None:
+    judged = made_up.verification(n=7)
+    write_link_angles(tmp_path / "a.csv", judged)
+    write_cables(tmp_path / "l.csv", judged)
+    angles, lengths = read(tmp_path / "a.csv"), read(tmp_path / "l.csv")
+    assert len(angles) == len(lengths) == 7
+    assert list(lengths[0])[:4] == ["waypoint", "l1a_m", "l1b_m", "l1c_m"]
+    expected = cables(judged.problem, judged.trajectory)
+    got = [[float(v) for v in list(row.values())[1:]] for row in lengths]
+    np.testing.assert_allclose(got, expected.reshape(7, -1), rtol=1e-11)
+    assert float(angles[3]["x0_m"]) == pytest.approx(judged.trajectory.x0[3])
+
+
+def test_a_summary_reads_back_as_it_was(tmp_path: Path) -> None:
+    file = verification_file(made_up.verification(), made_up.RECORD)
+    row = batch_row("made-up", "paper", file)
+    short = row.model_copy(
+        update={"outcome": "error", "waypoints": None, "coverage": None}
+    )
+    write_summary(tmp_path / "s.csv", [row, short])
+    assert read_summary(tmp_path / "s.csv") == (row, short)

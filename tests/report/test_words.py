@@ -1,0 +1,56 @@
+"""Oracle: the text a person expects."""
+
+import math
+
+import pytest
+
+from vdsm_pin.report.words import OUTCOMES, outcome, percent, quantity
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.0035, "m", "3.500 mm"),
+        (-0.0984, "m", "−98.400 mm"),
+        (math.radians(42.5), "rad", "42.500°"),
+        (2e-14, "m", "2.0e-11 mm"),
+        (-2e-14, "rad", "−1.1e-12°"),
+        (0.0, "m", "0.000 mm"),
+        (24.0, "-", "24"),
+        (1.5, "-", "1.500"),
+        (math.inf, "m", "+∞ mm"),
+        (-math.inf, "m", "−∞ mm"),
+        (math.nan, "m", "not available"),
+        (None, "rad", "not available"),
+        (3.0, "s", "3.000 s"),
+    ],
+)
+def test_quantities_read_as_people_write_them(
+    value: float | None, unit: str, text: str
+) -> None:
+    assert quantity(value, unit) == text
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [
+        (1.0, "100.0 %"),
+        (0.99999, "99.9 %"),
+        (1.0 - 1e-15, "100.0 %"),
+        (0.873, "87.3 %"),
+        (0.0, "0.0 %"),
+        (math.nan, "not available"),
+        (None, "not available"),
+    ],
+)
+def test_percent_never_rounds_up_to_complete(share: float | None, text: str) -> None:
+    assert percent(share) == text
+
+
+def test_only_certified_counts_as_passed() -> None:
+    assert [word for word, known in OUTCOMES.items() if known.passed] == ["certified"]
+    assert not outcome("splendid").passed
+    marks = [known.mark for known in OUTCOMES.values()]
+    assert len(set(marks)) == len(marks), (
+        "marks must tell outcomes apart without colour"
+    )

@@ -1,0 +1,77 @@
+"""Oracle: what a plain HTTP client gets, and the port afterwards."""
+
+import socket
+import threading
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.error import HTTPError
+
+import made_up
+import pytest
+
+from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.io.trajectory_file import write_trajectory
+from vdsm_pin.visualization import ViewServer, page, write_page
+
+
+@contextmanager
+def serving(trajectory: Path | None, watch: bool = True) -> Iterator[ViewServer]:
+    with ViewServer("paper/obs1", trajectory, 0, watch) as server:
+        thread = threading.Thread(target=server.serve_forever, args=(0.01,))
+        thread.start()
+        try:
+            yield server
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+def get(url: str) -> str:
+    with urllib.request.urlopen(url, timeout=30.0) as answer:
+        return str(answer.read().decode("utf-8"))
+
+
+def test_the_server_hands_out_the_page_and_lets_go_of_its_port() -> None:
+    with serving(None) as server:
+        text = get(server.url)
+        assert "paper/obs1" in text or "obs1" in text
+        with pytest.raises(HTTPError):
+            get(server.url + "etc/passwd")
+        port = server.server_address[1]
+        with pytest.raises(InvalidInput, match=f"port {port} cannot be used"):
+            ViewServer("paper/obs1", None, port, False)
+    with socket.socket() as again:
+        again.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        again.bind(("127.0.0.1", port))
+
+
+def test_a_changed_file_is_noticed_and_a_broken_one_explained(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    write_trajectory(path, made_up.trajectory(4))
+    with serving(path) as server:
+        first = get(server.url)
+        state = server.state()
+        assert f"changed?seen={state}" in first
+        write_trajectory(path, made_up.trajectory(6))
+        assert get(f"{server.url}changed?seen={state}") == "yes"
+        assert get(server.url) != first
+        path.write_text("not a table\n")
+        assert "Cannot be shown" in get(server.url)
+        write_trajectory(path, made_up.trajectory(5))
+        assert "Cannot be shown" not in get(server.url)
+
+
+def test_without_watching_no_page_asks(tmp_path: Path) -> None:
+    with serving(None, watch=False) as server:
+        assert "changed?seen" not in get(server.url)
+
+
+def test_a_page_is_one_file(tmp_path: Path) -> None:
+    write_page(tmp_path / "view.html", "paper/obs1", None)
+    assert (tmp_path / "view.html").stat().st_size < 2_000_000
+    with pytest.raises(InvalidFile, match="expected a file"):
+        write_page(tmp_path, "paper/obs1", None)
+    with pytest.raises(InvalidFile):
+        page("paper/obs1", tmp_path / "absent.csv")
