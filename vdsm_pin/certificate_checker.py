@@ -383,13 +383,14 @@ class _Check:
 
     def _draw(self, motion: _Interval, tips: list[Matrix]) -> None:
         """Take an interval on the path into tip deviation and coverage."""
+        path, rows = self.path, motion.rows
+        stations = [r.path_m if path.closed else path.local(r.path_m) for r in rows]
         if self.station is None:
-            self.station = motion.rows[0].path_m
+            self.station = stations[0]
             self.stretches.append((self.station, self.station))
-        start, step = self.station, motion.rows[1].path_m - motion.rows[0].path_m
-        half = self.path.length / 2
-        self.station = start + step - self.path.laps(step + half) * self.path.length
-        chord = self.path.deviation(start, self.station, tips)
+        start, step = self.station, stations[1] - stations[0]
+        self.station = start + step - path.laps(step + path.length / 2) * path.length
+        chord = path.deviation(start, self.station, tips)
         self.tip = self.tip.max(chord + motion.bends(0)[-1][0] / 8)
         low, high = self.stretches[-1]
         self.stretches[-1] = low.min(self.station), high.max(self.station)
