@@ -112,6 +112,53 @@ class DangerRegion:
             far = np.maximum(far, np.where(crossed, hit_x * ux + hit_y * uy, far))
         return far
 
+    def swing(self, points: FloatArray, side: int) -> FloatArray:
+        """Move points inside along circles about the origin onto the boundary.
+
+        Args:
+            points: Shape (n, 2); [m].
+            side: 1 counterclockwise, -1 clockwise.
+
+        Returns:
+            The points, those inside turned, shape (n, 2); [m].
+        """
+        turned = points.copy()
+        rows = np.flatnonzero(self.contains(points))
+        radius = np.linalg.norm(points[rows], axis=1)
+        bearing = np.arctan2(self.centre[1], self.centre[0])
+        swung = bearing + side * self._extent(radius, side)
+        turned[rows] = radius[:, None] * np.stack(
+            [np.cos(swung), np.sin(swung)], axis=1
+        )
+        return turned
+
+    def _extent(self, radius: FloatArray, side: int) -> FloatArray:
+        """How far the region reaches along circles about the origin, (n,); [rad].
+
+        Measured from the bearing of the centre; every circle meets the region.
+        """
+        bearing = np.arctan2(self.centre[1], self.centre[0])
+        extent = np.full(len(radius), -np.inf)
+        for corner in self.corners:
+            distance = np.linalg.norm(corner)
+            towards = side * _wrap(np.arctan2(corner[1], corner[0]) - bearing)
+            cosine = radius**2 + distance**2 - self.radius**2
+            cosine /= 2.0 * radius * distance
+            met = np.abs(cosine) <= 1.0
+            half = np.arccos(np.where(met, cosine, 0.0))
+            extent = np.maximum(extent, np.where(met, towards + half, extent))
+        for begin, end in self.sides:
+            along = end - begin
+            squared, half_b = along @ along, begin @ along
+            root = half_b**2 - squared * (begin @ begin - radius**2)
+            for sign in (1.0, -1.0):
+                part = (sign * np.sqrt(np.maximum(root, 0.0)) - half_b) / squared
+                hit = begin + part[:, None] * along
+                met = (root >= 0.0) & (part >= 0.0) & (part <= 1.0)
+                towards = side * _wrap(np.arctan2(hit[:, 1], hit[:, 0]) - bearing)
+                extent = np.maximum(extent, np.where(met, towards, extent))
+        return extent
+
     def tangent(self, point: FloatArray, sense: int) -> tuple[FloatArray, float]:
         """Where the tangent from a point outside touches.
 

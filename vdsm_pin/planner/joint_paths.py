@@ -11,7 +11,8 @@ def slide_joints(
     manipulator: Manipulator,
     tip: FloatArray,
     region: DangerRegion,
-    directions: FloatArray,
+    side: int,
+    direction: FloatArray | None,
 ) -> FloatArray:
     """Joints in the danger region slide onto its boundary, from the tip to the base.
 
@@ -23,8 +24,10 @@ def slide_joints(
         manipulator: The arm with its ratios.
         tip: Projected tip P_{N+1}, shape (n_samples, 2); [m].
         region: The danger region, in the plane Y0Z0.
-        directions: Auxiliary lines, unit vectors towards the arm's side, shape
-            (n_samples, 2); [-].
+        side: On which side of the region the arm passes, 1 for the larger polar angle
+            about P_1, -1 for the smaller.
+        direction: The auxiliary lines, a unit vector towards that side, shape (2,); or
+            None for the circles about P_1 through P'_i; [-].
 
     Returns:
         P_1..P_{N+1}, shape (n_samples, N + 1, 2); [m].
@@ -33,5 +36,8 @@ def slide_joints(
     planar[:, -1] = tip
     for i in range(manipulator.n_links, 1, -1):
         reference = manipulator.ratio(i, i + 1) * planar[:, i]
-        planar[:, i - 1] = region.slide(reference, directions)
+        if direction is None:
+            planar[:, i - 1] = region.swing(reference, side)
+        else:
+            planar[:, i - 1] = region.slide(reference, direction)
     return planar

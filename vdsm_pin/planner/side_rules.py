@@ -41,11 +41,14 @@ class SideRule:
 
     Args:
         region: What they slide on.
-        direction: The auxiliary line, a unit vector, shape (2,); [-].
+        side: 1 or -1.
+        direction: The auxiliary line, a unit vector towards the side, shape (2,); None
+            for circles about P_1; [-].
     """
 
     region: DangerRegion
-    direction: FloatArray
+    side: int
+    direction: FloatArray | None
 
 
 def choose_rule(
@@ -80,7 +83,7 @@ def _trials(
                 region = DangerRegion(shape.name, shape.corners, radius)
                 if growth > 0.0 and region.contains(anchors(problem)).any():
                     break
-                yield SideRule(region, direction)
+                yield SideRule(region, side, direction)
 
 
 def _score(
@@ -103,15 +106,16 @@ def _score(
     return reached / total if total else 1.0
 
 
-def _lines(region: DangerRegion, side: int) -> list[FloatArray]:
-    """Directions of the auxiliary lines, each turned to the side; [-]."""
+def _lines(region: DangerRegion, side: int) -> list[FloatArray | None]:
+    """Auxiliary lines as in `SideRule`, in the order in which they are tried."""
     centre = region.centre
     bearing = np.arctan2(centre[1], centre[0])
     across = side * np.array([-np.sin(bearing), np.cos(bearing)])
     lines = [np.array([0.0, 1.0]), np.array([1.0, 0.0])]
     lines = [line * (1.0 if line @ across > 0.0 else -1.0) for line in lines]
     turned = bearing + side * np.array(OBLIQUE)
-    return lines + [np.array([np.cos(t), np.sin(t)]) for t in turned]
+    oblique = [np.array([np.cos(t), np.sin(t)]) for t in turned]
+    return [*lines, *oblique, None]
 
 
 def anchors(problem: PlanningProblem) -> FloatArray:
@@ -121,8 +125,7 @@ def anchors(problem: PlanningProblem) -> FloatArray:
 
 def slid(manipulator: Manipulator, tip: FloatArray, rule: SideRule) -> FloatArray:
     """Step 5 by one rule: tip (n, 2) to joints (n, N + 1, 2); [m]."""
-    directions = np.broadcast_to(rule.direction, tip.shape)
-    return slide_joints(manipulator, tip, rule.region, directions)
+    return slide_joints(manipulator, tip, rule.region, rule.side, rule.direction)
 
 
 def stands(
