@@ -1,7 +1,7 @@
 """Obstacles: named solids in the base frame, and the convex pieces they are made of.
 
-Everything that measures a distance works on pieces (`geometry/convex.py`). A mesh is one
-hull per triangle plus, where it is watertight, an inside.
+Everything that measures a distance works on pieces (`geometry/convex.py`). A mesh is
+one hull per triangle plus, where it is watertight, an inside.
 """
 
 from dataclasses import dataclass
@@ -300,11 +300,12 @@ class Scene:
 
     def __post_init__(self) -> None:
         """Refuse duplicate names."""
-        names = [obstacle.name for obstacle in self.obstacles]
-        for name in names:
-            if names.count(name) > 1:
+        seen: set[str] = set()
+        for name in self.names:
+            if name in seen:
                 message = f"two obstacles are named {name!r}; names are unique"
                 raise InvalidInput(message)
+            seen.add(name)
 
     @property
     def names(self) -> tuple[str, ...]:

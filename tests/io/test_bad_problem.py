@@ -165,6 +165,11 @@ ONE_VALUE: list[tuple[tuple[Any, ...], Any, str]] = [
     ),
     (
         ("manipulator",),
+        ARM | {"base_range": [-98000, 0]},
+        "manipulator (line 4): is an arm of 3000 mm on a rail that goes 98000 mm out",
+    ),
+    (
+        ("manipulator",),
         ARM | {"link_lengths": [500, 120, 500]},
         "link_lengths[1] (line 7): is 120 mm, expected above 120 mm",
     ),

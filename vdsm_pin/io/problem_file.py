@@ -56,7 +56,7 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
         model = ProblemModel.model_validate(document.data)
     except ValidationError as error:
         raise first_error(error, document) from None
-    stem = "".join(c if c.isascii() and c.isalnum() else "_" for c in path.stem)
+    stem = "".join(c if c.isascii() and c.isalnum() else "_" for c in path.stem[:100])
     built = build_problem(model, document, name=stem, folder=path.parent)
     return ProblemFile(built.problem, path, sha256_of([content, *built.mesh_contents]))
 

@@ -1,0 +1,109 @@
+"""The arm of a problem file to a `Manipulator`, in metres and radians."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.io import problem_schema as schema
+from vdsm_pin.io.obstacle_builder import Frame
+from vdsm_pin.io.yaml_reader import YamlDocument
+from vdsm_pin.manipulator import (
+    BUILT_IN,
+    CableLayout,
+    Manipulator,
+    built_in,
+    paper_hole_angles,
+)
+from vdsm_pin.tolerances import TOLERANCES
+
+DEFAULT_HOLE_RADIUS: Final = 0.8
+"""Radius of the circle of cable holes over the body radius; [-]."""
+
+DEFAULT_HALF_GAP: Final = 0.1
+"""Half gap of a joint over the shortest link; [-]."""
+
+DEFAULT_STROKE: Final = 2.0
+"""Stroke of the rail either way over the arm's length; [-]."""
+
+
+@dataclass(frozen=True)
+class ArmBuilder:
+    """Converts the arm."""
+
+    document: YamlDocument
+    frame: Frame
+
+    def build(self, model: str | schema.ManipulatorModel) -> Manipulator:
+        """The arm by name or by its numbers.
+
+        Raises:
+            InvalidFile: If the name is unknown or the numbers do not fit together.
+        """
+        if isinstance(model, str):
+            if model not in BUILT_IN:
+                problem = f"is {model!r}; known: {', '.join(BUILT_IN)}, or a mapping"
+                raise self.document.invalid(("manipulator",), problem)
+            return built_in(model)
+        lengths = self.frame.metres(model.link_lengths)
+        stroke = DEFAULT_STROKE * float(lengths.sum())
+        low, high = -stroke, stroke
+        if model.base_range is not None:
+            low, high = (float(x) for x in self.frame.metres(model.base_range))
+            if not low < high:
+                problem = f"is {model.base_range}, expected the smaller value first"
+                raise self.document.invalid(("manipulator", "base_range"), problem)
+        self._check_extent(float(lengths.sum()), max(-low, high))
+        try:
+            return Manipulator(
+                model.name,
+                lengths,
+                float(self.frame.metres(model.link_radius)),
+                float(np.deg2rad(model.max_link_angle_deg)),
+                float(np.deg2rad(model.max_joint_angle_deg)),
+                (low, high),
+                self._cables(model),
+            )
+        except InvalidInput as error:
+            raise self.document.invalid(("manipulator",), str(error)) from None
+
+    def _check_extent(self, length: float, stroke: float) -> None:
+        """Distances are proved within a stated extent only, so the arm stays there."""
+        limit = TOLERANCES.scene_extent
+        if not length + stroke <= limit:
+            problem = (
+                f"is an arm of {self.frame.shown(length)} on a rail that goes "
+                f"{self.frame.shown(stroke)} out; expected at most "
+                f"{self.frame.shown(limit)} together"
+            )
+            raise self.document.invalid(("manipulator",), problem)
+
+    def _cables(self, model: schema.ManipulatorModel) -> CableLayout:
+        count, shortest = len(model.link_lengths), min(model.link_lengths)
+        hole_radius = DEFAULT_HOLE_RADIUS * model.link_radius
+        half_gap = DEFAULT_HALF_GAP * shortest
+        angles = paper_hole_angles(count)
+        if (cables := model.cables) is not None:
+            at = ("manipulator", "cables")
+            hole_radius, half_gap = cables.hole_radius, cables.half_gap
+            if not hole_radius < model.link_radius:
+                problem = (
+                    f"is {hole_radius:g}, expected below the body radius "
+                    f"{model.link_radius:g}"
+                )
+                raise self.document.invalid((*at, "hole_radius"), problem)
+            if not 2.0 * half_gap < shortest:
+                problem = (
+                    f"is {half_gap:g}, expected below half the shortest link "
+                    f"{shortest:g}"
+                )
+                raise self.document.invalid((*at, "half_gap"), problem)
+            if cables.hole_angles_deg is not None:
+                if len(cables.hole_angles_deg) != count:
+                    found = len(cables.hole_angles_deg)
+                    problem = f"has {found} rows, expected {count}, one per link"
+                    raise self.document.invalid((*at, "hole_angles_deg"), problem)
+                angles = np.deg2rad(cables.hole_angles_deg)
+        metres = self.frame.metres([hole_radius, half_gap])
+        return CableLayout(float(metres[0]), float(metres[1]), angles)
