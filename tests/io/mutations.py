@@ -31,7 +31,7 @@ def locations(data: Any, at: Location = ()) -> list[Location]:
 
 def changed_data(text: str, rng: np.random.Generator) -> str:
     """One to three values deleted, replaced, doubled, renamed, scaled or swapped."""
-    data = yaml.safe_load(text)
+    data = yaml.load(text, Loader=yaml.CSafeLoader)
     for _ in range(int(rng.integers(1, 4))):
         places = locations(data)
         if not places:
@@ -41,7 +41,9 @@ def changed_data(text: str, rng: np.random.Generator) -> str:
         for step in place[:-1]:
             holder = holder[step]
         _change(holder, place[-1], rng)
-    return str(yaml.safe_dump(data, sort_keys=False, allow_unicode=True))
+    return str(
+        yaml.dump(data, Dumper=yaml.CSafeDumper, sort_keys=False, allow_unicode=True)
+    )
 
 
 def _change(holder: Any, step: Any, rng: np.random.Generator) -> None:

@@ -84,7 +84,7 @@ def write_everything(folder: Path) -> Path:
 
 def edited(text: str, location: tuple[Any, ...], value: Any = ...) -> str:
     """The text with one value replaced, or removed where none is given."""
-    data = yaml.safe_load(text)
+    data = yaml.load(text, Loader=yaml.CSafeLoader)
     holder = data
     for step in location[:-1]:
         holder = holder[step]
@@ -92,4 +92,4 @@ def edited(text: str, location: tuple[Any, ...], value: Any = ...) -> str:
         del holder[location[-1]]
     else:
         holder[location[-1]] = value
-    return str(yaml.safe_dump(data, sort_keys=False))
+    return str(yaml.dump(data, Dumper=yaml.CSafeDumper, sort_keys=False))

@@ -112,11 +112,11 @@ FUZZERS = (fuzz_problems, fuzz_trajectories, fuzz_meshes)
 def test_hundreds_of_damaged_files(
     tmp_path: Path, fuzz: Callable[[Path, int, int], Counter[str]]
 ) -> None:
-    counts = fuzz(tmp_path, 600, 0)
-    assert counts["good"] + counts["refused"] == 600
+    counts = fuzz(tmp_path, 450, 0)
+    assert counts["good"] + counts["refused"] == 450
     # Both ends are seen: some damage is harmless, most is not.
     assert counts["good"] > 2
-    assert counts["refused"] > 200
+    assert counts["refused"] > 150
 
 
 @pytest.mark.slow
