@@ -5,6 +5,7 @@ from types import MappingProxyType
 from typing import Final, TypeAlias
 
 from vdsm_pin.errors import UnknownName
+from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Plan
 from vdsm_pin.problem import PlanningProblem
@@ -13,7 +14,9 @@ Strategy: TypeAlias = Callable[[PlanningProblem, LinkClearance, float], Plan]
 """(problem, clearance, margin) -> plan. `margin` is what the strategy shall keep beyond
 the required clearance [m]; the refinement raises it where verification asks for it."""
 
-STRATEGIES: Final[Mapping[str, Strategy]] = MappingProxyType({"paper": plan_paper})
+STRATEGIES: Final[Mapping[str, Strategy]] = MappingProxyType(
+    {"paper": plan_paper, "fewest": plan_fewest}
+)
 """Every strategy a user may name."""
 
 

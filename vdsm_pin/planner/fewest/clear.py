@@ -12,6 +12,7 @@ from vdsm_pin.planner.fewest.motion import Intervals, link_angles_at
 from vdsm_pin.planner.fewest.roadmap import link_limit
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
 
 
 class Judge:
@@ -36,6 +37,36 @@ class Judge:
         self.required, self.finest = required, finest
         self.limit = link_limit(problem)
         self.evaluated = 0
+
+    def look(
+        self, tips: FloatArray, offsets: FloatArray
+    ) -> tuple[FloatArray, IntArray, FloatArray]:
+        """Clearance, changed angles and largest angle of configurations.
+
+        Args:
+            tips: Shape (n, 3); [m].
+            offsets: Shape (n, N + 1, 2); [m].
+
+        Returns:
+            Least clearance, -inf where a limit is broken, shape (n,) [m]; number of
+            changed link angles, (n,); largest link angle, (n,) [rad].
+        """
+        still = Intervals(tips, tips, offsets, offsets)
+        number = np.arange(len(tips))
+        centres, room = self._states(
+            still, number, np.zeros(len(tips)), np.full(len(tips), np.inf)
+        )
+        angles = link_angles_at(centres)
+        changed = (angles > TOLERANCES.changed_angle).sum(axis=1)
+        return room, changed, angles.max(axis=1)
+
+    def bends(self, tips: FloatArray, offsets: FloatArray) -> FloatArray:
+        """Link angles of configurations, shape (n, N); [rad]."""
+        still = Intervals(tips, tips, offsets, offsets)
+        number = np.arange(len(tips))
+        manipulator = self.problem.manipulator
+        centres = still.centres(manipulator, number, np.zeros(len(tips)))
+        return link_angles_at(centres)
 
     def _states(
         self,

@@ -257,6 +257,7 @@ def shortest_ways(
     source: int,
     target: int,
     n_shapes: int,
+    n_lattice: int,
     index: IntArray,
     node: IntArray,
     tip_first: IntArray,
@@ -281,6 +282,7 @@ def shortest_ways(
         source: Node to start from.
         target: Node at which to stop, or -1 for all.
         n_shapes: Number of shapes n.
+        n_lattice: Number of shapes that exist at every tip; the others come after.
         index: Node of each (tip, shape) or -1, shape (k * n,).
         node: Number tip * n + shape of each node, shape (v,).
         tip_first: Neighbour rows of the tips, shape (k + 1,).
@@ -322,12 +324,22 @@ def shortest_ways(
                 heapq.heappush(heap, (value, v))
         for e in range(first[c], first[c + 1]):
             v = index[tip * n_shapes + neighbours[e]]
-            if v < 0 or done[v]:
+            if v >= 0 and not done[v]:
+                value = reached + arm * change[e] + strain[v]
+                if value < length[v] and not _is_blocked(u, v, flagged, blocked):
+                    length[v], before[v] = value, u
+                    heapq.heappush(heap, (value, v))
+            # Grown shapes live at one tip only: the tip moves as the shape changes.
+            if c < n_lattice and neighbours[e] < n_lattice:
                 continue
-            value = reached + arm * change[e] + strain[v]
-            if value < length[v] and not _is_blocked(u, v, flagged, blocked):
-                length[v], before[v] = value, u
-                heapq.heappush(heap, (value, v))
+            for g in range(tip_first[tip], tip_first[tip + 1]):
+                v = index[tip_links[g] * n_shapes + neighbours[e]]
+                if v < 0 or done[v]:
+                    continue
+                value = reached + arm * change[e] + tip_gap[g] + strain[v]
+                if value < length[v] and not _is_blocked(u, v, flagged, blocked):
+                    length[v], before[v] = value, u
+                    heapq.heappush(heap, (value, v))
         low, high = tip_nodes[tip], tip_nodes[tip + 1]
         if c > 0:
             high = low

@@ -107,38 +107,6 @@ class Intervals:
         return centres
 
 
-def offsets_of(
-    manipulator: Manipulator, tips: FloatArray, knees: IntArray, slopes: FloatArray
-) -> FloatArray:
-    """Offsets of sparse shapes at tips, shape (n, N + 1, 2); [m].
-
-    Args:
-        manipulator: The arm.
-        tips: Shape (n, 3); [m].
-        knees: Rows (i, j) of `Shapes`, shape (n, 2).
-        slopes: Rows of `Shapes`, shape (n, 4); [-].
-    """
-    stations = manipulator.stations
-    s1, s2 = stations[knees[:, 0]], stations[knees[:, 1]]
-    line = tips[:, None, 1:] * manipulator.ratios[:, None]
-    p1 = s1[:, None] * slopes[:, :2]
-    p2 = p1 + (s2 - s1)[:, None] * slopes[:, 2:]
-    end = tips[:, 1:]
-    bends = [(np.zeros(len(tips)), np.zeros_like(end)), (s1, p1), (s2, p2)]
-    bends.append((np.full(len(tips), stations[-1]), end))
-    planar = np.zeros_like(line)
-    for (sa, pa), (sb, pb) in itertools.pairwise(bends):
-        span = np.where(sb > sa, sb - sa, 1.0)
-        share = (stations[None, :] - sa[:, None]) / span[:, None]
-        on = (share >= 0.0) & (share <= 1.0) & (sb > sa)[:, None]
-        piece = pa[:, None] + share[..., None] * (pb - pa)[:, None]
-        planar = np.where(on[..., None], piece, planar)
-    offsets = planar - line
-    offsets[knees[:, 1] == 0] = 0.0
-    offsets[:, [0, -1]] = 0.0
-    return np.asarray(offsets)
-
-
 def knots_of(manipulator: Manipulator, roadmap: Roadmap, sequence: Sequence) -> Knots:
     """The knots of a sequence; a leg begins where the one before ends."""
     nodes: list[int] = []
@@ -153,9 +121,7 @@ def knots_of(manipulator: Manipulator, roadmap: Roadmap, sequence: Sequence) -> 
     node = roadmap.node[number]
     tips = roadmap.route.tips[node // roadmap.shapes.size]
     shape = node % roadmap.shapes.size
-    offsets = offsets_of(
-        manipulator, tips, roadmap.shapes.knees[shape], roadmap.shapes.slopes[shape]
-    )
+    offsets = roadmap.shapes.offsets(manipulator, tips, shape)
     edges = np.stack([number[:-1], number[1:]], axis=1)
     return Knots(
         tips, offsets, np.array(stations), np.array(drawn, dtype=np.bool_), edges

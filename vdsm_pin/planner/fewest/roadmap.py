@@ -1,6 +1,6 @@
 """The graph of sparse configurations: shapes at tips, with clearance and cost."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -119,22 +119,71 @@ def _assemble(
     taste: Taste,
     limit: float,
 ) -> Roadmap:
-    n_tips, n_shapes = len(route.tips), shapes.size
+    changed = (bends > TOLERANCES.changed_angle).sum(axis=1)
+    lack = np.maximum(0.0, 1.0 - (room - required) / taste.room)
+    over = np.maximum(0.0, bends.max(axis=1, initial=0.0) - taste.easy_bend)
+    bent = (over / max(limit - taste.easy_bend, 0.02)) ** 2
+    cost = taste.angle * changed + taste.room_cost * lack**2 + taste.bend_cost * bent
+    strain = 0.02 * taste.room_cost * lack**2 + 0.1 * taste.bend_cost * bent
+    lean = bends[:, 1:].sum(axis=1)
+    lean[node % shapes.size == 0] = 0.0
+    return _indexed(
+        Roadmap(route, shapes, node, node, node, lean, changed, cost, strain, room)
+    )
+
+
+def _indexed(roadmap: Roadmap) -> Roadmap:
+    """The roadmap with its nodes in order and its indices made."""
+    n_tips, n_shapes = len(roadmap.route.tips), roadmap.shapes.size
+    order = np.argsort(roadmap.node, kind="stable")
+    node = roadmap.node[order]
     index = np.full(n_tips * n_shapes, -1)
     index[node] = np.arange(len(node))
     tip_nodes = np.searchsorted(node, np.arange(n_tips + 1) * n_shapes)
-    changed = (bends > TOLERANCES.changed_angle).sum(axis=1)
-    lack = np.maximum(0.0, 1.0 - (room - required) / taste.room)
-    over = np.maximum(0.0, bends.max(axis=1) - taste.easy_bend)
-    cost = taste.angle * changed + taste.room_cost * lack**2
-    bent = (over / max(limit - taste.easy_bend, 0.02)) ** 2
-    cost += taste.bend_cost * bent
-    strain = 0.02 * taste.room_cost * lack**2 + 0.1 * taste.bend_cost * bent
-    lean = bends[:, 1:].sum(axis=1)
-    lean[node % n_shapes == 0] = 0.0
-    return Roadmap(
-        route, shapes, node, index, tip_nodes, lean, changed, cost, strain, room
+    return replace(
+        roadmap,
+        node=node,
+        index=index,
+        tip_nodes=tip_nodes,
+        lean=roadmap.lean[order],
+        changed=roadmap.changed[order],
+        cost=roadmap.cost[order],
+        strain=roadmap.strain[order],
+        clearance=roadmap.clearance[order],
     )
+
+
+def extended(
+    roadmap: Roadmap,
+    tips: IntArray,
+    bends: FloatArray,
+    room: FloatArray,
+    shapes: Shapes,
+    required: float,
+    taste: Taste,
+    limit: float,
+) -> Roadmap:
+    """The roadmap with grown configurations as further nodes.
+
+    Args:
+        roadmap: Before.
+        tips: Tip number of each new node, shape (g,).
+        bends: Link angles of each, shape (g, N); [rad].
+        room: Clearance of each, shape (g,); [m].
+        shapes: The shapes with the new ones at their end.
+        required: Clearance to keep; [m].
+        taste: What the strategy prefers.
+        limit: Largest link angle; [rad].
+    """
+    old = roadmap.shapes.size
+    tip, shape = roadmap.node // old, roadmap.node % old
+    fresh = tips * shapes.size + old + np.arange(len(tips))
+    more = _assemble(roadmap.route, shapes, fresh, bends, room, required, taste, limit)
+    values = {}
+    for name in ("lean", "changed", "cost", "strain", "clearance"):
+        values[name] = np.concatenate([getattr(roadmap, name), getattr(more, name)])
+    node = np.concatenate([tip * shapes.size + shape, more.node])
+    return _indexed(replace(roadmap, shapes=shapes, node=node, **values))
 
 
 @dataclass

@@ -81,12 +81,13 @@ def _chain(begin: FloatArray, end: FloatArray, coarse: float) -> FloatArray:
     return np.asarray(begin + np.outer(np.arange(count) / count, end - begin))
 
 
-def tip_route(problem: PlanningProblem, coarse: float) -> TipRoute:
+def tip_route(problem: PlanningProblem, coarse: float, back: float = 0.0) -> TipRoute:
     """Approach and path as one chain of tips, closed where the path is.
 
     Args:
         problem: What was asked.
         coarse: Largest distance between neighbouring tips; [m].
+        back: How far behind the chain there shall be tips too, along -X; [m].
     """
     path = problem.path
     begin = 0.0
@@ -100,7 +101,37 @@ def tip_route(problem: PlanningProblem, coarse: float) -> TipRoute:
     pairs = [(i, i + 1) for i in range(n - 1)]
     if path.closed and n - k > 2:
         pairs.append((k, n - 1))
+    if back > 0.0:
+        tips, more = _behind(tips, pairs[-1] == (k, n - 1), k, coarse, back)
+        pairs += more
     return _linked(tips, np.arange(k, n), stations, rows, np.array(pairs))
+
+
+SHEET_STRIDE = 4
+"""Only every fourth tip of the chain has tips behind it; the search is for ways."""
+
+
+def _behind(
+    tips: FloatArray, closed: bool, entry: int, coarse: float, back: float
+) -> tuple[FloatArray, list[tuple[int, int]]]:
+    """The chain's tips and, in a sheet behind them, tips drawn back along -X."""
+    n = len(tips)
+    feet = [*range(0, n - 1, SHEET_STRIDE), n - 1]
+    step = SHEET_STRIDE * coarse
+    depth = max(1, int(np.ceil(back / step)))
+    sheet, pairs = [tips], []
+    for level in range(1, depth + 1):
+        first = n + (level - 1) * len(feet)
+        sheet.append(tips[feet] - np.array([level * step, 0.0, 0.0]))
+        for i, foot in enumerate(feet):
+            under = foot if level == 1 else first - len(feet) + i
+            pairs.append((under, first + i))
+            if i + 1 < len(feet):
+                pairs.append((first + i, first + i + 1))
+        if closed:
+            nearest = int(np.argmin(np.abs(np.array(feet) - entry)))
+            pairs.append((first + nearest, first + len(feet) - 1))
+    return np.vstack(sheet), pairs
 
 
 def _linked(

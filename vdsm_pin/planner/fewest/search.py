@@ -59,7 +59,7 @@ def search(judge: Judge, roadmap: Roadmap, home: int, rounds: int) -> Found | No
         if not bad.size:
             return Found(roadmap, sequence, knots, count)
         known.update(map(tuple, np.sort(knots.edges[fresh[good]], axis=1).tolist()))
-        planner.blocked.add(knots.edges[bad])
+        planner.block(knots.edges[bad], not knots.drawn[bad].all())
     return None
 
 

@@ -18,6 +18,8 @@ WAY_COST = 0.05
 """Cost of a metre of way off the path."""
 SKIP_COST = 1000.0
 """Cost of a metre not drawn."""
+DISTRUST = 0.05
+"""Length added, with the distance, to a way between two tips that was blocked; [m]."""
 ARM = 1.0
 """Length by which a change of shape counts as a distance; [m]."""
 
@@ -60,14 +62,35 @@ class Planner:
         self.blocked = Blocked.none(len(roadmap.node))
         route = roadmap.route
         self.gap = np.concatenate([[0.0], np.diff(route.stations)])
+        self.way_gaps = route.gaps.copy()
+        self.from_home, _ = self.ways(home)
+
+    def block(self, edges: IntArray, on_ways: bool) -> None:
+        """Leave out edges, and lengthen all ways between the same two tips.
+
+        What blocks one shape is likely to block its neighbours too.
+
+        Args:
+            edges: Pairs of nodes, shape (n, 2).
+            on_ways: Whether one of them was part of a way, so that ways change.
+        """
+        self.blocked.add(edges)
+        route = self.roadmap.route
+        for a, b in self.roadmap.node[edges] // self.roadmap.shapes.size:
+            for u, v in ((a, b), (b, a)):
+                row = slice(route.first[u], route.first[u + 1])
+                link = route.links[row] == v
+                self.way_gaps[row] += link * (route.gaps[row] + DISTRUST)
+        if on_ways:
+            self.from_home, _ = self.ways(self.home)
 
     def ways(self, source: int, target: int = -1) -> tuple[FloatArray, IntArray]:
         """Shortest ways from a node, off the path; see `shortest_ways`."""
         roadmap = self.roadmap
         route, shapes = roadmap.route, roadmap.shapes
         return shortest_ways(
-            source, target, shapes.size, roadmap.index, roadmap.node,
-            route.first, route.links, route.gaps,
+            source, target, shapes.size, shapes.n_lattice, roadmap.index, roadmap.node,
+            route.first, route.links, self.way_gaps,
             shapes.first, shapes.neighbours, shapes.change,
             roadmap.lean, roadmap.strain, roadmap.tip_nodes, ARM,
             self.blocked.flagged, self.blocked.keys,
@@ -87,13 +110,12 @@ class Planner:
         """The cheapest sequence under the edges blocked so far."""
         roadmap = self.roadmap
         route, shapes = roadmap.route, roadmap.shapes
-        home, _ = self.ways(self.home)
         weights = np.array([TURN_COST, STILL_COST, VISIT_COST, WAY_COST, SKIP_COST])
         cost, parent, home_cost, home_from = stage_programme(
             route.layers, roadmap.tip_nodes, self.gap, shapes.size,
             roadmap.index, roadmap.node % shapes.size,
             shapes.first, shapes.neighbours, shapes.change,
-            roadmap.lean, roadmap.cost, home, -1, weights,
+            roadmap.lean, roadmap.cost, self.from_home, -1, weights,
             self.blocked.flagged, self.blocked.keys,
         )  # fmt: skip
         return self._trace(cost, parent, home_cost, home_from)

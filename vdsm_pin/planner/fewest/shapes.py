@@ -7,7 +7,8 @@ part, which is constant along a piece: the projection of joint i is s_i w1 with 
 arc length from O_1. Shape 0 is the straight arm (i = j = 1).
 """
 
-from dataclasses import dataclass
+import itertools
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +27,8 @@ class Shapes:
         neighbours: Shape numbers, shape (m,).
         change: How far the shape turns along each entry of `neighbours`, (m,); [rad].
         step: Lattice step of the slopes; [-].
+        grown: Offsets of shapes that exist at one tip only and are numbered after the
+            sparse ones, shape (g, N + 1, 2); [m].
     """
 
     knees: IntArray
@@ -34,11 +37,58 @@ class Shapes:
     neighbours: IntArray
     change: FloatArray
     step: float
+    grown: FloatArray
 
     @property
     def size(self) -> int:
-        """Number of shapes n."""
+        """Number of shapes n, the grown ones included."""
+        return len(self.first) - 1
+
+    @property
+    def n_lattice(self) -> int:
+        """Number of sparse shapes."""
         return len(self.knees)
+
+    def offsets(
+        self, manipulator: Manipulator, tips: FloatArray, shape: IntArray
+    ) -> FloatArray:
+        """Offsets D_1..D_{N+1} of shapes at tips; see `motion`.
+
+        Args:
+            manipulator: The arm.
+            tips: Shape (n, 3); [m].
+            shape: Shape numbers, (n,).
+
+        Returns:
+            Shape (n, N + 1, 2); [m].
+        """
+        sparse = np.minimum(shape, self.n_lattice - 1)
+        offsets = _offsets(manipulator, tips, self.knees[sparse], self.slopes[sparse])
+        more = shape >= self.n_lattice
+        if more.any():
+            offsets[more] = self.grown[shape[more] - self.n_lattice]
+        return offsets
+
+    def with_grown(self, grown: FloatArray, links: FloatArray) -> "Shapes":
+        """The same with more shapes, each of which exists at one tip.
+
+        Args:
+            grown: Their offsets, shape (g, N + 1, 2); [m].
+            links: Rows (shape, shape, change), one for both ways, shape (l, 3).
+        """
+        before = len(self.grown)
+        every = np.concatenate([self.grown, grown]) if before else grown
+        own = np.repeat(np.arange(self.size), np.diff(self.first))
+        old = np.column_stack([own, self.neighbours, self.change])
+        both = np.vstack([old, links, links[:, [1, 0, 2]]])
+        first, neighbours, change = _compressed(both, self.n_lattice + len(every))
+        return replace(
+            self,
+            first=first,
+            neighbours=neighbours,
+            change=change,
+            grown=every,
+        )
 
 
 def knee_joints(manipulator: Manipulator, most: int) -> IntArray:
@@ -101,23 +151,54 @@ def one_knee_shapes(
     return _shapes(knees, slopes, np.vstack(links), step)
 
 
+def _compressed(links: FloatArray, count: int) -> tuple[IntArray, IntArray, FloatArray]:
+    order = np.lexsort((links[:, 1], links[:, 0]))
+    links = links[order]
+    first = np.searchsorted(links[:, 0], np.arange(count + 1))
+    return first.astype(np.int64), links[:, 1].astype(np.int64), links[:, 2].copy()
+
+
 def _shapes(
     knees: IntArray, slopes: FloatArray, links: FloatArray, step: float
 ) -> Shapes:
-    order = np.lexsort((links[:, 1], links[:, 0]))
-    links = links[order]
     count = 1 + len(knees)
-    first = np.searchsorted(links[:, 0], np.arange(count + 1))
     all_knees = np.zeros((count, 2), dtype=np.int64)
     all_knees[1:] = knees[:, None]
     all_slopes = np.zeros((count, 4))
     all_slopes[1:, :2] = slopes
     all_slopes[1:, 2:] = slopes
-    return Shapes(
-        all_knees,
-        all_slopes,
-        first.astype(np.int64),
-        links[:, 1].astype(np.int64),
-        links[:, 2].copy(),
-        step,
-    )
+    first, neighbours, change = _compressed(links, count)
+    none = np.zeros((0, 0, 2))
+    return Shapes(all_knees, all_slopes, first, neighbours, change, step, none)
+
+
+def _offsets(
+    manipulator: Manipulator, tips: FloatArray, knees: IntArray, slopes: FloatArray
+) -> FloatArray:
+    """Offsets of sparse shapes at tips, shape (n, N + 1, 2); [m].
+
+    Args:
+        manipulator: The arm.
+        tips: Shape (n, 3); [m].
+        knees: Rows (i, j) of `Shapes`, shape (n, 2).
+        slopes: Rows of `Shapes`, shape (n, 4); [-].
+    """
+    stations = manipulator.stations
+    s1, s2 = stations[knees[:, 0]], stations[knees[:, 1]]
+    line = tips[:, None, 1:] * manipulator.ratios[:, None]
+    p1 = s1[:, None] * slopes[:, :2]
+    p2 = p1 + (s2 - s1)[:, None] * slopes[:, 2:]
+    end = tips[:, 1:]
+    bends = [(np.zeros(len(tips)), np.zeros_like(end)), (s1, p1), (s2, p2)]
+    bends.append((np.full(len(tips), stations[-1]), end))
+    planar = np.zeros_like(line)
+    for (sa, pa), (sb, pb) in itertools.pairwise(bends):
+        span = np.where(sb > sa, sb - sa, 1.0)
+        share = (stations[None, :] - sa[:, None]) / span[:, None]
+        on = (share >= 0.0) & (share <= 1.0) & (sb > sa)[:, None]
+        piece = pa[:, None] + share[..., None] * (pb - pa)[:, None]
+        planar = np.where(on[..., None], piece, planar)
+    offsets = planar - line
+    offsets[knees[:, 1] == 0] = 0.0
+    offsets[:, [0, -1]] = 0.0
+    return np.asarray(offsets)

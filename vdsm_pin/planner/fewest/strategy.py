@@ -13,6 +13,8 @@ from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.motion import Knots, Rows, dense_rows
 from vdsm_pin.planner.fewest.roadmap import Taste, build_roadmap, link_limit
 from vdsm_pin.planner.fewest.route import tip_route
+from vdsm_pin.planner.fewest.growth import fill
+from vdsm_pin.planner.fewest.sequence import Planner
 from vdsm_pin.planner.fewest.search import Found, search
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes
 from vdsm_pin.planner.fewest.smooth import smooth, straightened
@@ -39,18 +41,25 @@ class Level:
         coarse: Distance of the tips over the arm's length; [-].
         joints: Largest number of knee joints.
         rounds: Sequences to try.
+        back: How far tips are tried behind the path, over the arm's length; [-].
+        grow: Rounds of growing shapes into what is not drawn.
     """
 
     step: float
     coarse: float
     joints: int
     rounds: int
+    back: float = 0.0
+    grow: int = 0
 
+
+SEED = 0
+"""Seed of the growth of shapes; the same problem gives the same plan."""
 
 LEVELS = (
     Level(0.08, 0.026, 8, 40),
-    Level(0.05, 0.016, 10, 60),
-    Level(0.035, 0.01, 12, 60),
+    Level(0.08, 0.026, 8, 40, 1.0, 3),
+    Level(0.05, 0.016, 10, 60, 1.0, 3),
 )
 
 
@@ -64,6 +73,9 @@ def plan_fewest(
     best: Found | None = None
     for level in LEVELS:
         found = _look(judge, level, taste)
+        LOGGER.debug(
+            "%s: undrawn %s", level, None if found is None else found.undrawn_m
+        )
         if found is None:
             continue
         if best is None or found.undrawn_m < best.undrawn_m:
@@ -81,7 +93,8 @@ def _look(judge: Judge, level: Level, taste: Taste) -> Found | None:
     problem = judge.problem
     arm = problem.manipulator
     shapes = one_knee_shapes(arm, link_limit(problem), level.step, level.joints)
-    route = tip_route(problem, level.coarse * arm.total_length)
+    length = arm.total_length
+    route = tip_route(problem, level.coarse * length, level.back * length)
     roadmap = build_roadmap(
         problem, judge.clearance, judge.required, route, shapes, taste
     )
@@ -89,7 +102,28 @@ def _look(judge: Judge, level: Level, taste: Taste) -> Found | None:
     if home < 0:
         message = "the straight arm at the start is not clear"
         raise NoPlanFound(message)
-    return search(judge, roadmap, home, level.rounds)
+    found = search(judge, roadmap, home, level.rounds)
+    for _ in range(level.grow):
+        if found is None or not found.sequence.skipped:
+            break
+        rng = np.random.default_rng(SEED)
+        before = found.undrawn_m
+        lengths, _ = Planner(found.roadmap, home).ways(home)
+        more = fill(judge, found.roadmap, lengths, found.sequence.skipped, rng, taste)
+        if more is None:
+            break
+        again = search(judge, more, int(more.index[0]), level.rounds)
+        LOGGER.debug(
+            "grown: %d nodes, undrawn %.3f -> %s",
+            len(more.node) - len(found.roadmap.node),
+            before,
+            None if again is None else again.undrawn_m,
+        )
+        if again is None or not again.undrawn_m < before:
+            break
+        found = again
+        home = int(more.index[0])
+    return found
 
 
 def _plan(problem: PlanningProblem, knots: Knots, taste: Taste) -> Plan:

@@ -1,0 +1,382 @@
+"""Shapes with as many knees as it takes, grown along the path where sparse ones end.
+
+A population of configurations follows the tip from layer to layer. Each child bends one
+joint of its parent a little, adds a knee or takes one away; children that are clear and
+can be reached from their parent live on. Only the ancestors of the few best that came
+farthest enter the graph.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.planner.fewest.clear import Judge
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste, extended
+
+FAMILY = 16
+"""Children tried for each parent."""
+POPULATION = 150
+"""Configurations that live on at a layer."""
+RETRIES = 4
+"""Rounds of change at rest before a population that cannot go on is given up."""
+KEPT = 6
+"""Configurations at the farthest layer whose ancestors are kept."""
+SCALES = (0.008, 0.025, 0.06)
+"""Sizes of a change over the arm's length; [-]."""
+
+
+@dataclass(frozen=True)
+class Grown:
+    """A tree of configurations.
+
+    Args:
+        layer: Layer of each, shape (g,).
+        offsets: D_1..D_{N+1} of each, shape (g, N + 1, 2); [m].
+        parent: Number of the parent, or -1 - (root number), shape (g,).
+    """
+
+    layer: IntArray
+    offsets: FloatArray
+    parent: IntArray
+
+
+@compiled
+def vary(
+    offsets: FloatArray,
+    stations: FloatArray,
+    moved: FloatArray,
+    joint: FloatArray,
+    kind: FloatArray,
+    shift: FloatArray,
+) -> FloatArray:
+    """Children of configurations, one each.
+
+    Args:
+        offsets: Parents, shape (n, N + 1, 2); [m].
+        stations: Arc length of the joints, shape (N + 1,); [m].
+        moved: How far the tip has moved across the rail since, shape (n, 2); [m].
+        joint: Which joint to move, as a number in [0, 1), shape (n,).
+        kind: What to do, as a number in [0, 1), shape (n,).
+        shift: How far to move that joint, shape (n, 2); [m].
+
+    Returns:
+        Children, shape (n, N + 1, 2); [m].
+    """
+    n_rows, last = offsets.shape[0], offsets.shape[1] - 1
+    total = stations[last]
+    result = offsets.copy()
+    bent = np.zeros(last + 1, dtype=np.bool_)
+    for r in range(n_rows):
+        row = result[r]
+        count = 0
+        final = 0
+        for i in range(1, last):
+            span0 = stations[i] - stations[i - 1]
+            span1 = stations[i + 1] - stations[i]
+            gap = 0.0
+            for c in range(2):
+                before = (row[i, c] - row[i - 1, c]) / span0
+                after = (row[i + 1, c] - row[i, c]) / span1
+                gap = max(gap, abs(after - before))
+            bent[i] = gap > 1e-9
+            if bent[i]:
+                count += 1
+                final = i
+        if kind[r] < 0.5 and final > 0:
+            # The projections stay where they are up to the last knee.
+            for c in range(2):
+                for i in range(1, final + 1):
+                    row[i, c] -= stations[i] / total * moved[r, c]
+                for i in range(final + 1, last):
+                    share = (total - stations[i]) / (total - stations[final])
+                    row[i, c] = share * row[final, c]
+        half = kind[r] % 0.5
+        if half < 0.05:
+            continue
+        if half < 0.3 and count > 0:
+            wanted = int(joint[r] * count)
+            m = 0
+            for i in range(1, last):
+                if bent[i]:
+                    if wanted == 0:
+                        m = i
+                        break
+                    wanted -= 1
+        else:
+            m = 1 + int(joint[r] * (last - 1))
+        low = m - 1
+        while low > 0 and not bent[low]:
+            low -= 1
+        high = m + 1
+        while high < last and not bent[high]:
+            high += 1
+        for c in range(2):
+            target = row[m, c] + shift[r, c]
+            if half > 0.45:
+                share = (stations[m] - stations[low]) / (stations[high] - stations[low])
+                target = (1.0 - share) * row[low, c] + share * row[high, c]
+            for i in range(low + 1, m):
+                share = (stations[i] - stations[low]) / (stations[m] - stations[low])
+                row[i, c] = (1.0 - share) * row[low, c] + share * target
+            row[m, c] = target
+            for i in range(m + 1, high):
+                share = (stations[i] - stations[m]) / (stations[high] - stations[m])
+                row[i, c] = (1.0 - share) * target + share * row[high, c]
+    return result
+
+
+class Garden:
+    """Grows configurations along given tips.
+
+    Args:
+        judge: Says what is clear.
+        tips: Tip of each layer, shape (l, 3); [m].
+        rng: Source of chance.
+    """
+
+    def __init__(
+        self, judge: Judge, tips: FloatArray, rng: np.random.Generator
+    ) -> None:
+        self.judge, self.tips, self.rng = judge, tips, rng
+        self.layer: list[IntArray] = []
+        self.offsets: list[FloatArray] = []
+        self.parent: list[IntArray] = []
+        self.size = 0
+
+    def _sow(self, layer: int, offsets: FloatArray, parent: IntArray) -> IntArray:
+        self.layer.append(np.full(len(offsets), layer))
+        self.offsets.append(offsets)
+        self.parent.append(parent)
+        numbers = np.arange(self.size, self.size + len(offsets))
+        self.size += len(offsets)
+        return numbers
+
+    def _children(
+        self, offsets: FloatArray, layer: int, to: int
+    ) -> tuple[FloatArray, IntArray]:
+        """Living children at layer `to` and the row of each one's parent."""
+        arm = self.judge.problem.manipulator
+        rows = np.repeat(np.arange(len(offsets)), FAMILY)
+        moved = self.tips[to, 1:] - self.tips[layer, 1:]
+        n = len(rows)
+        scale = self.rng.choice(np.array(SCALES), n) * arm.total_length
+        shift = self.rng.normal(size=(n, 2)) * scale[:, None]
+        born = vary(
+            offsets[rows], arm.stations, np.broadcast_to(moved, (n, 2)).copy(),
+            self.rng.random(n), self.rng.random(n), shift,
+        )  # fmt: skip
+        tips = np.broadcast_to(self.tips[to], (n, 3))
+        room, changed, _ = self.judge.look(tips, born)
+        alive = np.flatnonzero(room >= self.judge.required)
+        order = self._choice(room[alive], changed[alive])
+        picked = alive[order]
+        lines = Intervals(
+            np.broadcast_to(self.tips[layer], (len(picked), 3)),
+            tips[picked],
+            offsets[rows[picked]],
+            born[picked],
+        )
+        good = self.judge.clear(lines) if len(picked) else np.zeros(0, bool)
+        return born[picked[good]], rows[picked[good]]
+
+    def _choice(self, room: FloatArray, changed: IntArray) -> IntArray:
+        """Half the best, half by chance."""
+        if len(room) <= POPULATION:
+            return np.arange(len(room))
+        lack = np.maximum(0.0, 1.0 - (room - self.judge.required) / 0.03)
+        score = changed + 2.0 * lack**2 + self.rng.random(len(room))
+        order = np.argsort(score, kind="stable")
+        best, rest = order[: POPULATION // 2], order[POPULATION // 2 :]
+        return np.concatenate(
+            [best, self.rng.permutation(rest)[: POPULATION - len(best)]]
+        )
+
+    def grow(self, offsets: FloatArray, first: int, last: int) -> Grown:
+        """Grow from configurations at layer `first` towards layer `last`.
+
+        Args:
+            offsets: Roots at layer `first`, shape (n, N + 1, 2); [m].
+            first: Layer of the roots.
+            last: Layer to reach, before or after.
+        """
+        step = 1 if last > first else -1
+        at, layer, retries = offsets, first, 0
+        numbers = -1 - np.arange(len(offsets))
+        front = numbers
+        while layer != last and len(at):
+            born, rows = self._children(at, layer, layer + step)
+            if len(born) < POPULATION // 10 and retries < RETRIES:
+                retries += 1
+                side, side_rows = self._children(at, layer, layer)
+                ids = self._sow(layer, side, numbers[side_rows])
+                at = np.concatenate([at, side])
+                numbers = np.concatenate([numbers, ids])
+                if len(at) > 2 * POPULATION:
+                    pick = self.rng.permutation(len(at))[: 2 * POPULATION]
+                    at, numbers = at[pick], numbers[pick]
+                continue
+            if not len(born):
+                break
+            retries = 0
+            layer += step
+            numbers = self._sow(layer, born, numbers[rows])
+            at, front = born, numbers
+        return self._ancestry(front)
+
+    def _ancestry(self, front: IntArray) -> Grown:
+        """The few best of the front with all their ancestors."""
+        shape = (0, *self.judge.problem.manipulator.stations.shape, 2)
+        if not self.size or front[0] < 0:
+            none = np.zeros(0, dtype=np.int64)
+            return Grown(none, np.zeros(shape), none)
+        layer, offsets, parent = (
+            np.concatenate(part) for part in (self.layer, self.offsets, self.parent)
+        )
+        tips = np.broadcast_to(self.tips[layer[front[0]]], (len(front), 3))
+        room, changed, _ = self.judge.look(tips, offsets[front])
+        lack = np.maximum(0.0, 1.0 - (room - self.judge.required) / 0.03)
+        best = front[np.argsort(changed + lack, kind="stable")[:KEPT]]
+        kept: set[int] = set()
+        for start in best.tolist():
+            at = start
+            while at >= 0 and at not in kept:
+                kept.add(at)
+                at = int(parent[at])
+        order = np.array(sorted(kept))
+        rank = np.full(self.size, -1)
+        rank[order] = np.arange(len(order))
+        up = parent[order]
+        return Grown(
+            layer[order], offsets[order], np.where(up < 0, up, rank[np.maximum(up, 0)])
+        )
+
+
+def graft(
+    judge: Judge,
+    roadmap: Roadmap,
+    grown: list[Grown],
+    roots: list[IntArray],
+    taste: Taste,
+) -> Roadmap:
+    """The roadmap with grown configurations, tied to what is near them.
+
+    Args:
+        judge: Says what is clear.
+        roadmap: The graph before.
+        grown: Trees, each rooted in nodes of the graph.
+        roots: For each tree the nodes of its roots.
+        taste: What the strategy prefers.
+    """
+    arm = judge.problem.manipulator
+    shapes, route = roadmap.shapes, roadmap.route
+    tips, offsets, links = [], [], []
+    first = shapes.size
+    for tree, nodes in zip(grown, roots, strict=True):
+        ids = first + np.arange(len(tree.layer))
+        root = roadmap.node[nodes[np.maximum(-1 - tree.parent, 0)]] % shapes.size
+        up = np.where(tree.parent >= 0, first + tree.parent, root)
+        links.append(np.column_stack([ids, up, np.full(len(ids), shapes.step)]))
+        tip = route.layers[tree.layer]
+        tips.append(tip)
+        offsets.append(tree.offsets)
+        first += len(ids)
+    every, places = np.concatenate(offsets), np.concatenate(tips)
+    links.append(_ties(judge, roadmap, places, every))
+    positions = route.tips[places]
+    room, _, _ = judge.look(positions, every)
+    bends = judge.bends(positions, every)
+    return extended(
+        roadmap, places, bends, room, shapes.with_grown(every, np.vstack(links)),
+        judge.required, taste, judge.limit,
+    )  # fmt: skip
+
+
+TIES = 4
+"""Nodes of the graph tied to each grown configuration at its tip."""
+TIE_LENGTH = 0.08
+"""Largest move of a joint along a tie over the arm's length; [-]."""
+
+
+def _ties(
+    judge: Judge, roadmap: Roadmap, places: IntArray, grown: FloatArray
+) -> FloatArray:
+    """Clear links from grown configurations to the nearest ones at the same tip."""
+    arm, shapes = judge.problem.manipulator, roadmap.shapes
+    rows, tips, here, there = [], [], [], []
+    for tip in np.unique(places):
+        own = np.flatnonzero(places == tip)
+        nodes = np.arange(roadmap.tip_nodes[tip], roadmap.tip_nodes[tip + 1])
+        shape = np.concatenate([roadmap.node[nodes] % shapes.size, shapes.size + own])
+        position = np.broadcast_to(roadmap.route.tips[tip], (len(nodes), 3))
+        around = shapes.offsets(arm, position, shape[: len(nodes)])
+        around = np.concatenate([around, grown[own]])
+        gap = np.abs(grown[own][:, None] - around[None]).max(axis=(2, 3))
+        gap[np.arange(len(own)), len(nodes) + np.arange(len(own))] = np.inf
+        near = np.argsort(gap, axis=1, kind="stable")[:, :TIES]
+        mine, column = np.repeat(np.arange(len(own)), near.shape[1]), near.ravel()
+        close = gap[mine, column] <= TIE_LENGTH * arm.total_length
+        mine, column = mine[close], column[close]
+        rows.append(
+            np.column_stack([shapes.size + own[mine], shape[column], gap[mine, column]])
+        )
+        tips.append(np.broadcast_to(roadmap.route.tips[tip], (len(mine), 3)))
+        here.append(grown[own[mine]])
+        there.append(around[column])
+    every = np.concatenate(tips)
+    lines = Intervals(every, every, np.concatenate(here), np.concatenate(there))
+    good = judge.clear(lines) if len(every) else np.zeros(0, bool)
+    return np.concatenate(rows)[good]
+
+
+def fill(
+    judge: Judge,
+    roadmap: Roadmap,
+    home: FloatArray,
+    skipped: tuple[int, ...],
+    rng: np.random.Generator,
+    taste: Taste,
+) -> Roadmap | None:
+    """The roadmap with what could be grown into the stretches not drawn.
+
+    Args:
+        judge: Says what is clear.
+        roadmap: The graph before.
+        home: Length of the way to each node, inf if none, shape (v,); [m].
+        skipped: Layers k whose stretch from layer k - 1 is not drawn.
+        rng: Source of chance.
+        taste: What the strategy prefers.
+
+    Returns:
+        None if nothing grew.
+    """
+    route, arm = roadmap.route, judge.problem.manipulator
+    marks = np.array(skipped)
+    breaks = np.flatnonzero(np.diff(marks) > 1) + 1
+    trees, roots = [], []
+    for stretch in np.split(marks, breaks):
+        ends = (int(stretch[0]) - 1, int(stretch[-1]))
+        crossed = False
+        for first, last in (ends, ends[::-1]):
+            if crossed:
+                break
+            tip = route.layers[first]
+            nodes = np.arange(roadmap.tip_nodes[tip], roadmap.tip_nodes[tip + 1])
+            nodes = nodes[np.isfinite(home[nodes])]
+            if len(nodes) > POPULATION:
+                nodes = rng.choice(nodes, POPULATION, replace=False)
+            if not len(nodes):
+                continue
+            position = np.broadcast_to(route.tips[tip], (len(nodes), 3))
+            shape = roadmap.node[nodes] % roadmap.shapes.size
+            offsets = roadmap.shapes.offsets(arm, position, shape)
+            garden = Garden(judge, route.tips[route.layers], rng)
+            tree = garden.grow(offsets, first, last)
+            if len(tree.layer):
+                trees.append(tree)
+                roots.append(nodes)
+                crossed = bool((tree.layer == last).any())
+    return graft(judge, roadmap, trees, roots, taste) if trees else None
