@@ -45,6 +45,18 @@ class Tolerances:
     changed_angle: float = 8.726646259971648e-4
     """A link angle above this counts as changed: 0.05 deg; [rad]."""
 
+    row_change: float = 8.726646259971648e-2
+    """Largest change of a joint angle from row to row: 5 deg; [rad]."""
+
+    start_joints: float = 1e-9
+    """Joint values of the first row against those of the problem; [m] and [rad]."""
+
+    coverage: float = 1e-9
+    """Coverage below the required one that counts as rounding of a CSV; [-]."""
+
+    joint_error: float = 1e-5
+    """Width to which the largest certified joint error is bisected; [rad]."""
+
     least_bracket: float = 1e-6
     """Width to which the bracket of the least clearance is narrowed; [m]."""
 

@@ -2,10 +2,12 @@
 
 numba notices a change of the file a function stands in, but not of the files of the
 functions it calls, and would go on with stale machine code. So the code is kept in a
-folder named by the content of every compiled module.
+folder named by the content of a module and of all that it imports. Modules with
+compiled functions therefore import little.
 """
 
 import hashlib
+import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -15,20 +17,29 @@ import numba
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-MARK: Final = b"import compiled\n"
-"""Modules with this line are compiled."""
+IMPORT: Final = re.compile(rb"^from vdsm_pin\.([\w.]+) import", re.MULTILINE)
+PACKAGE: Final = Path(__file__).parents[1]
 
 
 @cache
-def _folder() -> Path | None:
-    """Where the machine code is kept; None where numba shall choose."""
-    package = Path(__file__).parents[1]
+def _sources(path: Path) -> dict[Path, bytes]:
+    """A module and all of the package that it imports, with their content."""
+    content = path.read_bytes()
+    found = {path: content}
+    for name in IMPORT.findall(content):
+        other = PACKAGE.joinpath(*name.decode().split(".")).with_suffix(".py")
+        if other.is_file():
+            found |= _sources(other)
+    return found
+
+
+@cache
+def _folder(path: Path) -> Path | None:
+    """Where a module's machine code is kept; None where numba shall choose."""
     digest = hashlib.sha256(numba.__version__.encode())
-    for path in sorted(package.rglob("*.py")):
-        content = path.read_bytes()
-        if MARK in content:
-            digest.update(content)
-    folder = package / "__pycache__" / f"compiled-{digest.hexdigest()[:16]}"
+    for _, content in sorted(_sources(path).items()):
+        digest.update(content)
+    folder = PACKAGE / "__pycache__" / f"{path.stem}-{digest.hexdigest()[:16]}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:  # a read-only installation
@@ -43,7 +54,7 @@ def compiled(function: F) -> F:
     The GIL is released, divisions by zero give inf or nan as numpy's do.
     """
     config: Any = numba.config
-    before, folder = config.CACHE_DIR, _folder()
+    before, folder = config.CACHE_DIR, _folder(Path(function.__code__.co_filename))
     config.CACHE_DIR = str(folder) if folder else before
     try:
         jit = numba.njit(cache=True, nogil=True, fastmath=False, error_model="numpy")

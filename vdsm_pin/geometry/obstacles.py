@@ -103,11 +103,11 @@ def obstacle_bracket(
         node = stack[waiting]
         if box_distance(pieces, node, low, high) >= out[LOWER]:
             continue
-        if _plane_gap(pieces, node, points, count) >= out[LOWER]:
+        if _plane_gap(pieces, node, points, count, scratch[0]) >= out[LOWER]:
             continue
         first = pieces.node_range[node, 0]
         if pieces.node_range[node, 1] - first > 1:
-            waiting = _push_children(pieces, node, low, high, stack, waiting)
+            waiting = push_children(pieces, node, low, high, stack, waiting)
             continue
         bracket(pieces, first, points, count, goal, scratch, trial)
         if trial[UPPER] < out[UPPER]:
@@ -119,13 +119,17 @@ def obstacle_bracket(
 
 
 @compiled
-def _plane_gap(
-    pieces: PackedPieces, node: int, points: FloatArray, count: int
-) -> float:
-    """Gap of one plane between some points and a node's box; a lower bound; [m].
+def facing(pieces: PackedPieces, node: int, points: FloatArray, n: FloatArray) -> bool:
+    """A guess of n towards a node's box: from the nearest point of the first segment.
 
-    The plane faces the middle of the box from the nearest point of the first two
-    points' segment.
+    Args:
+        pieces: The scene.
+        node: The node.
+        points: The link's points; the first two are its ends.
+        n: Result, unit vector, shape (3,).
+
+    Returns:
+        Whether there is such a direction.
     """
     low, high = pieces.node_low[node], pieces.node_high[node]
     span = along = 0.0
@@ -134,21 +138,35 @@ def _plane_gap(
         span += d * d
         along += d * (0.5 * (low[c] + high[c]) - points[0, c])
     t = min(1.0, max(0.0, along / span)) if span > 0.0 else 0.0
-    nx = 0.5 * (low[0] + high[0]) - (points[0, 0] + t * (points[1, 0] - points[0, 0]))
-    ny = 0.5 * (low[1] + high[1]) - (points[0, 1] + t * (points[1, 1] - points[0, 1]))
-    nz = 0.5 * (low[2] + high[2]) - (points[0, 2] + t * (points[1, 2] - points[0, 2]))
-    length = sqrt(nx * nx + ny * ny + nz * nz)
-    if not length > 0.0:
-        return -np.inf
-    high_side = -np.inf
-    for k in range(count):
-        value = nx * points[k, 0] + ny * points[k, 1] + nz * points[k, 2]
-        high_side = max(high_side, value)
-    return (box_support(pieces, node, nx, ny, nz) - high_side) / length
+    squared = 0.0
+    for c in range(3):
+        at = points[0, c] + t * (points[1, c] - points[0, c])
+        n[c] = 0.5 * (low[c] + high[c]) - at
+        squared += n[c] * n[c]
+    length = sqrt(squared)
+    if not 0.0 < length < np.inf:
+        return False
+    for c in range(3):
+        n[c] /= length
+    return True
 
 
 @compiled
-def _push_children(
+def _plane_gap(
+    pieces: PackedPieces, node: int, points: FloatArray, count: int, n: FloatArray
+) -> float:
+    """Gap of one plane between some points and a node's box; a lower bound; [m]."""
+    if not facing(pieces, node, points, n):
+        return -np.inf
+    reach = -np.inf
+    for k in range(count):
+        value = n[0] * points[k, 0] + n[1] * points[k, 1] + n[2] * points[k, 2]
+        reach = max(reach, value)
+    return box_support(pieces, node, n[0], n[1], n[2]) - reach
+
+
+@compiled
+def push_children(
     pieces: PackedPieces,
     node: int,
     low: FloatArray,

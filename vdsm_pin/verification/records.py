@@ -142,16 +142,19 @@ class ClearanceProfile:
     """Brackets along the motion, reduced to what a plot shows.
 
     Args:
-        link_lower: Least over the obstacles, shape (n_intervals, N); [m].
+        link_lower: Least over the obstacles, shape (n_bins, N); [m].
         link_upper: The same for the upper bounds; [m].
-        obstacle_lower: Least over the links, shape (n_intervals, n_obstacles); [m].
+        obstacle_lower: Least over the links, shape (n_bins, n_obstacles); [m].
         obstacle_upper: The same for the upper bounds; [m].
+        first_interval: First interval of each bin, shape (n_bins,). A bin is one
+            interval unless the motion is very long.
     """
 
     link_lower: FloatArray
     link_upper: FloatArray
     obstacle_lower: FloatArray
     obstacle_upper: FloatArray
+    first_interval: IntArray
 
 
 @dataclass(frozen=True)

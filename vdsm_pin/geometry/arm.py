@@ -1,0 +1,147 @@
+"""The arm in compiled code: joint centres, their bend off a chord, their sway.
+
+Formulas of docs/certificate.md, "The bound".
+
+Links, joints and centres count from 0 here: link l joins O_l and O_{l+1}, joint l turns
+links l, l + 1, ...
+"""
+
+from math import cos, sin
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.compiled import compiled
+
+
+@compiled
+def place(
+    x0: float,
+    alpha: FloatArray,
+    theta: FloatArray,
+    lengths: FloatArray,
+    centres: FloatArray,
+    frames: FloatArray,
+) -> None:
+    """Joint centres and link frames of one configuration.
+
+    Args:
+        x0: Base position; [m].
+        alpha: Yaw angles, shape (N,); [rad].
+        theta: Pitch angles, shape (N,); [rad].
+        lengths: Link lengths, shape (N,); [m].
+        centres: Result, shape (N + 1, 3); [m].
+        frames: Result R_base_link, shape (N, 3, 3); [-].
+    """
+    centres[0, 0], centres[0, 1], centres[0, 2] = x0, 0.0, 0.0
+    for link in range(lengths.size):
+        ca, sa = cos(alpha[link]), sin(alpha[link])
+        ct, st = cos(theta[link]), sin(theta[link])
+        for row in range(3):
+            if link == 0:
+                x, y = 1.0 if row == 0 else 0.0, 1.0 if row == 1 else 0.0
+                z = 1.0 if row == 2 else 0.0
+            else:
+                x, y = frames[link - 1, row, 0], frames[link - 1, row, 1]
+                z = frames[link - 1, row, 2]
+            across = ca * x + sa * y
+            frames[link, row, 0] = ct * across - st * z
+            frames[link, row, 1] = ca * y - sa * x
+            frames[link, row, 2] = st * across + ct * z
+            step = lengths[link] * frames[link, row, 0]
+            centres[link + 1, row] = centres[link, row] + step
+
+
+@compiled
+def place_between(
+    t: float,
+    x0: FloatArray,
+    alpha: FloatArray,
+    theta: FloatArray,
+    lengths: FloatArray,
+    centres: FloatArray,
+    frames: FloatArray,
+) -> None:
+    """The same at time t between two rows, arrays of shape (2,) and (2, N)."""
+    if t == 0.0 or t == 1.0:
+        k = int(t)
+        place(x0[k], alpha[k], theta[k], lengths, centres, frames)
+        return
+    place(
+        x0[0] + t * (x0[1] - x0[0]),
+        alpha[0] + t * (alpha[1] - alpha[0]),
+        theta[0] + t * (theta[1] - theta[0]),
+        lengths,
+        centres,
+        frames,
+    )
+
+
+@compiled
+def bends_and_drifts(
+    alpha: FloatArray,
+    theta: FloatArray,
+    lengths: FloatArray,
+    bends: FloatArray,
+    drifts: FloatArray,
+) -> None:
+    """How far from linear a motion between two rows is.
+
+    Args:
+        alpha: Yaw angles of the two rows, shape (2, N); [rad].
+        theta: Pitch angles, shape (2, N); [rad].
+        lengths: Link lengths, shape (N,); [m].
+        bends: Result M, bound of the second derivative of O_j with joints below f at
+            rest, at [f, j], shape (N + 1, N + 1); [m].
+        drifts: Result D, bound of the rate of the sway of O_j, at [f, j]; [m].
+    """
+    for f in range(lengths.size):
+        turning = bend = drift = 0.0
+        bends[f, f] = drifts[f, f] = 0.0
+        for link in range(f, lengths.size):
+            turning += abs(alpha[1, link] - alpha[0, link])
+            turning += abs(theta[1, link] - theta[0, link])
+            bend += lengths[link] * turning * turning
+            drift += 2.0 * (link - f + 1) * lengths[link] * turning
+            bends[f, link + 1], drifts[f, link + 1] = bend, drift
+
+
+@compiled
+def second_order(lengths: FloatArray, f: int, j: int, error: float) -> float:
+    """Second order of joint errors in O_j with joints below f at rest; [m]."""
+    total = 0.0
+    for link in range(f, j):
+        angles = 2.0 * (link - f + 1) * error
+        total += lengths[link] * angles * angles
+    return 0.5 * total
+
+
+@compiled
+def _turned(n: FloatArray, axis: FloatArray, arm: FloatArray) -> float:
+    """|n . (axis x arm)|."""
+    x = axis[1] * arm[2] - axis[2] * arm[1]
+    y = axis[2] * arm[0] - axis[0] * arm[2]
+    z = axis[0] * arm[1] - axis[1] * arm[0]
+    return float(abs(n[0] * x + n[1] * y + n[2] * z))
+
+
+@compiled
+def sway(
+    n: FloatArray, centres: FloatArray, frames: FloatArray, f: int, j: int
+) -> float:
+    """G: sum of |n . dO_j/dq| over the angles of joints f to j - 1; [m/rad].
+
+    Args:
+        n: Unit vector in the base frame, shape (3,); [-].
+        centres: Joint centres, shape (N + 1, 3); [m].
+        frames: R_base_link, shape (N, 3, 3); [-].
+        f: First joint that errs.
+        j: Joint centre.
+    """
+    total = 0.0
+    for joint in range(f, j):
+        arm = centres[j] - centres[joint]
+        total += _turned(n, frames[joint, :, 1], arm)
+        if joint > 0:
+            total += _turned(n, frames[joint - 1, :, 2], arm)
+        else:
+            total += float(abs(n[1] * arm[0] - n[0] * arm[1]))
+    return total

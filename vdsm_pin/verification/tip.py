@@ -1,0 +1,267 @@
+"""The tip against the desired path: rows, deviation in between, coverage."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.records import Check, Verdict
+
+CHUNK: Final = 16_384
+"""Rows treated at once, so that memory stays bounded."""
+
+
+@dataclass(frozen=True)
+class TipReport:
+    """What is proved of the tip.
+
+    Args:
+        checks: One row of evidence each.
+        deviation: Bound of the tip's distance from the place on the path that belongs
+            to the same instant, over all intervals on the path; 0 without any; [m].
+        coverage: Proved part of the path that is drawn, 0 to 1; [-].
+        undrawn: Stretches not drawn, from and to, shape (k, 2); [m].
+    """
+
+    checks: tuple[Check, ...]
+    deviation: float
+    coverage: float
+    undrawn: FloatArray
+
+
+def tip_positions(manipulator: Manipulator, trajectory: Trajectory) -> FloatArray:
+    """The tip at every row, shape (n_samples, 3); [m]."""
+    tips = np.zeros((trajectory.n_samples, 3))
+    for first in range(0, trajectory.n_samples, CHUNK):
+        part = slice(first, first + CHUNK)
+        joints = trajectory.x0[part], trajectory.alpha[part], trajectory.theta[part]
+        tips[part] = joint_centres(manipulator, *joints)[:, -1]
+    return tips
+
+
+def bends(manipulator: Manipulator, trajectory: Trajectory) -> FloatArray:
+    """Bound M of the tip's second derivative on each interval, shape (n - 1,); [m]."""
+    result = np.zeros(max(0, trajectory.n_samples - 1))
+    for first in range(0, result.size, CHUNK):
+        rows = slice(first, first + CHUNK + 1)
+        rates = np.abs(np.diff(trajectory.alpha[rows], axis=0))
+        rates += np.abs(np.diff(trajectory.theta[rows], axis=0))
+        turning = np.cumsum(rates, axis=1)
+        result[first : first + CHUNK] = turning**2 @ manipulator.link_lengths
+    return result
+
+
+def _wrapped(path: DesiredPath, stations: FloatArray) -> FloatArray:
+    """Stations modulo the length where the path is closed, clamped elsewhere."""
+    if path.closed and path.length > 0.0:
+        return np.mod(stations, path.length)
+    return np.minimum(np.maximum(stations, 0.0), path.length)
+
+
+def _runs(path: DesiredPath, stations: FloatArray) -> FloatArray:
+    """How far each interval advances along the path, shape (n - 1,); [m]."""
+    run = np.diff(stations)
+    if path.closed and path.length > 0.0:
+        return np.asarray(run - path.length * np.round(run / path.length))
+    return np.asarray(np.diff(_wrapped(path, stations)))
+
+
+def _drawn_intervals(trajectory: Trajectory) -> IntArray:
+    """Intervals whose two rows are on the path; the one interval of a single row."""
+    on = trajectory.on_path
+    both = on if trajectory.n_samples == 1 else on[:-1] & on[1:]
+    return np.flatnonzero(both)
+
+
+def _corner_deviation(
+    path: DesiredPath,
+    tips: FloatArray,
+    start: FloatArray,
+    run: FloatArray,
+    intervals: IntArray,
+) -> FloatArray:
+    """Largest distance of each chord from the path's corners on its way; [m]."""
+    result = np.zeros(intervals.size)
+    turns = [0.0]
+    if path.closed and path.length > 0.0:
+        turns = [-path.length, 0.0, path.length]
+    stations = np.sort(np.concatenate([path.corner_stations + t for t in turns]))
+    low, high = np.minimum(start, start + run), np.maximum(start, start + run)
+    first = np.searchsorted(stations, low, side="right")
+    last = np.searchsorted(stations, high, side="left")
+    for at in np.flatnonzero(last > first):
+        corners = stations[first[at] : last[at]]
+        share = ((corners - start[at]) / run[at])[:, None]
+        k = intervals[at]
+        chord = tips[k] + share * (tips[k + 1] - tips[k])
+        gap = np.linalg.norm(chord - path.at(_wrapped(path, corners)), axis=1)
+        result[at] = gap.max()
+    return result
+
+
+def _deviation(
+    problem: PlanningProblem, trajectory: Trajectory, tips: FloatArray
+) -> tuple[float, int]:
+    """Bound of the deviation over the intervals on the path, and where it is met."""
+    intervals = _drawn_intervals(trajectory)
+    if not intervals.size:
+        return 0.0, 0
+    path, stations = problem.path, trajectory.path_m
+    rows = np.linalg.norm(tips - path.at(_wrapped(path, stations)), axis=1)
+    if trajectory.n_samples == 1:
+        return float(rows[0]), 0
+    run, start = _runs(path, stations)[intervals], _wrapped(path, stations)[intervals]
+    ends = np.maximum(rows[intervals], rows[intervals + 1])
+    corners = _corner_deviation(path, tips, start, run, intervals)
+    bend = bends(problem.manipulator, trajectory)[intervals] / 8.0
+    bound = np.maximum(ends, corners) + bend + TOLERANCES.arithmetic
+    worst = int(np.argmax(bound))
+    return float(bound[worst]), int(intervals[worst])
+
+
+def _stretches(path: DesiredPath, trajectory: Trajectory) -> FloatArray:
+    """The drawn stretches in order, inside [0, length], disjoint, shape (k, 2); [m]."""
+    intervals = _drawn_intervals(trajectory)
+    if not intervals.size or trajectory.n_samples == 1:
+        return np.zeros((0, 2))
+    start = _wrapped(path, trajectory.path_m)[intervals]
+    end = start + _runs(path, trajectory.path_m)[intervals]
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    parts = [np.column_stack([low, high])]
+    if path.closed:
+        turn = path.length
+        parts += [np.column_stack([low + t, high + t]) for t in (-turn, turn)]
+    spans: FloatArray = np.clip(np.concatenate(parts), 0.0, path.length)
+    spans = spans[spans[:, 1] > spans[:, 0]]
+    spans = spans[np.argsort(spans[:, 0], kind="stable")]
+    if not spans.size:
+        return spans
+    reach = np.maximum.accumulate(spans[:, 1])
+    fresh = np.concatenate([[True], spans[1:, 0] > reach[:-1]])
+    last = np.concatenate([np.flatnonzero(fresh)[1:] - 1, [len(spans) - 1]])
+    return np.asarray(np.column_stack([spans[fresh, 0], reach[last]]))
+
+
+def coverage(path: DesiredPath, trajectory: Trajectory) -> tuple[float, FloatArray]:
+    """Proved part of the path that is drawn, and the stretches that are not.
+
+    Args:
+        path: The desired path.
+        trajectory: Whose intervals with both rows on the path draw it.
+
+    Returns:
+        Coverage in [0, 1], rounded downwards, and gaps longer than
+        `TOLERANCES.on_path_length`, from and to, shape (k, 2); [m].
+    """
+    if not path.length > 0.0:
+        drawn = bool(_drawn_intervals(trajectory).size)
+        return float(drawn), frozen(np.zeros((0, 2)))
+    spans = _stretches(path, trajectory)
+    edges = np.concatenate([[0.0], spans.ravel(), [path.length]]).reshape(-1, 2)
+    gaps = edges[edges[:, 1] - edges[:, 0] > TOLERANCES.on_path_length]
+    share = float(np.sum(spans[:, 1] - spans[:, 0])) / path.length
+    # A sum of n terms below the length is off by less than n ulp of it.
+    ulps = 4.0 * (len(spans) + 1) * float(np.finfo(float).eps)
+    return min(1.0, max(0.0, share - ulps)), frozen(gaps)
+
+
+def _row_check(
+    problem: PlanningProblem, trajectory: Trajectory, tips: FloatArray
+) -> Check:
+    on, path = np.flatnonzero(trajectory.on_path), problem.path
+    worst, where, kept = float("nan"), "", False
+    if on.size:
+        goal = path.at(_wrapped(path, trajectory.path_m[on]))
+        gap = np.linalg.norm(tips[on] - goal, axis=1)
+        at = int(np.argmax(gap))
+        worst, where = float(gap[at]), f"waypoint {on[at]}"
+        kept = worst <= TOLERANCES.tip_on_path
+    verdict = Verdict.CERTIFIED if kept else Verdict.REFUTED
+    return Check(
+        name="tip on the desired path at the waypoints",
+        verdict=verdict if on.size else Verdict.UNDECIDED,
+        count=int(on.size),
+        worst=worst,
+        limit=TOLERANCES.tip_on_path,
+        unit="m",
+        where=where,
+    )
+
+
+def _start_checks(
+    problem: PlanningProblem, trajectory: Trajectory, tips: FloatArray
+) -> tuple[Check, ...]:
+    gap = float(np.linalg.norm(tips[0] - problem.path.start))
+    tip = Check(
+        name="tip at its start",
+        verdict=Verdict.CERTIFIED if gap <= TOLERANCES.tip_on_path else Verdict.REFUTED,
+        count=1,
+        worst=gap,
+        limit=TOLERANCES.tip_on_path,
+        unit="m",
+        where="waypoint 0",
+    )
+    joints = problem.path.start_joints
+    if joints is None:
+        return (tip,)
+    row = np.stack([trajectory.alpha[0], trajectory.theta[0]], axis=1).ravel()
+    off = np.abs(np.concatenate([trajectory.x0[:1], row]) - joints)
+    worst = float(off.max())
+    kept = worst <= TOLERANCES.start_joints
+    return (
+        tip,
+        Check(
+            name="joints at their start",
+            verdict=Verdict.CERTIFIED if kept else Verdict.REFUTED,
+            count=joints.size,
+            worst=worst,
+            limit=TOLERANCES.start_joints,
+            unit="-",
+            where="waypoint 0",
+        ),
+    )
+
+
+def check_tip(problem: PlanningProblem, trajectory: Trajectory) -> TipReport:
+    """Tip on the path at rows and in between, at its start, and what is covered.
+
+    Args:
+        problem: Arm and desired path.
+        trajectory: What is judged.
+
+    Returns:
+        The rows of evidence. The deviation between rows is a bound without a limit: it
+        is stated, and certified in that sense.
+    """
+    tips = tip_positions(problem.manipulator, trajectory)
+    deviation, interval = _deviation(problem, trajectory, tips)
+    share, undrawn = coverage(problem.path, trajectory)
+    drawn = int(_drawn_intervals(trajectory).size)
+    needed = problem.path.required_coverage
+    enough = share >= needed - TOLERANCES.coverage
+    between = Check(
+        name="tip near the desired path between the waypoints",
+        verdict=Verdict.CERTIFIED if drawn else Verdict.UNDECIDED,
+        count=drawn,
+        worst=deviation if drawn else float("nan"),
+        limit=float("nan"),
+        unit="m",
+        where=f"interval {interval}" if drawn else "",
+    )
+    covered = Check(
+        name="part of the desired path that is drawn",
+        verdict=Verdict.CERTIFIED if enough else Verdict.REFUTED,
+        count=max(1, drawn),
+        worst=share,
+        limit=needed,
+        unit="-",
+    )
+    start = _start_checks(problem, trajectory, tips)
+    checks = (*start, _row_check(problem, trajectory, tips), between, covered)
+    return TipReport(checks, deviation, share, undrawn)

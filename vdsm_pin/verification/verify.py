@@ -1,0 +1,213 @@
+"""The judgement of a trajectory: every check, one row each, in a fixed order."""
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidInput, VdsmError
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.cable_check import check_cables
+from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
+from vdsm_pin.verification.coal_clearance import check_coal
+from vdsm_pin.verification.fk import check_fk
+from vdsm_pin.verification.inside import check_inside
+from vdsm_pin.verification.limits import check_limits
+from vdsm_pin.verification.records import (
+    Check,
+    ClearanceChunk,
+    ClearanceSink,
+    ClosestApproach,
+    ErrorBox,
+    Verdict,
+    Verification,
+)
+from vdsm_pin.verification.robust import largest_joint_error
+from vdsm_pin.verification.sweep import (
+    AT_UPPER,
+    OTHER,
+    OWN,
+    TIME,
+    UP,
+)
+from vdsm_pin.verification.tip import check_tip
+
+CLOSEST: Final = 10
+"""Pairs listed as the closest approaches."""
+
+COMPARED: Final = 2_000_000
+"""Most proved bounds kept to hold Coal's distances against."""
+
+
+def verify(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    robot: RobotModel,
+    *,
+    errors: ErrorBox | None = None,
+    sinks: Sequence[ClearanceSink] = (),
+    joint_error: bool = False,
+) -> Verification:
+    """Judge a trajectory against a problem.
+
+    Args:
+        problem: What is asked.
+        trajectory: What is judged, whoever made it.
+        robot: The arm in Pinocchio and Coal.
+        errors: The clearance proof covers every motion within it.
+        sinks: Receive the clearance brackets in chunks, in order.
+        joint_error: Whether to find the largest joint error that is still certified.
+
+    Returns:
+        All rows of evidence. A check that could not be carried out is an undecided row.
+
+    Raises:
+        InvalidInput: If the trajectory is of another arm or the errors are negative.
+    """
+    box = errors or ErrorBox()
+    _check_input(problem, trajectory, box)
+    kept = _Lowers(problem, trajectory)
+    wanted = [*sinks, kept.keep] if kept.fits else list(sinks)
+    proof = prove_clearance(problem, trajectory, box, wanted)
+    tip = check_tip(problem, trajectory)
+    clearance = _clearance_checks(problem, proof)
+    checks = [
+        *_guarded(
+            "joint centres by Pinocchio", lambda: check_fk(robot, problem, trajectory)
+        ),
+        *check_limits(problem, trajectory),
+        *tip.checks,
+        *clearance,
+        *_guarded("arm outside the meshes", lambda: check_inside(problem, trajectory)),
+        *_guarded(
+            "clearances by Coal",
+            lambda: check_coal(robot, problem, trajectory, kept.proved),
+        ),
+        *_guarded("cable lengths", lambda: check_cables(problem, trajectory)),
+    ]
+    largest = float("nan")
+    if joint_error:
+        largest = largest_joint_error(problem, trajectory, box)
+    return Verification(
+        problem=problem,
+        trajectory=trajectory,
+        errors=box,
+        pairs=proof.pairs,
+        checks=tuple(checks),
+        closest=closest_approaches(proof),
+        profile=proof.profile,
+        coverage=tip.coverage,
+        undrawn=tip.undrawn,
+        joint_error=largest,
+    )
+
+
+class _Lowers:
+    """Collects the proved bounds against obstacles, where they fit into memory."""
+
+    def __init__(self, problem: PlanningProblem, trajectory: Trajectory) -> None:
+        n_intervals = max(1, trajectory.n_samples - 1)
+        n_obstacles = len(problem.scene.obstacles)
+        self.columns = n_obstacles * problem.manipulator.n_links
+        self.fits = 0 < n_intervals * self.columns <= COMPARED
+        self.parts: list[FloatArray] = []
+
+    def keep(self, chunk: ClearanceChunk) -> None:
+        """Receive a chunk."""
+        self.parts.append(chunk.lower[:, : self.columns])
+
+    @property
+    def proved(self) -> FloatArray | None:
+        """Lower bounds of all intervals, shape (n_intervals, columns); [m]."""
+        return np.concatenate(self.parts) if self.parts else None
+
+
+def _check_input(
+    problem: PlanningProblem, trajectory: Trajectory, errors: ErrorBox
+) -> None:
+    expected, found = problem.manipulator.n_links, trajectory.n_links
+    if expected != found:
+        message = f"trajectory has {found} links, the problem's arm has {expected}"
+        raise InvalidInput(message)
+    for name in ("joint", "base", "obstacle"):
+        value = getattr(errors, name)
+        if not 0.0 <= value < np.inf:
+            message = f"{name} error is {value}, expected 0 or more"
+            raise InvalidInput(message)
+
+
+def _guarded(
+    name: str, run: Callable[[], Check | tuple[Check, ...]]
+) -> tuple[Check, ...]:
+    """A check's rows; one undecided row where it could not be carried out."""
+    try:
+        rows = run()
+    except (VdsmError, ArithmeticError) as error:
+        nan = float("nan")
+        return (Check(name, Verdict.UNDECIDED, 0, nan, nan, "-", f"not run: {error}"),)
+    return rows if isinstance(rows, tuple) else (rows,)
+
+
+def _clearance_checks(
+    problem: PlanningProblem, proof: ClearanceProof
+) -> tuple[Check, ...]:
+    """One row for the obstacles, one for the links among themselves."""
+    of_obstacles = np.array([bool(pair.obstacle) for pair in proof.pairs], dtype=bool)
+    rows = []
+    for mine, name, needed in (
+        (of_obstacles, "clearance from obstacles", problem.required_clearance),
+        (~of_obstacles, "clearance between links", problem.required_self_clearance),
+    ):
+        if mine.any():
+            rows.append(_clearance_check(proof, np.flatnonzero(mine), name, needed))
+    return tuple(rows)
+
+
+def _clearance_check(
+    proof: ClearanceProof, mine: IntArray, name: str, needed: float
+) -> Check:
+    counts = proof.counts[mine].sum(axis=0)
+    verdict = Verdict.CERTIFIED
+    if counts[1]:
+        verdict = Verdict.REFUTED
+    elif counts[2]:
+        verdict = Verdict.UNDECIDED
+    # A refuted motion is as bad as its witness, another one as good as its proof.
+    column = UP if verdict is Verdict.REFUTED else 0
+    pair = int(mine[np.argmin(proof.best[mine, column])])
+    row = proof.best[pair]
+    at, when = int(row[AT_UPPER]), row[TIME]
+    where = f"interval {at} at {when:.4f}, link {proof.pairs[pair].link}"
+    where += f" and {proof.pairs[pair].label}"
+    if verdict is Verdict.UNDECIDED:
+        where += f"; {int(counts[2])} of {int(counts.sum())} undecided"
+    return Check(
+        name=name,
+        verdict=verdict,
+        count=int(counts.sum()),
+        worst=float(row[column]),
+        limit=needed,
+        unit="m",
+        where=where,
+    )
+
+
+def closest_approaches(proof: ClearanceProof) -> tuple[ClosestApproach, ...]:
+    """The pairs that come nearest, by their proved lower bounds."""
+    order = np.argsort(proof.best[:, 0], kind="stable")[:CLOSEST]
+    return tuple(
+        ClosestApproach(
+            interval=int(row[AT_UPPER]),
+            time=float(row[TIME]),
+            pair=proof.pairs[pair],
+            lower=float(row[0]),
+            upper=float(row[UP]),
+            station=float("nan"),
+            link_point=frozen(row[OWN:OTHER]),
+            other_point=frozen(row[OTHER : OTHER + 3]),
+        )
+        for pair, row in ((int(p), proof.best[p]) for p in order)
+    )
