@@ -7,11 +7,18 @@ works on several at once.
 """
 
 from math import sqrt
+from typing import Final
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import compiled
+
+STARTS: Final = 9
+"""Starts per angle where Newton's method fails from the first guess."""
+
+LARGEST_START: Final = 0.8
+"""Tangent of half the largest angle started from, 77 deg."""
 
 
 @compiled
@@ -23,6 +30,7 @@ def peel(
     v: FloatArray,
     rounds: int,
     enough: float,
+    tolerance: float,
 ) -> None:
     """Solve joint by joint; a solved joint's spans come off all cables through it.
 
@@ -35,6 +43,7 @@ def peel(
         v: Result, tan(theta / 2), shape (N, n_samples); [-].
         rounds: Largest number of Newton steps per joint.
         enough: Step after which the next one would be rounding; [-].
+        tolerance: Contradiction of three cables that makes other starts needed; [m].
     """
     n_links, n_samples = u.shape
     step = np.zeros(n_samples)
@@ -47,9 +56,68 @@ def peel(
             newton_step(holes[i], left[i], u[i], v[i], step)
             if step.max() <= enough:
                 break
-        for j in range(i, n_links):
+        own = left[i].copy()
+        for hole in range(3):
+            take_off(holes[i, hole], u[i], v[i], left[i, hole])
+        searched = False
+        for k in range(n_samples):
+            if not fits(left[i], k, tolerance):
+                u[i, k], v[i, k] = search(holes[i], own, k, rounds, tolerance)
+                searched = True
+        if searched:
+            left[i] = own
+            for hole in range(3):
+                take_off(holes[i, hole], u[i], v[i], left[i, hole])
+        for j in range(i + 1, n_links):
             for hole in range(3):
                 take_off(holes[j, hole], u[i], v[i], left[j, hole])
+
+
+@compiled
+def fits(left: FloatArray, k: int, tolerance: float) -> bool:
+    """Whether what is left of the three spans of sample k is rounding; NaN is not."""
+    worst = max(abs(left[0, k]), abs(left[1, k]), abs(left[2, k]))
+    total = left[0, k] + left[1, k] + left[2, k]
+    return bool(worst <= tolerance and not np.isnan(total))
+
+
+@compiled
+def search(
+    holes: FloatArray, spans: FloatArray, sample: int, rounds: int, tolerance: float
+) -> tuple[float, float]:
+    """Newton's method from a grid of starts, for the rare joint that needs it.
+
+    Near the end of the domain, and with holes close to each other, the residual has
+    hollows in which the first guess may end.
+
+    Args:
+        holes: Constants of the three holes, shape (3, 7); [m^2].
+        spans: Cable lengths inside the joint, shape (3, n_samples); [m].
+        sample: The column meant.
+        rounds: Largest number of Newton steps.
+        tolerance: Contradiction of the spans at which a solution fits; [m].
+
+    Returns:
+        tan(alpha / 2) and tan(theta / 2) of the fitting solution nearest to straight;
+        zeros where nothing fits; [-].
+    """
+    count = STARTS * STARTS
+    us, vs, step = np.zeros(count), np.zeros(count), np.zeros(count)
+    left = np.zeros((3, count))
+    for k in range(count):
+        us[k] = LARGEST_START * (2 * (k // STARTS) / (STARTS - 1) - 1)
+        vs[k] = LARGEST_START * (2 * (k % STARTS) / (STARTS - 1) - 1)
+        left[:, k] = spans[:, sample]
+    for _ in range(rounds):
+        newton_step(holes, left, us, vs, step)
+    for hole in range(3):
+        take_off(holes[hole], us, vs, left[hole])
+    nearest, u, v = np.inf, 0.0, 0.0
+    for k in range(count):
+        size = us[k] * us[k] + vs[k] * vs[k]
+        if size < nearest and fits(left, k, tolerance):
+            nearest, u, v = size, us[k], vs[k]
+    return u, v
 
 
 @compiled
