@@ -175,11 +175,14 @@ def _first_guesses(manipulator: Manipulator) -> FloatArray:
 def _check_consistent(left: FloatArray, first_sample: int) -> None:
     """Refuse what three cables of a link contradict each other by, (N, 3, n); [m]."""
     residual = np.abs(left).max(axis=1)
-    if not (residual <= TOLERANCES.cable_length).all():
-        link, sample = np.unravel_index(int(np.argmax(residual)), residual.shape)
+    wrong = ~(residual <= TOLERANCES.cable_length)
+    if wrong.any():
+        # The first link at fault: those beyond it inherit its error.
+        link = int(np.argmax(wrong.any(axis=1)))
+        sample = int(np.argmax(wrong[link]))
         raise InconsistentCables(
-            sample=first_sample + int(sample),
-            link=int(link) + 1,
+            sample=first_sample + sample,
+            link=link + 1,
             residual=float(residual[link, sample]),
             tolerance=TOLERANCES.cable_length,
         )

@@ -62,8 +62,10 @@ def peel(
         searched = False
         for k in range(n_samples):
             if not fits(left[i], k, tolerance):
-                u[i, k], v[i, k] = search(holes[i], own, k, rounds, tolerance)
-                searched = True
+                found = search(holes[i], own, k, rounds, tolerance)
+                if not np.isnan(found[0]):
+                    u[i, k], v[i, k] = found
+                    searched = True
         if searched:
             left[i] = own
             for hole in range(3):
@@ -99,7 +101,7 @@ def search(
 
     Returns:
         tan(alpha / 2) and tan(theta / 2) of the fitting solution nearest to straight;
-        zeros where nothing fits; [-].
+        NaN where nothing fits; [-].
     """
     count = STARTS * STARTS
     us, vs, step = np.zeros(count), np.zeros(count), np.zeros(count)
@@ -112,7 +114,7 @@ def search(
         newton_step(holes, left, us, vs, step)
     for hole in range(3):
         take_off(holes[hole], us, vs, left[hole])
-    nearest, u, v = np.inf, 0.0, 0.0
+    nearest, u, v = np.inf, np.nan, np.nan
     for k in range(count):
         size = us[k] * us[k] + vs[k] * vs[k]
         if size < nearest and fits(left, k, tolerance):
