@@ -30,6 +30,9 @@ MAX_LINE: Final = 1 << 16
 """Longest line looked at; [bytes]. A row of 40 links has below 2,000."""
 
 _FIXED: Final = ("waypoint", "on_path", "path_m", "x0_m")
+PLAIN: Final = b"0123456789+-.eE, \r\n"
+"""Bytes that rows of numbers are made of."""
+
 _BOM: Final = b"\xef\xbb\xbf"
 
 
@@ -164,14 +167,8 @@ class _Reader:
 
     def _parsed(self, chunk: list[bytes], number: int) -> FloatArray:
         """Fast for good rows; where that fails, row by row to say what is wrong."""
-        table = np.zeros((0, 0))
-        if b"," in chunk[0]:  # of nothing but empty lines loadtxt would only warn
-            with suppress(ValueError):
-                table = np.loadtxt(
-                    chunk, delimiter=",", comments=None, ndmin=2, encoding="latin-1"
-                )
-        shape = (len(chunk), len(self.columns))
-        if table.shape != shape or not np.isfinite(table).all():
+        table = _numbers(chunk, len(self.columns))
+        if not np.isfinite(table).all():
             rows = [self._row(line, number + i) for i, line in enumerate(chunk)]
             table = np.array(rows)
         return table
@@ -219,6 +216,23 @@ class _Reader:
 
     def _invalid(self, line: int, problem: str) -> InvalidFile:
         return InvalidFile(file=self.file, where=f"line {line}", problem=problem)
+
+
+def _numbers(lines: list[bytes], n_columns: int) -> FloatArray:
+    """Rows of plain numbers as a table; of infinities where they are anything else.
+
+    Numbers in JSON's notation only, which is that of nearly every program's CSV: its
+    reader is twice as fast as numpy's, and as exact.
+    """
+    table = np.full((len(lines), n_columns), np.inf)
+    text = b",".join(lines)
+    commas = n_columns - 1
+    if text.translate(None, PLAIN) or any(x.count(b",") != commas for x in lines):
+        return table
+    with suppress(ValueError, OverflowError):
+        numbers = pydantic_core.from_json(b"[%b]" % text)
+        table = np.array(numbers, dtype=np.float64).reshape(table.shape)
+    return table
 
 
 def _plain_number(word: str) -> str:
