@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from oracles.certificate_oracle import CannotCertify, OracleWriter, sealed
 
+from vdsm_pin.geometry.arrays import rotation_from_rpy
+
 SHAPES = (
     "cylinder",
     "cylinder_oblique",
@@ -103,9 +105,11 @@ def random_problem(rng: np.random.Generator, folder: Path, shapes: Any) -> Any:
         placed.append(item)
     start, steps = rng.uniform(-0.15, 0.15, 2 * n), rng.normal(size=(2, 2 * n)) * 0.05
     angles = np.cumsum(np.vstack([start, steps[: rng.integers(0, 3)]]), axis=0)
-    base = np.cumsum(rng.uniform(-0.02, 0.02, len(angles)))
-    position = [float(x) for x in rng.uniform(-1, 1, 3).round(3)]
-    rpy = [float(x) for x in rng.choice([0.0, 90.0, 33.3], 3)]
+    x0 = np.cumsum(rng.uniform(-0.02, 0.02, len(angles)))
+    base = {
+        "position": [float(x) for x in rng.uniform(-0.05, 0.05, 3).round(3)],
+        "rpy_deg": [float(x) for x in rng.uniform(-15, 15, 3).round(2)],
+    }
     data = {
         "vdsm_problem": 1,
         "name": "case",
@@ -123,13 +127,18 @@ def random_problem(rng: np.random.Generator, folder: Path, shapes: Any) -> Any:
         },
         "required_clearance": 0.002,
     }
-    return data, np.column_stack([base, angles]), (position, rpy)
+    if rng.random() < 0.5:
+        data["base"] = base
+        data["tip_path"]["start"] = frame(base) @ [sum(lengths), 0.0, 0.0]
+        data["tip_path"]["start"] = (
+            data["tip_path"]["start"] + base["position"]
+        ).tolist()
+    return data, np.column_stack([x0, angles])
 
 
-def moved(data: Any, pose: Any) -> Any:
-    """The same problem seen from another frame: base and obstacles together."""
-    position, rpy = pose
-    return data | {"base": {"position": position, "rpy_deg": rpy}}
+def frame(base: Any) -> Any:
+    """R_world_base of a problem's base entry."""
+    return rotation_from_rpy(np.deg2rad(base["rpy_deg"]))
 
 
 def write_rows(path: Path, q: Any, on_path: Any = None, path_m: Any = None) -> None:
@@ -165,8 +174,8 @@ class Case:
 def random_case(rng: np.random.Generator, folder: Path, shapes: Any = None) -> Case:
     """A case that can be certified; what the simple writer fails on is thrown away."""
     while True:
-        chosen = rng.choice(SHAPES, rng.integers(0, 4)) if shapes is None else shapes
-        data, q, _ = random_problem(rng, folder, chosen)
+        chosen = rng.choice(SHAPES, rng.integers(1, 4)) if shapes is None else shapes
+        data, q = random_problem(rng, folder, chosen)
         if rng.random() < 0.5:
             data = scaled(data) | {"length_unit": "mm"}
         errors = [(0.0, 0.0, 0.0), (0.002, 0.001, 0.0005)][int(rng.integers(2))]

@@ -7,6 +7,7 @@ the plane between them, halving where it does not prove enough. For small proble
 import hashlib
 import json
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.scene import FlatCylinder, HalfSpacePiece, Hull, Prism
 
 PAD = 1e-11
-SMALLEST_SLICE = 2.0**-14
+SMALLEST_SLICE = 2.0**-5
 
 
 class CannotCertify(Exception):
@@ -38,7 +39,7 @@ def frames_and_centres(lengths: Any, q: Any) -> tuple[Any, Any]:
     return frames, np.array(centres)
 
 
-def nearest(support: Any, start: Any, rounds: int = 200) -> Any:
+def nearest(support: Any, start: Any, rounds: int = 30) -> Any:
     """Point of least norm of a convex set; `support(d)` is its point of least d.x.
 
     Wolfe's algorithm; any rounding only makes the plane worse, never the proof wrong.
@@ -46,7 +47,7 @@ def nearest(support: Any, start: Any, rounds: int = 200) -> Any:
     points, weights, x = [start], np.ones(1), start
     for _ in range(rounds):
         q = support(x)
-        if x @ x - x @ q <= 1e-13 * (1.0 + x @ x):
+        if x @ x - x @ q <= 1e-9 * (x @ x):
             break
         points, weights = [*points, q], np.append(weights, 0.0)
         for _ in range(len(points) + 3):
@@ -93,7 +94,7 @@ def least(piece: Any, n: Any) -> tuple[float, Any]:
     return float(value), where
 
 
-@dataclass
+@dataclass(eq=False)
 class OracleWriter:
     """Writes one certificate.
 
@@ -120,6 +121,7 @@ class OracleWriter:
 
     # ---- the bound -------------------------------------------------------------------
 
+    @cache  # noqa: B019  (writers live as long as their test)
     def bends(self, k: int, first: int) -> tuple[Any, Any, Any]:
         """M_j, D_j and the second order, j = 0..N, for a chain from joint first on."""
         n = len(self.lengths)
@@ -137,6 +139,7 @@ class OracleWriter:
                 second[j] += 0.5 * self.lengths[link] * (angles * self.errors[0]) ** 2
         return bend, drift, second
 
+    @cache  # noqa: B019
     def pose(self, k: int, time: float) -> tuple[Any, Any]:
         return frames_and_centres(
             self.lengths, self.q[k] + time * (self.q[k + 1] - self.q[k])

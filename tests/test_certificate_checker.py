@@ -1,0 +1,413 @@
+"""The checker accepts what is proved, over all shapes, and nothing that is not."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from oracles.certificate_cases import (
+    CUBE,
+    SHAPES,
+    Case,
+    random_case,
+    write_cube,
+    write_rows,
+)
+from oracles.certificate_mutations import forged, raw
+from oracles.certificate_oracle import nearest, sealed, sha256
+
+from vdsm_pin.certificate_checker import check_certificate, main
+from vdsm_pin.errors import InvalidFile
+
+STRAIGHT = {
+    "vdsm_problem": 1,
+    "length_unit": "m",
+    "manipulator": {
+        "link_lengths": [0.4, 0.3, 0.3],
+        "link_radius": 0.03,
+        "max_link_angle_deg": 60,
+        "max_joint_angle_deg": 50,
+    },
+    "obstacles": [],
+    "tip_path": {"start": [1, 0, 0], "points": [[1, 0, 0], [1.3, 0, 0]]},
+    "required_clearance": 0.002,
+}
+NO_ERRORS = (0.0, 0.0, 0.0)
+
+
+def judge(case: Case, content: bytes | None = None) -> Any:
+    if content is not None:
+        case.certificate.write_bytes(content)
+    return check_certificate(case.certificate, case.problem, case.trajectory)
+
+
+def refused(case: Case, content: bytes | None = None) -> str:
+    """Why a certificate is not accepted."""
+    try:
+        outcome = judge(case, content)
+    except InvalidFile as error:
+        return str(error)
+    assert not outcome.accepted
+    assert outcome.reason
+    return str(outcome.reason)
+
+
+def straight_rows(x0: Any) -> Any:
+    return np.column_stack([x0, np.zeros((len(x0), 6))])
+
+
+def with_obstacles(*obstacles: Any) -> Any:
+    return STRAIGHT | {"obstacles": list(obstacles)}
+
+
+# ---- good certificates ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_every_shape_is_accepted(shape: str, tmp_path: Path) -> None:
+    case = random_case(np.random.default_rng(SHAPES.index(shape)), tmp_path, [shape])
+    outcome = judge(case)
+    assert outcome.accepted, outcome.reason
+    planes = sum(
+        len(entry[2])
+        for line in case.lines[1:]
+        for proof in line["proofs"]
+        for entry in proof
+    )
+    assert outcome.n_claims == planes
+    assert outcome.n_intervals == len(case.lines) - 1
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_arms_and_scenes_are_accepted(seed: int, tmp_path: Path) -> None:
+    outcome = judge(random_case(np.random.default_rng(100 + seed), tmp_path))
+    assert outcome.accepted, outcome.reason
+
+
+def test_slices_and_sections_are_accepted(tmp_path: Path) -> None:
+    """A link that dips into the notch of a prism needs its triangles one by one."""
+    corners = [[-0.3, -0.3], [0.3, -0.3], [0.3, 0.2], [0.1, 0.2], [0.1, -0.1]]
+    corners += [[-0.1, -0.1], [-0.1, 0.2], [-0.3, 0.2]]
+    bar = {"name": "bar", "shape": "prism", "axis": "x", "polygon": corners}
+    data = with_obstacles(bar | {"from": 0.5, "to": 2.0})
+    q = straight_rows([0.0, 0.5])
+    case = Case(tmp_path, data, q, NO_ERRORS)
+    assert case.lines[0]["sections"]["bar"]
+    assert judge(case).accepted
+    planes = case.lines[1]["proofs"][2][0][2]
+    assert len(planes) > 1
+    assert "the ranges end" in refused(
+        case, sealed(edited(case, lambda ls: planes_of(ls).pop()))
+    )
+
+
+def planes_of(lines: Any) -> Any:
+    return lines[1]["proofs"][2][0][2]
+
+
+def edited(case: Case, change: Any) -> Any:
+    lines = json.loads(json.dumps(case.lines))
+    change(lines)
+    return lines
+
+
+def test_a_row_that_stands_still_is_accepted(tmp_path: Path) -> None:
+    ball = {"name": "ball", "shape": "sphere", "center": [0.5, 0.5, 0], "radius": 0.2}
+    case = Case(tmp_path, with_obstacles(ball), straight_rows([0.1]), NO_ERRORS)
+    outcome = judge(case)
+    assert outcome.accepted, outcome.reason
+    assert outcome.n_intervals == 1
+
+
+@pytest.mark.parametrize("past_the_seam", [True, False])
+def test_a_closed_path_is_covered(past_the_seam: bool, tmp_path: Path) -> None:
+    """Out and back along x: the path closes, path_m goes on or starts again."""
+    points = [[1.0, 0, 0], [1.2, 0, 0], [1.4, 0, 0]]
+    path = {"start": [1.0, 0, 0], "points": points, "closed": True}
+    x0 = np.array([0.3, 0.4, 0.4, 0.3, 0.1, 0.0, 0.0, 0.1, 0.3])
+    station = np.array([0.3, 0.4, 0.4, 0.5, 0.7, 0.8, 0.8, 0.9, 1.1])
+    if not past_the_seam:
+        station[6:] -= 0.8
+    data = STRAIGHT | {"tip_path": path | {"required_coverage": 1.0}}
+    case = Case(
+        tmp_path,
+        data,
+        straight_rows(x0),
+        NO_ERRORS,
+        on_path=np.ones(9),
+        path_m=station,
+    )
+    outcome = judge(case)
+    assert outcome.accepted, outcome.reason
+    assert case.lines[0]["coverage"] > 1.0 - 1e-9
+    higher = edited(case, lambda lines: lines[0].update(coverage=1.0 + 1e-8))
+    assert "coverage" in refused(case, sealed(higher))
+
+
+def test_too_little_drawn_is_rejected(tmp_path: Path) -> None:
+    path = STRAIGHT["tip_path"] | {"required_coverage": 0.5}
+    drawn = {"on_path": [1, 1, 0], "path_m": [0.0, 0.1, 0.2]}
+    q = straight_rows([0.0, 0.1, 0.2])
+    case = Case(tmp_path, STRAIGHT | {"tip_path": path}, q, NO_ERRORS, **drawn)
+    assert "coverage" in refused(case)
+
+
+def test_a_tip_off_the_path_is_rejected(tmp_path: Path) -> None:
+    drawn = {"on_path": [1, 1], "path_m": [0.0, 0.1]}
+    good = Case(tmp_path, STRAIGHT, straight_rows([0.0, 0.1]), NO_ERRORS, **drawn)
+    assert judge(good).accepted
+    off = Case(tmp_path, STRAIGHT, straight_rows([0.0, 0.10001]), NO_ERRORS, **drawn)
+    assert "off the path" in refused(off)
+
+
+# ---- meshes and their inside ---------------------------------------------------------
+
+
+def cube_around(tmp_path: Path, name: str, **mesh: Any) -> Case:
+    obstacle = {"name": "shell", "shape": "mesh", "file": name, "check_size": False}
+    return Case(
+        tmp_path, with_obstacles(obstacle | mesh), straight_rows([0, 0.1]), NO_ERRORS
+    )
+
+
+@pytest.mark.parametrize("name", ["c.stl", "c.obj"])
+@pytest.mark.parametrize("rpy", [[0, 0, 0], [0, 45, 0], [30, 20, 10]])
+def test_an_arm_inside_a_closed_mesh_is_rejected(
+    name: str, rpy: list[float], tmp_path: Path
+) -> None:
+    write_cube(tmp_path / name, 4.0)
+    assert "outside" in refused(cube_around(tmp_path, name, rpy_deg=rpy))
+
+
+def test_an_arm_beside_a_closed_mesh_is_accepted(tmp_path: Path) -> None:
+    write_cube(tmp_path / "c.stl", 0.5)
+    assert judge(cube_around(tmp_path, "c.stl", center=[-1, 0, 0])).accepted
+
+
+def test_an_arm_inside_two_cubes_of_one_mesh_is_rejected(tmp_path: Path) -> None:
+    """Where bodies overlap the number of crossings is even, yet it is an inside."""
+    write_cube(tmp_path / "c.stl", 4.0)
+    write_cube(tmp_path / "d.stl", 5.0)
+    one, two = ((tmp_path / n).read_bytes() for n in ("c.stl", "d.stl"))
+    both = bytes(80) + (24).to_bytes(4, "little") + one[84:] + two[84:]
+    (tmp_path / "c.stl").write_bytes(both)
+    assert "outside" in refused(cube_around(tmp_path, "c.stl"))
+
+
+def test_a_mesh_with_a_hole_is_a_surface(tmp_path: Path) -> None:
+    write_cube(tmp_path / "c.stl", 4.0, skip=1)
+    outcome = judge(cube_around(tmp_path, "c.stl"))
+    assert outcome.accepted
+    assert outcome.surfaces == ("shell",)
+
+
+def test_piece_order_is_a_permutation(tmp_path: Path) -> None:
+    write_cube(tmp_path / "c.stl", 0.2)
+    case = cube_around(tmp_path, "c.stl", center=[0.5, 0, 0.4])
+    order = list(range(12))[::-1]
+
+    def reverse(lines: Any) -> None:
+        lines[0]["piece_order"]["shell"] = order
+        for line in lines[1:]:
+            for proof in line["proofs"][:3]:
+                for entry in proof:
+                    flipped = [[12 - p[1], 12 - p[0], *p[2:]] for p in entry[2]]
+                    entry[2][:] = flipped[::-1]
+
+    assert judge(case, sealed(edited(case, reverse))).accepted
+    order[0] = 3
+    assert "piece_order" in refused(case, sealed(edited(case, reverse)))
+
+
+# ---- wrong files ---------------------------------------------------------------------
+
+
+def rehashed(case: Case) -> bytes:
+    """The certificate with the hashes of the files as they are now."""
+
+    def change(lines: Any) -> None:
+        lines[0]["problem_sha256"] = sha256(case.problem.read_bytes())
+        lines[0]["trajectory_sha256"] = sha256(case.trajectory.read_bytes())
+
+    return sealed(edited(case, change))
+
+
+@pytest.mark.parametrize(
+    "kind", ["radius", "unit", "moved", "gone", "clearance", "arm"]
+)
+def test_another_problem_is_rejected(kind: str, tmp_path: Path) -> None:
+    case = random_case(np.random.default_rng(5), tmp_path, ["sphere", "capsule"])
+    data = json.loads(json.dumps(case.data))
+    if kind == "radius":
+        data["obstacles"][0]["radius"] *= 1.0 + 1e-6
+    elif kind == "unit":
+        data["length_unit"] = "mm" if data["length_unit"] == "m" else "m"
+    elif kind == "moved":
+        data["obstacles"][1]["center"][1] *= 1.0 + 1e-6
+    elif kind == "gone":
+        del data["obstacles"][1]
+    elif kind == "clearance":
+        data["required_clearance"] *= 1.001
+    else:
+        data["manipulator"]["link_radius"] *= 1.0 + 1e-6
+    case.problem.write_text(json.dumps(data))
+    assert "problem" in refused(case)
+    assert "another problem" not in refused(case, rehashed(case))
+
+
+def test_another_trajectory_is_rejected(tmp_path: Path) -> None:
+    case = random_case(np.random.default_rng(6), tmp_path, ["box"])
+    q = case.writer.q[: case.writer.trajectory.n_samples].copy()
+    q[-1, 2] += 1e-6
+    write_rows(case.trajectory, q)
+    assert "another trajectory" in refused(case)
+    assert "claims" in refused(case, rehashed(case))
+
+
+def test_a_limit_that_is_passed_is_rejected(tmp_path: Path) -> None:
+    q = straight_rows([0.0, 0.0])
+    q[1, 1] = np.deg2rad(50.0) + 1e-8
+    assert "alpha_rad" in refused(Case(tmp_path, STRAIGHT, q, NO_ERRORS))
+    q[1, 1:3] = np.deg2rad(45.1)
+    assert "psi_rad" in refused(Case(tmp_path, STRAIGHT, q, NO_ERRORS))
+    q[1] = [2.1, 0, 0, 0, 0, 0, 0]
+    assert "x0_max" in refused(Case(tmp_path, STRAIGHT, q, NO_ERRORS))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\n",
+        b"[]\n",
+        b"{}\n",
+        b"{",
+        b"\xff\xfe\n",
+        b'{"a": 1, "a": 2}\n',
+        b"[" * 9999,
+    ],
+)
+def test_damaged_certificates_end_in_one_line(
+    content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = Case(tmp_path, STRAIGHT, straight_rows([0.0, 0.1]), NO_ERRORS)
+    case.certificate.write_bytes(content)
+    files = [str(x) for x in (case.certificate, case.problem, case.trajectory)]
+    assert main(files) in (1, 2)
+    output = capsys.readouterr()
+    assert len((output.out + output.err).splitlines()) == 1
+
+
+@pytest.mark.parametrize("damaged", ["problem", "trajectory"])
+@pytest.mark.parametrize(
+    "content",
+    ["", "[", "a: *b", "a: 1\na: 2", "x,y\n1,2\n", "!!python/none", "\0", "[" * 9999],
+)
+def test_damaged_inputs_end_in_one_line(
+    damaged: str, content: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = Case(tmp_path, STRAIGHT, straight_rows([0.0, 0.1]), NO_ERRORS)
+    getattr(case, damaged).write_text(content)
+    files = [str(x) for x in (case.certificate, case.problem, case.trajectory)]
+    assert main(files) in (1, 2)
+    output = capsys.readouterr()
+    assert len((output.out + output.err).splitlines()) == 1
+
+
+def test_exit_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    case = Case(tmp_path, STRAIGHT, straight_rows([0.0, 0.1]), NO_ERRORS)
+    files = [str(x) for x in (case.certificate, case.problem, case.trajectory)]
+    assert main(files) == 0
+    assert capsys.readouterr().out.startswith("accepted")
+    assert main([*files[:2], str(tmp_path / "none.csv")]) == 2
+    assert "none.csv" in capsys.readouterr().err
+    assert main(files[:2]) == 2
+
+
+# ---- mutations -----------------------------------------------------------------------
+
+
+def gap(writer: Any, k: int, time: float, link: int, pieces: Any, q: Any) -> float:
+    """Clearance at one configuration by nearest points: an estimate from above."""
+    from oracles.certificate_oracle import HalfSpacePiece, frames_and_centres, least
+
+    ends = frames_and_centres(writer.lengths, q)[1][link : link + 2]
+    radius = float(writer.arm.link_radius)
+    if isinstance(pieces[0], HalfSpacePiece):
+        return float((ends @ pieces[0].normal).min() - pieces[0].offset) - radius
+
+    def difference(d: Any) -> Any:
+        low = min((least(piece, d) for piece in pieces), key=lambda x: x[0])
+        return low[1] - ends[np.argmax(ends @ d)]
+
+    start = least(pieces[0], np.ones(3))[1] - ends[0]
+    return float(np.linalg.norm(nearest(difference, start))) - radius
+
+
+def assert_claims_hold(case: Case, lines: Any, rng: np.random.Generator) -> None:
+    """Sampled clearances under sampled errors are nowhere below what is claimed."""
+    writer, errors = case.writer, lines[0]["errors"]
+    assert [len(line["proofs"]) for line in lines[1:]] == [len(writer.partners())] * (
+        len(lines) - 1
+    )
+    for k, line in enumerate(lines[1:]):
+        assert line["k"] == k
+        for (link, other), proof in zip(writer.partners(), line["proofs"], strict=True):
+            for a, b, planes in proof:
+                time = rng.choice([a, b, rng.uniform(a, b)])
+                q = writer.q[k] + time * (writer.q[k + 1] - writer.q[k])
+                q[1:] += errors["joint_rad"] * rng.choice([-1, 0, 1], q.size - 1)
+                q[0] += errors["base_m"] * rng.choice([-1, 0, 1])
+                for first, last, *_, lower in planes:
+                    if isinstance(other, int):
+                        continue
+                    near = gap(writer, k, time, link, other.pieces[first:last], q)
+                    assert lower <= near - errors["obstacle_m"] + 1e-7
+
+
+def run_mutations(folder: Path, seed: int, n_cases: int, n_each: int) -> list[int]:
+    """Counts: raw, forged, forged and accepted."""
+    rng, counts = np.random.default_rng(seed), [0, 0, 0]
+    for number in range(n_cases):
+        (home := folder / str(number)).mkdir()
+        case = random_case(rng, home)
+        content = case.certificate.read_bytes()
+        for _ in range(n_each):
+            damaged, what = raw(content, rng)
+            if damaged != content:
+                assert refused(case, damaged), what
+                counts[0] += 1
+            lines, damaged, what = forged(case.lines, rng)
+            if lines == case.lines:
+                continue
+            counts[1] += 1
+            case.certificate.write_bytes(damaged)
+            try:
+                accepted = judge(case).accepted
+            except InvalidFile:
+                accepted = False
+            if accepted:
+                assert not what.startswith(("drop", "repeat", "another")), what
+                assert_claims_hold(case, lines, rng)
+                counts[2] += 1
+    return counts
+
+
+def test_mutations_are_rejected(tmp_path: Path) -> None:
+    n_raw, n_forged, n_accepted = run_mutations(tmp_path, 1, 6, 30)
+    assert n_raw > 150
+    assert n_forged > 150
+    assert n_accepted < 0.35 * n_forged
+
+
+@pytest.mark.slow
+def test_many_mutations_are_rejected(tmp_path: Path) -> None:
+    n_raw, n_forged, n_accepted = run_mutations(tmp_path, 2, 60, 180)
+    assert n_raw + n_forged > 20_000
+    assert n_raw > 10_000
+    assert n_accepted < 0.35 * n_forged
+
+
+def test_cube_corners_are_those_of_the_faces() -> None:
+    assert len(set(CUBE)) == 8
