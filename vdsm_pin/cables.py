@@ -19,15 +19,19 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.errors import InconsistentCables, InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.tolerances import TOLERANCES
 
-CHUNK: Final = 512
+CHUNK: Final = 1024
 """Rows worked on at a time, so that the temporaries stay in the processor's cache."""
 
 NEWTON_STEPS: Final = 60
 """Budget of the solver of one joint; 4 steps are usual, 25 were seen to succeed."""
+
+
+STARTS: Final = frozen(np.linspace(-0.8, 0.8, 9))
+"""Tangents of half the angles, up to 77 deg, from which the solver starts again."""
 
 
 def cable_lengths(
@@ -81,35 +85,96 @@ def angles_from_cables(
         InvalidInput: If the shape is not (n_samples, N, 3).
         InconsistentCables: If no angles are found that give these lengths.
     """
-    # Compiled code takes half a second to import, and the planners never come here.
-    from vdsm_pin.geometry.cable_kernels import peel
-
     n_samples, n_links = len(lengths), manipulator.n_links
     if lengths.shape != (n_samples, n_links, 3):
         shape = lengths.shape
         message = f"cable lengths have shape {shape}, expected (n, {n_links}, 3)"
         raise InvalidInput(message)
-    holes = _hole_constants(manipulator).reshape(n_links, 3, -1)
-    guesses = _first_guesses(manipulator)
+    holes, guesses = _hole_constants(manipulator), _first_guesses(manipulator)
     straight = _straight_parts(manipulator)[:, None]
     alpha, theta = np.zeros((n_samples, n_links)), np.zeros((n_samples, n_links))
     for rows in _chunks(n_samples):
-        inside = lengths[rows].reshape(-1, 3 * n_links).T - straight
-        left = np.ascontiguousarray(inside).reshape(n_links, 3, -1)
-        u, v = np.zeros((2, n_links, left.shape[2]))
-        peel(
-            holes,
-            guesses,
-            left,
-            u,
-            v,
-            NEWTON_STEPS,
-            TOLERANCES.cable_step,
-            TOLERANCES.cable_length,
-        )
-        _check_consistent(left, rows.start)
+        left = np.ascontiguousarray(lengths[rows].reshape(-1, 3 * n_links).T) - straight
+        u, v = _peel(holes, guesses, left, rows.start)
         alpha[rows], theta[rows] = 2.0 * np.arctan(u.T), 2.0 * np.arctan(v.T)
     return alpha, theta
+
+
+def _peel(
+    holes: FloatArray, guesses: FloatArray, left: FloatArray, first_sample: int
+) -> FloatArray:
+    """Solve joint by joint; a solved joint's spans come off all cables through it.
+
+    Args:
+        holes: Constants of all holes, shape (3N, 7); [m^2].
+        guesses: First guesses as linear maps of spans, shape (N, 2, 3); [1/m].
+        left: Cable lengths inside the joints, shape (3N, n), used up; [m].
+        first_sample: Number of the first column, for messages.
+
+    Returns:
+        tan(alpha / 2) and tan(theta / 2), shape (2, N, n); [-].
+
+    Raises:
+        InconsistentCables: If a link's cables contradict each other.
+    """
+    # Compiled code takes half a second to import, and the planners never come here.
+    from vdsm_pin.geometry.cable_kernels import solve_joint, take_off
+
+    half = np.zeros((2, len(guesses), left.shape[1]))
+    for i, guess in enumerate(guesses):
+        own, beyond = slice(3 * i, 3 * i + 3), slice(3 * i + 3, None)
+        spans = left[own]
+        half[:, i] = guess @ spans
+        u, v = half[:, i]
+        solve_joint(holes[own], spans, u, v, NEWTON_STEPS, TOLERANCES.cable_step)
+        residual = _residual(holes[own], spans, u, v)
+        for k in np.flatnonzero(~(residual <= TOLERANCES.cable_length)):
+            u[k], v[k] = _search(holes[own], spans[:, k])
+            if np.isnan(u[k]):
+                raise InconsistentCables(
+                    sample=first_sample + int(k),
+                    link=i + 1,
+                    residual=float(residual[k]),
+                    tolerance=TOLERANCES.cable_length,
+                )
+        take_off(holes[beyond], u, v, left[beyond])
+    return half
+
+
+def _residual(
+    holes: FloatArray, spans: FloatArray, u: FloatArray, v: FloatArray
+) -> FloatArray:
+    """Largest error of a joint's three spans, shape (n,); NaN if there is one; [m]."""
+    from vdsm_pin.geometry.cable_kernels import take_off
+
+    left = spans.copy()
+    take_off(holes, u, v, left)
+    return np.asarray(np.abs(left).max(axis=0))
+
+
+def _search(holes: FloatArray, spans: FloatArray) -> FloatArray:
+    """Newton's method from a grid of starts, for the rare joint that needs it.
+
+    Near the end of the domain, and with holes close to each other, the residual has
+    hollows in which the first guess may end.
+
+    Args:
+        holes: Constants of the joint's three holes, shape (3, 7); [m^2].
+        spans: Cable lengths inside the joint, shape (3,); [m].
+
+    Returns:
+        tan(alpha / 2) and tan(theta / 2), shape (2,): the fitting ones nearest to
+        straight, NaN if none fit; [-].
+    """
+    from vdsm_pin.geometry.cable_kernels import solve_joint
+
+    u, v = np.stack(np.meshgrid(STARTS, STARTS)).reshape(2, -1)
+    many = np.repeat(spans[:, None], u.size, axis=1)
+    solve_joint(holes, many, u, v, NEWTON_STEPS, 0.0)
+    size = u * u + v * v
+    size[~(_residual(holes, many, u, v) <= TOLERANCES.cable_length)] = np.inf
+    best = int(np.argmin(size))
+    return np.array([u[best], v[best]]) if size[best] < np.inf else np.full(2, np.nan)
 
 
 def _chunks(n_samples: int) -> Iterator[slice]:
@@ -170,19 +235,3 @@ def _first_guesses(manipulator: Manipulator) -> FloatArray:
     lever = 2.0 * manipulator.cables.hole_radius
     columns = [np.ones_like(phi), -lever * np.sin(phi), lever * np.cos(phi)]
     return np.ascontiguousarray(np.linalg.pinv(np.stack(columns, axis=-1))[:, 1:])
-
-
-def _check_consistent(left: FloatArray, first_sample: int) -> None:
-    """Refuse what three cables of a link contradict each other by, (N, 3, n); [m]."""
-    residual = np.abs(left).max(axis=1)
-    wrong = ~(residual <= TOLERANCES.cable_length)
-    if wrong.any():
-        # The first link at fault: those beyond it inherit its error.
-        link = int(np.argmax(wrong.any(axis=1)))
-        sample = int(np.argmax(wrong[link]))
-        raise InconsistentCables(
-            sample=first_sample + sample,
-            link=link + 1,
-            residual=float(residual[link, sample]),
-            tolerance=TOLERANCES.cable_length,
-        )
