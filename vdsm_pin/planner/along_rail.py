@@ -26,7 +26,7 @@ from vdsm_pin.planner.side_rules import SideRule, anchors, choose_rule, slid, st
 from vdsm_pin.planner.tip_path import Route
 from vdsm_pin.problem import PlanningProblem
 
-ROUNDINGS: Final = (0.0, 0.25, 0.5, 0.75, 1.0)
+ROUNDINGS: Final = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.75, 1.0)
 """How far corners are blunted, tried in this order; [-]."""
 
 
@@ -62,7 +62,7 @@ class AlongRail:
 
     def stands(self, points: FloatArray, side: int) -> BoolArray:
         """Whether the arm can stand with its tip at points, on a side, (n,)."""
-        return stands(self.problem, self.forbidden, self.rules[side], points)
+        return stands(self.problem, self.forbidden, self.rules[side], points)[0]
 
 
 def along_rail(

@@ -5,6 +5,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.danger_region import DangerRegion
+from vdsm_pin.planner.region_kernels import slide_chains
 
 
 def slide_joints(
@@ -32,12 +33,17 @@ def slide_joints(
     Returns:
         P_1..P_{N+1}, shape (n_samples, N + 1, 2); [m].
     """
-    planar = np.zeros((len(tip), manipulator.n_links + 1, 2))
+    n_links = manipulator.n_links
+    planar = np.zeros((len(tip), n_links + 1, 2))
     planar[:, -1] = tip
-    for i in range(manipulator.n_links, 1, -1):
-        reference = manipulator.ratio(i, i + 1) * planar[:, i]
-        if direction is None:
-            planar[:, i - 1] = region.swing(reference, side)
-        else:
-            planar[:, i - 1] = region.slide(reference, direction)
+    ratios = manipulator.stations[:-1] / manipulator.stations[1:]  # k_{i,i+1}
+    slide_chains(
+        region.corners,
+        region.sides,
+        region.radius,
+        ratios,
+        side,
+        np.zeros(2) if direction is None else direction,
+        planar,
+    )
     return planar

@@ -9,6 +9,7 @@ and is grown on until the links between the joints, not only the joints, keep cl
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import product
 from typing import Final
 
 import numpy as np
@@ -17,11 +18,11 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.danger_region import DangerRegion
 from vdsm_pin.planner.joint_paths import slide_joints
-from vdsm_pin.planner.lift import rises_squared
 from vdsm_pin.planner.project import project
+from vdsm_pin.planner.region_kernels import standing
 from vdsm_pin.problem import PlanningProblem
 
-GROWTHS: Final = (0.0, 0.01, 0.02, 0.03, 0.04, 0.06, 0.09, 0.12)
+GROWTHS: Final = (0.0, 0.01, 0.02, 0.03, 0.04, 0.06, 0.08, 0.1, 0.12, 0.15)
 """How far the region is grown for the links, as parts of the longest link; [-]."""
 
 OBLIQUE: Final = tuple(np.deg2rad([90.0, 75.0, 105.0, 60.0, 120.0]))
@@ -30,6 +31,9 @@ OBLIQUE: Final = tuple(np.deg2rad([90.0, 75.0, 105.0, 60.0, 120.0]))
 LARGEST_SWING: Final = float(np.deg2rad(15.0))
 """A link that turns farther than this between two neighbouring waypoints has jumped:
 inserting waypoints would not make its motion continuous; [rad]."""
+
+CROSS: Final = 2
+"""The first two lines are the vertical and the horizontal."""
 
 COARSE: Final = 4
 """Choices are compared on every fourth waypoint, then confirmed on all."""
@@ -58,14 +62,26 @@ def choose_rule(
     side: int,
     sequences: list[FloatArray],
 ) -> SideRule:
-    """The first shape, line and growth that does all that is wanted, else the best."""
+    """The paper's cross where it does all that is wanted, else the best line.
+
+    Args:
+        problem: What is asked.
+        forbidden: What the links keep out of.
+        shapes: The danger region with sharper to blunter corners.
+        side: 1 or -1.
+        sequences: Tip positions wanted on this side, going into the shadow, (n, 3).
+
+    Returns:
+        The rule that brings the tip farthest; of several, the one that shortens the
+        arm least, which is the one that moves the base least.
+    """
     best: SideRule | None = None
-    best_score = -1.0
-    for rule in _trials(problem, shapes, side):
+    best_score = (-1.0, 0.0)
+    for k, rule in _trials(problem, shapes, side):
         score = _score(problem, forbidden, rule, sequences)
         if best is None or score > best_score:
             best, best_score = rule, score
-        if score == 1.0:
+        if score[0] == 1.0 and k < CROSS:
             break
     assert best is not None
     return best
@@ -73,17 +89,16 @@ def choose_rule(
 
 def _trials(
     problem: PlanningProblem, shapes: list[DangerRegion], side: int
-) -> Iterator[SideRule]:
-    """Every rule that is tried, the paper's own first."""
+) -> Iterator[tuple[int, SideRule]]:
+    """Every rule that is tried, with the number of its line, the cross first."""
     longest = float(problem.manipulator.link_lengths.max())
-    for shape in shapes:
-        for direction in _lines(shape, side):
-            for growth in GROWTHS:
-                radius = shape.radius + growth * longest
-                region = DangerRegion(shape.name, shape.corners, radius)
-                if growth > 0.0 and region.contains(anchors(problem)).any():
-                    break
-                yield SideRule(region, side, direction)
+    lines = _lines(shapes[0], side)
+    for numbers in (range(CROSS), range(CROSS, len(lines))):
+        for shape, k, growth in product(shapes, numbers, GROWTHS):
+            radius = shape.radius + growth * longest
+            region = DangerRegion(shape.name, shape.corners, radius)
+            if not region.contains(anchors(problem)).any():
+                yield k, SideRule(region, side, lines[k])
 
 
 def _score(
@@ -91,19 +106,24 @@ def _score(
     forbidden: DangerRegion,
     rule: SideRule,
     sequences: list[FloatArray],
-) -> float:
-    """The part of the wanted waypoints reached without a break, 1 for all; [-]."""
+) -> tuple[float, float]:
+    """Part of the wanted waypoints reached without a break, and minus the shortening.
+
+    Compared on some waypoints, confirmed on all; [-], [m].
+    """
     reached = total = 0
+    shortening = 0.0
     for points in sequences:
-        for coarse in (True, False):
-            chosen = points[::COARSE] if coarse else points
-            able = stands(problem, forbidden, rule, chosen, neighbours=not coarse)
+        for stride in (COARSE, 1):
+            near = stride == 1
+            able, shortened = stands(problem, forbidden, rule, points[::stride], near)
             if not able.all():
                 break
         first = len(able) if able.all() else int(np.argmin(able))
-        reached += min(first * (COARSE if coarse else 1), len(points))
+        reached += min(first * stride, len(points))
         total += len(points)
-    return reached / total if total else 1.0
+        shortening = max(shortening, shortened)
+    return (reached / total if total else 1.0), -shortening
 
 
 def _lines(region: DangerRegion, side: int) -> list[FloatArray | None]:
@@ -134,7 +154,7 @@ def stands(
     rule: SideRule,
     points: FloatArray,
     neighbours: bool = True,
-) -> BoolArray:
+) -> tuple[BoolArray, float]:
     """Whether links are long enough, limits and clearance kept, and no joint jumps.
 
     Args:
@@ -143,21 +163,18 @@ def stands(
         rule: How the joints slide.
         points: Tip positions, shape (n, 3); [m].
         neighbours: Whether they follow each other as waypoints do.
+
+    Returns:
+        For each position, shape (n,), and the largest shortening of the arm along X
+        before the first failure; [m].
     """
     manipulator = problem.manipulator
-    planar = slid(manipulator, project(points), rule)
-    squares = rises_squared(manipulator, planar)
-    able = (squares > 0.0).all(axis=1)
-    links = np.concatenate(
-        [np.sqrt(np.maximum(squares, 0.0))[..., None], np.diff(planar, axis=1)], axis=2
+    limit = min(manipulator.max_link_angle, manipulator.max_joint_angle)
+    return standing(
+        slid(manipulator, project(points), rule),
+        manipulator.link_lengths,
+        float(np.cos(limit)),
+        forbidden.corners,
+        forbidden.radius,
+        LARGEST_SWING if neighbours else np.inf,
     )
-    links /= manipulator.link_lengths[:, None]
-    cosine = np.einsum("nij,nij->ni", links[:, 1:], links[:, :-1])
-    limit = np.cos(min(manipulator.max_link_angle, manipulator.max_joint_angle))
-    able &= (cosine >= limit).all(axis=1) & (links[:, 0, 0] >= limit)
-    able &= forbidden.core_distance(planar) >= forbidden.radius
-    if not neighbours:
-        return np.asarray(able)
-    swing = np.abs(np.diff(links, axis=0)).max(axis=(1, 2), initial=0.0)
-    able[1:] &= swing <= LARGEST_SWING
-    return np.asarray(able)

@@ -1,0 +1,242 @@
+"""Compiled geometry of the danger region: lines and circles out of it, distances to it.
+
+A region is the convex hull of `corners`, counterclockwise, (n, 2), n >= 1, grown by
+`radius`; `sides` are the straight parts of its boundary, (n, 2 ends, 2), for n > 1.
+Everything is in the projection plane and in metres.
+"""
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.geometry.compiled import compiled
+
+
+@compiled
+def leave_along(
+    corners: FloatArray,
+    sides: FloatArray,
+    radius: float,
+    x: float,
+    y: float,
+    ux: float,
+    uy: float,
+) -> float:
+    """How far along (ux, uy) the line through (x, y) leaves the region; -inf: never."""
+    far = -np.inf
+    for i in range(corners.shape[0]):
+        dx, dy = corners[i, 0] - x, corners[i, 1] - y
+        squared = radius * radius - (ux * dy - uy * dx) ** 2
+        if squared >= 0.0:
+            far = max(far, dx * ux + dy * uy + np.sqrt(squared))
+    for i in range(sides.shape[0]):
+        ax, ay = sides[i, 0, 0] - x, sides[i, 0, 1] - y
+        bx, by = sides[i, 1, 0] - x, sides[i, 1, 1] - y
+        # The ends lie on either side of the line where it crosses.
+        a, b = ux * ay - uy * ax, ux * by - uy * bx
+        if a * b <= 0.0 and a != b:
+            part = a / (a - b)
+            hit_x, hit_y = ax + part * (bx - ax), ay + part * (by - ay)
+            far = max(far, hit_x * ux + hit_y * uy)
+    return far
+
+
+@compiled
+def wrapped(angle: float) -> float:
+    """The angle brought into [-pi, pi); [rad]."""
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi
+
+
+@compiled
+def reach_along_circle(
+    corners: FloatArray,
+    sides: FloatArray,
+    radius: float,
+    circle: float,
+    bearing: float,
+    side: int,
+) -> float:
+    """Largest angle, from a bearing to a side, at which a circle meets the boundary.
+
+    The circle is about the origin; -inf where it does not meet the boundary.
+    """
+    extent = -np.inf
+    for i in range(corners.shape[0]):
+        cx, cy = corners[i, 0], corners[i, 1]
+        distance = np.hypot(cx, cy)
+        cosine = circle * circle + distance * distance - radius * radius
+        cosine /= 2.0 * circle * distance
+        if abs(cosine) <= 1.0:
+            towards = side * wrapped(np.arctan2(cy, cx) - bearing)
+            extent = max(extent, towards + np.arccos(cosine))
+    for i in range(sides.shape[0]):
+        ax, ay = sides[i, 0, 0], sides[i, 0, 1]
+        ux, uy = sides[i, 1, 0] - ax, sides[i, 1, 1] - ay
+        squared, half = ux * ux + uy * uy, ax * ux + ay * uy
+        under = half * half - squared * (ax * ax + ay * ay - circle * circle)
+        if under < 0.0:
+            continue
+        for sign in (1.0, -1.0):
+            part = (sign * np.sqrt(under) - half) / squared
+            if 0.0 <= part <= 1.0:
+                hit = np.arctan2(ay + part * uy, ax + part * ux)
+                extent = max(extent, side * wrapped(hit - bearing))
+    return extent
+
+
+@compiled
+def point_to_segment(
+    px: float, py: float, ax: float, ay: float, bx: float, by: float
+) -> float:
+    """Distance of p from the segment a-b."""
+    ux, uy, vx, vy = bx - ax, by - ay, px - ax, py - ay
+    squared = ux * ux + uy * uy
+    part = 0.0
+    if squared > 0.0:
+        part = min(max((vx * ux + vy * uy) / squared, 0.0), 1.0)
+    return float(np.hypot(vx - part * ux, vy - part * uy))
+
+
+@compiled
+def segment_to_core(
+    corners: FloatArray, ax: float, ay: float, bx: float, by: float
+) -> float:
+    """Distance of the segment a-b from the hull of the corners; 0 where they meet."""
+    n = corners.shape[0]
+    nearest = np.inf
+    # The part of the segment inside every edge's half-plane, from low to high.
+    low, high = 0.0, 1.0 if n > 2 else -1.0
+    for i in range(n):
+        cx, cy = corners[i, 0], corners[i, 1]
+        nearest = min(nearest, point_to_segment(cx, cy, ax, ay, bx, by))
+        if n == 1:
+            break
+        dx, dy = corners[(i + 1) % n, 0], corners[(i + 1) % n, 1]
+        nearest = min(nearest, point_to_segment(ax, ay, cx, cy, dx, dy))
+        nearest = min(nearest, point_to_segment(bx, by, cx, cy, dx, dy))
+        inside_a = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)
+        inside_b = (dx - cx) * (by - cy) - (dy - cy) * (bx - cx)
+        if n == 2 and i == 0 and inside_a * inside_b < 0.0:
+            # Two segments cross where either separates the ends of the other.
+            of_c = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+            of_d = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
+            if of_c * of_d < 0.0:
+                return 0.0
+        if inside_a < 0.0 and inside_b < 0.0:
+            high = -1.0
+        elif inside_a < 0.0:
+            low = max(low, inside_a / (inside_a - inside_b))
+        elif inside_b < 0.0:
+            high = min(high, inside_a / (inside_a - inside_b))
+    return 0.0 if low <= high else nearest
+
+
+@compiled
+def core_distances(corners: FloatArray, chains: FloatArray) -> FloatArray:
+    """Distance of each polyline from the hull of the corners, (n, m, 2) to (n,)."""
+    result = np.full(chains.shape[0], np.inf)
+    for k in range(chains.shape[0]):
+        for i in range(chains.shape[1] - 1):
+            a, b = chains[k, i], chains[k, i + 1]
+            distance = segment_to_core(corners, a[0], a[1], b[0], b[1])
+            result[k] = min(result[k], distance)
+    return result
+
+
+@compiled
+def slide_chains(
+    corners: FloatArray,
+    sides: FloatArray,
+    radius: float,
+    ratios: FloatArray,
+    side: int,
+    direction: FloatArray,
+    planar: FloatArray,
+) -> None:
+    """Joints from the tip to the base: in proportion, then out of the region.
+
+    Args:
+        corners: Of the region.
+        sides: Of the region.
+        radius: Of the region.
+        ratios: k_{i,i+1} for i = 1..N (Eq. 6), shape (N,).
+        side: 1 or -1.
+        direction: Auxiliary line, a unit vector; zero for circles about the origin.
+        planar: P_1..P_{N+1}, shape (n, N + 1, 2); the tips are given, the rest is set.
+    """
+    ux, uy = direction[0], direction[1]
+    circles = ux == 0.0 and uy == 0.0
+    mean_x, mean_y = corners[:, 0].mean(), corners[:, 1].mean()
+    bearing = np.arctan2(mean_y, mean_x)
+    for k in range(planar.shape[0]):
+        for i in range(ratios.shape[0] - 1, 0, -1):
+            x, y = ratios[i] * planar[k, i + 1, 0], ratios[i] * planar[k, i + 1, 1]
+            if segment_to_core(corners, x, y, x, y) < radius:
+                if circles:
+                    circle = np.hypot(x, y)
+                    turn = reach_along_circle(
+                        corners, sides, radius, circle, bearing, side
+                    )
+                    x = circle * np.cos(bearing + side * turn)
+                    y = circle * np.sin(bearing + side * turn)
+                else:
+                    far = leave_along(corners, sides, radius, x, y, ux, uy)
+                    x, y = x + far * ux, y + far * uy
+            planar[k, i, 0], planar[k, i, 1] = x, y
+
+
+@compiled
+def standing(
+    planar: FloatArray,
+    lengths: FloatArray,
+    least_cosine: float,
+    corners: FloatArray,
+    radius: float,
+    largest_swing: float,
+) -> tuple[BoolArray, float]:
+    """Which configurations can be taken, and the largest shortening of the arm.
+
+    Args:
+        planar: P_1..P_{N+1}, shape (n, N + 1, 2).
+        lengths: Of the links, shape (N,).
+        least_cosine: Cosine of the largest link angle.
+        corners: Of the region the links keep out of.
+        radius: Of that region.
+        largest_swing: Largest change of a coordinate of a link's direction from one
+            configuration to the next; infinite where they are no neighbours; [-].
+
+    Returns:
+        Shape (n,), and the largest difference between the arm's length and its extent
+        along X before the first configuration that cannot be taken.
+    """
+    n, n_links = planar.shape[0], lengths.shape[0]
+    able = np.ones(n, np.bool_)
+    before, here = np.zeros((n_links, 3)), np.zeros((n_links, 3))
+    total, shortest, unbroken, known = lengths.sum(), np.inf, True, False
+    for k in range(n):
+        extent = 0.0
+        for i in range(n_links):
+            uy = (planar[k, i + 1, 0] - planar[k, i, 0]) / lengths[i]
+            uz = (planar[k, i + 1, 1] - planar[k, i, 1]) / lengths[i]
+            squared = 1.0 - uy * uy - uz * uz
+            if not squared > 0.0:
+                able[k] = False
+                break
+            here[i, 0], here[i, 1], here[i, 2] = np.sqrt(squared), uy, uz
+            cosine = here[0, 0] if i == 0 else (here[i] * here[i - 1]).sum()
+            if not cosine >= least_cosine:
+                able[k] = False
+                break
+            if known and not np.abs(here[i] - before[i]).max() <= largest_swing:
+                able[k] = False
+                break
+            a, b = planar[k, i], planar[k, i + 1]
+            if not segment_to_core(corners, a[0], a[1], b[0], b[1]) >= radius:
+                able[k] = False
+                break
+            extent += lengths[i] * here[i, 0]
+        known = able[k]
+        unbroken = unbroken and able[k]
+        if unbroken:
+            shortest = min(shortest, extent)
+        before, here = here, before
+    return able, total - shortest
