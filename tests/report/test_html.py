@@ -74,7 +74,7 @@ def test_everything_a_reader_needs_is_there(tmp_path: Path) -> None:
     text = Page(report(tmp_path, made_up.verification())).text
     for needed in (
         "4.100 mm", "±0.132°", "87.3 %", "link 1 to pillar", "forward kinematics",
-        "1000.000 mm", "vdsm verify made-up.yaml --trajectory 'a b.csv' --out out",
+        "1000.0 mm", "vdsm verify made-up.yaml --trajectory 'a b.csv' --out out",
         "1" * 64, "numpy", "coal agreement", "42.500°",
     ):  # fmt: skip
         assert needed in text, needed
@@ -83,7 +83,7 @@ def test_everything_a_reader_needs_is_there(tmp_path: Path) -> None:
 def test_missing_evidence_is_shown_as_missing(tmp_path: Path) -> None:
     text = report(tmp_path, made_up.verification(scene=Scene(), joint_error=math.nan))
     assert 'class="value missing">not available' in text
-    assert "nothing to keep clear of" in text
+    assert "there is no obstacle" in text
 
 
 def test_names_cannot_break_out_of_the_page(tmp_path: Path) -> None:

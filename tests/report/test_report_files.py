@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import jsonschema
 import made_up
@@ -19,7 +20,7 @@ from vdsm_pin.report.files import (
     schema,
 )
 from vdsm_pin.scene import Scene
-from vdsm_pin.verification.records import Check, Verdict, Verification
+from vdsm_pin.verification.records import Check, Pair, Verdict, Verification
 
 
 def written(verification: Verification) -> VerificationFile:
@@ -109,3 +110,17 @@ def test_motion_facts_follow_the_rows() -> None:
     mean = motion.changed_angles_mean_on_path
     assert mean == pytest.approx(changed[rows.on_path].mean())
     assert (motion.x0_min_m, motion.x0_max_m) == (rows.x0.min(), rows.x0.max())
+
+
+def test_links_near_each_other_do_not_hide_the_obstacles() -> None:
+    judged = made_up.verification()
+    near = replace(judged.closest[0], pair=Pair(1, other_link=3), lower=0.001)
+    file = written(replace(judged, closest=(near,)))
+    profile = judged.profile.obstacle_lower
+    assert file.min_clearance_m is not None
+    assert file.min_clearance_m.lower == profile.min()
+    k, obstacle = np.unravel_index(np.argmin(profile), profile.shape)
+    assert file.min_clearance_m.obstacle == judged.problem.scene.names[int(obstacle)]
+    assert file.min_clearance_m.waypoint == k
+    both = written(replace(judged, closest=(near, *judged.closest)))
+    assert both.min_clearance_m == written(judged).min_clearance_m

@@ -73,7 +73,7 @@ def _base_chart(verification: Verification, shown: Thinned) -> dict[str, Any]:
     return {
         "id": "x0",
         "title": "Base position x₀",
-        "note": f"Along the rail, which ends at {low:g} and {high:g} mm.",
+        "note": f"Along the rail, from {low:g} to {high:g} mm.".replace("-", "−"),
         "unit": " mm",
         "axis": "x₀ [mm]",
         "limits": [_limit("rail end", low), _limit("rail end", high)],

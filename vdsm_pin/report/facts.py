@@ -98,17 +98,41 @@ def closest_row(verification: Verification, approach: ClosestApproach) -> Closes
     )
 
 
+def nearest_to_obstacle(verification: Verification) -> int | None:
+    """Index of the closest approach to an obstacle; None where none is listed."""
+    near = (i for i, row in enumerate(verification.closest) if row.pair.obstacle)
+    return next(near, None)
+
+
 def min_clearance(verification: Verification) -> MinClearance | None:
-    """The smallest clearance over all pairs; None where no pair exists."""
-    if not verification.closest:
+    """The smallest clearance from any obstacle; None where there is no obstacle."""
+    names = verification.problem.scene.names
+    if not names:
         return None
-    first = verification.closest[0]
+    index = nearest_to_obstacle(verification)
+    if index is None:
+        return _from_profile(verification, names)
+    # Rows are sorted by their lower bounds: no other pair has a smaller one.
+    row = verification.closest[index]
     return MinClearance(
-        lower=finite(min(row.lower for row in verification.closest)),
-        upper=finite(min(row.upper for row in verification.closest)),
-        link=first.pair.link,
-        obstacle=first.pair.label,
-        waypoint=first.interval,
+        lower=finite(row.lower),
+        upper=finite(row.upper),
+        link=row.pair.link,
+        obstacle=row.pair.label,
+        waypoint=row.interval,
+    )
+
+
+def _from_profile(verification: Verification, names: tuple[str, ...]) -> MinClearance:
+    """The same where links come nearer to each other than to any obstacle."""
+    profile = verification.profile
+    k, obstacle = divmod(int(np.argmin(profile.obstacle_lower)), len(names))
+    return MinClearance(
+        lower=finite(float(profile.obstacle_lower[k, obstacle])),
+        upper=finite(float(profile.obstacle_upper.min())),
+        link=int(np.argmin(profile.link_lower[k])) + 1,
+        obstacle=names[obstacle],
+        waypoint=int(profile.first_interval[k]),
     )
 
 
@@ -135,11 +159,12 @@ def _certified_sentence(verification: Verification) -> str:
     count = len(verification.checks)
     smallest = min_clearance(verification)
     if smallest is None:
-        return f"All {count} checks passed over the whole motion; nothing is near it."
+        return f"All {count} checks passed over the whole motion; no obstacle is there."
     required = quantity(verification.problem.required_clearance, "m")
     return (
         f"All {count} checks passed; at every instant of the motion the arm keeps at "
-        f"least {quantity(smallest.lower, 'm')} of clearance, {required} are required."
+        f"least {quantity(smallest.lower, 'm')} from every obstacle; {required} are "
+        "required."
     )
 
 

@@ -11,6 +11,7 @@ import jinja2
 from vdsm_pin import __version__
 from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.report.facts import nearest_to_obstacle
 from vdsm_pin.report.files import BatchRow, PlanFile, Point, VerificationFile
 from vdsm_pin.report.page_data import report_data, view_data
 from vdsm_pin.report.words import (
@@ -103,6 +104,7 @@ def write_report(
         data=data.text,
         charts=data.charts,
         complete=data.complete,
+        worst=nearest_to_obstacle(verification),
     )
     path.write_text(page, encoding="utf-8")
 

@@ -12,6 +12,7 @@ MISSING: Final = "not available"
 """What stands where there is no evidence; never a pass."""
 
 _SMALLEST_FIXED: Final = 1e-3  # below this, three decimals would print 0.000
+_LARGE: Final = 1e3  # from here on, a tenth is fine enough
 _SHARE_DIGITS: Final = 9
 _DISPLAY_UNITS: Final[Mapping[str, tuple[float, str]]] = MappingProxyType(
     {"m": (MM_PER_M, " mm"), "rad": (math.degrees(1.0), "°"), "-": (1.0, "")}
@@ -88,7 +89,8 @@ def quantity(value: float | None, unit: str) -> str:
     if unit == "-" and float(shown).is_integer():
         return f"{shown:.0f}"
     fixed = shown == 0.0 or abs(shown) >= _SMALLEST_FIXED
-    text = f"{shown:.3f}" if fixed else f"{shown:.1e}"
+    digits = 3 if abs(shown) < _LARGE else 1
+    text = f"{shown:.{digits}f}" if fixed else f"{shown:.1e}"
     return text.replace("-", "−", 1) + suffix if text[0] == "-" else text + suffix
 
 

@@ -2,7 +2,7 @@
 "use strict";
 
 class ArmView {
-  constructor(pane, scene, motion, closest) {
+  constructor(pane, scene, motion) {
     this.pane = pane;
     this.motion = motion;
     this.scene = scene;
@@ -27,7 +27,6 @@ class ArmView {
     this.addWitness();
     this.addCamera();
     this.look("overview");
-    this.showWitness(closest[0] || null);
     new ResizeObserver(() => this.resize()).observe(pane);
     this.resize();
     motion.listen((time) => this.pose(time));
@@ -230,9 +229,9 @@ class ArmView {
 }
 
 // Make the view, or say plainly that there is none.
-function makeView(pane, scene, motion, closest) {
+function makeView(pane, scene, motion) {
   try {
-    const view = new ArmView(pane, scene, motion, closest);
+    const view = new ArmView(pane, scene, motion);
     pane.querySelector("canvas").setAttribute("aria-label", "The arm in its scene, in 3D");
     return view;
   } catch (error) {

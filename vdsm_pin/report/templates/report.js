@@ -5,7 +5,7 @@
   const data = JSON.parse(document.getElementById("data").textContent);
   const motion = new Motion(data.motion, data.scene.lengths);
   const pane = document.getElementById("view");
-  const view = makeView(pane, data.scene, motion, data.closest);
+  const view = makeView(pane, data.scene, motion);
   bindControls(motion, document);
 
   const figures = document.querySelectorAll("[data-chart]");
@@ -36,6 +36,7 @@
     document.querySelectorAll("details").forEach((one) => (one.open = true));
   });
 
-  if (data.closest.length) motion.go(data.closest[0].time);
+  const worst = document.querySelector("[data-worst]");
+  if (worst) worst.click();
   window.vdsm = { motion, view, plots, data };
 })();

@@ -1,0 +1,286 @@
+"""Oracle: exit status, the two output streams, and what is on the disk afterwards.
+
+Commands run in this process through `main`; one runs as a real process.
+"""
+
+import json
+import re
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import jsonschema
+import pytest
+from problem_files import NEAR, OUT_OF_REACH, write_problem
+
+from vdsm_pin.cli import app, main
+from vdsm_pin.report.files import schema
+
+COMMANDS = [
+    command.name or command.callback.__name__ for command in app.registered_commands
+]
+
+
+@dataclass
+class Ran:
+    status: int
+    out: str
+    err: str
+
+
+class Shell:
+    """Runs `vdsm` in this process."""
+
+    def __init__(self, capsys: pytest.CaptureFixture[str]) -> None:
+        self.capsys = capsys
+
+    def __call__(self, *words: object) -> Ran:
+        self.capsys.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            main([str(word) for word in words])
+        captured = self.capsys.readouterr()
+        return Ran(int(ended.value.code or 0), captured.out, captured.err)
+
+
+@pytest.fixture
+def vdsm(capsys: pytest.CaptureFixture[str]) -> Shell:
+    return Shell(capsys)
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a problem, its plan and its verification."""
+    folder = tmp_path_factory.mktemp("planned")
+    problem = write_problem(folder / "near.yaml", NEAR)
+    with pytest.raises(SystemExit) as plan:
+        main(["plan", str(problem), "--out", str(folder)])
+    assert plan.value.code == 0
+    trajectory = str(folder / "trajectory.csv")
+    with pytest.raises(SystemExit) as verify:
+        main(["verify", str(problem), "--trajectory", trajectory, "--out", str(folder)])
+    assert verify.value.code == 0
+    return folder
+
+
+def one_message(ran: Ran) -> str:
+    """The one line on stderr, after checking that it is one."""
+    assert "Traceback" not in ran.err
+    lines = ran.err.strip().splitlines()
+    assert len(lines) == 1, ran.err
+    assert ran.out == ""
+    return lines[0]
+
+
+def test_help_is_quick_and_every_command_shows_an_example(vdsm: Shell) -> None:
+    assert vdsm("--help").status == 0
+    for command in COMMANDS:
+        ran = vdsm(command, "--help")
+        assert ran.status == 0
+        assert re.search(rf"Examples:\n +vdsm {command}", ran.out), ran.out
+
+
+def test_the_installed_command_answers_before_libraries_are_loaded() -> None:
+    script = "import sys; sys.argv = ['vdsm', '--help']; import vdsm_pin.cli as c\n"
+    script += "try: c.main()\nexcept SystemExit: pass\n"
+    script += "print(sorted(m for m in sys.modules if '.' not in m))"
+    ran = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    loaded = set(re.findall(r"'(\w+)'", ran.stdout.splitlines()[-1]))
+    heavy = {"numpy", "numba", "pinocchio", "coal", "meshcat", "pydantic", "rich"}
+    assert not loaded & heavy
+    started = time.perf_counter()
+    subprocess.run(
+        [sys.executable, "-m", "vdsm_pin", "--help"], capture_output=True, check=True
+    )
+    assert time.perf_counter() - started < 2.0, "a sane machine needs a tenth of it"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["dance"],
+        ["plan"],
+        ["plan", "paper/free"],
+        ["plan", "paper/free", "--out"],
+        ["plan", "paper/free", "--out", "x", "--speed", "9"],
+        ["verify", "paper/free", "--out", "x"],
+        ["batch", "--out", "x", "--jobs", "0"],
+        ["batch", "--out", "x", "--time-limit", "-1"],
+        ["view", "paper/free", "--port", "99999"],
+    ],
+)
+def test_wrong_usage_is_status_2(vdsm: Shell, words: list[str]) -> None:
+    ran = vdsm(*words)
+    assert ran.status == 2
+    assert "Traceback" not in ran.err
+
+
+def test_a_certified_motion_has_every_file(planned: Path) -> None:
+    names = {path.name for path in planned.iterdir()}
+    assert names == {
+        "near.yaml", "trajectory.csv", "plan.json", "verification.json",
+        "clearance.csv", "link_angles.csv", "cables.csv", "report.html",
+    }  # fmt: skip
+    for name in ("plan", "verification"):
+        content = json.loads((planned / f"{name}.json").read_text(encoding="utf-8"))
+        jsonschema.validate(content, schema(name))
+        assert content["verdict"] == "certified"
+        assert content["command"].startswith(f"vdsm {name.replace('ication', 'y')}"[:9])
+    report = (planned / "report.html").read_text(encoding="utf-8")
+    assert "planned by" in report
+
+
+def test_the_terminal_shows_every_check(
+    vdsm: Shell, planned: Path, tmp_path: Path
+) -> None:
+    ran = vdsm(
+        "verify", planned / "near.yaml",
+        "--trajectory", planned / "trajectory.csv", "--out", tmp_path / "out",
+    )  # fmt: skip
+    assert ran.status == 0
+    content = json.loads((planned / "verification.json").read_text(encoding="utf-8"))
+    for check in content["checks"]:
+        assert check["name"].replace("_", " ") in ran.out
+    assert ran.out.startswith("✓ certified")
+    assert "\x1b" not in ran.out, "no colours without a terminal"
+
+
+def test_a_spoilt_motion_is_refuted_and_still_reported(
+    vdsm: Shell, planned: Path, tmp_path: Path
+) -> None:
+    lines = (planned / "trajectory.csv").read_text(encoding="utf-8").splitlines()
+    cells = lines[2].split(",")
+    cells[4] = "0.9"  # alpha1, beyond every limit
+    lines[2] = ",".join(cells)
+    spoilt = tmp_path / "spoilt.csv"
+    spoilt.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    out = tmp_path / "out"
+    ran = vdsm("verify", planned / "near.yaml", "--trajectory", spoilt, "--out", out)
+    assert ran.status == 1
+    assert ran.out.startswith("✗ refuted")
+    content = json.loads((out / "verification.json").read_text(encoding="utf-8"))
+    assert content["verdict"] == "refuted"
+    assert "planner unknown" in (out / "report.html").read_text(encoding="utf-8")
+
+
+def test_an_infeasible_problem_leaves_nothing(vdsm: Shell, tmp_path: Path) -> None:
+    problem = write_problem(tmp_path / "far.yaml", OUT_OF_REACH)
+    ran = vdsm("plan", problem, "--out", tmp_path / "out")
+    assert ran.status == 1
+    assert "reach" in one_message(ran)
+    assert not (tmp_path / "out").exists()
+
+
+def bad_inputs(folder: Path, planned: Path) -> dict[str, list[object]]:
+    """Command lines with bad input, by the words their message must hold."""
+    good, rows = planned / "near.yaml", planned / "trajectory.csv"
+    file = folder / "file"
+    file.write_text("x")
+    text = folder / "text.yaml"
+    text.write_text("just words")
+    short = folder / "short.csv"
+    short.write_text("\n".join(rows.read_text().splitlines()[:3])[:-9])
+    out = folder / "out"
+    verify = ["verify", good, "--out", out, "--trajectory"]
+    return {
+        "absent.yaml": ["plan", folder / "absent.yaml", "--out", out],
+        "known: paper": ["plan", "paper/obs9", "--out", out],
+        "expected a file": ["plan", folder, "--out", out],
+        "text.yaml": ["plan", text, "--out", out],
+        "file: is a file, expected a folder": ["plan", good, "--out", file],
+        "unknown strategy": ["plan", good, "--out", out, "--strategy", "luck"],
+        "absent.csv": [*verify, folder / "absent.csv"],
+        "short.csv": [*verify, short],
+        "folder": [*verify, folder],
+        "near.yaml": [*verify, good],
+        "is a folder, expected a file": [*verify, rows, "--certificate", folder],
+        "unknown schema": ["schema", "poem"],
+        "unknown manipulator": ["urdf", "octopus", "--out", folder / "o.urdf"],
+        "neither summary.csv": ["diff", folder, folder],
+        "holds no .yaml": ["batch", planned / "empty", "--out", out],
+    }
+
+
+def test_bad_input_is_one_message_and_writes_nothing(
+    vdsm: Shell, planned: Path, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    work = tmp_path / "work"
+    work.mkdir()
+    cases = bad_inputs(work, planned)
+    cases["holds no .yaml"] = [
+        "batch",
+        tmp_path_factory.mktemp("e"),
+        "--out",
+        work / "out",
+    ]
+    before = {path: path.read_bytes() for path in work.iterdir()}
+    for words, command in cases.items():
+        ran = vdsm(*command)
+        assert ran.status == 2, (command, ran)
+        assert words in one_message(ran), (command, ran.err)
+        assert {p: p.read_bytes() for p in work.iterdir()} == before, command
+
+
+def test_a_failed_run_leaves_earlier_results_alone(
+    vdsm: Shell, planned: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "verification.json").write_text("earlier")
+    bad = tmp_path / "bad.csv"
+    bad.write_text("waypoint\n1\n")
+    ran = vdsm("verify", planned / "near.yaml", "--trajectory", bad, "--out", tmp_path)
+    assert ran.status == 2
+    assert {p.name for p in tmp_path.iterdir()} == {"verification.json", "bad.csv"}
+    assert (tmp_path / "verification.json").read_text() == "earlier"
+
+
+def test_problems_are_listed_and_printed(vdsm: Shell) -> None:
+    names = vdsm("problems").out.split()
+    assert "paper/obs1" in names
+    for name in names:
+        assert vdsm("problems", "--show", name).out.startswith("#") or name
+    assert "vdsm_problem: 1" in vdsm("problems", "--show", "paper/obs2").out
+    assert vdsm("problems", "--show", "poem").status == 2
+
+
+@pytest.mark.parametrize("name", ["problem", "plan", "verification", "manifest"])
+def test_schemas_are_printed(vdsm: Shell, name: str) -> None:
+    jsonschema.Draft202012Validator.check_schema(json.loads(vdsm("schema", name).out))
+
+
+def test_the_urdf_is_written_whole(vdsm: Shell, tmp_path: Path) -> None:
+    committed = Path(__file__).parents[1] / "urdf" / "hrm8.urdf"
+    assert vdsm("urdf", "hrm8", "--out", tmp_path / "arm.urdf").status == 0
+    assert (tmp_path / "arm.urdf").read_text() == committed.read_text()
+
+
+def test_a_view_is_written_as_one_page(
+    vdsm: Shell, planned: Path, tmp_path: Path
+) -> None:
+    ran = vdsm(
+        "view", planned / "near.yaml", "--trajectory", planned / "trajectory.csv",
+        "--html", tmp_path / "view.html",
+    )  # fmt: skip
+    assert ran.status == 0
+    assert "MeshCat" in (tmp_path / "view.html").read_text(encoding="utf-8")
+
+
+def test_a_result_does_not_differ_from_itself(vdsm: Shell, planned: Path) -> None:
+    ran = vdsm("diff", planned, planned)
+    assert (ran.status, ran.out) == (0, "no difference\n")
+
+
+def test_a_certificate_is_written_and_accepted(
+    vdsm: Shell, planned: Path, tmp_path: Path
+) -> None:
+    rows, proof = planned / "trajectory.csv", tmp_path / "proof.jsonl"
+    ran = vdsm(
+        "verify", planned / "near.yaml", "--trajectory", rows,
+        "--out", tmp_path / "out", "--certificate", proof,
+    )  # fmt: skip
+    assert ran.status == 0, ran.err
+    assert vdsm("check-certificate", proof, planned / "near.yaml", rows).status == 0
+    other = write_problem(tmp_path / "other.yaml", NEAR.replace("3.5", "3.6"))
+    assert vdsm("check-certificate", proof, other, rows).status == 1
