@@ -1,5 +1,6 @@
 """Mesh files: the same triangles from every format, and damage named."""
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -93,6 +94,29 @@ def test_convex_obj_faces_of_any_size_are_filled(tmp_path: Path) -> None:
 
 def test_degenerate_triangles_are_not_watertight() -> None:
     assert not is_closed(np.array([[0, 0, 1], [0, 1, 0]]))
+
+
+def test_two_solids_that_share_an_edge_enclose_an_inside() -> None:
+    one = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    other = np.array([0, 1, 4, 5])[one]  # the edge 0-1 belongs to four triangles
+    assert is_closed(np.vstack([one, other]))
+    assert not is_closed(np.vstack([one, other[:3]]))
+
+
+def test_closedness_is_what_counting_edges_gives() -> None:
+    """Oracle: counting in a dictionary, over sets of few random triangles."""
+    rng = np.random.default_rng(3)
+    seen = Counter()
+    for _ in range(500):
+        solid = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+        extra = rng.integers(0, 4, (int(rng.integers(0, 5)), 3))
+        triangles = np.vstack([solid[: rng.integers(1, 5)], extra])
+        edges = [frozenset(t[[i, i - 1]].tolist()) for t in triangles for i in range(3)]
+        flat = any(len(edge) == 1 for edge in edges)
+        expected = not flat and all(n % 2 == 0 for n in Counter(edges).values())
+        assert is_closed(triangles) == expected
+        seen[expected] += 1
+    assert min(seen[True], seen[False]) > 20
 
 
 def test_a_binary_file_that_begins_with_solid_is_binary(tmp_path: Path) -> None:

@@ -61,8 +61,8 @@ def read_mesh(path: Path) -> MeshData:
     else:
         corners = _text_stl_corners(content, path)
     _check_corners(corners, path)
-    vertices, indices = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    triangles = indices.reshape(-1, 3).astype(np.int64)
+    vertices, indices = _joined(corners.reshape(-1, 3))
+    triangles = indices.reshape(-1, 3)
     return MeshData(vertices, triangles, is_closed(triangles), content)
 
 
@@ -72,11 +72,23 @@ def is_closed(triangles: IntArray) -> bool:
     Then a ray from a point crosses the triangles an even number of times or an odd one,
     whatever its direction: the triangles part space into an outside and an inside.
     """
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    if (edges[:, 0] == edges[:, 1]).any():
+    starts, ends = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
+    if (starts == ends).any() or starts.size % 2:
         return False
-    _, counts = np.unique(edges, axis=0, return_counts=True)
-    return bool((counts % 2 == 0).all())
+    low, high = np.minimum(starts, ends), np.maximum(starts, ends)
+    edges = np.sort(low * (int(high.max()) + 1) + high)
+    return bool((edges[0::2] == edges[1::2]).all())
+
+
+def _joined(points: FloatArray) -> tuple[FloatArray, IntArray]:
+    """The different points among points, shape (n, 3), and which one each is."""
+    index = np.zeros(len(points), dtype=np.int64)
+    first = index
+    for column in points.T:  # several times faster than numpy's unique rows
+        _, rank = np.unique(column, return_inverse=True)
+        key = index * (int(rank.max()) + 1) + rank
+        _, first, index = np.unique(key, return_index=True, return_inverse=True)
+    return points[first], index
 
 
 def _check_corners(corners: FloatArray, path: Path) -> None:

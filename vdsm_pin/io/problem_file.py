@@ -102,4 +102,4 @@ def built_in_text(name: str) -> str:
 def problem_schema() -> dict[str, Any]:
     """JSON Schema of the problem file, for editors."""
     schema = ProblemModel.model_json_schema(by_alias=True)
-    return {"$schema": SCHEMA_DIALECT, "title": "vdsm problem file", **schema}
+    return {"$schema": SCHEMA_DIALECT, **schema, "title": "vdsm problem file"}
