@@ -1,0 +1,209 @@
+"""The planes of a proof, written down interval by interval, in compiled code."""
+
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.kernels import NEAR, NORMAL
+from vdsm_pin.verification.search import (
+    CERTIFIED,
+    END,
+    INTERVAL,
+    KEY,
+    PAIR,
+    SLICE,
+    START,
+    Motion,
+    Task,
+    bound_between,
+    new_witness,
+    resolve,
+)
+from vdsm_pin.verification.slices import (
+    losses,
+    node_bound,
+    obstacle_support,
+    piece_bound,
+    reach_along,
+)
+from vdsm_pin.verification.sweep import Desk
+
+FIRST: Final = 4
+LAST: Final = 5
+PLANE_NORMAL: Final = 6
+CLAIM: Final = 9
+RECORD: Final = 10
+"""Layout of a written plane: interval, pair, start and end of the slice, pieces [first,
+last) counted from the obstacle's first, n (3), the clearance it proves."""
+
+
+@compiled
+def _claim(
+    task: Task, desk: Desk, row: FloatArray, first: int, last: int, n: FloatArray
+) -> float:
+    """Clearance that one plane proves of the pieces [first, last) over a slice."""
+    pair = int(row[PAIR])
+    link, frame = task.pairs.link[pair], task.pairs.frame[pair]
+    space, h = desk.space, row[END] - row[START]
+    support = obstacle_support(task.pieces, first, last, n, space.scratch[0])
+    reach = reach_along(task.rules, desk.ends, space, link, frame, n, h)
+    return support - reach - losses(task.rules, frame)
+
+
+@compiled
+def _write(
+    task: Task,
+    row: FloatArray,
+    first: int,
+    last: int,
+    n: FloatArray,
+    claim: float,
+    records: FloatArray,
+    count: int,
+) -> int:
+    """Append a plane; returns the new count, or -1 where there is no room."""
+    if count == records.shape[0]:
+        return -1
+    pair = int(row[PAIR])
+    start = task.pieces.first_piece[task.pairs.obstacle[pair]]
+    out = records[count]
+    out[0], out[1], out[2], out[3] = row[INTERVAL], pair, row[START], row[END]
+    out[FIRST], out[LAST] = first - start, last - start
+    out[PLANE_NORMAL:CLAIM] = n
+    out[CLAIM] = claim
+    return count + 1
+
+
+@compiled
+def _write_ranges(
+    task: Task, desk: Desk, row: FloatArray, records: FloatArray, count: int
+) -> int:
+    """Write planes for ranges of pieces, as few as the hierarchy allows."""
+    pieces, space, pair = task.pieces, desk.space, int(row[PAIR])
+    link, frame = task.pairs.link[pair], task.pairs.frame[pair]
+    needed, h = task.pairs.required[pair], row[END] - row[START]
+    n = np.zeros(3)
+    waiting = 1
+    space.stack[0] = pieces.root[task.pairs.obstacle[pair]]
+    while waiting > 0 and count >= 0:
+        waiting -= 1
+        node = space.stack[waiting]
+        first, last = pieces.node_range[node]
+        if last - first == 1:
+            piece_bound(
+                pieces, task.rules, desk.ends, space, first, link, frame, h, space.trial
+            )
+            n[:] = space.trial[NORMAL:NEAR]
+            claim = _claim(task, desk, row, first, last, n)
+            count = _write(task, row, first, last, n, claim, records, count)
+            continue
+        bound = node_bound(
+            pieces, task.rules, desk.ends, space, node, link, frame, h, n
+        )
+        if bound >= needed:
+            claim = _claim(task, desk, row, first, last, n)
+            count = _write(task, row, first, last, n, claim, records, count)
+            continue
+        space.stack[waiting], space.stack[waiting + 1] = (
+            pieces.node_right[node],
+            node + 1,
+        )
+        waiting += 2
+    return count
+
+
+@compiled
+def _write_slice(
+    task: Task,
+    motion: Motion,
+    desk: Desk,
+    row: FloatArray,
+    records: FloatArray,
+    count: int,
+) -> int:
+    """Write the planes of one slice; returns the new count, -1 without room.
+
+    The slice is one that `bound_between` proves.
+    """
+    bound_between(task, motion, desk.ends, desk.space, row)
+    pair = int(row[PAIR])
+    obstacle = task.pairs.obstacle[pair]
+    first = task.pieces.first_piece[obstacle]
+    last = task.pieces.first_piece[obstacle + 1]
+    n = desk.space.out[NORMAL:NEAR].copy()
+    claim = _claim(task, desk, row, first, last, n)
+    if last - first == 1 or claim >= task.pairs.required[pair]:
+        return _write(task, row, first, last, n, claim, records, count)
+    desk.space.trial[NORMAL:NEAR] = n
+    return _write_ranges(task, desk, row, records, count)
+
+
+@compiled
+def _record_pair(
+    task: Task,
+    motion: Motion,
+    desk: Desk,
+    row: FloatArray,
+    records: FloatArray,
+    count: int,
+) -> tuple[int, bool]:
+    """Write the planes of one pair over one interval.
+
+    Returns:
+        The new count, -1 without room, and whether the interval is proved.
+    """
+    pair = int(row[PAIR])
+    row[START], row[END] = 0.0, 1.0
+    desk.space.out[NORMAL:NEAR] = desk.planes[pair, :3]
+    bound_between(task, motion, desk.ends, desk.space, row)
+    desk.planes[pair, :3] = desk.space.out[NORMAL:NEAR]
+    if row[KEY] >= task.pairs.required[pair]:
+        return _write_slice(task, motion, desk, row, records, count), True
+    verdict, n_slices = resolve(
+        task, motion, desk.ends, desk.space, desk.heap, row, new_witness()
+    )
+    if verdict != CERTIFIED:
+        return count, False
+    for k in range(n_slices):
+        if count >= 0:
+            row[:] = desk.heap[k]
+            count = _write_slice(task, motion, desk, row, records, count)
+    return count, True
+
+
+@compiled
+def record(
+    task: Task,
+    motion: Motion,
+    desk: Desk,
+    first: int,
+    last: int,
+    records: FloatArray,
+) -> tuple[int, int, int]:
+    """Write the planes of the intervals [first, last) and all pairs.
+
+    Args:
+        task: The scene, pairs and rules.
+        motion: Rows of joint values.
+        desk: Working space; what the pairs remember is carried on.
+        first: First interval.
+        last: One past the last interval.
+        records: Result, shape (room, RECORD).
+
+    Returns:
+        Number of planes written, the interval reached (below `last` where the room
+        ended; all its pairs are missing) and the pair that is not proved in it, or -1.
+    """
+    row, count = np.zeros(SLICE), 0
+    for k in range(first, last):
+        before = count
+        for pair in range(task.pairs.link.size):
+            row[INTERVAL], row[PAIR] = k, pair
+            count, proved = _record_pair(task, motion, desk, row, records, count)
+            if not proved:
+                return before, k, pair
+            if count < 0:
+                return before, k, -1
+    return count, last, -1
