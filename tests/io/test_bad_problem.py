@@ -150,6 +150,14 @@ ONE_VALUE: list[tuple[tuple[Any, ...], Any, str]] = [
         {"joints": STRAIGHT | {"theta_deg": [0] * 7 + [43]}},
         "theta_deg[7] (line 36): is 43 deg, the joint's limit is 42.5 deg",
     ),
+    (
+        ("tip_path", "start"),
+        {
+            "joints": STRAIGHT
+            | {"alpha_deg": [0, 0, 40] + [0] * 5, "theta_deg": [40] * 8}
+        },
+        "joints (line 17): has a link angle psi of 54.07 deg at joint 3, the limit",
+    ),
     (("manipulator",), ARM | {"link_lengths": [500]}, "expected at least 2 entries"),
     (("manipulator",), ARM | {"link_lengths": [9] * 41}, "expected at most 40 entries"),
     (

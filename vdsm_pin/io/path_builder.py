@@ -8,7 +8,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.obstacle_builder import Frame, without_repeats
 from vdsm_pin.io.yaml_reader import YamlDocument
-from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.kinematics import joint_centres, link_angles
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.problem import Approach, Blocked, DesiredPath, Order
 from vdsm_pin.tolerances import TOLERANCES
@@ -68,11 +68,19 @@ class PathBuilder:
                 problem = f"has {len(values)} values, expected {n}, one per joint"
                 raise self.document.invalid((*at, name), problem)
             for i, value in enumerate(values):
-                if not abs(value) <= limit:
+                if not abs(value) <= limit + np.rad2deg(TOLERANCES.joint_limit):
                     problem = f"is {value:g} deg, the joint's limit is {limit:g} deg"
                     raise self.document.invalid((*at, name, i), problem)
-        pairs = np.deg2rad([model.alpha_deg, model.theta_deg]).T
-        return np.concatenate([[x0], pairs.reshape(-1)])
+        alpha, theta = np.deg2rad([model.alpha_deg, model.theta_deg])
+        psi = link_angles(alpha, theta)
+        worst = int(np.argmax(psi))
+        if not psi[worst] <= self.arm.max_link_angle + TOLERANCES.joint_limit:
+            problem = (
+                f"has a link angle psi of {np.rad2deg(psi[worst]):.4g} deg at joint "
+                f"{worst + 1}, the limit is {np.rad2deg(self.arm.max_link_angle):.4g}"
+            )
+            raise self.document.invalid(at, problem)
+        return np.concatenate([[x0], np.column_stack([alpha, theta]).reshape(-1)])
 
     def _tip(self, joints: FloatArray) -> FloatArray:
         alpha, theta = joints[None, 1::2], joints[None, 2::2]
