@@ -1,0 +1,66 @@
+"""The cable round trip passes what cables can drive and refuses what they cannot."""
+
+import numpy as np
+import pytest
+
+from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
+from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.scene import Scene
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification import cable_check
+from vdsm_pin.verification.cable_check import check_cables
+from vdsm_pin.verification.records import Verdict
+
+HRM8 = built_in("hrm8")
+
+
+def problem_for(arm: Manipulator) -> PlanningProblem:
+    tip = np.array([arm.total_length, 0.0, 0.0])
+    path = DesiredPath(tip, tip[None])
+    return PlanningProblem("any", arm, Scene(), path, 0.0, np.eye(4))
+
+
+def trajectory_of(alpha: np.ndarray, theta: np.ndarray) -> Trajectory:
+    n = len(alpha)
+    return Trajectory(np.zeros(n), np.zeros(n), np.zeros(n), alpha, theta)
+
+
+def test_motion_inside_the_box_passes() -> None:
+    box = HRM8.max_joint_angle
+    alpha, theta = np.random.default_rng(1).uniform(-box, box, (2, 2500, 8))
+    check = check_cables(problem_for(HRM8), trajectory_of(alpha, theta))
+    assert check.verdict is Verdict.CERTIFIED
+    assert check.count == 2 * 8 * 2500
+    assert 0.0 < check.worst < 1e-12
+
+
+def test_cables_that_do_not_determine_the_angles_are_refuted() -> None:
+    """Link 5's three cables in one hole: a turn across it changes no length."""
+    holes = paper_hole_angles(8)
+    holes[4] = 0.3
+    fields = {name: getattr(HRM8, name) for name in Manipulator.__dataclass_fields__}
+    arm = Manipulator(**(fields | {"cables": CableLayout(0.05, 0.03, holes)}))
+    alpha = np.zeros((3, 8))
+    alpha[2, 4] = 0.2
+    check = check_cables(problem_for(arm), trajectory_of(alpha, np.zeros((3, 8))))
+    assert check.verdict is Verdict.REFUTED
+    assert "joint 5" in check.where
+
+
+@pytest.mark.parametrize(("error", "passes"), [(0.9e-9, True), (1.1e-9, False)])
+def test_both_sides_of_the_tolerance(
+    error: float, passes: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A solver that is off by so much at one joint is caught at that joint."""
+    honest = cable_check.angles_from_cables
+
+    def off(arm: Manipulator, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        alpha, theta = honest(arm, lengths)
+        theta[3, 5] += error
+        return alpha, theta
+
+    monkeypatch.setattr(cable_check, "angles_from_cables", off)
+    still = np.zeros((6, 8))
+    check = check_cables(problem_for(HRM8), trajectory_of(still, still))
+    assert (check.verdict is Verdict.CERTIFIED) == passes
+    assert check.where == "waypoint 3, theta6"

@@ -1,0 +1,75 @@
+"""The forward kinematics check passes the arm it knows and refuses any other."""
+
+import numpy as np
+import pytest
+
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.manipulator import Manipulator, built_in
+from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.scene import Scene
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification import fk
+from vdsm_pin.verification.fk import CHUNK, check_fk
+from vdsm_pin.verification.records import Verdict
+
+HRM8 = built_in("hrm8")
+
+
+def problem_for(arm: Manipulator) -> PlanningProblem:
+    tip = np.array([arm.total_length, 0.0, 0.0])
+    path = DesiredPath(tip, tip[None])
+    return PlanningProblem("any", arm, Scene(), path, 0.0, np.eye(4))
+
+
+def trajectory_of(n: int, seed: int = 1) -> Trajectory:
+    rng = np.random.default_rng(seed)
+    alpha, theta = rng.uniform(-0.7, 0.7, (2, n, 8))
+    return Trajectory(np.zeros(n), np.zeros(n), rng.uniform(-1, 1, n), alpha, theta)
+
+
+def with_length(link: int, change: float) -> Manipulator:
+    fields = {name: getattr(HRM8, name) for name in Manipulator.__dataclass_fields__}
+    lengths = HRM8.link_lengths.copy()
+    lengths[link - 1] += change
+    return Manipulator(**(fields | {"link_lengths": lengths}))
+
+
+def test_the_arm_agrees_with_itself() -> None:
+    n = 2 * CHUNK + 17
+    check = check_fk(load_robot(HRM8), problem_for(HRM8), trajectory_of(n))
+    assert check.verdict is Verdict.CERTIFIED
+    assert check.count == 9 * n
+    assert 0.0 <= check.worst < 1e-12
+    assert check.limit == TOLERANCES.joint_centre
+
+
+@pytest.mark.parametrize(("change", "passes"), [(0.9e-9, True), (1.1e-9, False)])
+def test_both_sides_of_the_tolerance(change: float, passes: bool) -> None:
+    """A last link longer by so much moves the tip by as much and nothing else."""
+    arm = with_length(8, change)
+    check = check_fk(load_robot(HRM8), problem_for(arm), trajectory_of(40))
+    assert (check.verdict is Verdict.CERTIFIED) == passes
+    assert check.worst == pytest.approx(change, rel=1e-4)
+    assert check.where.endswith("O9")
+
+
+def test_a_wrong_arm_is_refuted_where_it_is_worst() -> None:
+    arm = with_length(3, 0.001)
+    check = check_fk(load_robot(HRM8), problem_for(arm), trajectory_of(CHUNK + 40))
+    assert check.verdict is Verdict.REFUTED
+    assert check.worst == pytest.approx(0.001)
+
+
+def test_missing_evidence_is_no_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+    def with_hole(*arguments: object) -> np.ndarray:
+        centres = joint_centres(*arguments)
+        centres[2, 4, 1] = np.nan
+        return centres
+
+    monkeypatch.setattr(fk, "joint_centres", with_hole)
+    check = check_fk(load_robot(HRM8), problem_for(HRM8), trajectory_of(5))
+    assert check.verdict is Verdict.REFUTED
+    assert np.isnan(check.worst)
+    assert check.where == "waypoint 2, joint centre O5"
