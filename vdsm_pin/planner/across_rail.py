@@ -24,6 +24,7 @@ from vdsm_pin.planner.scale import scale
 from vdsm_pin.planner.sections import VIEWS, Section, grown_by
 from vdsm_pin.planner.tip_path import Route, drawn_rows, straight_route
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
 
 SCAN: Final = 12
 """Moves of the bend tried before the first clear one is narrowed down."""
@@ -67,6 +68,13 @@ class AcrossRail:
             )
             raise PathBlocked(obstacle=self.region.name, reason=reason)
         return route
+
+    def clearance(self, centres: FloatArray) -> float:
+        """From the section and its lee, taken as endless, less the margin."""
+        chains = np.ascontiguousarray(centres[..., [0, 1 + self.axis]])
+        needed = self.problem.required_clearance + TOLERANCES.planned_clearance
+        reserve = self.region.radius - needed
+        return float(self.region.core_distance(chains).min()) - reserve
 
     def joints(self, route: Route, reference: FloatArray) -> FloatArray:
         """Step 5: the bend moves as little as clears the region."""

@@ -25,6 +25,7 @@ from vdsm_pin.planner.sections import Section, grown_by
 from vdsm_pin.planner.side_rules import SideRule, anchors, choose_rule, slid, stands
 from vdsm_pin.planner.tip_path import Route
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
 
 ROUNDINGS: Final = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.75, 1.0)
 """How far corners are blunted, tried in this order; [-]."""
@@ -50,6 +51,13 @@ class AlongRail:
         """Step 4."""
         return detour_route(self.problem.path, self.region, self.stands)
 
+    def clearance(self, centres: FloatArray) -> float:
+        """From the section, taken as endless along the rail, less the margin."""
+        distance = self.forbidden.core_distance(project(centres)).min()
+        needed = self.problem.required_clearance + TOLERANCES.planned_clearance
+        reserve = self.forbidden.radius - needed
+        return float(distance) - reserve
+
     def joints(self, route: Route, reference: FloatArray) -> FloatArray:
         """Step 5: the joints slide where the arm passes the obstacle."""
         manipulator = self.problem.manipulator
@@ -62,7 +70,7 @@ class AlongRail:
 
     def stands(self, points: FloatArray, side: int) -> BoolArray:
         """Whether the arm can stand with its tip at points, on a side, (n,)."""
-        return stands(self.problem, self.forbidden, self.rules[side], points)[0]
+        return stands(self.problem, self.forbidden, self.rules[side], points)
 
 
 def along_rail(
@@ -136,16 +144,17 @@ def _choice(
 def _sequences(
     problem: PlanningProblem, region: DangerRegion
 ) -> dict[int, list[FloatArray]]:
-    """For each side the tip positions wanted on it, going into the shadow."""
+    """For each side the projected tips wanted on it, going into the shadow."""
     path = problem.path
     rows = path_rows(path, first_station(path, region)[0], region)
     shadow = Shadow(region)
     wanted: dict[int, list[FloatArray]] = {1: [], -1: []}
-    for visit in shadow.visits(project(rows.points)):
-        points = rows.points[visit.first : visit.last + 1]
+    tip = project(rows.points)
+    for visit in shadow.visits(tip):
+        points = tip[visit.first : visit.last + 1]
         sides = {visit.entry, visit.exit} - {0}
         if len(sides) == 2:
-            gaps = np.linalg.norm(project(points) - region.centre, axis=1)
+            gaps = np.linalg.norm(points - region.centre, axis=1)
             change = int(np.argmin(gaps))
             wanted[visit.entry].append(points[: change + 1])
             wanted[visit.exit].append(points[change:][::-1])

@@ -6,15 +6,21 @@ projection. The pipeline tries them in the order given here.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Final, Protocol
+
+import numpy as np
 
 from vdsm_pin.errors import Infeasible, NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.across_rail import across_rail
 from vdsm_pin.planner.along_rail import along_rail
+from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.sections import section_along
 from vdsm_pin.planner.tip_path import Route, straight_route
 from vdsm_pin.problem import PlanningProblem
+
+SPARSE: Final = 16
+"""Every so manieth waypoint is looked at first."""
 
 
 class Avoidance(Protocol):
@@ -22,6 +28,10 @@ class Avoidance(Protocol):
 
     def route(self) -> Route:
         """Step 4: the tip's route; raises Infeasible where there is none."""
+        ...
+
+    def clearance(self, centres: FloatArray) -> float:
+        """Smallest clearance at joint centres (n, N + 1, 3), less any margin; [m]."""
         ...
 
     def joints(self, route: Route, reference: FloatArray) -> FloatArray:
@@ -43,9 +53,19 @@ class Straight:
 
     Args:
         problem: What was asked.
+        link_clearance: Clearance of every link at given joint centres.
     """
 
     problem: PlanningProblem
+    link_clearance: LinkClearance
+
+    def clearance(self, centres: FloatArray) -> float:
+        """By the function handed in; a few waypoints tell where it is hopeless."""
+        if not self.problem.scene.obstacles:
+            return np.inf
+        needed = self.problem.required_clearance
+        few = float(self.link_clearance(centres[::SPARSE]).min())
+        return few if few < needed else float(self.link_clearance(centres).min())
 
     def route(self) -> Route:
         """Step 4 without obstacles."""

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
-from vdsm_pin.planner.region_kernels import core_distances
+from vdsm_pin.planner.region_kernels import core_distances, sides_of
 from vdsm_pin.tolerances import TOLERANCES
 
 ARC_STEP: Final = float(np.deg2rad(0.25))
@@ -46,13 +46,7 @@ class DangerRegion:
     @cached_property
     def sides(self) -> FloatArray:
         """Straight parts of the boundary, shape (n, 2 ends, 2); [m]."""
-        if len(self.corners) == 1:
-            return frozen(np.zeros((0, 2, 2)))
-        ends = np.stack([self.corners, np.roll(self.corners, -1, axis=0)], axis=1)
-        along = ends[:, 1] - ends[:, 0]
-        outward = np.stack([along[:, 1], -along[:, 0]], axis=1)
-        outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-        return frozen(ends + self.radius * outward[:, None])
+        return frozen(sides_of(self.corners, self.radius))
 
     def core_distance(self, chains: FloatArray) -> FloatArray:
         """Distance of polylines to the core, shape (n, m, 2) to (n,); [m]."""

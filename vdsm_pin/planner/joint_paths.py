@@ -8,6 +8,11 @@ from vdsm_pin.planner.danger_region import DangerRegion
 from vdsm_pin.planner.region_kernels import slide_chains
 
 
+def chain_ratios(manipulator: Manipulator) -> FloatArray:
+    """k_{i,i+1} for i = 1..N (Eq. 6), shape (N,); [-]."""
+    return manipulator.stations[:-1] / manipulator.stations[1:]
+
+
 def slide_joints(
     manipulator: Manipulator,
     tip: FloatArray,
@@ -33,17 +38,9 @@ def slide_joints(
     Returns:
         P_1..P_{N+1}, shape (n_samples, N + 1, 2); [m].
     """
-    n_links = manipulator.n_links
-    planar = np.zeros((len(tip), n_links + 1, 2))
+    planar = np.zeros((len(tip), manipulator.n_links + 1, 2))
     planar[:, -1] = tip
-    ratios = manipulator.stations[:-1] / manipulator.stations[1:]  # k_{i,i+1}
-    slide_chains(
-        region.corners,
-        region.sides,
-        region.radius,
-        ratios,
-        side,
-        np.zeros(2) if direction is None else direction,
-        planar,
-    )
+    line = np.zeros(2) if direction is None else direction
+    ratios = chain_ratios(manipulator)
+    slide_chains(region.corners, region.radius, ratios, side, line, planar)
     return planar

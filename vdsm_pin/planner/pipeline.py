@@ -74,22 +74,15 @@ def _best_motion(
     problem: PlanningProblem, clearance: LinkClearance, margin: float
 ) -> Motion:
     """The first motion that draws the whole path, else the one that draws most."""
-    required = problem.required_clearance + margin
-    straight = _motion(problem, Straight(problem))
-    if not problem.scene.obstacles or _least(clearance, straight) >= required:
-        return straight
+    motion = _motion(problem, straight := Straight(problem, clearance))
+    if straight.clearance(motion.centres) >= problem.required_clearance + margin:
+        return motion
     best: Motion | None = None
     missing, reason = np.inf, None
     for avoidance in avoidances(problem, margin):
         try:
             motion = _motion(problem, avoidance)
-            least = _least(clearance, motion)
-            if not least >= required:
-                message = (
-                    f"the links come within {least:.6f} m of the obstacle, "
-                    f"{required:.6f} m are needed"
-                )
-                raise NoPlanFound(message)
+            _refuse_touch(problem, avoidance.clearance(motion.centres))
         except Infeasible as error:
             reason = reason or error
             continue
@@ -134,8 +127,13 @@ def _joint_steps(trajectory: Trajectory) -> FloatArray:
     return np.asarray(np.maximum(yaw, pitch))
 
 
-def _least(clearance: LinkClearance, motion: Motion) -> float:
-    return float(clearance(motion.centres).min())
+def _refuse_touch(problem: PlanningProblem, clearance: float) -> None:
+    if not clearance >= problem.required_clearance:
+        message = (
+            f"off the path the links come within {clearance:.6f} m of the obstacle, "
+            f"{problem.required_clearance:.6f} m are required"
+        )
+        raise NoPlanFound(message)
 
 
 def _refuse_gaps(problem: PlanningProblem, motion: Motion) -> None:

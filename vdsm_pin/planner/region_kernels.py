@@ -143,9 +143,50 @@ def core_distances(corners: FloatArray, chains: FloatArray) -> FloatArray:
 
 
 @compiled
-def slide_chains(
+def sides_of(corners: FloatArray, radius: float) -> FloatArray:
+    """Straight parts of the boundary, shape (n, 2 ends, 2); empty for a disc."""
+    n = corners.shape[0]
+    sides = np.zeros((n if n > 1 else 0, 2, 2))
+    for i in range(sides.shape[0]):
+        a, b = corners[i], corners[(i + 1) % n]
+        ux, uy = b[0] - a[0], b[1] - a[1]
+        length = np.hypot(ux, uy)
+        out_x, out_y = radius * uy / length, -radius * ux / length
+        sides[i, 0, 0], sides[i, 0, 1] = a[0] + out_x, a[1] + out_y
+        sides[i, 1, 0], sides[i, 1, 1] = b[0] + out_x, b[1] + out_y
+    return sides
+
+
+@compiled
+def _slide_chain(
     corners: FloatArray,
     sides: FloatArray,
+    radius: float,
+    ratios: FloatArray,
+    side: int,
+    direction: FloatArray,
+    bearing: float,
+    chain: FloatArray,
+) -> None:
+    """`slide_chains` for one configuration, chain of shape (N + 1, 2)."""
+    ux, uy = direction[0], direction[1]
+    for i in range(ratios.shape[0] - 1, 0, -1):
+        x, y = ratios[i] * chain[i + 1, 0], ratios[i] * chain[i + 1, 1]
+        if segment_to_core(corners, x, y, x, y) < radius:
+            if ux == 0.0 and uy == 0.0:
+                circle = np.hypot(x, y)
+                turn = reach_along_circle(corners, sides, radius, circle, bearing, side)
+                x = circle * np.cos(bearing + side * turn)
+                y = circle * np.sin(bearing + side * turn)
+            else:
+                far = leave_along(corners, sides, radius, x, y, ux, uy)
+                x, y = x + far * ux, y + far * uy
+        chain[i, 0], chain[i, 1] = x, y
+
+
+@compiled
+def slide_chains(
+    corners: FloatArray,
     radius: float,
     ratios: FloatArray,
     side: int,
@@ -156,32 +197,55 @@ def slide_chains(
 
     Args:
         corners: Of the region.
-        sides: Of the region.
         radius: Of the region.
         ratios: k_{i,i+1} for i = 1..N (Eq. 6), shape (N,).
         side: 1 or -1.
         direction: Auxiliary line, a unit vector; zero for circles about the origin.
         planar: P_1..P_{N+1}, shape (n, N + 1, 2); the tips are given, the rest is set.
     """
-    ux, uy = direction[0], direction[1]
-    circles = ux == 0.0 and uy == 0.0
-    mean_x, mean_y = corners[:, 0].mean(), corners[:, 1].mean()
-    bearing = np.arctan2(mean_y, mean_x)
+    sides = sides_of(corners, radius)
+    bearing = np.arctan2(corners[:, 1].mean(), corners[:, 0].mean())
     for k in range(planar.shape[0]):
-        for i in range(ratios.shape[0] - 1, 0, -1):
-            x, y = ratios[i] * planar[k, i + 1, 0], ratios[i] * planar[k, i + 1, 1]
-            if segment_to_core(corners, x, y, x, y) < radius:
-                if circles:
-                    circle = np.hypot(x, y)
-                    turn = reach_along_circle(
-                        corners, sides, radius, circle, bearing, side
-                    )
-                    x = circle * np.cos(bearing + side * turn)
-                    y = circle * np.sin(bearing + side * turn)
-                else:
-                    far = leave_along(corners, sides, radius, x, y, ux, uy)
-                    x, y = x + far * ux, y + far * uy
-            planar[k, i, 0], planar[k, i, 1] = x, y
+        _slide_chain(
+            corners, sides, radius, ratios, side, direction, bearing, planar[k]
+        )
+
+
+@compiled
+def _extent(
+    chain: FloatArray,
+    lengths: FloatArray,
+    least_cosine: float,
+    corners: FloatArray,
+    radius: float,
+    links: FloatArray,
+) -> float:
+    """Extent of one configuration along X; -1 where it cannot be taken.
+
+    Args:
+        chain: P_1..P_{N+1}, shape (N + 1, 2).
+        lengths: Of the links, shape (N,).
+        least_cosine: Cosine of the largest link angle.
+        corners: Of the region the links keep out of.
+        radius: Of that region.
+        links: Set to the directions of the links, shape (N, 3).
+    """
+    extent = 0.0
+    for i in range(lengths.shape[0]):
+        uy = (chain[i + 1, 0] - chain[i, 0]) / lengths[i]
+        uz = (chain[i + 1, 1] - chain[i, 1]) / lengths[i]
+        squared = 1.0 - uy * uy - uz * uz
+        if not squared > 0.0:
+            return -1.0
+        links[i, 0], links[i, 1], links[i, 2] = np.sqrt(squared), uy, uz
+        cosine = links[0, 0] if i == 0 else (links[i] * links[i - 1]).sum()
+        if not cosine >= least_cosine:
+            return -1.0
+        a, b = chain[i], chain[i + 1]
+        if not segment_to_core(corners, a[0], a[1], b[0], b[1]) >= radius:
+            return -1.0
+        extent += lengths[i] * links[i, 0]
+    return extent
 
 
 @compiled
@@ -192,51 +256,72 @@ def standing(
     corners: FloatArray,
     radius: float,
     largest_swing: float,
-) -> tuple[BoolArray, float]:
-    """Which configurations can be taken, and the largest shortening of the arm.
+) -> BoolArray:
+    """Which configurations can be taken, neighbours following each other, (n,).
+
+    Arguments as in `_extent`; `largest_swing` is the largest change of a coordinate of
+    a link's direction from one configuration to the next; [-].
+    """
+    able = np.zeros(planar.shape[0], np.bool_)
+    before = np.zeros((lengths.shape[0], 3))
+    here = np.zeros((lengths.shape[0], 3))
+    for k in range(planar.shape[0]):
+        extent = _extent(planar[k], lengths, least_cosine, corners, radius, here)
+        able[k] = extent > 0.0
+        if able[k] and k > 0 and able[k - 1]:
+            able[k] = np.abs(here - before).max() <= largest_swing
+        before, here = here, before
+    return able
+
+
+@compiled
+def reach_of_rule(
+    tip: FloatArray,
+    corners: FloatArray,
+    radius: float,
+    ratios: FloatArray,
+    side: int,
+    direction: FloatArray,
+    lengths: FloatArray,
+    least_cosine: float,
+    forbidden: FloatArray,
+    forbidden_radius: float,
+    largest_swing: float,
+) -> tuple[int, float]:
+    """How many tip positions in a row a rule brings the arm to, from the first on.
 
     Args:
-        planar: P_1..P_{N+1}, shape (n, N + 1, 2).
+        tip: Shape (n, 2).
+        corners: Of the region the joints slide on.
+        radius: Of that region.
+        ratios: As in `slide_chains`.
+        side: As in `slide_chains`.
+        direction: As in `slide_chains`.
         lengths: Of the links, shape (N,).
         least_cosine: Cosine of the largest link angle.
-        corners: Of the region the links keep out of.
-        radius: Of that region.
-        largest_swing: Largest change of a coordinate of a link's direction from one
-            configuration to the next; infinite where they are no neighbours; [-].
+        forbidden: Corners of the region the links keep out of.
+        forbidden_radius: Of that region.
+        largest_swing: As in `standing`.
 
     Returns:
-        Shape (n,), and the largest difference between the arm's length and its extent
-        along X before the first configuration that cannot be taken.
+        The count, and the largest shortening of the arm along X among them.
     """
-    n, n_links = planar.shape[0], lengths.shape[0]
-    able = np.ones(n, np.bool_)
+    sides = sides_of(corners, radius)
+    bearing = np.arctan2(corners[:, 1].mean(), corners[:, 0].mean())
+    n_links = lengths.shape[0]
+    chain = np.zeros((n_links + 1, 2))
     before, here = np.zeros((n_links, 3)), np.zeros((n_links, 3))
-    total, shortest, unbroken, known = lengths.sum(), np.inf, True, False
-    for k in range(n):
-        extent = 0.0
-        for i in range(n_links):
-            uy = (planar[k, i + 1, 0] - planar[k, i, 0]) / lengths[i]
-            uz = (planar[k, i + 1, 1] - planar[k, i, 1]) / lengths[i]
-            squared = 1.0 - uy * uy - uz * uz
-            if not squared > 0.0:
-                able[k] = False
-                break
-            here[i, 0], here[i, 1], here[i, 2] = np.sqrt(squared), uy, uz
-            cosine = here[0, 0] if i == 0 else (here[i] * here[i - 1]).sum()
-            if not cosine >= least_cosine:
-                able[k] = False
-                break
-            if known and not np.abs(here[i] - before[i]).max() <= largest_swing:
-                able[k] = False
-                break
-            a, b = planar[k, i], planar[k, i + 1]
-            if not segment_to_core(corners, a[0], a[1], b[0], b[1]) >= radius:
-                able[k] = False
-                break
-            extent += lengths[i] * here[i, 0]
-        known = able[k]
-        unbroken = unbroken and able[k]
-        if unbroken:
-            shortest = min(shortest, extent)
+    total, shortening = lengths.sum(), 0.0
+    for k in range(tip.shape[0]):
+        chain[n_links] = tip[k]
+        _slide_chain(corners, sides, radius, ratios, side, direction, bearing, chain)
+        extent = _extent(
+            chain, lengths, least_cosine, forbidden, forbidden_radius, here
+        )
+        if extent < 0.0:
+            return k, shortening
+        if k > 0 and not np.abs(here - before).max() <= largest_swing:
+            return k, shortening
+        shortening = max(shortening, total - extent)
         before, here = here, before
-    return able, total - shortest
+    return tip.shape[0], shortening

@@ -17,9 +17,9 @@ import numpy as np
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.danger_region import DangerRegion
-from vdsm_pin.planner.joint_paths import slide_joints
+from vdsm_pin.planner.joint_paths import chain_ratios, slide_joints
 from vdsm_pin.planner.project import project
-from vdsm_pin.planner.region_kernels import standing
+from vdsm_pin.planner.region_kernels import reach_of_rule, standing
 from vdsm_pin.problem import PlanningProblem
 
 GROWTHS: Final = (0.0, 0.01, 0.02, 0.03, 0.04, 0.06, 0.08, 0.1, 0.12, 0.15)
@@ -54,6 +54,11 @@ class SideRule:
     side: int
     direction: FloatArray | None
 
+    @property
+    def line(self) -> FloatArray:
+        """The direction as the kernels take it: zero for circles, shape (2,); [-]."""
+        return np.zeros(2) if self.direction is None else self.direction
+
 
 def choose_rule(
     problem: PlanningProblem,
@@ -69,7 +74,7 @@ def choose_rule(
         forbidden: What the links keep out of.
         shapes: The danger region with sharper to blunter corners.
         side: 1 or -1.
-        sequences: Tip positions wanted on this side, going into the shadow, (n, 3).
+        sequences: Projected tips wanted on this side, going into the shadow, (n, 2).
 
     Returns:
         The rule that brings the tip farthest; of several, the one that shortens the
@@ -92,13 +97,20 @@ def _trials(
 ) -> Iterator[tuple[int, SideRule]]:
     """Every rule that is tried, with the number of its line, the cross first."""
     longest = float(problem.manipulator.link_lengths.max())
+    free = np.repeat(anchors(problem)[:, None], 2, axis=1)
     lines = _lines(shapes[0], side)
+    regions = []
+    for shape in shapes:
+        room = float(shape.core_distance(free).min())
+        radii = [shape.radius + growth * longest for growth in GROWTHS]
+        regions += [
+            DangerRegion(shape.name, shape.corners, radius)
+            for radius in radii
+            if radius < room
+        ]
     for numbers in (range(CROSS), range(CROSS, len(lines))):
-        for shape, k, growth in product(shapes, numbers, GROWTHS):
-            radius = shape.radius + growth * longest
-            region = DangerRegion(shape.name, shape.corners, radius)
-            if not region.contains(anchors(problem)).any():
-                yield k, SideRule(region, side, lines[k])
+        for k, region in product(numbers, regions):
+            yield k, SideRule(region, side, lines[k])
 
 
 def _score(
@@ -111,17 +123,30 @@ def _score(
 
     Compared on some waypoints, confirmed on all; [-], [m].
     """
+    arm = problem.manipulator
+    cosine = least_cosine(arm)
     reached = total = 0
     shortening = 0.0
-    for points in sequences:
-        for stride in (COARSE, 1):
-            near = stride == 1
-            able, shortened = stands(problem, forbidden, rule, points[::stride], near)
-            if not able.all():
+    for tip in sequences:
+        for stride, swing in ((COARSE, np.inf), (1, LARGEST_SWING)):
+            count, shortened = reach_of_rule(
+                tip[::stride],
+                rule.region.corners,
+                rule.region.radius,
+                chain_ratios(arm),
+                rule.side,
+                rule.line,
+                arm.link_lengths,
+                cosine,
+                forbidden.corners,
+                forbidden.radius,
+                swing,
+            )
+            count = min(count * stride, len(tip))
+            if count < len(tip):
                 break
-        first = len(able) if able.all() else int(np.argmin(able))
-        reached += min(first * stride, len(points))
-        total += len(points)
+        reached += count
+        total += len(tip)
         shortening = max(shortening, shortened)
     return (reached / total if total else 1.0), -shortening
 
@@ -148,33 +173,34 @@ def slid(manipulator: Manipulator, tip: FloatArray, rule: SideRule) -> FloatArra
     return slide_joints(manipulator, tip, rule.region, rule.side, rule.direction)
 
 
+def least_cosine(manipulator: Manipulator) -> float:
+    """Cosine of the largest link angle that keeps cone and box; [-]."""
+    return float(np.cos(min(manipulator.max_link_angle, manipulator.max_joint_angle)))
+
+
 def stands(
     problem: PlanningProblem,
     forbidden: DangerRegion,
     rule: SideRule,
     points: FloatArray,
-    neighbours: bool = True,
-) -> tuple[BoolArray, float]:
+) -> BoolArray:
     """Whether links are long enough, limits and clearance kept, and no joint jumps.
 
     Args:
         problem: The arm and its limits.
         forbidden: What the links keep out of.
         rule: How the joints slide.
-        points: Tip positions, shape (n, 3); [m].
-        neighbours: Whether they follow each other as waypoints do.
+        points: Tip positions that follow each other as waypoints do, (n, 3); [m].
 
     Returns:
-        For each position, shape (n,), and the largest shortening of the arm along X
-        before the first failure; [m].
+        Shape (n,).
     """
     manipulator = problem.manipulator
-    limit = min(manipulator.max_link_angle, manipulator.max_joint_angle)
     return standing(
         slid(manipulator, project(points), rule),
         manipulator.link_lengths,
-        float(np.cos(limit)),
+        least_cosine(manipulator),
         forbidden.corners,
         forbidden.radius,
-        LARGEST_SWING if neighbours else np.inf,
+        LARGEST_SWING,
     )
