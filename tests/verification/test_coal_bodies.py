@@ -1,0 +1,209 @@
+"""What Coal gets wrong, one test each: with our care the answer stays sound.
+
+The oracles are closed forms and the proved brackets, never Coal itself.
+"""
+
+import coal
+import numpy as np
+import pytest
+import trimesh
+
+from vdsm_pin.errors import VerificationFailed
+from vdsm_pin.geometry.pieces import pack_pieces
+from vdsm_pin.geometry.row_bounds import row_brackets
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.manipulator import built_in
+from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.scene import Cylinder, Mesh, Prism, Scene, Sphere
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification import coal_clearance
+from vdsm_pin.verification.coal_bodies import (
+    CoalBody,
+    coal_bodies,
+    distance_request,
+    measure,
+)
+from vdsm_pin.verification.coal_clearance import check_coal
+from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.records import Verdict
+
+RADIUS, HALF = 0.06, 0.24
+X_TO_Z = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+
+
+def unit(rng: np.random.Generator) -> np.ndarray:
+    vector = rng.normal(size=3)
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def rotation_to(axis: np.ndarray) -> np.ndarray:
+    start = np.eye(3)[np.argmin(np.abs(axis))]
+    x = np.cross(start, axis)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(axis, x), axis], axis=1)
+
+
+def random_pairs(
+    n: int, spread: float
+) -> list[tuple[np.ndarray, np.ndarray, Cylinder]]:
+    """Capsule centre and axis, and a cylinder nearby."""
+    rng = np.random.default_rng(8)
+    return [
+        (
+            rng.uniform(-spread, spread, 3),
+            unit(rng),
+            Cylinder("c", np.zeros(3), unit(rng), rng.uniform(0.1, 2.0), 0.2),
+        )
+        for _ in range(n)
+    ]
+
+
+def compared(
+    pairs: list[tuple[np.ndarray, np.ndarray, Cylinder]], request: object
+) -> tuple[np.ndarray, np.ndarray]:
+    """Coal's distances and the proved brackets of capsule-cylinder pairs."""
+    capsule = coal.Capsule(RADIUS, 2.0 * HALF)
+    values, brackets = [], []
+    for centre, axis, cylinder in pairs:
+        pose = coal.Transform3s(rotation_to(axis), centre)
+        values.append(measure(request, capsule, pose, coal_bodies(cylinder)).distance)
+        ends = np.array([[centre - HALF * axis, centre + HALF * axis]])
+        pieces = pack_pieces([cylinder.pieces])
+        bracket = row_brackets(pieces, ends, np.zeros(1, np.int64), 1e-9)
+        brackets.append(bracket[0] - RADIUS)
+    return np.array(values), np.array(brackets)
+
+
+def test_settings_are_the_measured_ones() -> None:
+    request = distance_request()
+    assert request.gjk_tolerance == TOLERANCES.coal_gjk == 1e-8
+    assert request.epa_tolerance == coal.DistanceRequest().epa_tolerance
+
+
+def test_separated_pairs_are_within_1e_7_of_the_bracket() -> None:
+    """At Coal's default tolerance the same pairs read up to 1.5e-6 m too far."""
+    values, brackets = compared(random_pairs(1500, 1.5), distance_request())
+    apart = brackets[:, 0] > 0.0
+    assert apart.sum() > 700
+    assert (values[apart] - brackets[apart, 1]).max() < 1e-7
+    assert (brackets[apart, 0] - values[apart]).max() < 1e-7
+
+
+def test_penetrating_pairs_have_an_answer_and_the_right_sign() -> None:
+    """A tighter EPA tolerance loses some percent of these to -1.8e308."""
+    values, brackets = compared(random_pairs(1000, 0.3), distance_request())
+    inside = brackets[:, 1] < 0.0
+    assert inside.sum() > 300
+    assert np.isfinite(values).all()
+    assert (values[inside] <= 0.0).all()
+    assert (values[brackets[:, 0] > 0.0] > 0.0).all()
+
+
+def test_a_ball_inside_near_the_cap_of_a_cylinder_has_the_right_sign() -> None:
+    """Coal reports the depth to the side, -0.23 m, where the cap is 0.06 m away."""
+    rng = np.random.default_rng(2)
+    cylinder = Cylinder("c", np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.5, 0.3)
+    ball, request = coal.Sphere(0.05), distance_request()
+    for _ in range(500):
+        turn, out = rng.uniform(-np.pi, np.pi), rng.uniform(0.0, 0.25)
+        depth = rng.uniform(-0.2, 0.049)  # of the ball's centre above the cap
+        centre = np.array([out * np.cos(turn), out * np.sin(turn), 0.5 + depth])
+        pose = coal.Transform3s(np.eye(3), centre)
+        assert measure(request, ball, pose, coal_bodies(cylinder)).distance <= 0.0
+        pose = coal.Transform3s(np.eye(3), centre + np.array([0.0, 0.0, 0.051 - depth]))
+        found = measure(request, ball, pose, coal_bodies(cylinder)).distance
+        assert found == pytest.approx(0.001, abs=1e-7)
+
+
+@pytest.mark.parametrize("gap", [0.3, 1e-3, 2e-8, -1e-6, -0.01])
+def test_coaxial_bodies(gap: float) -> None:
+    """End on: apart the closed form, in contact the sign; Coal's depth is 1 mm off."""
+    axis = np.array([1.0, 0.0, 0.0])
+    cylinder = Cylinder("c", np.zeros(3), axis, 0.5, 0.2)
+    centre = np.array([0.5 + gap + RADIUS + HALF, 0.0, 0.0])
+    pose = coal.Transform3s(X_TO_Z, centre)
+    capsule = coal.Capsule(RADIUS, 2.0 * HALF)
+    found = measure(distance_request(), capsule, pose, coal_bodies(cylinder)).distance
+    if gap > 0.0:
+        assert found == pytest.approx(gap, abs=1e-7)
+    else:
+        assert found <= 1e-7
+
+
+def test_an_answer_does_not_depend_on_the_one_before() -> None:
+    """A reused DistanceResult keeps the smaller value; ours is always fresh."""
+    capsule, request = coal.Capsule(RADIUS, 2.0 * HALF), distance_request()
+    cylinder = coal_bodies(Cylinder("c", np.zeros(3), np.eye(3)[0], 1.0, 0.2))
+    ball = coal_bodies(Sphere("s", np.zeros(3), 0.2))
+    for bodies in (cylinder, ball):
+        near = coal.Transform3s(np.eye(3), np.array([0.0, 0.5, 0.0]))
+        far = coal.Transform3s(np.eye(3), np.array([0.0, 2.5, 0.0]))
+        first = measure(request, capsule, far, bodies).distance
+        assert measure(request, capsule, near, bodies).distance < first
+        assert measure(request, capsule, far, bodies).distance == first
+
+
+def test_the_nearest_part_counts_whatever_its_place_in_the_list() -> None:
+    iron = [[0, 0], [1.0, 0], [1.0, 0.1], [0.1, 0.1], [0.1, 0.8], [0, 0.8]]
+    prism = Prism("iron", np.zeros(3), np.eye(3), np.array(iron), (-1.0, 1.0))
+    bodies = coal_bodies(prism)
+    assert len(bodies) > 1
+    ball = coal.Sphere(0.01)
+    for place, gap in (([1.2, 0.05, 0.0], 0.19), ([0.05, 1.0, 0.0], 0.19)):
+        pose = coal.Transform3s(np.eye(3), np.array(place))
+        for order in (bodies, bodies[::-1]):
+            found = measure(distance_request(), ball, pose, order)
+            assert found.distance == pytest.approx(gap, abs=1e-7)
+
+
+def test_one_unusable_part_makes_the_whole_unusable(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    answers = iter([0.5, -1.7976931348623157e308])
+    monkeypatch.setattr(coal, "distance", lambda *arguments: next(answers))
+    body = CoalBody(coal.Sphere(0.1), coal.Transform3s())
+    found = measure(distance_request(), coal.Sphere(1.0), body.pose, (body, body))
+    assert found.distance == -np.inf
+
+
+HRM8 = built_in("hrm8")
+
+
+def room(half: float, watertight: bool) -> PlanningProblem:
+    """The arm inside a closed mesh whose skin is far away."""
+    shell = trimesh.creation.box(extents=[12.0, 2.0 * half, 2.0 * half])
+    mesh = Mesh("room", shell.vertices, shell.faces, watertight)
+    tip = np.array([HRM8.total_length, 0.0, 0.0])
+    path = DesiredPath(tip, tip[None])
+    return PlanningProblem("in", HRM8, Scene((mesh,)), path, 0.0035, np.eye(4))
+
+
+def test_inside_a_solid_mesh_coal_speaks_of_its_skin_only() -> None:
+    """Coal calls the arm 0.4 m clear; that it is inside is found elsewhere."""
+    problem = room(0.4 + HRM8.link_radius, True)
+    still, x0 = np.zeros((1, 8)), np.full(1, 0.1)
+    trajectory = Trajectory(np.zeros(1), np.zeros(1), x0, still, still)
+    (found,) = coal_clearance.coal_distances(
+        load_robot(HRM8), problem, trajectory, np.inf
+    )
+    np.testing.assert_allclose(found.distance, 0.4, atol=1e-7)
+    (check,) = check_coal(load_robot(HRM8), problem, trajectory)
+    assert check.verdict is Verdict.CERTIFIED, "the distances to the skin agree"
+    centres = joint_centres(HRM8, x0, still, still)
+    assert (link_clearance(problem)(centres) < 0.0).all(), "and yet it is inside"
+    surface = room(0.4 + HRM8.link_radius, False)
+    assert (link_clearance(surface)(centres) > 0.0).all()
+
+
+def test_a_shape_coal_refuses_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*arguments: object) -> None:
+        message = "QH6154 initial simplex is flat"
+        raise RuntimeError(message)
+
+    monkeypatch.setattr(coal.Convex, "convexHull", refuse)
+    triangle = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    prism = Prism("bar", np.zeros(3), np.eye(3), triangle, (0.0, 1.0))
+    with pytest.raises(VerificationFailed, match=r"'bar': Coal refuses.*flat"):
+        coal_bodies(prism)

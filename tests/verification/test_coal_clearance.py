@@ -1,0 +1,242 @@
+"""Coal against the proved brackets: agreement is seen, disagreement is reported."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+from vdsm_pin.geometry.arrays import rotation_from_rpy
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.manipulator import built_in
+from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.scene import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Obstacle,
+    Prism,
+    Scene,
+    Sphere,
+)
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification import coal_clearance
+from vdsm_pin.verification.coal_bodies import Measured
+from vdsm_pin.verification.coal_clearance import (
+    check_coal,
+    coal_distances,
+    reach_of,
+)
+from vdsm_pin.verification.records import Verdict
+
+HRM8 = built_in("hrm8")
+ROBOT = load_robot(HRM8)
+
+
+def unit(rng: np.random.Generator) -> np.ndarray:
+    vector = rng.normal(size=3)
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def obstacle_of(shape: str, rng: np.random.Generator) -> Obstacle:
+    """An obstacle within reach of the arm, anywhere, turned anyhow."""
+    centre = rng.uniform([0.3, -1.0, -1.0], [3.0, 1.0, 1.0])
+    turn = rotation_from_rpy(rng.uniform(-3.0, 3.0, 3))
+    size = rng.uniform(0.05, 0.4)
+    match shape:
+        case "sphere":
+            return Sphere(shape, centre, size)
+        case "capsule":
+            return Capsule(shape, centre, unit(rng), rng.uniform(0.1, 2.0), size)
+        case "cylinder":
+            return Cylinder(shape, centre, unit(rng), rng.uniform(0.1, 4.0), size)
+        case "box":
+            return Box(shape, centre, turn, rng.uniform(0.05, 0.5, 3))
+        case "half_space":
+            normal = unit(rng)
+            return HalfSpace(shape, -normal * rng.uniform(0.3, 1.5), normal)
+        case "prism":
+            triangle = rng.uniform(-0.4, 0.4, (3, 2))
+            return Prism(shape, centre, turn, triangle, (-1.5, 2.0))
+        case "angle iron":
+            corners = [[0, 0], [0.5, 0], [0.5, 0.1], [0.1, 0.1], [0.1, 0.4], [0, 0.4]]
+            return Prism(shape, centre, turn, np.array(corners), (-1.0, 1.0))
+        case _:
+            part = trimesh.creation.icosphere(subdivisions=2, radius=size)
+            return Mesh(shape, part.vertices + centre, part.faces, True)
+
+
+SHAPES = [
+    "sphere",
+    "capsule",
+    "cylinder",
+    "box",
+    "half_space",
+    "prism",
+    "angle iron",
+    "mesh",
+]
+
+
+def problem_with(*obstacles: Obstacle, clearance: float = 0.0035) -> PlanningProblem:
+    tip = np.array([HRM8.total_length, 0.0, 0.0])
+    path = DesiredPath(tip, tip[None])
+    return PlanningProblem("any", HRM8, Scene(obstacles), path, clearance, np.eye(4))
+
+
+def trajectory_of(n: int, seed: int = 1, size: float = 0.3) -> Trajectory:
+    rng = np.random.default_rng(seed)
+    alpha, theta = rng.uniform(-size, size, (2, n, 8))
+    return Trajectory(np.zeros(n), np.zeros(n), rng.uniform(-0.5, 0.5, n), alpha, theta)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_coal_agrees_with_the_brackets_everywhere(shape: str) -> None:
+    """Every (row, link, obstacle), near and far, apart and through each other."""
+    rng = np.random.default_rng(SHAPES.index(shape))
+    three = [replace(obstacle_of(shape, rng), name=f"number {k}") for k in range(3)]
+    problem = problem_with(*three)
+    found = list(coal_distances(ROBOT, problem, trajectory_of(25), np.inf))
+    assert sum(chunk.sample.size for chunk in found) == 25 * 8 * 3
+    for chunk in found:
+        assert chunk.disagreement.max() < 2e-7
+        apart = chunk.distance > 0.0
+        gap = np.linalg.norm(chunk.other_point - chunk.link_point, axis=1)
+        np.testing.assert_allclose(gap[apart], chunk.distance[apart], atol=1e-6)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_culling_skips_only_what_is_far(shape: str) -> None:
+    obstacle = obstacle_of(shape, np.random.default_rng(10 + SHAPES.index(shape)))
+    problem, trajectory = problem_with(obstacle), trajectory_of(60)
+    reach = reach_of(problem)
+    full = list(coal_distances(ROBOT, problem, trajectory, np.inf))
+    culled = list(coal_distances(ROBOT, problem, trajectory, reach))
+    near = {
+        (s, i)
+        for chunk in full
+        for s, i, d in zip(chunk.sample, chunk.link, chunk.distance, strict=True)
+        if d <= reach
+    }
+    seen = {
+        (s, i)
+        for chunk in culled
+        for s, i in zip(chunk.sample, chunk.link, strict=True)
+    }
+    assert near <= seen
+    assert {i for _, i in seen} == set(range(8)), "every pair at least once"
+
+
+def test_verdict_and_count_of_an_honest_scene() -> None:
+    rng = np.random.default_rng(3)
+    problem = problem_with(*(obstacle_of(shape, rng) for shape in SHAPES))
+    (check,) = check_coal(ROBOT, problem, trajectory_of(40))
+    assert check.verdict is Verdict.CERTIFIED
+    assert check.worst <= check.limit == TOLERANCES.coal_agreement
+    assert 8 * len(SHAPES) <= check.count <= 40 * 8 * len(SHAPES)
+    assert f"{check.count} of {40 * 8 * len(SHAPES)} pairs" in check.where
+
+
+def test_no_obstacles_no_row() -> None:
+    assert check_coal(ROBOT, problem_with(), trajectory_of(3)) == ()
+
+
+def ball_near_link_4(gap: float) -> PlanningProblem:
+    """A ball beside the middle of link 4 of the straight arm."""
+    middle = HRM8.stations[3] + HRM8.link_lengths[3] / 2.0
+    centre = np.array([middle, 0.1 + HRM8.link_radius + gap, 0.0])
+    return problem_with(Sphere("ball", centre, 0.1))
+
+
+STRAIGHT = Trajectory(
+    np.zeros(2), np.zeros(2), np.zeros(2), np.zeros((2, 8)), np.zeros((2, 8))
+)
+
+
+@pytest.mark.parametrize("excess", [0.9, 1.1])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_wrong_distance_is_noticed_on_both_sides(
+    excess: float, sign: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    honest = coal_clearance.measure
+
+    def lying(*arguments: object) -> Measured:
+        found = honest(*arguments)
+        error = sign * excess * TOLERANCES.coal_agreement
+        return Measured(found.distance + error, found.near, found.far)
+
+    monkeypatch.setattr(coal_clearance, "measure", lying)
+    (check,) = check_coal(ROBOT, ball_near_link_4(0.01), STRAIGHT)
+    expected = Verdict.CERTIFIED if excess < 1.0 else Verdict.UNDECIDED
+    assert check.verdict is expected
+
+
+@pytest.mark.parametrize("answer", [-np.inf, np.nan, -1.7976931348623157e308])
+def test_no_answer_is_no_agreement(
+    answer: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import coal
+
+    monkeypatch.setattr(coal, "distance", lambda *arguments: answer)
+    (check,) = check_coal(ROBOT, ball_near_link_4(0.01), STRAIGHT)
+    assert check.verdict is Verdict.UNDECIDED
+    assert check.worst == np.inf
+
+
+def test_a_wrong_sign_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    honest = coal_clearance.measure
+
+    def flipped(*arguments: object) -> Measured:
+        found = honest(*arguments)
+        return Measured(-found.distance, found.near, found.far)
+
+    monkeypatch.setattr(coal_clearance, "measure", flipped)
+    for gap in (0.01, -0.01):
+        (check,) = check_coal(ROBOT, ball_near_link_4(gap), STRAIGHT)
+        assert check.verdict is Verdict.UNDECIDED
+        assert check.worst >= 0.01
+
+
+def test_an_interval_proof_above_coal_is_noticed() -> None:
+    problem = ball_near_link_4(0.01)
+    proved = np.full((1, 8), -1.0)
+    proved[0, 3] = 0.01 - 1e-6
+    (check,) = check_coal(ROBOT, problem, STRAIGHT, proved)
+    assert check.verdict is Verdict.CERTIFIED
+    proved[0, 3] = 0.01 + 1e-5
+    (check,) = check_coal(ROBOT, problem, STRAIGHT, proved)
+    assert check.verdict is Verdict.UNDECIDED
+    assert "link 4, ball" in check.where
+
+
+def test_poses_come_from_pinocchio_and_match_the_centres() -> None:
+    """Spheres at the joint centres touch their links at depth radius + sphere."""
+    trajectory = trajectory_of(1, seed=5)
+    centres = joint_centres(HRM8, trajectory.x0, trajectory.alpha, trajectory.theta)
+    for i in range(8):
+        outward = centres[0, i] + np.array([0.0, 0.0, 5.0])
+        problem = problem_with(Sphere("far", outward, 0.1))
+        (chunk,) = coal_distances(ROBOT, problem, trajectory, np.inf)
+        expected = np.linalg.norm(
+            centres[0, :-1]
+            + _nearest(centres[0, :-1], centres[0, 1:], outward)[:, None]
+            * (centres[0, 1:] - centres[0, :-1])
+            - outward,
+            axis=1,
+        )
+        np.testing.assert_allclose(
+            chunk.distance, expected - 0.1 - HRM8.link_radius, atol=1e-12
+        )
+
+
+def _nearest(start: np.ndarray, end: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Where along each segment the point is nearest, 0 to 1."""
+    along = end - start
+    t = np.einsum("ij,ij->i", point - start, along) / np.einsum(
+        "ij,ij->i", along, along
+    )
+    return np.minimum(np.maximum(t, 0.0), 1.0)
