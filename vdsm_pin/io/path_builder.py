@@ -1,6 +1,7 @@
 """The tip path of a problem file to a `DesiredPath` in the base frame."""
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.problem import Approach, Blocked, DesiredPath, Order
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import MAX_ROWS
+
+DEFAULT_SPACING: Final = 0.010
+"""The paper's spacing of waypoints; [m]."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,7 @@ class PathBuilder:
             start,
             without_repeats(points, closed=model.closed),
             model.closed,
-            0.010 if model.spacing is None else float(self.frame.metres(model.spacing)),
+            self._spacing(model.spacing),
             Approach(model.approach),
             float(self.frame.metres(model.retreat)),
             Blocked(model.blocked),
@@ -53,6 +57,9 @@ class PathBuilder:
         )
         self._check_rows(path)
         return path
+
+    def _spacing(self, spacing: float | None) -> float:
+        return DEFAULT_SPACING if spacing is None else float(self.frame.metres(spacing))
 
     def _start_joints(self, model: schema.JointsModel) -> FloatArray:
         at = ("tip_path", "start", "joints")
