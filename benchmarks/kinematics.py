@@ -3,9 +3,10 @@
     python benchmarks/kinematics.py
     python benchmarks/kinematics.py --rows 10000 --save kinematics.json
 
-Figures are the median of the repeats after a warm-up, the 95th percentile and the least,
-in microseconds a waypoint on one thread; the least tells a busy machine from a slow one. "There" is joint centres to angles to cable
-lengths, "back" is lengths to angles to centres.
+Figures are microseconds a waypoint on one thread, after a warm-up: the median of the
+repeats, the 95th percentile and the least, which tells a busy machine from a slow one.
+"There" is joint centres to angles to cable lengths, "back" is lengths to angles to
+centres.
 """
 
 import argparse

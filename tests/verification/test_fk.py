@@ -71,5 +71,5 @@ def test_missing_evidence_is_no_pass(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fk, "joint_centres", with_hole)
     check = check_fk(load_robot(HRM8), problem_for(HRM8), trajectory_of(5))
     assert check.verdict is Verdict.REFUTED
-    assert np.isnan(check.worst)
+    assert check.worst == np.inf
     assert check.where == "waypoint 2, joint centre O5"

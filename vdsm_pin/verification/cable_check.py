@@ -1,5 +1,7 @@
 """Cables there and back: the planned lengths must give the planned angles."""
 
+from typing import Final
+
 import numpy as np
 
 from vdsm_pin.cables import angles_from_cables, cable_lengths
@@ -8,6 +10,9 @@ from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import Check, Verdict
+
+CHUNK: Final = 8192
+"""Rows held in memory at a time."""
 
 
 def check_cables(problem: PlanningProblem, trajectory: Trajectory) -> Check:
@@ -22,22 +27,28 @@ def check_cables(problem: PlanningProblem, trajectory: Trajectory) -> Check:
         domain in which lengths determine them, the motion cannot be driven by these
         cables: refuted.
     """
-    limit = TOLERANCES.cable_round_trip
-    planned = np.stack([trajectory.alpha, trajectory.theta])
-    lengths = cable_lengths(problem.manipulator, *planned)
-    try:
-        found = np.stack(angles_from_cables(problem.manipulator, lengths))
-    except InconsistentCables as error:
-        worst, where = float("inf"), f"waypoint {error.sample}, joint {error.link}"
-    else:
+    worst, where = -np.inf, ""
+    for first in range(0, trajectory.n_samples, CHUNK):
+        rows = slice(first, first + CHUNK)
+        planned = np.stack([trajectory.alpha[rows], trajectory.theta[rows]])
+        lengths = cable_lengths(problem.manipulator, *planned)
+        try:
+            found = np.stack(angles_from_cables(problem.manipulator, lengths))
+        except InconsistentCables as error:
+            worst = float("inf")
+            where = f"waypoint {first + error.sample}, joint {error.link}"
+            break
         residual = np.abs(found - planned)
-        angle, row, joint = np.unravel_index(int(np.argmax(residual)), residual.shape)
-        worst = float(residual[angle, row, joint])
-        where = f"waypoint {row}, {('alpha', 'theta')[angle]}{joint + 1}"
+        residual[np.isnan(residual)] = np.inf
+        kind, row, joint = np.unravel_index(int(np.argmax(residual)), residual.shape)
+        if residual[kind, row, joint] > worst:
+            worst = float(residual[kind, row, joint])
+            where = f"waypoint {first + row}, {('alpha', 'theta')[kind]}{joint + 1}"
+    limit = TOLERANCES.cable_round_trip
     return Check(
         name="angles recovered from the cable lengths",
         verdict=Verdict.CERTIFIED if worst <= limit else Verdict.REFUTED,
-        count=planned.size,
+        count=trajectory.alpha.size + trajectory.theta.size,
         worst=worst,
         limit=limit,
         unit="rad",

@@ -101,9 +101,10 @@ def check_coal(
         excess = found.disagreement
         if proved is not None:
             excess = np.maximum(excess, _below_proof(found, proved, n_links))
+        excess = np.where(np.isnan(excess), np.inf, excess)
         count += excess.size
         k = int(np.argmax(excess))
-        if not excess[k] <= worst:
+        if excess[k] > worst:
             worst = float(excess[k])
             where = (
                 f"waypoint {found.sample[k]}, link {found.link[k] + 1}, "

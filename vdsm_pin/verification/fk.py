@@ -35,13 +35,11 @@ def check_fk(
         joints = trajectory.x0[part], trajectory.alpha[part], trajectory.theta[part]
         planned = joint_centres(problem.manipulator, *joints)
         residual = np.linalg.norm(robot.joint_centres(*joints) - planned, axis=2)
-        here = int(np.argmax(residual))
-        if not residual.flat[here] <= worst:  # NaN counts as worse than anything
-            worst = float(residual.flat[here])
-            row, joint = np.unravel_index(here, residual.shape)  # type: ignore[assignment]
-            row += first
-        if np.isnan(worst):
-            break
+        residual[np.isnan(residual)] = np.inf
+        here, centre = np.unravel_index(int(np.argmax(residual)), residual.shape)
+        if residual[here, centre] > worst:
+            worst = float(residual[here, centre])
+            row, joint = first + int(here), int(centre)
     passed = worst <= TOLERANCES.joint_centre
     return Check(
         name="joint centres by Pinocchio against the closed form",
