@@ -94,3 +94,72 @@ def row_brackets(
         )
         bounds[m, 0], bounds[m, 1] = out[LOWER], out[UPPER]
     return bounds
+
+
+@compiled
+def _point_gap(point: FloatArray, start: FloatArray, end: FloatArray) -> float:
+    """Squared distance from a point to a segment; [m^2]."""
+    along = span = 0.0
+    for c in range(3):
+        along += (point[c] - start[c]) * (end[c] - start[c])
+        span += (end[c] - start[c]) ** 2
+    t = min(1.0, max(0.0, along / span)) if span > 0.0 else 0.0
+    square = 0.0
+    for c in range(3):
+        square += (start[c] + t * (end[c] - start[c]) - point[c]) ** 2
+    return square
+
+
+@compiled
+def _crossing_gap(p: FloatArray, q: FloatArray, r: FloatArray, s: FloatArray) -> float:
+    """Squared distance of two segments where both inner parts are nearest, or inf."""
+    aa = bb = ab = ac = bc = 0.0
+    for k in range(3):
+        a, b, c = q[k] - p[k], s[k] - r[k], p[k] - r[k]
+        aa, bb, ab = aa + a * a, bb + b * b, ab + a * b
+        ac, bc = ac + a * c, bc + b * c
+    det = aa * bb - ab * ab
+    if not det > 0.0:
+        return np.inf
+    t, u = (ab * bc - bb * ac) / det, (aa * bc - ab * ac) / det
+    if not (0.0 < t < 1.0 and 0.0 < u < 1.0):
+        return np.inf
+    square = 0.0
+    for k in range(3):
+        gap = p[k] + t * (q[k] - p[k]) - r[k] - u * (s[k] - r[k])
+        square += gap * gap
+    return square
+
+
+@compiled
+def link_gaps(centres: FloatArray, radius: float) -> FloatArray:
+    """Clearance between links two or more apart, in closed form.
+
+    The squared distance of two segments is convex, so it is least in the inside of both
+    or at an end of one. Every candidate is the distance of two points of the links:
+    where links are almost parallel and the first is inexact, the others are not.
+
+    Args:
+        centres: Joint centres, shape (n_samples, N + 1, 3); [m].
+        radius: Of the links; [m].
+
+    Returns:
+        Shape (n_samples, N, N), for links i and k >= i + 2 counted from 0; the others
+        are inf; negative where they meet; [m].
+    """
+    n_samples, n_links = centres.shape[0], centres.shape[1] - 1
+    gaps = np.full((n_samples, n_links, n_links), np.inf)
+    for m in range(n_samples):
+        for i in range(n_links):
+            p, q = centres[m, i], centres[m, i + 1]
+            for k in range(i + 2, n_links):
+                r, s = centres[m, k], centres[m, k + 1]
+                square = min(
+                    _crossing_gap(p, q, r, s),
+                    _point_gap(p, r, s),
+                    _point_gap(q, r, s),
+                    _point_gap(r, p, q),
+                    _point_gap(s, p, q),
+                )
+                gaps[m, i, k] = sqrt(square) - 2.0 * radius
+    return gaps

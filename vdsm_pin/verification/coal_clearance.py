@@ -192,7 +192,7 @@ def _measured(
         [centres[row_of_pair, link], centres[row_of_pair, link + 1]], axis=1
     )
     bounds = row_brackets(pieces, ends, obstacle, TOLERANCES.bracket_gap) - radius
-    transforms = _capsule_transforms(robot, poses, row_of_pair, link)
+    transforms = capsule_transforms(robot, poses, row_of_pair, link)
     request = distance_request()
     distance = np.zeros(len(pairs))
     near, far = np.zeros((2, len(pairs), 3))
@@ -205,7 +205,7 @@ def _measured(
     )
 
 
-def _capsule_transforms(
+def capsule_transforms(
     robot: RobotModel, poses: LinkPoses, row: IntArray, link: IntArray
 ) -> Iterator[Any]:
     """Coal's pose of a link's capsule for each (row, link), one after the other."""

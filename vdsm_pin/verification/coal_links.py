@@ -1,0 +1,159 @@
+"""Coal's distances between the links themselves, against the closed form.
+
+Both bodies are capsules, for which Coal has a closed form too. Poses come from
+Pinocchio on one side and from the closed-form kinematics on the other.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.row_bounds import link_gaps
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.coal_bodies import CoalBody, distance_request, measure
+from vdsm_pin.verification.coal_clearance import capsule_transforms
+from vdsm_pin.verification.records import Check, Verdict
+
+CHUNK_GAPS: Final = 1 << 20
+"""Gaps held in memory at a time: rows times links times links."""
+
+
+@dataclass(frozen=True)
+class LinkDistances:
+    """Measured distances between links, with the closed form beside them.
+
+    Args:
+        sample: Row of the trajectory, from 0, shape (m,).
+        link: The link nearer to the base, from 0, shape (m,).
+        other: The link farther out, from 0, shape (m,).
+        distance: By Coal; -inf where its answer is unusable, shape (m,); [m].
+        expected: In closed form, shape (m,); [m].
+    """
+
+    sample: IntArray
+    link: IntArray
+    other: IntArray
+    distance: FloatArray
+    expected: FloatArray
+
+    @property
+    def disagreement(self) -> FloatArray:
+        """How far the two differ, inf if unusable; where links meet only the sign."""
+        difference = np.abs(
+            np.maximum(self.distance, 0.0) - np.maximum(self.expected, 0.0)
+        )
+        return np.where(np.isfinite(self.distance), difference, np.inf)
+
+
+def check_coal_links(
+    robot: RobotModel, problem: PlanningProblem, trajectory: Trajectory
+) -> tuple[Check, ...]:
+    """Hold Coal's distances between links two or more apart against the closed form.
+
+    Args:
+        robot: The arm in Pinocchio and Coal.
+        problem: Names the arm and the required self-clearance.
+        trajectory: What is judged.
+
+    Returns:
+        One row of evidence with the largest disagreement; none for an arm of two links.
+        Measured are the pairs nearer than the required self-clearance and a link's
+        radius past it, and every pair where it is nearest.
+    """
+    n_links = problem.manipulator.n_links
+    n_pairs = (n_links - 1) * (n_links - 2) // 2
+    if n_pairs == 0:
+        return ()
+    reach = problem.required_self_clearance + problem.manipulator.link_radius
+    count, worst, where = 0, -np.inf, ""
+    for found in link_distances(robot, trajectory, reach):
+        excess = np.where(np.isnan(found.disagreement), np.inf, found.disagreement)
+        count += excess.size
+        k = int(np.argmax(excess))
+        if excess[k] > worst:
+            worst = float(excess[k])
+            where = (
+                f"waypoint {found.sample[k]}, link {found.link[k] + 1} and link "
+                f"{found.other[k] + 1}: Coal {found.distance[k]:.9g} m, "
+                f"closed form {found.expected[k]:.9g} m"
+            )
+    agreed = worst <= TOLERANCES.coal_agreement
+    check = Check(
+        name="distances between links by Coal against the closed form",
+        verdict=Verdict.CERTIFIED if agreed else Verdict.UNDECIDED,
+        count=count,
+        worst=worst,
+        limit=TOLERANCES.coal_agreement,
+        unit="m",
+        where=f"{where}; {count} of {n_pairs * trajectory.n_samples} pairs within "
+        "reach measured",
+    )
+    return (check,)
+
+
+def link_distances(
+    robot: RobotModel, trajectory: Trajectory, reach: float
+) -> Iterator[LinkDistances]:
+    """Measure the pairs of links within reach, then every pair not yet seen.
+
+    Args:
+        robot: The arm in Pinocchio and Coal.
+        trajectory: The rows.
+        reach: Measure where the closed form is at most this; inf for everything; [m].
+
+    Yields:
+        Distances in the order of the rows; last the pairs that never came within
+        reach, each at the row where it is nearest.
+    """
+    arm = robot.manipulator
+    least = np.full((arm.n_links, arm.n_links), np.inf)
+    nearest = np.zeros(least.shape, dtype=np.int64)
+    apart = np.triu(np.ones(least.shape, dtype=bool), k=2)
+    step = max(1, CHUNK_GAPS // least.size)
+    for first in range(0, trajectory.n_samples, step):
+        part = slice(first, first + step)
+        joints = trajectory.x0[part], trajectory.alpha[part], trajectory.theta[part]
+        gaps = link_gaps(joint_centres(arm, *joints), arm.link_radius)
+        here = np.argmin(gaps, axis=0)
+        value = np.take_along_axis(gaps, here[None], axis=0)[0]
+        nearer = value < least
+        least[nearer], nearest[nearer] = value[nearer], here[nearer] + first
+        close = np.argwhere((gaps <= reach) & apart)
+        if close.size:
+            expected = gaps[tuple(close.T)]
+            close[:, 0] += first
+            yield _measured(robot, trajectory, close, expected)
+    unseen = np.argwhere((least > reach) & apart)
+    if unseen.size:
+        rows = nearest[tuple(unseen.T)]
+        pairs = np.column_stack([rows, unseen])
+        yield _measured(robot, trajectory, pairs, least[tuple(unseen.T)])
+
+
+def _measured(
+    robot: RobotModel, trajectory: Trajectory, pairs: IntArray, expected: FloatArray
+) -> LinkDistances:
+    """Ask Coal about (sample, link, other link) triples, shape (m, 3)."""
+    rows, place = np.unique(pairs[:, 0], return_inverse=True)
+    poses = robot.link_poses(
+        trajectory.x0[rows], trajectory.alpha[rows], trajectory.theta[rows]
+    )
+    link, other = pairs[:, 1], pairs[:, 2]
+    request, distance = distance_request(), np.zeros(len(pairs))
+    both = zip(
+        capsule_transforms(robot, poses, place, link),
+        capsule_transforms(robot, poses, place, other),
+        strict=True,
+    )
+    for k, (mine, its) in enumerate(both):
+        partner = CoalBody(robot.capsules[other[k]], its)
+        found = measure(request, robot.capsules[link[k]], mine, (partner,))
+        distance[k] = found.distance
+    return LinkDistances(pairs[:, 0], link, other, distance, expected)
