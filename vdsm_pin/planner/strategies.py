@@ -5,7 +5,7 @@ from types import MappingProxyType
 from typing import Final, TypeAlias
 
 from vdsm_pin.errors import UnknownName
-from vdsm_pin.planner.fewest.strategy import plan_fewest
+from vdsm_pin.planner.fewest.strategy import plan_clearest, plan_fewest
 from vdsm_pin.planner.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Plan
 from vdsm_pin.problem import PlanningProblem
@@ -15,7 +15,7 @@ Strategy: TypeAlias = Callable[[PlanningProblem, LinkClearance, float], Plan]
 the required clearance [m]; the refinement raises it where verification asks for it."""
 
 STRATEGIES: Final[Mapping[str, Strategy]] = MappingProxyType(
-    {"paper": plan_paper, "fewest": plan_fewest}
+    {"fewest": plan_fewest, "clearest": plan_clearest, "paper": plan_paper}
 )
 """Every strategy a user may name."""
 

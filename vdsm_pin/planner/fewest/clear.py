@@ -21,7 +21,8 @@ class Judge:
     Args:
         problem: Arm and limits.
         clearance: The clearance function.
-        required: Clearance to keep; [m].
+        margin: Kept beyond the required clearance; [m].
+        slack: Kept for what happens between two rows; [m].
         finest: Way of the body below which an interval between two clear
             configurations counts as clear; [m].
     """
@@ -30,11 +31,13 @@ class Judge:
         self,
         problem: PlanningProblem,
         clearance: LinkClearance,
-        required: float,
+        margin: float,
+        slack: float,
         finest: float,
     ) -> None:
         self.problem, self.clearance = problem, clearance
-        self.required, self.finest = required, finest
+        self.required = problem.required_clearance + margin + slack
+        self.slack, self.finest = slack, finest
         self.limit = link_limit(problem)
         self.evaluated = 0
 

@@ -13,7 +13,6 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.planner.fewest.clear import Judge
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste, extended
 
@@ -236,7 +235,8 @@ class Garden:
         layer, offsets, parent = (
             np.concatenate(part) for part in (self.layer, self.offsets, self.parent)
         )
-        tips = np.broadcast_to(self.tips[layer[front[0]]], (len(front), 3))
+        place = int(layer[front[0]])
+        tips = np.broadcast_to(self.tips[place], (len(front), 3))
         room, changed, _ = self.judge.look(tips, offsets[front])
         lack = np.maximum(0.0, 1.0 - (room - self.judge.required) / 0.03)
         best = front[np.argsort(changed + lack, kind="stable")[:KEPT]]
@@ -271,7 +271,6 @@ def graft(
         roots: For each tree the nodes of its roots.
         taste: What the strategy prefers.
     """
-    arm = judge.problem.manipulator
     shapes, route = roadmap.shapes, roadmap.route
     tips, offsets, links = [], [], []
     first = shapes.size

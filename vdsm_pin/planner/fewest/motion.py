@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.kinematics import joint_angles
+from vdsm_pin.kinematics import joint_angles, joint_centres
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.fewest.roadmap import Roadmap
 from vdsm_pin.planner.fewest.sequence import Sequence
@@ -178,11 +178,19 @@ def link_angles_at(centres: FloatArray) -> FloatArray:
 
 
 def dense_rows(
-    manipulator: Manipulator, knots: Knots, spacing: float, turn: float
+    manipulator: Manipulator, knots: Knots, spacing: float, turn: float, stray: float
 ) -> Rows:
-    """Rows whose tips are at most `spacing` apart and whose joints turn at most `turn`.
+    """Rows close enough that straight lines in joint space follow the chart.
 
     Every knot is a row.
+
+    Args:
+        manipulator: The arm.
+        knots: The motion.
+        spacing: Largest distance of the tips of two rows; [m].
+        turn: Largest change of a joint angle between two rows; [rad].
+        stray: Largest distance of a joint centre, midway between two rows in joint
+            space, from where the chart has it; [m].
     """
     way = np.linalg.norm(np.diff(knots.tips, axis=0), axis=1)
     counts = np.maximum(1, np.ceil(way / spacing - 1e-9)).astype(np.int64)
@@ -192,11 +200,32 @@ def dense_rows(
         step = np.maximum(
             np.abs(np.diff(alpha, axis=0)), np.abs(np.diff(theta, axis=0))
         ).max(axis=1)
-        worst = np.zeros(len(counts))
-        np.maximum.at(worst, rows.interval[:-1], step)
-        if (worst <= turn).all():
+        # Straying falls with the square of the distance of the rows.
+        bow = np.sqrt(_stray(manipulator, knots, rows, alpha, theta) / stray)
+        excess = np.zeros(len(counts))
+        np.maximum.at(excess, rows.interval[:-1], np.maximum(step / turn, bow))
+        if (excess <= 1.0).all():
             break
-        counts = np.where(
-            worst > turn, np.ceil(counts * worst / turn * 1.05).astype(np.int64), counts
-        )
+        more = np.ceil(counts * excess * 1.05).astype(np.int64)
+        counts = np.where(excess > 1.0, np.maximum(more, counts + 1), counts)
     return rows
+
+
+def _stray(
+    manipulator: Manipulator,
+    knots: Knots,
+    rows: Rows,
+    alpha: FloatArray,
+    theta: FloatArray,
+) -> FloatArray:
+    """How far joint space and chart differ midway between rows, (r - 1,); [m]."""
+    ends = np.where(np.diff(rows.interval) > 0, 1.0, rows.share[1:])
+    middle = (rows.share[:-1] + ends) / 2.0
+    chart = rows_at(manipulator, knots, rows.interval[:-1], middle).centres
+    joint = joint_centres(
+        manipulator,
+        (rows.centres[:-1, 0, 0] + rows.centres[1:, 0, 0]) / 2.0,
+        (alpha[:-1] + alpha[1:]) / 2.0,
+        (theta[:-1] + theta[1:]) / 2.0,
+    )
+    return np.asarray(np.linalg.norm(chart - joint, axis=2).max(axis=1))

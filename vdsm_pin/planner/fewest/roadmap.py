@@ -179,11 +179,18 @@ def extended(
     tip, shape = roadmap.node // old, roadmap.node % old
     fresh = tips * shapes.size + old + np.arange(len(tips))
     more = _assemble(roadmap.route, shapes, fresh, bends, room, required, taste, limit)
-    values = {}
-    for name in ("lean", "changed", "cost", "strain", "clearance"):
-        values[name] = np.concatenate([getattr(roadmap, name), getattr(more, name)])
-    node = np.concatenate([tip * shapes.size + shape, more.node])
-    return _indexed(replace(roadmap, shapes=shapes, node=node, **values))
+    return _indexed(
+        replace(
+            roadmap,
+            shapes=shapes,
+            node=np.concatenate([tip * shapes.size + shape, more.node]),
+            lean=np.concatenate([roadmap.lean, more.lean]),
+            changed=np.concatenate([roadmap.changed, more.changed]),
+            cost=np.concatenate([roadmap.cost, more.cost]),
+            strain=np.concatenate([roadmap.strain, more.strain]),
+            clearance=np.concatenate([roadmap.clearance, more.clearance]),
+        )
+    )
 
 
 @dataclass

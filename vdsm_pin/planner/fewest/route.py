@@ -5,8 +5,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.problem import DesiredPath, PlanningProblem
+
+
+@dataclass(frozen=True)
+class PathRows:
+    """The desired path row by row, in drawing order.
+
+    Args:
+        stations: Arc length of each row; on a closed path they go on counting past its
+            length, shape (r,); [m].
+        tips: Where the rows are, shape (r, 3); [m].
+        corner: Whether a row is a corner, the first or the last, shape (r,).
+    """
+
+    stations: FloatArray
+    tips: FloatArray
+    corner: BoolArray
 
 
 @dataclass(frozen=True)
@@ -16,9 +32,9 @@ class TipRoute:
     Args:
         tips: Positions, shape (k, 3); [m].
         layers: Tip numbers along the desired path in drawing order, shape (l,).
-        stations: Arc length along the desired path at each layer; on a closed path
-            they go on counting past its length, shape (l,); [m].
-        rows: Rows of the trajectory from the layer before to each layer, shape (l,).
+        stations: Arc length along the desired path at each layer, shape (l,); [m].
+        closed: Whether it is proved that the stretch from the layer before cannot be
+            drawn, shape (l,).
         first: Where each tip's neighbours begin, shape (k + 1,).
         links: Neighbouring tips, shape (m,).
         gaps: Distances to them, shape (m,); [m].
@@ -27,7 +43,7 @@ class TipRoute:
     tips: FloatArray
     layers: IntArray
     stations: FloatArray
-    rows: IntArray
+    closed: BoolArray
     first: IntArray
     links: IntArray
     gaps: FloatArray
@@ -47,32 +63,48 @@ def nearest_station(path: DesiredPath, point: FloatArray) -> float:
     return where
 
 
-def drawing_stations(
-    path: DesiredPath, begin: float, coarse: float
-) -> tuple[FloatArray, IntArray]:
-    """Stations of the layers and the number of rows up to each.
+def path_rows(path: DesiredPath) -> PathRows:
+    """Rows at most `spacing` apart; every corner is a row.
 
-    Every corner is a layer; each side is divided evenly, rows at most `spacing` apart
-    and layers about `coarse` apart.
+    A closed path is entered at the point nearest to the start, an open one at its
+    first point.
     """
     corners = path.corner_stations
+    begin = 0.0
+    if path.closed and len(path.points) > 1:
+        begin = nearest_station(path, path.start)
     if begin > 0.0:
         later, sooner = corners[corners > begin], corners[1:][corners[1:] < begin]
-        corners = np.concatenate(
-            [[begin], later, sooner + path.length, [begin + path.length]]
-        )
-    stations, rows = [corners[:1]], [np.zeros(1, dtype=np.int64)]
+        end = [begin + path.length]
+        corners = np.concatenate([[begin], later, sooner + path.length, end])
+    stations, corner = [corners[:1]], [np.ones(1, dtype=np.bool_)]
     for a, b in itertools.pairwise(corners):
-        if b - a <= 0.0:
+        if not b > a:
             continue
-        n_rows = max(1, int(np.ceil((b - a) / path.spacing - 1e-9)))
-        n_layers = max(1, min(n_rows, int(np.ceil((b - a) / coarse - 1e-9))))
-        marks = np.round(np.linspace(0, n_rows, n_layers + 1)).astype(np.int64)
-        side = a + (b - a) * marks[1:] / n_rows
+        count = max(1, int(np.ceil((b - a) / path.spacing - 1e-9)))
+        side = a + (b - a) * np.arange(1, count + 1) / count
         side[-1] = b
         stations.append(side)
-        rows.append(np.diff(marks))
-    return np.concatenate(stations), np.concatenate(rows)
+        corner.append(np.arange(1, count + 1) == count)
+    every = np.concatenate(stations)
+    wrapped = np.where(every > path.length, every - path.length, every)
+    return PathRows(every, path.at(wrapped), np.concatenate(corner))
+
+
+def _layer_rows(rows: PathRows, closed: BoolArray, coarse: float) -> IntArray:
+    """Rows that become layers: corners, borders of closed stretches, some between."""
+    change = closed[1:] != closed[:-1]
+    kept = rows.corner.copy()
+    kept[1:] |= change
+    kept[:-1] |= change
+    marks = np.flatnonzero(kept)
+    layers = [marks[:1]]
+    for a, b in itertools.pairwise(marks):
+        length = rows.stations[b] - rows.stations[a]
+        count = max(1, min(int(b - a), int(np.ceil(length / coarse - 1e-9))))
+        inner = np.round(a + (b - a) * np.arange(1, count + 1) / count)
+        layers.append(inner.astype(np.int64))
+    return np.concatenate(layers)
 
 
 def _chain(begin: FloatArray, end: FloatArray, coarse: float) -> FloatArray:
@@ -81,30 +113,40 @@ def _chain(begin: FloatArray, end: FloatArray, coarse: float) -> FloatArray:
     return np.asarray(begin + np.outer(np.arange(count) / count, end - begin))
 
 
-def tip_route(problem: PlanningProblem, coarse: float, back: float = 0.0) -> TipRoute:
+def tip_route(
+    problem: PlanningProblem,
+    rows: PathRows,
+    closed: BoolArray,
+    coarse: float,
+    back: float,
+) -> TipRoute:
     """Approach and path as one chain of tips, closed where the path is.
 
     Args:
         problem: What was asked.
+        rows: The desired path row by row.
+        closed: Rows that nobody can reach, shape (r,).
         coarse: Largest distance between neighbouring tips; [m].
         back: How far behind the chain there shall be tips too, along -X; [m].
     """
     path = problem.path
-    begin = 0.0
-    if path.closed and len(path.points) > 1:
-        begin = nearest_station(path, path.start)
-    stations, rows = drawing_stations(path, begin, coarse)
-    drawn = path.at(np.where(stations > path.length, stations - path.length, stations))
+    chosen = _layer_rows(rows, closed, coarse)
+    drawn = rows.tips[chosen]
     approach = _chain(path.start, drawn[0], coarse)
     tips = np.vstack([approach, drawn])
     n, k = len(tips), len(approach)
     pairs = [(i, i + 1) for i in range(n - 1)]
-    if path.closed and n - k > 2:
+    ring = path.closed and n - k > 2
+    if ring:
         pairs.append((k, n - 1))
     if back > 0.0:
-        tips, more = _behind(tips, pairs[-1] == (k, n - 1), k, coarse, back)
+        tips, more = _behind(tips, ring, k, coarse, back)
         pairs += more
-    return _linked(tips, np.arange(k, n), stations, rows, np.array(pairs))
+    shut = np.zeros(len(chosen), dtype=np.bool_)
+    for i, (a, b) in enumerate(itertools.pairwise(chosen)):
+        shut[i + 1] = closed[a : b + 1].any()
+    links = np.array(pairs).reshape(-1, 2)
+    return _linked(tips, np.arange(k, n), rows.stations[chosen], shut, links)
 
 
 SHEET_STRIDE = 4
@@ -138,7 +180,7 @@ def _linked(
     tips: FloatArray,
     layers: IntArray,
     stations: FloatArray,
-    rows: IntArray,
+    closed: BoolArray,
     pairs: IntArray,
 ) -> TipRoute:
     both = np.vstack([pairs.reshape(-1, 2), pairs.reshape(-1, 2)[:, ::-1]])
@@ -146,5 +188,5 @@ def _linked(
     first = np.searchsorted(both[:, 0], np.arange(len(tips) + 1))
     gaps = np.linalg.norm(tips[both[:, 0]] - tips[both[:, 1]], axis=1)
     return TipRoute(
-        tips, layers, stations, rows, first.astype(np.int64), both[:, 1].copy(), gaps
+        tips, layers, stations, closed, first.astype(np.int64), both[:, 1].copy(), gaps
     )

@@ -20,18 +20,22 @@ class Found:
         sequence: The sequence of nodes.
         knots: Its knots, every interval clear.
         rounds: Sequences tried.
+        home: The node the motion starts from.
     """
 
     roadmap: Roadmap
     sequence: Sequence
     knots: Knots
     rounds: int
+    home: int
 
     @property
-    def undrawn_m(self) -> float:
-        """Length of the desired path that is not drawn; [m]."""
-        gaps = np.diff(self.roadmap.route.stations)
-        return float(sum(gaps[k - 1] for k in self.sequence.skipped))
+    def missing(self) -> float:
+        """Length of the path not drawn and not proved impossible to draw; [m]."""
+        route = self.roadmap.route
+        gaps = np.diff(route.stations)
+        skipped = self.sequence.skipped
+        return float(sum(gaps[k - 1] for k in skipped if not route.closed[k]))
 
 
 def search(judge: Judge, roadmap: Roadmap, home: int, rounds: int) -> Found | None:
@@ -57,7 +61,7 @@ def search(judge: Judge, roadmap: Roadmap, home: int, rounds: int) -> Found | No
         good = judge.clear(knots.pick(fresh)) if fresh.size else np.ones(0, bool)
         bad = fresh[~good]
         if not bad.size:
-            return Found(roadmap, sequence, knots, count)
+            return Found(roadmap, sequence, knots, count, home)
         known.update(map(tuple, np.sort(knots.edges[fresh[good]], axis=1).tolist()))
         planner.block(knots.edges[bad], not knots.drawn[bad].all())
     return None

@@ -160,3 +160,73 @@ def straightened(knots: Knots) -> Knots:
         gap = max(gap, np.abs(span.tips - knots.tips)[a : k + 2].max())
         kept[k] = gap > TOLERANCES.joint_centre
     return knots.take(np.flatnonzero(kept))
+
+
+def lifted(judge: Judge, knots: Knots) -> Knots:
+    """Ways with the tip stepping back along -X, where there is room for it.
+
+    The step grows with the distance from the ends of the way, up to the problem's
+    retreat; half and a quarter of it are tried too.
+    """
+    retreat = judge.problem.path.retreat
+    for begin, end in reversed(_runs(knots)):
+        if knots.drawn[begin] or not retreat > 0.0:
+            continue
+        tips = knots.tips[begin : end + 1]
+        if tips[:, 0].min() < min(tips[0, 0], tips[-1, 0]) - TOLERANCES.joint_centre:
+            continue
+        for part in (1.0, 0.5, 0.25):
+            trial = _stepped_back(knots, begin, end, part * retreat)
+            count = end - begin + len(trial.tips) - len(knots.tips)
+            if judge.clear(trial.pick(np.arange(begin, begin + count))).all():
+                knots = trial
+                break
+    return knots
+
+
+def _stepped_back(knots: Knots, begin: int, end: int, depth: float) -> Knots:
+    """One way stepped back by at most `depth`, with knots where the slope changes."""
+    tips = knots.tips[begin : end + 1]
+    along = np.linalg.norm(np.diff(tips, axis=0), axis=1)
+    length = np.concatenate([[0.0], np.cumsum(along)])
+    total = float(length[-1])
+    if not total > 0.0:
+        return knots
+    ramp = min(depth, total / 2.0)
+    marks = np.union1d(length, [ramp, total - ramp])
+    # Knots where only the shape changes share a length: keep every one of them.
+    order = np.argsort(np.concatenate([length, np.setdiff1d(marks, length)]))
+    values = np.concatenate([length, np.setdiff1d(marks, length)])[order]
+    own = order < len(length)
+    upper = np.clip(np.searchsorted(length, values, side="right"), 1, len(length) - 1)
+    low = upper - 1
+    span = length[upper] - length[low]
+    share = np.where(
+        span > 0.0, (values - length[low]) / np.where(span > 0, span, 1), 0
+    )
+    low, share = np.where(own, order, low), np.where(own, 0.0, share)
+    high = np.minimum(low + 1, len(length) - 1)
+    t = share[:, None]
+    new_tips = (1 - t) * tips[low] + t * tips[high]
+    new_tips[:, 0] -= np.minimum(np.minimum(values, total - values), ramp)
+    shapes = knots.offsets[begin : end + 1]
+    t = t[..., None]
+    new_shapes = (1 - t) * shapes[low] + t * shapes[high]
+    count = len(values) - 1
+    return Knots(
+        np.concatenate([knots.tips[:begin], new_tips, knots.tips[end + 1 :]]),
+        np.concatenate([knots.offsets[:begin], new_shapes, knots.offsets[end + 1 :]]),
+        np.concatenate(
+            [
+                knots.stations[:begin],
+                np.append(np.full(count, knots.stations[end]), knots.stations[end]),
+                knots.stations[end + 1 :],
+            ]
+        ),
+        np.concatenate(
+            [knots.drawn[:begin], np.zeros(count, np.bool_), knots.drawn[end:]]
+        ),
+        np.concatenate(
+            [knots.edges[:begin], np.full((count, 2), -1), knots.edges[end:]]
+        ),
+    )

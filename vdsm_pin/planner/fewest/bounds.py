@@ -1,0 +1,160 @@
+"""What can be proved about a problem: tips no arm reaches, angles no plan can spare.
+
+Every proof here rests on a necessary condition. A tip beyond the curled reach or within
+an obstacle's margin cannot be drawn. An arm without a changed link angle lies on the
+rail, and an arm with one lies on it up to that joint: N postures for each tip, and
+where none of them is clear a second angle must change.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.kernels import BRACKET, NORMAL, SCRATCH_ROWS, UPPER
+from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
+from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
+from vdsm_pin.planner.feasibility import curled_reach
+from vdsm_pin.planner.fewest.kernels import pose_shapes
+from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
+
+GOAL: Final = TOLERANCES.bracket_gap
+"""Width of a bracket at which to stop; [m]."""
+
+
+@dataclass(frozen=True)
+class TipProof:
+    """Which tips nobody can reach.
+
+    Args:
+        far: Beyond the reach of the curled arm, shape (n,).
+        buried: Within the margin of an obstacle, shape (n,).
+    """
+
+    far: BoolArray
+    buried: BoolArray
+
+    @property
+    def closed(self) -> BoolArray:
+        """Either of them, shape (n,)."""
+        return self.far | self.buried
+
+
+@compiled
+def _upper_bounds(pieces: PackedPieces, segments: FloatArray) -> FloatArray:
+    """Proved upper bounds of the distance of segments to each obstacle.
+
+    Args:
+        pieces: The scene.
+        segments: Shape (n, 2, 3); [m].
+
+    Returns:
+        Shape (n, n_obstacles); [m].
+    """
+    count = pieces.root.size
+    result = np.full((segments.shape[0], count), np.inf)
+    scratch = np.zeros((SCRATCH_ROWS + 2, 3))
+    stack = np.zeros(STACK, np.int64)
+    trial, out = np.zeros(BRACKET + 4), np.zeros(BRACKET + 4)
+    for n in range(segments.shape[0]):
+        for o in range(count):
+            out[NORMAL : NORMAL + 3] = 1.0
+            obstacle_bracket(
+                pieces, o, segments[n], 2, GOAL, scratch, stack, trial, out
+            )
+            result[n, o] = out[UPPER]
+    return result
+
+
+def upper_clearance(problem: PlanningProblem, segments: FloatArray) -> FloatArray:
+    """Upper bounds of the clearance of links along segments to each obstacle.
+
+    Each rests on two points, one of the link and one of the obstacle's surface.
+
+    Args:
+        problem: Arm and scene.
+        segments: Axes of links, shape (n, 2, 3); [m].
+
+    Returns:
+        Shape (n, n_obstacles); [m].
+    """
+    obstacles = problem.scene.obstacles
+    if not obstacles:
+        return np.full((len(segments), 0), np.inf)
+    pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
+    upper = _upper_bounds(pieces, np.ascontiguousarray(segments))
+    return np.asarray(upper - problem.manipulator.link_radius)
+
+
+def prove_tips(
+    problem: PlanningProblem, clearance: LinkClearance, tips: FloatArray
+) -> TipProof:
+    """Tips that no configuration reaches with the required clearance.
+
+    Args:
+        problem: Arm, scene, required clearance.
+        clearance: Lower bounds, which tell where a proof is worth trying.
+        tips: Shape (n, 3); [m].
+    """
+    reach = curled_reach(problem.manipulator)
+    far = np.hypot(tips[:, 1], tips[:, 2]) > reach + TOLERANCES.tip_on_path
+    points = np.stack([tips, tips], axis=1)
+    buried = clearance(points)[:, 0] < problem.required_clearance
+    near = np.flatnonzero(buried)
+    upper = upper_clearance(problem, points[near]).min(axis=1, initial=np.inf)
+    buried[near] = upper < problem.required_clearance - TOLERANCES.bracket_gap
+    return TipProof(far, buried)
+
+
+def least_changed(
+    problem: PlanningProblem, clearance: LinkClearance, tips: FloatArray
+) -> IntArray:
+    """Proved lower bounds of the number of changed link angles, shape (n,).
+
+    Args:
+        problem: Arm, scene, required clearance.
+        clearance: Lower bounds, which tell where a proof is worth trying.
+        tips: Shape (n, 3); [m].
+
+    Returns:
+        0 where the tip is on the rail, 1 elsewhere, and 2 where every posture with one
+        changed angle breaks a limit or the clearance.
+    """
+    arm = problem.manipulator
+    n_links, required = arm.n_links, problem.required_clearance
+    knees = np.repeat(np.arange(n_links)[:, None], 2, axis=1)
+    off = np.hypot(tips[:, 1], tips[:, 2])
+    least = np.where(off > arm.total_length * TOLERANCES.changed_angle, 1, 0)
+    node, ends, _ = pose_shapes(
+        np.ascontiguousarray(tips), knees, np.zeros((n_links, 4)), arm.stations,
+        arm.max_link_angle + TOLERANCES.joint_limit, *arm.base_range,
+    )  # fmt: skip
+    ends = np.ascontiguousarray(ends[:, [0, 1, 3]])
+    tip = node // n_links
+    room = clearance(ends).min(axis=1)
+    free = np.zeros(len(tips), dtype=np.bool_)
+    free[tip[room >= required]] = True
+    doubtful = np.flatnonzero(~free[tip])
+    for part in (0, 1):
+        segments = ends[doubtful, part : part + 2]
+        upper = upper_clearance(problem, segments).min(axis=1, initial=np.inf)
+        doubtful = doubtful[~(upper < required - TOLERANCES.bracket_gap)]
+    free[tip[doubtful]] = True
+    return np.asarray(np.where(free | (least == 0), least, 2))
+
+
+def culprit(problem: PlanningProblem, centres: FloatArray) -> tuple[int, str, float]:
+    """The link nearest to an obstacle, that obstacle, and the clearance's upper bound.
+
+    Args:
+        problem: Arm and scene.
+        centres: Joint centres of one configuration, shape (N + 1, 3); [m].
+    """
+    upper = upper_clearance(problem, np.stack([centres[:-1], centres[1:]], axis=1))
+    link, obstacle = np.unravel_index(int(np.argmin(upper)), upper.shape)
+    name = problem.scene.obstacles[int(obstacle)].name
+    return int(link) + 1, name, float(upper[link, obstacle])

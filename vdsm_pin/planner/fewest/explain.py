@@ -1,0 +1,184 @@
+"""What the user is told: why there is no plan, and what is proved about a plan."""
+
+import itertools
+
+import numpy as np
+
+from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfReach, PathBlocked
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.planner.feasibility import curled_reach
+from vdsm_pin.planner.fewest.bounds import TipProof, culprit, least_changed
+from vdsm_pin.planner.fewest.explore import Outcome
+from vdsm_pin.planner.fewest.motion import Intervals, link_angles_at
+from vdsm_pin.planner.fewest.route import PathRows
+from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.problem import Blocked, PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+
+
+def demanded(problem: PlanningProblem) -> float:
+    """Least part of the path that must be drawn; [-]."""
+    path = problem.path
+    return 1.0 if path.blocked is Blocked.FAIL else path.required_coverage
+
+
+def refuse(problem: PlanningProblem, outcome: Outcome) -> None:
+    """Raise where too little of the path can be drawn.
+
+    Raises:
+        OutOfReach: Proved: beyond the reach of the curled arm.
+        PathBlocked: Proved: too much of the path lies within an obstacle's margin.
+        NoPlanFound: Not proved: the search did not get that far.
+    """
+    rows, proof = outcome.rows, outcome.proof
+    length = problem.path.length
+    shut = _length(rows, _either_end(proof.closed))
+    none_open = bool(proof.closed.all())
+    if none_open or (length > 0.0 and 1.0 - shut / length < demanded(problem)):
+        raise _proved(problem, rows, proof)
+    if outcome.found is None:
+        raise NoPlanFound(_stuck(problem, outcome, 0.0))
+    skipped = outcome.found.sequence.skipped
+    stations = outcome.found.roadmap.route.stations
+    undrawn = sum(float(stations[k] - stations[k - 1]) for k in skipped)
+    if length > 0.0 and 1.0 - undrawn / length < demanded(problem) - 1e-12:
+        raise NoPlanFound(_stuck(problem, outcome, length - undrawn))
+
+
+def _either_end(closed: BoolArray) -> BoolArray:
+    """Intervals with both ends closed, shape (r - 1,)."""
+    return np.asarray(closed[:-1] & closed[1:])
+
+
+def _length(rows: PathRows, picked: BoolArray) -> float:
+    return float(np.diff(rows.stations)[picked].sum())
+
+
+def _proved(problem: PlanningProblem, rows: PathRows, proof: TipProof) -> Infeasible:
+    if proof.far.any():
+        distance = np.hypot(rows.tips[:, 1], rows.tips[:, 2])
+        worst = int(np.argmax(distance))
+        return OutOfReach(
+            sample=worst,
+            distance=float(distance[worst]),
+            reach=curled_reach(problem.manipulator),
+            reason="every joint at its limit, Eq. 4",
+        )
+    first = int(np.flatnonzero(proof.buried)[0])
+    tip = rows.tips[first]
+    _, name, room = culprit(problem, np.stack([tip, tip]))
+    return PathBlocked(
+        obstacle=name,
+        reason=(
+            f"at {rows.stations[first]:.4f} m along the path the tip itself would have "
+            f"at most {room * 1e3:.3f} mm to it, required are "
+            f"{problem.required_clearance * 1e3:.3f} mm"
+        ),
+    )
+
+
+def _stuck(problem: PlanningProblem, outcome: Outcome, drawn: float) -> str:
+    """Where the search came to an end, in words; not a proof."""
+    route = None if outcome.found is None else outcome.found.roadmap.route
+    station, tip = 0.0, outcome.rows.tips[0]
+    if outcome.found is not None and route is not None:
+        skipped = [k for k in outcome.found.sequence.skipped if not route.closed[k]]
+        if skipped:
+            station = float(route.stations[skipped[0] - 1])
+            tip = route.tips[route.layers[skipped[0]]]
+    words = (
+        f"drew {drawn:.3f} m of {problem.path.length:.3f} m; the first stretch not "
+        f"drawn begins at {station:.3f} m along the path, tip "
+        f"({', '.join(f'{value:.3f}' for value in tip)}) m"
+    )
+    zero = np.zeros((1, problem.manipulator.n_links + 1, 2))
+    straight = Intervals(tip[None], tip[None], zero, zero)
+    place = np.zeros(1, dtype=np.int64)
+    centres = straight.centres(problem.manipulator, place, np.zeros(1))[0]
+    if problem.scene.obstacles and np.isfinite(centres).all():
+        link, name, room = culprit(problem, centres)
+        words += (
+            f"; link {link} of the straight arm there has {room * 1e3:.1f} mm to "
+            f"{name!r}"
+        )
+    return words
+
+
+def notes_of(
+    problem: PlanningProblem,
+    clearance: LinkClearance,
+    outcome: Outcome,
+    trajectory: Trajectory,
+    centres: FloatArray,
+) -> tuple[str, ...]:
+    """Notes of a plan: what is not drawn, how sparse it is, what is proved."""
+    notes = [*_undrawn(outcome)]
+    on_path = trajectory.on_path
+    if not on_path.any():
+        return tuple(notes)
+    angles = link_angles_at(centres[on_path])
+    changed = (angles > TOLERANCES.changed_angle).sum(axis=1)
+    tips = centres[on_path, -1]
+    least = np.minimum(least_changed(problem, clearance, tips), changed)
+    notes.append(
+        f"changed link angles on the path: {changed.mean():.3f} on average, "
+        f"{changed.max()} at most"
+    )
+    notes.append(
+        f"proved minimal at {int((changed == least).sum())} of {len(changed)} "
+        "waypoints on the path: fewer would break a limit or the clearance there"
+    )
+    ways = _ways(on_path)
+    if len(ways) > 1:
+        notes.append(
+            f"the tip leaves the path {len(ways) - 1} times to let the arm change sides"
+        )
+    retreat = problem.path.retreat
+    back = _farthest_back(trajectory, centres[:, -1], ways)
+    if back > retreat + TOLERANCES.tip_on_path:
+        notes.append(
+            f"off the path the tip steps back by up to {back:.3f} m, more than the "
+            f"retreat of {retreat:.3f} m: no change of sides was found within it"
+        )
+    return tuple(notes)
+
+
+def _ways(on_path: BoolArray) -> list[tuple[int, int]]:
+    """Runs of rows off the path: their first row and the row past their last."""
+    marks = np.flatnonzero(np.diff(on_path.astype(np.int64))) + 1
+    edges = [0, *marks.tolist(), len(on_path)]
+    return [(a, b) for a, b in itertools.pairwise(edges) if not on_path[a]]
+
+
+def _farthest_back(
+    trajectory: Trajectory, tips: FloatArray, ways: list[tuple[int, int]]
+) -> float:
+    """How far the tip goes behind both ends of a way; [m]."""
+    worst = 0.0
+    for a, b in ways:
+        ends = min(tips[max(a - 1, 0), 0], tips[min(b, len(tips) - 1), 0])
+        worst = max(worst, float(ends - tips[a:b, 0].min()))
+    return worst
+
+
+def _undrawn(outcome: Outcome) -> list[str]:
+    """One note for each stretch that is not drawn."""
+    assert outcome.found is not None
+    route = outcome.found.roadmap.route
+    notes = []
+    stretch: list[int] = []
+    skipped = outcome.found.sequence.skipped
+    for k, after in itertools.zip_longest(skipped, skipped[1:]):
+        stretch.append(k)
+        if after == k + 1 and route.closed[after] == route.closed[k]:
+            continue
+        a, b = route.stations[stretch[0] - 1], route.stations[k]
+        why = (
+            "proved: the tip there is out of reach or within an obstacle's margin"
+            if route.closed[k]
+            else "no way was found, which proves nothing"
+        )
+        notes.append(f"not drawn from {a:.4f} m to {b:.4f} m along the path ({why})")
+        stretch = []
+    return notes

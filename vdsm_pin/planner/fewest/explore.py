@@ -1,0 +1,161 @@
+"""From coarse to fine: which searches are run, in which order, and when to stop.
+
+Everything is counted, nothing is timed: the same problem gives the same plan.
+"""
+
+import logging
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.fewest.bounds import TipProof, prove_tips
+from vdsm_pin.planner.fewest.clear import Judge
+from vdsm_pin.planner.fewest.growth import fill
+from vdsm_pin.planner.fewest.home import with_start
+from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste, build_roadmap
+from vdsm_pin.planner.fewest.route import PathRows, path_rows, tip_route
+from vdsm_pin.planner.fewest.search import Found, search
+from vdsm_pin.planner.fewest.sequence import Planner
+from vdsm_pin.planner.fewest.shapes import one_knee_shapes
+from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.problem import PlanningProblem
+
+LOGGER = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Level:
+    """How finely to look.
+
+    Args:
+        step: Lattice step of the directions; [-].
+        coarse: Distance of the tips over the arm's length; [-].
+        joints: Largest number of knee joints.
+        rounds: Sequences to try.
+        back: How far tips are tried behind the path, over the arm's length; [-].
+        grow: Rounds of growing shapes into what is not drawn.
+        slack: Clearance kept for what happens between two rows; [m].
+        finest: Way of the body between two looks at the clearance; [m].
+    """
+
+    step: float
+    coarse: float
+    joints: int
+    rounds: int
+    back: float
+    grow: int
+    slack: float = 3e-4
+    finest: float = 2e-3
+
+
+SEED: Final = 0
+"""Seed of the growth of shapes; the same problem gives the same plan."""
+
+LEVELS: Final = (
+    Level(0.08, 0.026, 8, 40, 0.0, 2),
+    Level(0.08, 0.026, 8, 40, 1.0, 2),
+    Level(0.05, 0.016, 10, 60, 1.0, 3),
+    Level(0.05, 0.013, 10, 60, 1.0, 3, 3e-5, 5e-4),
+)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the exploration came to.
+
+    Args:
+        judge: The judge of the level that found it.
+        found: The best sequence, None if nothing can be drawn.
+        rows: The desired path row by row.
+        proof: Which of its rows nobody can reach.
+    """
+
+    judge: Judge
+    found: Found | None
+    rows: PathRows
+    proof: TipProof
+
+    @property
+    def missing(self) -> float:
+        """Length not drawn and not proved impossible; [m]."""
+        return np.inf if self.found is None else self.found.missing
+
+
+def explore(
+    problem: PlanningProblem, clearance: LinkClearance, margin: float, taste: Taste
+) -> Outcome:
+    """Search level by level until all that can be drawn is drawn.
+
+    Args:
+        problem: What is asked.
+        clearance: The clearance function.
+        margin: Kept beyond the required clearance; [m].
+        taste: What the strategy prefers.
+    """
+    rows = path_rows(problem.path)
+    proof = prove_tips(problem, clearance, rows.tips)
+    judge = Judge(problem, clearance, margin, LEVELS[0].slack, LEVELS[0].finest)
+    best = Outcome(judge, None, rows, proof)
+    if proof.closed.all():
+        return best
+    for level in LEVELS:
+        judge = Judge(problem, clearance, margin, level.slack, level.finest)
+        found = _look(judge, level, rows, proof, taste)
+        now = Outcome(judge, found, rows, proof)
+        LOGGER.debug("%s: %.4f m missing", level, now.missing)
+        if now.missing < best.missing:
+            best = now
+        if not best.missing > 0.0:
+            break
+    return best
+
+
+def _look(
+    judge: Judge, level: Level, rows: PathRows, proof: TipProof, taste: Taste
+) -> Found | None:
+    """One level: a roadmap, a search, and growth where it falls short."""
+    problem = judge.problem
+    arm = problem.manipulator
+    length = arm.total_length
+    coarse, back = level.coarse * length, level.back * length
+    shapes = one_knee_shapes(arm, judge.limit, level.step, level.joints)
+    route = tip_route(problem, rows, proof.closed, coarse, back)
+    roadmap = build_roadmap(
+        problem, judge.clearance, judge.required, route, shapes, taste
+    )
+    roadmap, home = with_start(judge, roadmap, taste)
+    rng = np.random.default_rng(SEED)
+    found = search(judge, roadmap, home, level.rounds)
+    for _ in range(level.grow):
+        if found is None or not found.missing > 0.0:
+            break
+        skipped = tuple(k for k in found.sequence.skipped if not route.closed[k])
+        lengths, _ = Planner(found.roadmap, found.home).ways(found.home)
+        if back == 0.0 and _cut_off(found.roadmap, lengths, skipped):
+            break
+        more = fill(judge, found.roadmap, lengths, skipped, rng, taste)
+        if more is None:
+            break
+        home = _same_node(found.roadmap, more, found.home)
+        again = search(judge, more, home, level.rounds)
+        if again is None or not again.missing < found.missing:
+            break
+        found = again
+    return found
+
+
+def _cut_off(roadmap: Roadmap, lengths: FloatArray, skipped: tuple[int, ...]) -> bool:
+    """Whether there are nodes in the stretches not drawn that no way leads to."""
+    for k in skipped:
+        tip = roadmap.route.layers[k]
+        nodes = slice(roadmap.tip_nodes[tip], roadmap.tip_nodes[tip + 1])
+        if not np.isfinite(lengths[nodes]).all():
+            return True
+    return False
+
+
+def _same_node(before: Roadmap, after: Roadmap, node: int) -> int:
+    """The number of a node in an extended roadmap."""
+    return int(after.index[before.tip(node) * after.shapes.size + before.shape(node)])

@@ -1,0 +1,99 @@
+"""Where the motion starts: the node of the arm as it stands."""
+
+import numpy as np
+
+from vdsm_pin.errors import LimitExceeded, NoPlanFound, PathBlocked
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.planner.fewest.bounds import culprit
+from vdsm_pin.planner.fewest.clear import Judge
+from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste, extended
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
+
+EXITS = 24
+"""Nodes tried as the first step away from the start."""
+
+
+def start_offsets(problem: PlanningProblem) -> FloatArray:
+    """Offsets D_1..D_{N+1} of the arm at the start, shape (N + 1, 2); [m].
+
+    Raises:
+        NoPlanFound: If a link leans backwards, where the chart ends.
+    """
+    arm, path = problem.manipulator, problem.path
+    if path.start_joints is None:
+        return np.zeros((arm.n_links + 1, 2))
+    joints = path.start_joints[None]
+    centres = joint_centres(arm, joints[:, 0], joints[:, 1::2], joints[:, 2::2])[0]
+    if not (np.diff(centres[:, 0]) > 0.0).all():
+        link = int(np.argmin(np.diff(centres[:, 0]))) + 1
+        message = f"link {link} leans backwards at the start; the chart ends there"
+        raise NoPlanFound(message)
+    line = centres[-1, 1:] * arm.ratios[:, None]
+    offsets = centres[:, 1:] - line
+    offsets[[0, -1]] = 0.0
+    return np.asarray(offsets)
+
+
+def with_start(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, int]:
+    """The roadmap with the start as a node, tied to what can be reached from it.
+
+    Raises:
+        PathBlocked: If the arm at the start is not clear.
+        LimitExceeded: If it breaks a limit.
+        NoPlanFound: If no node can be reached from it.
+    """
+    if judge.problem.path.start_joints is None and roadmap.index[0] >= 0:
+        return roadmap, int(roadmap.index[0])
+    offsets = start_offsets(judge.problem)[None]
+    tip = roadmap.route.tips[:1]
+    room, _, bend = judge.look(tip, offsets)
+    _check_start(judge, tip, offsets, float(room[0]), float(bend[0]))
+    shapes = roadmap.shapes
+    nodes = np.arange(roadmap.tip_nodes[0], roadmap.tip_nodes[1])
+    shape = roadmap.node[nodes] % shapes.size
+    there = shapes.offsets(
+        judge.problem.manipulator, np.broadcast_to(tip, (len(nodes), 3)), shape
+    )
+    gap = np.abs(there - offsets).max(axis=(1, 2))
+    near = np.argsort(gap, kind="stable")[:EXITS]
+    every = np.broadcast_to(tip, (len(near), 3))
+    lines = Intervals(
+        every, every, np.broadcast_to(offsets, there[near].shape), there[near]
+    )
+    # The start may be closer than the margin asks for; the way out only gets better.
+    need = np.minimum(judge.required, float(room[0])) * np.ones(len(near))
+    good = judge.clear(lines, need) if len(near) else np.zeros(0, bool)
+    if not good.any():
+        message = "no way out of the start was found"
+        raise NoPlanFound(message)
+    ids = np.full(int(good.sum()), shapes.size)
+    links = np.column_stack([ids, shape[near[good]], gap[near[good]]])
+    more = extended(
+        roadmap, np.zeros(1, dtype=np.int64), judge.bends(tip, offsets), room,
+        shapes.with_grown(offsets, links), judge.required, taste, judge.limit,
+    )  # fmt: skip
+    return more, int(more.index[shapes.size])
+
+
+def _check_start(
+    judge: Judge, tip: FloatArray, offsets: FloatArray, room: float, bend: float
+) -> None:
+    problem = judge.problem
+    if not bend <= problem.manipulator.max_link_angle + TOLERANCES.joint_limit:
+        limit = float(np.rad2deg(problem.manipulator.max_link_angle))
+        raise LimitExceeded(
+            sample=0, quantity="psi", value=float(np.rad2deg(bend)), limit=limit,
+            unit="deg",
+        )  # fmt: skip
+    if not room >= problem.required_clearance:
+        still = Intervals(tip, tip, offsets, offsets)
+        centres = still.centres(problem.manipulator, np.zeros(1, int), np.zeros(1))[0]
+        link, obstacle, gap = culprit(problem, centres)
+        reason = (
+            f"the arm at its start has {gap * 1e3:.3f} mm from link {link} to it, "
+            f"required are {problem.required_clearance * 1e3:.3f} mm"
+        )
+        raise PathBlocked(obstacle=obstacle, reason=reason)
