@@ -105,10 +105,16 @@ def verify(
     if certificate is not None:
         check_output_file(certificate)
     errors = error_box(joint_error_deg, base_error_mm, obstacle_error_mm)
-    file = verify_to_folder(
+    verified = verify_to_folder(
         Order(read_problem(problem), trajectory, out, context.obj, errors, certificate)
     )
+    file = verified.file
     show_verification(file, out)
+    if certificate is not None:
+        written = file.verdict == "certified"
+        typer.echo(
+            f"  certificate: {certificate if written else 'none, not certified'}"
+        )
     raise typer.Exit(PASSED if outcome(file.verdict).passed else NOT_PASSED)
 
 
@@ -264,7 +270,7 @@ def urdf(
 )
 def check_certificate(
     certificate: Annotated[Path, typer.Argument(metavar="FILE")],
-    problem: Annotated[Path, typer.Argument(metavar="PROBLEM")],
+    problem: Problem,
     trajectory: Annotated[Path, typer.Argument(metavar="TRAJECTORY")],
 ) -> None:
     """Recheck a certificate.
@@ -272,8 +278,10 @@ def check_certificate(
     The checker is a second program that shares no code with the verifier.
     """
     from vdsm_pin.certificate_checker import main as check
+    from vdsm_pin.io.problem_file import find_problem
 
-    raise typer.Exit(check([str(certificate), str(problem), str(trajectory)]))
+    file = find_problem(problem)
+    raise typer.Exit(check([str(certificate), str(file), str(trajectory)]))
 
 
 @app.command(

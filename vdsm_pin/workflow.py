@@ -22,8 +22,9 @@ from vdsm_pin.report.run_record import RunRecord, sha256_of
 from vdsm_pin.report.tables import ClearanceCsv, write_cables, write_link_angles
 from vdsm_pin.robot_model import RobotModel, load_robot
 from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
 from vdsm_pin.verification.clearance import all_pairs
-from vdsm_pin.verification.records import ErrorBox, Verdict
+from vdsm_pin.verification.records import ErrorBox, Verdict, Verification
 from vdsm_pin.verification.verify import verify
 
 TRAJECTORY: Final = "trajectory.csv"
@@ -42,7 +43,7 @@ class Order:
         folder: Where the results go.
         command: The exact command line, for the report.
         errors: The error box the proof shall cover.
-        certificate: Where the certificate goes; None for none.
+        certificate: Where the certificate of a certified motion goes; None for none.
     """
 
     source: ProblemFile
@@ -51,6 +52,14 @@ class Order:
     command: str
     errors: ErrorBox = field(default_factory=ErrorBox)
     certificate: Path | None = None
+
+
+@dataclass(frozen=True)
+class Verified:
+    """A verification as records and as what verification.json says."""
+
+    file: VerificationFile
+    records: Verification
 
 
 def error_box(joint_deg: float, base_mm: float, obstacle_mm: float) -> ErrorBox:
@@ -96,7 +105,7 @@ def plan_to_folder(
     return file
 
 
-def verify_to_folder(order: Order) -> VerificationFile:
+def verify_to_folder(order: Order) -> Verified:
     """Verify a trajectory file and write every result of it.
 
     Raises:
@@ -123,7 +132,10 @@ def verify_to_folder(order: Order) -> VerificationFile:
         file = verification_file(verification, record)
         (aside / VERIFICATION).write_text(file.text(), encoding="utf-8")
         write_report(aside / REPORT, verification, file, planned_by(order.trajectory))
-    return file
+        # Last inside: a certificate that cannot be written leaves no half of a result.
+        if order.certificate is not None and verification.verdict is Verdict.CERTIFIED:
+            write_certificate(order.certificate, verification, _certified(record))
+    return Verified(file, verification)
 
 
 def planned_by(trajectory: Path) -> PlanFile | None:
@@ -135,6 +147,14 @@ def planned_by(trajectory: Path) -> PlanFile | None:
         return None
     same = plan.hashes.trajectory_sha256 == sha256_of(trajectory)
     return plan if same else None
+
+
+def _certified(record: RunRecord) -> Hashes:
+    return Hashes(
+        problem=record.problem_sha256,
+        trajectory=record.trajectory_sha256,
+        urdf=record.urdf_sha256,
+    )
 
 
 def _record(order: Order, robot: RobotModel) -> RunRecord:

@@ -15,6 +15,7 @@ from vdsm_pin.errors import Infeasible, VdsmError
 from vdsm_pin.io.problem_file import ProblemFile, read_problem
 from vdsm_pin.report.facts import batch_row
 from vdsm_pin.report.files import BatchRow, ManifestFile
+from vdsm_pin.report.picture import picture
 from vdsm_pin.report.run_record import sha256_of, versions
 from vdsm_pin.workflow import TRAJECTORY, Order, plan_to_folder, verify_to_folder
 
@@ -158,5 +159,7 @@ def _short_hash(problem: str) -> str:
 def _plan_and_verify(task: Task, source: ProblemFile) -> BatchRow:
     plan_to_folder(source, task.strategy, task.aside, task.command)
     order = Order(source, task.aside / TRAJECTORY, task.aside, task.command)
-    file = verify_to_folder(order)
-    return batch_row(task.folder, task.strategy, file)
+    verified = verify_to_folder(order)
+    drawing = picture(verified.records)
+    (task.aside / "picture.svg").write_text(drawing, encoding="utf-8")
+    return batch_row(task.folder, task.strategy, verified.file)

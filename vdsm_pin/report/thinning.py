@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.trajectory import Trajectory
 
 MOST_ROWS: Final = 2_000
@@ -42,13 +42,12 @@ class Thinned:
             Shape (k - 1, m), or one row where one row is shown.
         """
         if len(self.rows) < 2:
-            return bins.min(axis=0, keepdims=True)
+            return frozen(bins.min(axis=0, keepdims=True))
         start = np.searchsorted(first, self.rows[:-1], side="right") - 1
         end = np.searchsorted(first, self.rows[1:], side="left")
         padded = np.vstack([bins, np.full((1, bins.shape[1]), np.inf)])
         edges = np.stack([start, end], axis=1).ravel()
-        least: FloatArray = np.minimum.reduceat(padded, edges, axis=0)[::2]
-        return least
+        return frozen(np.minimum.reduceat(padded, edges, axis=0)[::2])
 
 
 def thinned(trajectory: Trajectory, keep: IntArray) -> Thinned:

@@ -1,0 +1,221 @@
+"""Oracle: the bytes of whole folders, compared between runs; the exit status.
+
+Timing files are the only ones that may differ.
+"""
+
+import fcntl
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import junitparser
+import pytest
+from problem_files import NEAR, OUT_OF_REACH, write_problem
+
+from vdsm_pin.batch.run import Batch, expanded, run_batch
+from vdsm_pin.batch.task import folder_names
+from vdsm_pin.errors import InvalidFile, InvalidInput, UnknownName
+from vdsm_pin.report.tables import read_summary
+
+NAMES = ("good", "other", "far", "bad")
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    """Every file but the timings, by its path in the folder."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name not in ("timing.json", "timing.js", ".lock")
+    }
+
+
+@pytest.fixture(scope="module")
+def problems(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of problem files: two to solve, one without a plan, one broken."""
+    folder = tmp_path_factory.mktemp("problems")
+    write_problem(folder / "good.yaml", NEAR)
+    write_problem(folder / "other.yaml", NEAR.replace("[2000, 900", "[2100, 950"))
+    write_problem(folder / "far.yaml", OUT_OF_REACH)
+    write_problem(folder / "bad.yaml", "vdsm_problem: 1\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def reference(problems: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The batch done once, by one process."""
+    folder = tmp_path_factory.mktemp("reference") / "out"
+    run_batch(Batch((str(problems),), folder, "paper"))
+    return folder
+
+
+def command(problems: Path, out: Path, *more: str) -> list[str]:
+    words = ["batch", str(problems), "--out", str(out), "--strategy", "paper"]
+    return [sys.executable, "-m", "vdsm_pin", *words, *more]
+
+
+def test_every_problem_has_its_row_and_its_folder(reference: Path) -> None:
+    rows = {row.folder: row for row in read_summary(reference / "summary.csv")}
+    outcomes = {name: row.outcome for name, row in rows.items()}
+    assert outcomes == {
+        "good": "certified",
+        "other": "certified",
+        "far": "infeasible",
+        "bad": "error",
+    }
+    assert "reach" in rows["far"].reason
+    assert "bad.yaml" in rows["bad"].reason
+    for name in ("good", "other"):
+        assert (reference / name / "report.html").is_file()
+        assert (reference / name / "picture.svg").is_file()
+    assert {p.name for p in (reference / "far").iterdir()} == {
+        "manifest.json",
+        "timing.json",
+    }
+    (suite,) = junitparser.JUnitXml.fromfile(str(reference / "junit.xml"))
+    assert (suite.tests, suite.failures, suite.errors) == (4, 1, 1)
+    assert not (reference / ".unfinished").exists()
+
+
+def test_jobs_and_order_change_no_byte(
+    problems: Path, reference: Path, tmp_path: Path
+) -> None:
+    files = [str(problems / f"{name}.yaml") for name in NAMES]
+    run_batch(Batch(tuple(reversed(files)), tmp_path / "out", "paper", jobs=2))
+    assert tree(tmp_path / "out") == tree(reference)
+
+
+def test_resuming_keeps_what_is_intact_and_mends_the_rest(
+    problems: Path, reference: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(reference, out)
+    spoilt = out / "other" / "cables.csv"
+    spoilt.write_bytes(spoilt.read_bytes().replace(b"1", b"2", 1))
+    (out / "summary.csv").unlink()
+    run_batch(Batch((str(problems),), out, "paper", resume=True))
+    kept = {line.split()[4] for line in capsys.readouterr().out.splitlines()
+            if "(kept)" in line}  # fmt: skip
+    assert kept == {"good", "far"}
+    assert tree(out) == tree(reference)
+
+
+def kill_once(words: list[str], moment: float) -> bool:
+    """Start the batch, kill -9 it after a while; whether it was still at work."""
+    with subprocess.Popen(words, stdout=subprocess.DEVNULL) as process:
+        try:
+            process.wait(timeout=moment)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            return True
+    return False
+
+
+def check_kills(problems: Path, reference: Path, out: Path, rounds: int) -> int:
+    rng = random.Random(rounds)
+    killed = 0
+    for _ in range(rounds):
+        shutil.rmtree(out, ignore_errors=True)
+        words = command(problems, out, "--jobs", "2", "--resume")
+        killed += kill_once(words, rng.uniform(0.3, 9.0))
+        ran = subprocess.run(words, capture_output=True, text=True, check=False)
+        assert ran.returncode == 1, ran.stderr
+        assert tree(out) == tree(reference)
+    return killed
+
+
+def test_killed_and_resumed_is_the_same_to_the_byte(
+    problems: Path, reference: Path, tmp_path: Path
+) -> None:
+    assert check_kills(problems, reference, tmp_path / "out", 1) <= 1
+
+
+@pytest.mark.slow
+def test_killed_fifty_times_and_resumed_is_the_same_to_the_byte(
+    problems: Path, reference: Path, tmp_path: Path
+) -> None:
+    assert check_kills(problems, reference, tmp_path / "out", 50) >= 10
+
+
+def test_ctrl_c_ends_with_what_is_done(problems: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with subprocess.Popen(
+        command(problems, out),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60.0)
+    assert process.returncode == 130
+    assert "--resume does the rest" in said
+    assert "Traceback" not in said
+    assert 1 <= len(read_summary(out / "summary.csv")) < len(NAMES)
+    assert not (out / ".unfinished").exists()
+
+
+def test_a_time_limit_makes_a_row(problems: Path, tmp_path: Path) -> None:
+    file = str(problems / "good.yaml")
+    (row,) = run_batch(Batch((file,), tmp_path, "paper", time_limit=0.01))
+    assert (row.outcome, row.folder) == ("timeout", "good")
+    assert (tmp_path / "good" / "manifest.json").is_file()
+
+
+def test_what_is_not_a_result_is_never_overwritten(
+    problems: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "good").mkdir()
+    (tmp_path / "good" / "thesis.txt").write_text("mine")
+    with pytest.raises(InvalidFile, match="nothing was overwritten"):
+        run_batch(Batch((str(problems),), tmp_path, "paper"))
+    assert [p.name for p in tmp_path.iterdir()] == ["good"]
+    with pytest.raises(UnknownName, match="strategy"):
+        run_batch(Batch((str(problems),), tmp_path / "x", "luck"))
+    assert not (tmp_path / "x").exists()
+
+
+def test_two_batches_do_not_share_a_folder(problems: Path, tmp_path: Path) -> None:
+    with (tmp_path / ".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        with pytest.raises(InvalidInput, match="another batch"):
+            run_batch(Batch((str(problems),), tmp_path, "paper"))
+
+
+def test_names_of_folders_depend_on_nothing_but_the_problem(tmp_path: Path) -> None:
+    names = folder_names(("paper/obs1", "a/x.yaml", "b/x.yaml", "y.yml", "../..yaml"))
+    assert names["paper/obs1"] == "paper-obs1"
+    assert names["y.yml"] == "y"
+    assert names["a/x.yaml"].startswith("x-")
+    assert len(set(names.values())) == 5
+    assert names == folder_names(tuple(reversed(names)))
+    assert all("/" not in n and not n.startswith(".") for n in names.values())
+
+
+def test_folders_and_built_ins_expand_in_order(problems: Path, tmp_path: Path) -> None:
+    assert "paper/obs1" in expanded(())
+    inside = expanded((str(problems), str(problems / "good.yaml")))
+    assert [Path(p).stem for p in inside] == ["bad", "far", "good", "other"]
+    with pytest.raises(InvalidFile, match="holds no"):
+        expanded((str(tmp_path),))
+
+
+def test_no_process_outlives_a_killed_batch(problems: Path, tmp_path: Path) -> None:
+    words = command(problems, tmp_path / "out", "--jobs", "1")
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        if not children.exists():
+            pytest.skip("the system does not list children")
+        workers = [int(pid) for pid in children.read_text().split()]
+        process.kill()
+    assert workers
+    until = time.monotonic() + 20.0
+    while any(Path(f"/proc/{pid}/exe").exists() for pid in workers):
+        assert time.monotonic() < until, "a worker lives on"
+        time.sleep(0.1)
