@@ -1,0 +1,204 @@
+"""The paper's numbers beside ours: certified plans of the strategy `paper`.
+
+    python analysis/paper_table.py --out reports/paper
+
+Writes `table.json` and `table.md`. "Paper says" is quoted from the text, with its
+section; "we get" comes from the certified plan and its verification.
+"""
+
+import argparse
+import json
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.kinematics import link_angles
+from vdsm_pin.manipulator import built_in
+from vdsm_pin.planner.feasibility import curled_reach, straight_reach
+from vdsm_pin.refinement import Refinement, plan_and_verify
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.robust import largest_joint_error
+
+SCENES: Final = ("free", "obs1", "obs2", "obs2-small", "obs3")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One number or statement of the paper and ours.
+
+    Args:
+        scene: The environment.
+        quantity: What is compared, with its unit.
+        paper: What the paper says, and where.
+        ours: What we get.
+    """
+
+    scene: str
+    quantity: str
+    paper: str
+    ours: str
+
+
+PAPER: Final = {
+    ("free", "psi"): "32 (6.2.3)",
+    ("obs1", "psi"): "39 (6.2.3)",
+    ("obs2", "psi"): "42 (6.2.3)",
+    ("obs2-small", "psi"): "42 (6.2.3)",
+    ("obs3", "psi"): "30 (6.2.3)",
+    ("free", "x0 min"): "-98 (6.2.3)",
+    ("obs1", "x0 min"): "-98 (6.2.3)",
+    ("obs3", "x0 min"): "-98 (6.2.3)",
+    ("free", "x0 max"): "465 (6.2.3)",
+    ("obs1", "x0 max"): "one of 465, 538, 591 over the scenes (6.2.3)",
+    ("obs2", "x0 max"): "one of 465, 538, 591 over the scenes (6.2.3)",
+    ("obs2-small", "x0 max"): "one of 465, 538, 591 over the scenes (6.2.3)",
+    ("obs3", "x0 max"): "one of 465, 538, 591 over the scenes (6.2.3)",
+    ("obs1", "clearance"): "axis above 265 from the axis, so 3.5 at samples (6.3)",
+    ("obs2", "clearance"): "axis above 265 from the axis (6.3)",
+    ("obs2-small", "clearance"): "axis above 265 from the axis (6.3)",
+    ("obs3", "clearance"): "axis above 265 from the axis, so 3.5 at samples (6.3)",
+    ("free", "changed"): "psi1 (6.2.1)",
+    ("obs1", "changed"): "psi1, psi4..psi8; psi2 = psi3 = 0 always (6.2.3)",
+    ("obs2", "changed"): "psi1..psi8 (6.2.3)",
+    ("obs2-small", "changed"): "psi1..psi8 (6.2.3)",
+    ("obs3", "changed"): "psi1, psi4..psi6 (6.2.3)",
+    ("obs1", "A4"): "psi7, psi8 besides psi1 (6.2.2)",
+    ("obs1", "A5"): "psi4..psi8 besides psi1 (6.2.1)",
+    ("obs1", "A6"): "psi1, psi4, psi5, psi6 (6.2.1)",
+    ("obs1", "error"): "mostly within 0.3, up to about 4 (7)",
+    ("obs3", "error"): "mostly within 0.3, up to about 4 (7)",
+}
+"""What the paper says; a dash stands for nothing."""
+
+
+def changed(psi: FloatArray) -> str:
+    """The link angles above the threshold, in words; psi of shape (n, N); [rad]."""
+    joints = np.flatnonzero(psi.max(axis=0) > TOLERANCES.changed_angle) + 1
+    return ", ".join(f"psi{joint}" for joint in joints)
+
+
+def angles(psi: FloatArray) -> str:
+    """The link angles of one waypoint that are not zero; psi of shape (N,); [rad]."""
+    return ", ".join(
+        f"psi{i} = {np.rad2deg(value):.1f}"
+        for i, value in enumerate(psi, start=1)
+        if value > TOLERANCES.changed_angle
+    )
+
+
+def moments(trajectory: Trajectory, tip: FloatArray) -> dict[str, int]:
+    """Waypoints A4 and A5 (leaving and rejoining the path) and A6 (the far corner)."""
+    on = trajectory.on_path
+    left = np.flatnonzero(on[:-1] & ~on[1:])
+    joined = np.flatnonzero(~on[:-1] & on[1:]) + 1
+    corner = np.where(on, tip[:, 1] + tip[:, 2], -np.inf)
+    return {"A4": int(left[0]), "A5": int(joined[1]), "A6": int(np.argmax(corner))}
+
+
+def touching_error(result: Refinement) -> float:
+    """The largest joint error for which no contact is proved; [rad]."""
+    problem = replace(result.plan.problem, required_clearance=0.0)
+    trajectory, errors = result.plan.trajectory, result.verification.errors
+    return largest_joint_error(problem, trajectory, errors)
+
+
+def rows_of(scene: str, result: Refinement) -> list[Row]:
+    """Every row of one scene."""
+    trajectory, verification = result.plan.trajectory, result.verification
+    psi = link_angles(trajectory.alpha, trajectory.theta)
+    steps = np.abs(np.diff(trajectory.joints[:, 1:], axis=0))
+    ours = {
+        "psi": ("largest psi [deg]", f"{np.rad2deg(psi.max()):.2f}"),
+        "changed": ("link angles that change", changed(psi)),
+        "x0 min": ("x0 min [mm]", f"{trajectory.x0.min() * MM_PER_M:.1f}"),
+        "x0 max": ("x0 max [mm]", f"{trajectory.x0.max() * MM_PER_M:.1f}"),
+        "step": ("largest change per row [deg]", f"{np.rad2deg(steps.max()):.2f}"),
+        "coverage": ("path drawn [%]", f"{verification.coverage * 100.0:.2f}"),
+    }
+    if result.plan.problem.scene.obstacles:
+        near = min(one.lower for one in verification.closest if one.pair.obstacle)
+        ours["clearance"] = (
+            "smallest clearance, proved between samples too [mm]",
+            f"{near * MM_PER_M:.3f}",
+        )
+        error = np.rad2deg(touching_error(result))
+        ours["error"] = ("joint error without contact, proved [deg]", f"{error:.3f}")
+    if scene == "obs1":
+        for name, row in moments(trajectory, result.plan.tip_path.points).items():
+            ours[name] = (
+                f"link angles not zero at {name}",
+                changed(psi[row : row + 1]),
+            )
+    return [
+        Row(scene, name, PAPER.get((scene, key), "-"), value)
+        for key, (name, value) in ours.items()
+    ]
+
+
+def reach_rows() -> list[Row]:
+    """Step 1: the reach by Eq. 4, and what the straight arm reaches."""
+    arm = built_in("hrm8")
+    return [
+        Row(
+            "-",
+            "reach with every joint at its limit, Eq. 4 [mm]",
+            "2966 (3.2)",
+            f"{curled_reach(arm) * MM_PER_M:.2f}",
+        ),
+        Row(
+            "-",
+            "reach of the straight arm within psi1 [mm]",
+            "-",
+            f"{straight_reach(arm) * MM_PER_M:.2f}",
+        ),
+    ]
+
+
+def table() -> list[Row]:
+    """All rows."""
+    rows = reach_rows()
+    for scene in SCENES:
+        problem = read_problem(f"paper/{scene}").problem
+        robot = load_robot(problem.manipulator)
+        rows += rows_of(scene, plan_and_verify(problem, "paper", robot))
+    return rows
+
+
+def markdown(rows: list[Row]) -> str:
+    """The table for reading."""
+    lines = [
+        "# The paper's numbers and ours",
+        "",
+        "Plans of the strategy `paper` at 10 mm spacing, certified; made by",
+        "`python analysis/paper_table.py --out reports/paper`. Section numbers are the",
+        "paper's; the reasons for differences are in `docs/paper.md`.",
+        "",
+        "| scene | quantity | paper says | we get |",
+        "|---|---|---|---|",
+    ]
+    lines += [f"| {r.scene} | {r.quantity} | {r.paper} | {r.ours} |" for r in rows]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Write both files and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("reports/paper"))
+    folder = parser.parse_args().out
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = table()
+    text = json.dumps([asdict(row) for row in rows], indent=1) + "\n"
+    (folder / "table.json").write_text(text, encoding="utf-8")
+    (folder / "table.md").write_text(markdown(rows), encoding="utf-8")
+    print(markdown(rows))
+
+
+if __name__ == "__main__":
+    main()
