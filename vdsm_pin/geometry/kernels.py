@@ -24,6 +24,9 @@ BRACKET: Final = 11
 """Layout of a bracket: lower, upper, n (3), point of the points' hull (3), point of the
 piece (3); n is a unit vector from the hull to the piece."""
 
+ALIGNED: Final = 1e-14
+"""Sine below which a direction counts as that of a cylinder's axis; [-]."""
+
 MAX_STEPS: Final = 60
 """Largest number of supports tried; 5 to 15 are usual."""
 
@@ -52,9 +55,13 @@ def piece_support(
         a, c = pieces.axis[p], pieces.centre[p]
         along = nx * a[0] + ny * a[1] + nz * a[2]
         qx, qy, qz = nx - along * a[0], ny - along * a[1], nz - along * a[2]
+        # Where n is nearly the axis q is mostly rounding, even along the axis: taken
+        # across it again, or dropped, so that the point lies in the solid.
+        rest = qx * a[0] + qy * a[1] + qz * a[2]
+        qx, qy, qz = qx - rest * a[0], qy - rest * a[1], qz - rest * a[2]
         across = sqrt(qx * qx + qy * qy + qz * qz)
         shift = pieces.extent[p] if along < 0.0 else -pieces.extent[p]
-        turn = pieces.radius[p] / across if across > 0.0 else 0.0
+        turn = pieces.radius[p] / across if across > ALIGNED * abs(along) else 0.0
         point[0] = c[0] + shift * a[0] - turn * qx
         point[1] = c[1] + shift * a[1] - turn * qy
         point[2] = c[2] + shift * a[2] - turn * qz
