@@ -9,7 +9,7 @@ links l, l + 1, ...
 from math import cos, sin
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.compiled import apart, compiled
 
 
 @compiled
@@ -31,6 +31,7 @@ def place(
         centres: Result, shape (N + 1, 3); [m].
         frames: Result R_base_link, shape (N, 3, 3); [-].
     """
+    apart()
     centres[0, 0], centres[0, 1], centres[0, 2] = x0, 0.0, 0.0
     for link in range(lengths.size):
         ca, sa = cos(alpha[link]), sin(alpha[link])
@@ -93,6 +94,7 @@ def bends_and_drifts(
             rest, at [f, j], shape (N + 1, N + 1); [m].
         drifts: Result D, bound of the rate of the sway of O_j, at [f, j]; [m].
     """
+    apart()
     for f in range(lengths.size):
         turning = bend = drift = 0.0
         bends[f, f] = drifts[f, f] = 0.0
@@ -136,6 +138,7 @@ def sway(
         f: First joint that errs.
         j: Joint centre.
     """
+    apart()
     total = 0.0
     for joint in range(f, j):
         arm = centres[j] - centres[joint]

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
 import numba
+from numba.extending import intrinsic
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -61,3 +62,18 @@ def compiled(function: F) -> F:
         return cast(F, jit(function))
     finally:
         config.CACHE_DIR = before
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def apart(typing_context: Any) -> Any:
+    """Called in a compiled function, keeps it from being copied into its callers.
+
+    Without it every large function is optimised again inside every other one, and
+    compiling takes minutes.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        builder.function.attributes.add("noinline")
+        return context.get_dummy_value()
+
+    return numba.types.void(), generate

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.pieces import CYLINDER, HALF_SPACE, PackedPieces
 from vdsm_pin.geometry.simplex import nearest
 
@@ -51,6 +51,7 @@ def piece_support(
     Returns:
         The least value.
     """
+    apart()
     if pieces.kind[p] == CYLINDER:
         a, c = pieces.axis[p], pieces.centre[p]
         along = nx * a[0] + ny * a[1] + nz * a[2]
@@ -109,6 +110,8 @@ def points_support(
 def _half_space_bracket(
     pieces: PackedPieces, p: int, points: FloatArray, count: int, out: FloatArray
 ) -> None:
+    """The exact distance to a half-space."""
+    apart()
     n = pieces.axis[p]
     near = out[NEAR:FAR]
     high = points_support(points, count, -n[0], -n[1], -n[2], near)
@@ -184,6 +187,7 @@ def _iterate(
     out: FloatArray,
 ) -> None:
     """Core distance, from the direction in `out`; a bracket is left in `out`."""
+    apart()
     weights = out[BRACKET : BRACKET + 4]
     nx, ny, nz = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
     out[LOWER], out[UPPER] = -np.inf, np.inf
@@ -234,6 +238,7 @@ def bracket(
             zero; on return the bracket. Where the bodies meet both bounds are below or
             at 0 and only their sign is meant; `lower` may be far below `upper`.
     """
+    apart()
     if pieces.kind[p] == HALF_SPACE:
         _half_space_bracket(pieces, p, points, count, out)
         return

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import (
     BRACKET,
     LOWER,
@@ -87,6 +87,7 @@ def obstacle_bracket(
             the least upper bound over the pieces, with n of the former and the witness
             points of the latter.
     """
+    apart()
     root = pieces.root[obstacle]
     first = pieces.node_range[root, 0]
     if pieces.node_range[root, 1] - first == 1:
@@ -131,6 +132,7 @@ def facing(pieces: PackedPieces, node: int, points: FloatArray, n: FloatArray) -
     Returns:
         Whether there is such a direction.
     """
+    apart()
     low, high = pieces.node_low[node], pieces.node_high[node]
     span = along = 0.0
     for c in range(3):
@@ -175,6 +177,7 @@ def push_children(
     waiting: int,
 ) -> int:
     """Push both children, the nearer one last so that it is seen first."""
+    apart()
     left, right = node + 1, pieces.node_right[node]
     left_gap = box_distance(pieces, left, low, high)
     right_gap = box_distance(pieces, right, low, high)

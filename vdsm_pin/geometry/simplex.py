@@ -5,7 +5,7 @@ Nothing here has to be exact: it only proposes a plane and two witness points.
 """
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.compiled import apart, compiled
 
 
 @compiled
@@ -42,6 +42,7 @@ def on_triangle(
     w: FloatArray, i: int, j: int, k: int
 ) -> tuple[float, float, float, float]:
     """Weights of the corners and the squared distance, by Voronoi regions."""
+    apart()
     ii, jj, kk = _dot(w, i, i), _dot(w, j, j), _dot(w, k, k)
     ij, ik, jk = _dot(w, i, j), _dot(w, i, k), _dot(w, j, k)
     # Projections of the origin on the edges, seen from each corner.
@@ -103,6 +104,7 @@ def nearest(w: FloatArray, m: int, weights: FloatArray) -> None:
         m: 1 to 4.
         weights: Result, shape (4,), not negative, sum 1; 0 beyond m.
     """
+    apart()
     weights[:] = 0.0
     if m == 1:
         weights[0] = 1.0

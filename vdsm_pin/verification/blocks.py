@@ -4,9 +4,9 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.compiled import compiled
-from vdsm_pin.geometry.kernels import FAR, LOWER, NEAR, NORMAL, UPPER
+from vdsm_pin.geometry.compiled import apart, compiled
+from vdsm_pin.geometry.kernels import BRACKET, FAR, LOWER, NEAR, NORMAL, UPPER
+from vdsm_pin.verification.coasting import POINT, SUPPORT, WIDTH, coast
 from vdsm_pin.verification.culling import cull
 from vdsm_pin.verification.search import (
     CERTIFIED,
@@ -25,31 +25,22 @@ from vdsm_pin.verification.search import (
 from vdsm_pin.verification.slices import (
     BASE,
     Ends,
-    load_points,
     losses,
     obstacle_support,
-    reach_along,
     slice_bound,
 )
 from vdsm_pin.verification.sweep import (
     BLOCK,
-    POINT,
-    SUPPORT,
-    WIDTH,
     Desk,
     Results,
     Rows,
     fill_rows,
-    note,
-    stale_upper,
+    note_block,
+    surface_points,
 )
 
 FEW: Final = 8
 """Up to so many obstacles nothing is culled and every bracket is narrow."""
-
-SLACK: Final = 0.05
-"""A bracket is renewed where it is wider than this part of the clearance, and wider
-than twice what it was when its plane was found."""
 
 
 @compiled
@@ -85,54 +76,40 @@ def _subdivide(
     local: int,
     pair: int,
 ) -> int:
-    """Decide an interval by subdivision and record it; returns the verdict."""
+    """Decide an interval by subdivision; writes its run and returns the verdict."""
+    apart()
     row, witness = np.zeros(SLICE), new_witness()
     row[INTERVAL], row[PAIR], row[END] = k, pair, 1.0
     verdict, count = resolve(
         task, motion, desk.ends, desk.space, desk.heap, row, witness
     )
     results.tally[1] += count
-    lower, upper, time = row[KEY], witness.value[0], witness.value[1]
+    run, time = desk.runs[local], witness.value[1]
+    run[0], run[1], run[2], run[9] = row[KEY], witness.value[0], time, 1.0
     group = 0 if task.pairs.frame[pair] == BASE else 1
     results.limit[group] = min(results.limit[group], witness.value[2])
     row[START] = row[END] = time
     bound_between(task, motion, desk.ends, desk.space, row)
-    note(
+    surface_points(
         task,
-        results,
-        desk.ends,
-        k,
-        local,
-        pair,
-        lower,
-        upper,
-        time,
-        verdict,
+        desk.ends.centres[0],
+        desk.ends.frames[0],
+        task.pairs.frame[pair],
         witness.points,
+        run[3:9],
     )
     desk.planes[pair, SUPPORT] = -np.inf
     return verdict
 
 
 @compiled
-def _renew(
-    task: Task,
-    desk: Desk,
-    results: Results,
-    ends: Ends,
-    rows: Rows,
-    local: int,
-    pair: int,
-    core: FloatArray,
-) -> tuple[float, float, float]:
-    """A new plane and witness for a pair.
-
-    Returns:
-        Lower bound over the interval, upper bound and its time.
-    """
-    space, plane = desk.space, desk.planes[pair]
+def _renew(task: Task, desk: Desk, results: Results, local: int, pair: int) -> None:
+    """A new plane and witness for a pair, and the run of the interval they are for."""
+    apart()
+    space, plane, run = desk.space, desk.planes[pair], desk.runs[local]
     obstacle = task.pairs.obstacle[pair]
     space.out[NORMAL:NEAR] = plane[:3]
+    ends = _interval(desk.rows, local)
     slice_bound(task.pieces, task.pairs, task.rules, ends, space, pair, 1.0)
     lower, n = space.out[LOWER], space.out[NORMAL:NEAR].copy()
     start = end = -np.inf
@@ -141,20 +118,18 @@ def _renew(
         start = max(start, n[0] * p[0] + n[1] * p[1] + n[2] * p[2])
         end = max(end, n[0] * q[0] + n[1] * q[1] + n[2] * q[2])
     time = 1.0 if end > start else 0.0
-    at = _instant(rows, local + int(time))
+    at = _instant(desk.rows, local + int(time))
     slice_bound(task.pieces, task.pairs, task.rules, at, space, pair, 0.0)
     upper = space.out[UPPER] - task.rules.radius + task.rules.pad
     group = 0 if task.pairs.frame[pair] == BASE else 1
     results.limit[group] = min(results.limit[group], space.out[LOWER])
-    core[0], core[1] = space.out[NEAR:FAR], space.out[FAR : FAR + 3]
-    first, last = (
-        task.pieces.first_piece[obstacle],
-        task.pieces.first_piece[obstacle + 1],
-    )
-    plane[:3], plane[POINT:WIDTH] = n, core[1]
+    run[0], run[1], run[2], run[9] = lower, upper, time, 0.0
+    run[3:9] = space.out[NEAR:BRACKET]
+    first = task.pieces.first_piece[obstacle]
+    last = task.pieces.first_piece[obstacle + 1]
+    plane[:3], plane[POINT:WIDTH] = n, space.out[FAR:BRACKET]
     plane[SUPPORT] = obstacle_support(task.pieces, first, last, n, space.scratch[0])
     plane[WIDTH] = upper - lower
-    return lower, upper, time
 
 
 @compiled
@@ -165,7 +140,6 @@ def _sweep_pair(
     results: Results,
     first: int,
     count: int,
-    offset: int,
     pair: int,
     hasty: bool,
 ) -> bool:
@@ -174,57 +148,58 @@ def _sweep_pair(
     Args:
         task: The scene, pairs and rules.
         motion: Rows of joint values.
-        desk: Working space, its rows filled.
-        results: Where to write.
+        desk: Working space, its rows filled; its runs are written.
+        results: For the least bounds.
         first: First interval of the block.
         count: Intervals in the block.
-        offset: Row of `first` in the dense results.
         pair: The pair.
         hasty: Whether to stop at the first interval that is not proved.
     """
-    link, frame = task.pairs.link[pair], task.pairs.frame[pair]
-    required, rules = task.pairs.required[pair], task.rules
-    plane, lost = desk.planes[pair], losses(task.rules, frame)
-    core, group = np.zeros((2, 3)), 0 if frame == BASE else 1
-    for local in range(count):
-        ends = _interval(desk.rows, local)
-        load_points(ends, desk.space, link, frame)
-        n, time = plane[:3], 0.0
-        reach = reach_along(rules, ends, desk.space, link, frame, n, 1.0)
-        lower = plane[SUPPORT] - reach - lost
-        core[1] = plane[POINT:WIDTH]
-        upper = stale_upper(desk.space.points, core[1], core[0])
-        upper += rules.pad - rules.radius
-        allowed = 2.0 * plane[WIDTH] + SLACK * upper
-        threshold = max(required, results.limit[group] - results.gap)
-        if not (lower >= threshold and upper - lower <= allowed):
-            lower, upper, time = _renew(
-                task, desk, results, ends, desk.rows, local, pair, core
+    apart()
+    rows, rules, frame = desk.rows, task.rules, task.pairs.frame[pair]
+    required, group = task.pairs.required[pair], 0 if frame == BASE else 1
+    lost, rise = losses(rules, frame), rules.pad - rules.radius
+    errors = np.array([rules.joint_error, rules.base_error])
+    nominal = rules.joint_error + rules.base_error + rules.obstacle_error == 0.0
+    local = 0
+    while True:
+        limit = results.limit[group : group + 1]
+        threshold = max(required, limit[0] - results.gap)
+        local = coast(
+            rows.centres,
+            rows.frames,
+            rows.bends,
+            rows.drifts,
+            rules.lengths,
+            task.pairs.link[pair],
+            frame,
+            desk.planes[pair],
+            errors,
+            lost,
+            rise,
+            threshold,
+            limit if nominal else np.full(1, -np.inf),
+            desk.space.scratch,
+            desk.runs,
+            local,
+            count,
+        )
+        if local == count:
+            return True
+        _renew(task, desk, results, local, pair)
+        desk.verdicts[local] = CERTIFIED
+        if not desk.runs[local, 0] >= required:
+            if hasty and desk.runs[local, 1] < required:
+                return False
+            verdict = _subdivide(
+                task, motion, desk, results, first + local, local, pair
             )
-        elif rules.joint_error + rules.base_error + rules.obstacle_error == 0.0:
-            results.limit[group] = min(results.limit[group], upper)
-        k = first + local
-        if lower >= required:
-            note(
-                task,
-                results,
-                ends,
-                k,
-                offset + local,
-                pair,
-                lower,
-                upper,
-                time,
-                CERTIFIED,
-                core,
-            )
-            continue
-        if hasty and upper < required:
-            return False
-        verdict = _subdivide(task, motion, desk, results, k, offset + local, pair)
-        if hasty and verdict != CERTIFIED:
-            return False
-    return True
+            desk.verdicts[local] = verdict
+            if hasty and verdict != CERTIFIED:
+                return False
+        local += 1
+        if local == count:
+            return True
 
 
 @compiled
@@ -258,8 +233,20 @@ def sweep(
         if n_obstacles > FEW:
             cull(task, desk, results, start, count, start - first, n_obstacles, near)
         for pair in range(n_pairs):
-            if near[pair] and not _sweep_pair(
-                task, motion, desk, results, start, count, start - first, pair, hasty
-            ):
+            if not near[pair]:
+                continue
+            desk.verdicts[:] = CERTIFIED
+            if not _sweep_pair(task, motion, desk, results, start, count, pair, hasty):
                 return False
+            note_block(
+                task,
+                results,
+                desk.rows,
+                pair,
+                desk.runs,
+                desk.verdicts,
+                start,
+                start - first,
+                count,
+            )
     return True

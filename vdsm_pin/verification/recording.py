@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import NEAR, NORMAL
 from vdsm_pin.verification.search import (
     CERTIFIED,
@@ -44,6 +44,7 @@ def _claim(
     task: Task, desk: Desk, row: FloatArray, first: int, last: int, n: FloatArray
 ) -> float:
     """Clearance that one plane proves of the pieces [first, last) over a slice."""
+    apart()
     pair = int(row[PAIR])
     link, frame = task.pairs.link[pair], task.pairs.frame[pair]
     space, h = desk.space, row[END] - row[START]
@@ -81,6 +82,7 @@ def _write_ranges(
     task: Task, desk: Desk, row: FloatArray, records: FloatArray, count: int
 ) -> int:
     """Write planes for ranges of pieces, as few as the hierarchy allows."""
+    apart()
     pieces, space, pair = task.pieces, desk.space, int(row[PAIR])
     link, frame = task.pairs.link[pair], task.pairs.frame[pair]
     needed, h = task.pairs.required[pair], row[END] - row[START]
@@ -127,6 +129,7 @@ def _write_slice(
 
     The slice is one that `bound_between` proves.
     """
+    apart()
     bound_between(task, motion, desk.ends, desk.space, row)
     pair = int(row[PAIR])
     obstacle = task.pairs.obstacle[pair]
@@ -154,6 +157,7 @@ def _record_pair(
     Returns:
         The new count, -1 without room, and whether the interval is proved.
     """
+    apart()
     pair = int(row[PAIR])
     row[START], row[END] = 0.0, 1.0
     desk.space.out[NORMAL:NEAR] = desk.planes[pair, :3]
@@ -196,6 +200,7 @@ def record(
         Number of planes written, the interval reached (below `last` where the room
         ended; all its pairs are missing) and the pair that is not proved in it, or -1.
     """
+    apart()
     row, count = np.zeros(SLICE), 0
     for k in range(first, last):
         before = count

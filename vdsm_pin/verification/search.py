@@ -6,7 +6,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arm import bends_and_drifts, place_between
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import BRACKET, LOWER, NEAR, UPPER
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.verification.slices import Ends, Pairs, Rules, Space, slice_bound
@@ -71,6 +71,7 @@ def new_witness() -> Witness:
 @compiled
 def push(heap: FloatArray, count: int, row: FloatArray) -> int:
     """Add a slice to a heap of `count` slices; returns the new count."""
+    apart()
     at = count
     while at > 0:
         parent = (at - 1) // 2
@@ -85,6 +86,7 @@ def push(heap: FloatArray, count: int, row: FloatArray) -> int:
 @compiled
 def pop(heap: FloatArray, count: int, row: FloatArray) -> int:
     """Take the slice of the least bound; returns the new count."""
+    apart()
     row[:] = heap[0]
     count -= 1
     last = heap[count].copy()
@@ -116,6 +118,7 @@ def bound_between(
         space: Working space; holds the bracket on return.
         row: The slice.
     """
+    apart()
     k = int(row[INTERVAL])
     last = min(k + 2, motion.x0.size)
     x0, alpha = motion.x0[k:last], motion.alpha[k:last]
@@ -148,6 +151,7 @@ def examine(
     Returns:
         The clearance that a plane proves at this instant alone; [m].
     """
+    apart()
     instant = row.copy()
     instant[START] = instant[END] = t
     bound_between(task, motion, ends, space, instant)
@@ -171,6 +175,7 @@ def split(
     count: int,
 ) -> int:
     """Push the two halves of a slice; returns the new count of the heap."""
+    apart()
     start, end = row[START], row[END]
     middle = 0.5 * (start + end)
     half = row.copy()
@@ -209,6 +214,7 @@ def resolve(
     Returns:
         Verdict and number of slices in the heap.
     """
+    apart()
     required = task.pairs.required[int(row[PAIR])]
     examine(task, motion, ends, space, row, 0.0, witness)
     examine(task, motion, ends, space, row, 1.0, witness)
@@ -264,6 +270,7 @@ def tighten(
     Returns:
         Number of slices in the heap; the first is the least bound.
     """
+    apart()
     row = np.zeros(SLICE)
     least = np.inf
     for pair in range(witnesses.shape[0]):

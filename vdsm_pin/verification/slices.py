@@ -11,7 +11,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arm import second_order, sway
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import (
     BRACKET,
     LOWER,
@@ -111,6 +111,7 @@ class Space(NamedTuple):
 @compiled
 def new_space() -> Space:
     """Fresh working space."""
+    apart()
     return Space(
         np.zeros((4, 3)),
         np.zeros((SCRATCH_ROWS + 2, 3)),
@@ -200,6 +201,7 @@ def reach_along(
         n: Unit vector towards the partner, in its frame, shape (3,); [-].
         h: Length of the slice.
     """
+    apart()
     p = space.points
     reach = -np.inf
     for k in range(2):
@@ -225,6 +227,7 @@ def losses(rules: Rules, frame: int) -> float:
 @compiled
 def load_points(ends: Ends, space: Space, link: int, frame: int) -> None:
     """Write the four points of a link over a slice to the working space."""
+    apart()
     local_points(ends.centres[0], ends.frames[0], link, frame, space.points[:2])
     local_points(ends.centres[1], ends.frames[1], link, frame, space.points[2:])
 
@@ -234,6 +237,7 @@ def obstacle_support(
     pieces: PackedPieces, first: int, last: int, n: FloatArray, point: FloatArray
 ) -> float:
     """Least n.x over the pieces [first, last), n of unit length; [m]."""
+    apart()
     least = np.inf
     for p in range(first, last):
         if pieces.kind[p] == HALF_SPACE:
@@ -269,6 +273,7 @@ def piece_bound(
         out: Guess of n on entry; bracket on return, whose `lower` is the bound over
             the slice and whose `upper` is of the hull of the points alone.
     """
+    apart()
     bracket(pieces, p, space.points, 4, rules.goal, space.scratch, out)
     n = out[NORMAL:NEAR]
     support = obstacle_support(pieces, p, p + 1, n, space.scratch[0])
@@ -289,6 +294,7 @@ def node_bound(
     n: FloatArray,
 ) -> float:
     """Clearance that one plane proves of all pieces of a node, by its box; [m]."""
+    apart()
     if not facing(pieces, node, space.points, n):
         return -np.inf
     support = box_support(pieces, node, n[0], n[1], n[2])
@@ -308,6 +314,7 @@ def _mesh_bound(
     h: float,
 ) -> None:
     """`slice_bound` for an obstacle of many pieces, by its hierarchy."""
+    apart()
     low, high = space.scratch[SCRATCH_ROWS], space.scratch[SCRATCH_ROWS + 1]
     box_of(space.points, 4, low, high)
     trial, out = space.trial, space.out
@@ -357,6 +364,7 @@ def slice_bound(
         pair: Number of the pair.
         h: Length of the slice; 0 for an instant, where `upper` is a true distance.
     """
+    apart()
     link, frame = pairs.link[pair], pairs.frame[pair]
     load_points(ends, space, link, frame)
     root = pieces.root[pairs.obstacle[pair]]

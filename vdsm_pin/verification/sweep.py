@@ -12,7 +12,8 @@ import numpy as np
 
 from vdsm_pin.geometry.arm import bends_and_drifts, place
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.compiled import apart, compiled
+from vdsm_pin.verification.coasting import PLANE, RUN, SUPPORT
 from vdsm_pin.verification.search import (
     END,
     INTERVAL,
@@ -34,13 +35,6 @@ from vdsm_pin.verification.slices import (
 
 BLOCK: Final = 32
 """Intervals whose configurations are computed at once: they fit the cache."""
-
-SUPPORT: Final = 3
-POINT: Final = 4
-WIDTH: Final = 7
-PLANE: Final = 8
-"""Layout of what a pair remembers: n (3), support in n, witness on the partner (3),
-width of the bracket when they were found."""
 
 AT_LOWER: Final = 1
 UP: Final = 2
@@ -105,6 +99,8 @@ class Desk(NamedTuple):
         space: For bounds.
         heap: For subdivision; its length is the budget of one interval and pair.
         planes: What the pairs remember, shape (n_pairs, PLANE).
+        runs: Bounds of the block's intervals for one pair, shape (BLOCK, RUN).
+        verdicts: Their verdicts, shape (BLOCK,).
     """
 
     rows: Rows
@@ -112,11 +108,14 @@ class Desk(NamedTuple):
     space: Space
     heap: FloatArray
     planes: FloatArray
+    runs: FloatArray
+    verdicts: IntArray
 
 
 @compiled
 def new_desk(n_links: int, n_pairs: int, budget: int) -> Desk:
     """Fresh working space; no pair remembers a plane yet."""
+    apart()
     n = n_links
     rows = Rows(
         np.zeros((BLOCK + 1, n + 1, 3)),
@@ -133,12 +132,15 @@ def new_desk(n_links: int, n_pairs: int, budget: int) -> Desk:
     planes = np.zeros((n_pairs, PLANE))
     planes[:, 0] = 1.0
     planes[:, SUPPORT] = -np.inf
-    return Desk(rows, ends, new_space(), np.zeros((budget, SLICE)), planes)
+    runs, verdicts = np.zeros((BLOCK, RUN)), np.zeros(BLOCK, np.int64)
+    heap = np.zeros((budget, SLICE))
+    return Desk(rows, ends, new_space(), heap, planes, runs, verdicts)
 
 
 @compiled
 def fill_rows(task: Task, motion: Motion, rows: Rows, first: int, count: int) -> None:
     """Configurations of rows first .. first + count; the last row may repeat."""
+    apart()
     n_rows = motion.x0.size
     lengths = task.rules.lengths
     for r in range(count + 1):
@@ -162,29 +164,11 @@ def fill_rows(task: Task, motion: Motion, rows: Rows, first: int, count: int) ->
 
 
 @compiled
-def stale_upper(points: FloatArray, witness: FloatArray, near: FloatArray) -> float:
-    """Distance of a point from the segment of the first two points, and its foot."""
-    span = along = 0.0
-    for c in range(3):
-        d = points[1, c] - points[0, c]
-        span += d * d
-        along += d * (witness[c] - points[0, c])
-    t = min(1.0, max(0.0, along / span)) if span > 0.0 else 0.0
-    squared = 0.0
-    for c in range(3):
-        near[c] = points[0, c] + t * (points[1, c] - points[0, c])
-        d = witness[c] - near[c]
-        squared += d * d
-    return sqrt(squared)
-
-
-@compiled
-def _surface_points(
+def surface_points(
     task: Task,
-    ends: Ends,
-    end: int,
+    centres: FloatArray,
+    frames: FloatArray,
     frame: int,
-    link: int,
     core: FloatArray,
     out: FloatArray,
 ) -> None:
@@ -192,32 +176,31 @@ def _surface_points(
 
     Args:
         task: For the radius of the links.
-        ends: Configurations.
-        end: Which of the two.
+        centres: Joint centres, shape (N + 1, 3); [m].
+        frames: Link frames, shape (N, 3, 3); [-].
         frame: Frame of the partner.
-        link: The moving link; gives a direction where the points coincide.
         core: Point on the link's axis, then on the partner, shape (2, 3); [m].
         out: Result, shape (6,); [m].
     """
-    own, other, turned = out[:3], out[3:6], out[:3].copy()
+    apart()
     gap = 0.0
     for c in range(3):
-        turned[c] = core[1, c] - core[0, c]
-        gap += turned[c] * turned[c]
+        gap += (core[1, c] - core[0, c]) ** 2
     gap = sqrt(gap)
     share = task.rules.radius / gap if gap > 0.0 else 0.0
-    moved = core[0] + share * turned
-    base_direction(ends.frames[end], frame, moved, own)
-    base_direction(ends.frames[end], frame, core[1], other)
+    moved = core[0] + share * (core[1] - core[0])
+    base_direction(frames, frame, moved, out[:3])
+    base_direction(frames, frame, core[1], out[3:6])
     if frame != BASE:
         for c in range(3):
-            own[c] += ends.centres[end, frame, c]
-            other[c] += ends.centres[end, frame, c]
+            out[c] += centres[frame, c]
+            out[3 + c] += centres[frame, c]
 
 
 @compiled
 def drop_candidates(task: Task, results: Results) -> None:
     """Drop the candidates that can no longer hold the least bound."""
+    apart()
     kept = 0
     for k in range(results.tally[0]):
         pair = int(results.candidates[k, PAIR])
@@ -229,10 +212,11 @@ def drop_candidates(task: Task, results: Results) -> None:
 
 
 @compiled
-def _nominate(
+def nominate(
     task: Task, results: Results, k: int, pair: int, group: int, lower: float
 ) -> None:
     """Remember an interval whose lower bound is below the least instant bound."""
+    apart()
     if results.tally[0] == results.candidates.shape[0]:
         drop_candidates(task, results)
     if results.tally[0] == results.candidates.shape[0]:
@@ -245,58 +229,120 @@ def _nominate(
 
 
 @compiled
-def note(
+def _note_bests(
+    best: FloatArray,
+    counts: IntArray,
+    runs: FloatArray,
+    verdicts: IntArray,
+    first: int,
+    count: int,
+) -> int:
+    """Keep a pair's least bounds; the local number of a new least upper one, or -1."""
+    at = -1
+    for local in range(count):
+        counts[verdicts[local]] += 1
+        if runs[local, 0] < best[KEY]:
+            best[KEY], best[AT_LOWER] = runs[local, 0], first + local
+        if runs[local, 1] < best[UP]:
+            best[UP], best[AT_UPPER] = runs[local, 1], first + local
+            best[TIME] = runs[local, 2]
+            at = local
+    return at
+
+
+@compiled
+def _note_profile(
+    profile: FloatArray,
+    stride: int,
+    column: int,
+    runs: FloatArray,
+    first: int,
+    count: int,
+) -> None:
+    """Lower the profile's column to a pair's bounds."""
+    for local in range(count):
+        row = (first + local) // stride
+        profile[row, 0, column] = min(profile[row, 0, column], runs[local, 0])
+        profile[row, 1, column] = min(profile[row, 1, column], runs[local, 1])
+
+
+@compiled
+def _note_dense(
     task: Task,
     results: Results,
-    ends: Ends,
-    k: int,
-    local: int,
+    rows: Rows,
     pair: int,
-    lower: float,
-    upper: float,
-    time: float,
-    verdict: int,
-    core: FloatArray,
+    runs: FloatArray,
+    verdicts: IntArray,
+    offset: int,
+    count: int,
 ) -> None:
-    """Record the bracket of one pair over one interval.
+    """Write a pair's bounds to the dense rows."""
+    for local in range(count):
+        results.verdicts[offset + local, pair] = verdicts[local]
+        row = results.numbers[offset + local, pair]
+        row[:3] = runs[local, :3]
+        _place_run(task, rows, pair, runs, local, row[3:9])
+
+
+@compiled
+def _place_run(
+    task: Task, rows: Rows, pair: int, runs: FloatArray, local: int, out: FloatArray
+) -> None:
+    """Surface points of an interval's result in the base frame, shape (6,); [m]."""
+    if runs[local, 9] > 0.0:
+        out[:] = runs[local, 3:9]
+        return
+    row = local + int(runs[local, 2])
+    core = runs[local, 3:9].copy().reshape(2, 3)
+    surface_points(
+        task, rows.centres[row], rows.frames[row], task.pairs.frame[pair], core, out
+    )
+
+
+@compiled
+def note_block(
+    task: Task,
+    results: Results,
+    rows: Rows,
+    pair: int,
+    runs: FloatArray,
+    verdicts: IntArray,
+    first: int,
+    offset: int,
+    count: int,
+) -> None:
+    """Record the brackets of one pair over a block.
 
     Args:
         task: The scene, pairs and rules.
         results: Where to.
-        ends: The interval's configurations; witnesses are placed at the nearer end.
-        k: The interval.
-        local: Its row in the dense results.
+        rows: Configurations of the block.
         pair: The pair.
-        lower: Proved over the interval; [m].
-        upper: Proved at `time`; [m].
-        time: In the interval.
-        verdict: Its number.
-        core: Core points of the witnesses in the partner's frame, shape (2, 3); [m].
+        runs: Its bounds and witnesses, shape (>= count, RUN).
+        verdicts: Its verdicts, shape (>= count,).
+        first: First interval of the block.
+        offset: Its row in the dense results.
+        count: Intervals in the block.
     """
-    best = results.best[pair]
-    link, frame = task.pairs.link[pair], task.pairs.frame[pair]
-    end = int(time > 0.5)
-    results.counts[pair, verdict] += 1
-    if lower < best[KEY]:
-        best[KEY], best[AT_LOWER] = lower, k
-    if upper < best[UP]:
-        best[UP], best[AT_UPPER], best[TIME] = upper, k, time
-        _surface_points(task, ends, end, frame, link, core, best[OWN : OWN + 6])
+    apart()
+    best, frame = results.best[pair], task.pairs.frame[pair]
+    at = _note_bests(best, results.counts[pair], runs, verdicts, first, count)
+    if at >= 0:
+        _place_run(task, rows, pair, runs, at, best[OWN : OWN + 6])
     group = 0 if frame == BASE else 1
-    if lower < results.limit[group] - results.gap:
-        _nominate(task, results, k, pair, group, lower)
+    bar = results.limit[group] - results.gap
+    for local in range(count):
+        if runs[local, 0] < bar:
+            nominate(task, results, first + local, pair, group, runs[local, 0])
     if frame == BASE:
-        span = results.profile[k // results.stride]
+        profile, stride = results.profile, results.stride
         column = task.rules.lengths.size + task.pairs.obstacle[pair]
-        span[0, link] = min(span[0, link], lower)
-        span[1, link] = min(span[1, link], upper)
-        span[0, column] = min(span[0, column], lower)
-        span[1, column] = min(span[1, column], upper)
+        link = task.pairs.link[pair]
+        _note_profile(profile, stride, link, runs, first, count)
+        _note_profile(profile, stride, column, runs, first, count)
     if results.verdicts.shape[0] > 0:
-        results.verdicts[local, pair] = verdict
-        row = results.numbers[local, pair]
-        row[0], row[1], row[2] = lower, upper, time
-        _surface_points(task, ends, end, frame, link, core, row[3:9])
+        _note_dense(task, results, rows, pair, runs, verdicts, offset, count)
 
 
 @compiled
@@ -318,11 +364,18 @@ def place_witness(
         pair: The pair.
         found: Its row of the witnesses of `search.tighten`.
     """
+    apart()
     row = np.zeros(SLICE)
     row[INTERVAL], row[PAIR], row[START], row[END] = found[1], pair, found[2], found[2]
     bound_between(task, motion, desk.ends, desk.space, row)
     best = results.best[pair]
     best[UP], best[AT_UPPER], best[TIME] = found[0], found[1], found[2]
     core = found[3:9].copy().reshape(2, 3)
-    link, frame = task.pairs.link[pair], task.pairs.frame[pair]
-    _surface_points(task, desk.ends, 0, frame, link, core, best[OWN : OWN + 6])
+    surface_points(
+        task,
+        desk.ends.centres[0],
+        desk.ends.frames[0],
+        task.pairs.frame[pair],
+        core,
+        best[OWN : OWN + 6],
+    )
