@@ -15,8 +15,8 @@ from vdsm_pin.geometry.kernels import BRACKET, LOWER, NORMAL, SCRATCH_ROWS, UPPE
 from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
 from vdsm_pin.geometry.pieces import HALF_SPACE, PackedPieces
 
-BALLS: Final = 4
-"""Balls along a link; the coarse bound is loose by an eighth of the link's length."""
+BALLS: Final = 8
+"""Balls along a link; the coarse bound is loose by a sixteenth of its length."""
 
 
 @compiled
