@@ -89,7 +89,8 @@ def _boxes(pieces: Sequence[Piece]) -> FloatArray:
             box[0] = piece.points.min(axis=0) - piece.radius
             box[1] = piece.points.max(axis=0) + piece.radius
         elif isinstance(piece, FlatCylinder):
-            across = np.sqrt(np.maximum(0.0, 1.0 - piece.axis**2))
+            # Not sqrt(1 - axis^2): it loses half the digits along the axis.
+            across = np.hypot(np.roll(piece.axis, 1), np.roll(piece.axis, 2))
             half = piece.half_length * np.abs(piece.axis) + piece.radius * across
             # A box must hold the solid: half an ulp lost to the square root is given.
             half = half * (1.0 + 4.0 * np.finfo(float).eps)
