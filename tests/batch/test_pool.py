@@ -10,7 +10,7 @@ from vdsm_pin.batch import pool
 from vdsm_pin.batch.pool import WorkerFailed, run_tasks
 
 
-@pytest.mark.parametrize("jobs", [1, 3])
+@pytest.mark.parametrize("jobs", [2])
 def test_every_task_ends_once_whatever_the_others_do(jobs: int) -> None:
     words = ["a", "crash", "b", "hang", "c", "leave", "d"]
     ended = list(run_tasks(words, errand, jobs=jobs, time_limit=1.0))

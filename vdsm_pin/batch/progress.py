@@ -52,8 +52,9 @@ class Progress:
         tail = row.reason
         if known.passed:
             clearance = quantity(row.min_clearance_lower_m, "m")
-            angle = quantity(row.max_link_angle_rad, "rad")
-            tail = f"clearance {clearance}, largest link angle {angle}"
+            near = f"clearance {clearance}" if row.closest else "no obstacle"
+            tail = f"{near}, largest link angle "
+            tail += quantity(row.max_link_angle_rad, "rad")
         kept = " (kept)" if done.kept else ""
         if self._bar is None:
             sys.stdout.write(f"{head} {verdict} {row.folder}{kept}  {tail}\n")

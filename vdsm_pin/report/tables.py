@@ -108,7 +108,7 @@ def read_summary(path: Path) -> tuple[BatchRow, ...]:
     """The rows of a summary.csv."""
     with path.open(encoding="utf-8", newline="") as file:
         return tuple(
-            BatchRow.model_validate({key: value or None for key, value in row.items()})
+            BatchRow.model_validate({key: value for key, value in row.items() if value})
             for row in csv.DictReader(file)
         )
 
