@@ -39,7 +39,6 @@ class Judge:
         self.required = problem.required_clearance + margin + slack
         self.slack, self.finest = slack, finest
         self.limit = link_limit(problem)
-        self.evaluated = 0
 
     def look(
         self, tips: FloatArray, offsets: FloatArray
@@ -86,10 +85,21 @@ class Judge:
         low, high = manipulator.base_range
         fine = (peak <= np.minimum(self.limit, bend)) & (base >= low) & (base <= high)
         room = np.full(len(fine), -np.inf)
-        if fine.any():
-            room[fine] = self.clearance(centres[fine]).min(axis=1)
-            self.evaluated += int(fine.sum())
+        kept = np.flatnonzero(fine)
+        knees = intervals.knees(manipulator)
+        room[kept] = self._room(centres[kept], knees[interval[kept]])
         return centres, room
+
+    def _room(self, centres: FloatArray, knees: BoolArray) -> FloatArray:
+        """Least clearance; links in line between two knees are measured as one."""
+        room = np.full(len(centres), np.inf)
+        counts = knees.sum(axis=1)
+        for count in np.unique(counts):
+            rows = np.flatnonzero(counts == count)
+            joints = np.nonzero(knees[rows])[1].reshape(len(rows), count)
+            pieces = centres[rows[:, None], joints]
+            room[rows] = self.clearance(np.ascontiguousarray(pieces)).min(axis=1)
+        return room
 
     def clear(
         self,
@@ -113,7 +123,9 @@ class Judge:
         good = np.ones(count, dtype=np.bool_)
         tol = 1e-9
         c0, r0 = self._states(intervals, number, low, most + tol)
-        c1, r1 = self._states(intervals, number, high, most + tol)
+        c1, r1 = np.roll(c0, -1, axis=0), np.roll(r0, -1)
+        ends = np.flatnonzero(~intervals.continued())
+        c1[ends], r1[ends] = self._states(intervals, ends, high[ends], most[ends] + tol)
         good &= (r0 >= need - tol) & (r1 >= need - tol)
         for _ in range(16):
             way = np.linalg.norm(c1 - c0, axis=2).max(axis=1)

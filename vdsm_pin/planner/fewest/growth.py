@@ -232,9 +232,8 @@ class Garden:
         if not self.size or front[0] < 0:
             none = np.zeros(0, dtype=np.int64)
             return Grown(none, np.zeros(shape), none)
-        layer, offsets, parent = (
-            np.concatenate(part) for part in (self.layer, self.offsets, self.parent)
-        )
+        layer, parent = np.concatenate(self.layer), np.concatenate(self.parent)
+        offsets = np.concatenate(self.offsets)
         place = int(layer[front[0]])
         tips = np.broadcast_to(self.tips[place], (len(front), 3))
         room, changed, _ = self.judge.look(tips, offsets[front])

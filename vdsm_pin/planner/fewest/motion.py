@@ -18,6 +18,7 @@ from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.fewest.roadmap import Roadmap
 from vdsm_pin.planner.fewest.sequence import Sequence
 from vdsm_pin.planner.lift import rises_squared
+from vdsm_pin.tolerances import TOLERANCES
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,28 @@ class Intervals:
     next_tips: FloatArray
     offsets: FloatArray
     next_offsets: FloatArray
+
+    def knees(self, manipulator: Manipulator) -> BoolArray:
+        """Joints where the arm may bend somewhere in each interval, and both ends.
+
+        Returns:
+            Shape (n, N + 1).
+        """
+        lengths = manipulator.link_lengths[:, None]
+        bent = np.ones((len(self.tips), len(lengths) + 1), dtype=np.bool_)
+        bent[:, 1:-1] = False
+        for offsets in (self.offsets, self.next_offsets):
+            slopes = np.diff(offsets, axis=1) / lengths
+            turn = np.abs(np.diff(slopes, axis=1)).max(axis=2, initial=0.0)
+            bent[:, 1:-1] |= turn > TOLERANCES.straight_slope
+        return bent
+
+    def continued(self) -> BoolArray:
+        """Whether each interval ends where the next begins, shape (n,)."""
+        same = np.zeros(len(self.tips), dtype=np.bool_)
+        same[:-1] = (self.next_tips[:-1] == self.tips[1:]).all(axis=1)
+        same[:-1] &= (self.next_offsets[:-1] == self.offsets[1:]).all(axis=(1, 2))
+        return same
 
     def centres(
         self, manipulator: Manipulator, interval: IntArray, share: FloatArray

@@ -7,7 +7,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.clear import Judge
-from vdsm_pin.planner.fewest.motion import Knots, link_angles_at, rows_at
+from vdsm_pin.planner.fewest.motion import Knots
 from vdsm_pin.planner.fewest.roadmap import Taste
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -22,14 +22,8 @@ class _State:
 
 
 def _state(judge: Judge, knots: Knots) -> _State:
-    n = len(knots.tips)
-    interval = np.minimum(np.arange(n), n - 2)
-    share = (np.arange(n) - interval).astype(float)
-    centres = rows_at(judge.problem.manipulator, knots, interval, share).centres
-    angles = link_angles_at(centres)
-    changed = (angles > TOLERANCES.changed_angle).sum(axis=1)
-    room = judge.clearance(centres).min(axis=1)
-    return _State(changed, angles.max(axis=1), room)
+    room, changed, bend = judge.look(knots.tips, knots.offsets)
+    return _State(changed, bend, room)
 
 
 def _runs(knots: Knots) -> list[tuple[int, int]]:
@@ -93,41 +87,51 @@ def smooth(judge: Judge, knots: Knots, taste: Taste) -> Knots:
     """
     longest = max(b - a for a, b in _runs(knots))
     stride = 1 << max(1, int(np.ceil(np.log2(max(longest, 2)))))
+    state = _state(judge, knots)
     while stride >= 2:
         for phase in (0, stride // 2):
             spans = _spans(knots, stride, phase)
             if spans:
-                knots = _round(judge, knots, taste, spans)
+                knots, state = _round(judge, knots, state, taste, spans)
         stride //= 2
     return knots
 
 
 def _round(
-    judge: Judge, knots: Knots, taste: Taste, spans: list[tuple[int, int]]
-) -> Knots:
-    state = _state(judge, knots)
+    judge: Judge,
+    knots: Knots,
+    state: _State,
+    taste: Taste,
+    spans: list[tuple[int, int]],
+) -> tuple[Knots, _State]:
     trial = _flattened(knots, spans)
-    moved = np.zeros(len(knots.tips), dtype=np.bool_)
     change = np.abs(trial.offsets - knots.offsets).max(axis=(1, 2))
     change = np.maximum(change, np.abs(trial.tips - knots.tips).max(axis=1))
     moved = change > TOLERANCES.joint_centre
     spans = [(a, b) for a, b in spans if moved[a : b + 1].any()]
     if not spans:
-        return knots
+        return knots, state
     new = _state(judge, trial)
     need, bend = _guards(judge, knots, state, taste, spans)
     picked = np.concatenate([np.arange(a, b) for a, b in spans])
     good = judge.clear(trial.pick(picked), need, bend)
     kept = []
     place = 0
+    taken = np.zeros(len(knots.tips), dtype=np.bool_)
     for span in spans:
         a, b = span
         if good[place : place + b - a].all() and _allowed(
             state, new, span, bool(knots.drawn[a])
         ):
             kept.append(span)
+            taken[a + 1 : b] = True
         place += b - a
-    return _flattened(knots, kept)
+    state = _State(
+        np.where(taken, new.changed, state.changed),
+        np.where(taken, new.bend, state.bend),
+        np.where(taken, new.room, state.room),
+    )
+    return _flattened(knots, kept), state
 
 
 def _guards(
