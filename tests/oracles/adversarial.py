@@ -43,6 +43,8 @@ SHAPES: Final = (
     "plate",
     "half_space",
 )
+DECIDABLE: Final = 2e-11
+"""Nearer to the limit than the verifier's padding nothing can be decided; [m]."""
 CORNERS: Final = np.array(list(product((-1.0, 1.0), repeat=3)))
 FACES: Final = np.array(
     [
@@ -111,7 +113,10 @@ def small_angles(rng: np.random.Generator, size: int) -> Any:
 
 def excesses(rng: np.random.Generator, size: int, least: float, radius: float) -> Any:
     """Both sides of the limit: by `least` .. 1e-3 m, sometimes deep inside."""
-    excess = 10.0 ** rng.uniform(np.log10(least), -3.0, size)
+    low = np.log10(max(least, DECIDABLE))
+    excess = 10.0 ** rng.uniform(low, -3.0, size)
+    hopeless = 10.0 ** rng.uniform(np.log10(least), low, size)
+    excess = np.where(rng.random(size) < 0.02, hopeless, excess)
     excess *= rng.choice([-1.0, 1.0], size)
     deep = rng.random(size) < 0.05
     return np.where(deep, -rng.uniform(0.0, radius, size), excess)
@@ -304,18 +309,22 @@ def make_batch(rng: np.random.Generator, motion: str, size: int, least: float) -
         if of.size:
             pieces = bodies(name, p[of], n[of], u[of], rng)
             made += [Body(f"b{k}", x) for k, x in zip(of, pieces, strict=True)]
+    problem = _problem(arm, made, required)
+    trajectory = _trajectory(rows[:1] if motion == "none" else rows)
+    return Batch(problem, trajectory, motion, shape, link, excess, time, n, station, p)
+
+
+def _problem(arm: Manipulator, made: list[Body], required: float) -> PlanningProblem:
     scene: Any = object.__new__(Scene)  # thousands of names need no search for doubles
     object.__setattr__(scene, "obstacles", tuple(made))
     tip = np.array([arm.total_length, 0.0, 0.0])
-    problem = PlanningProblem(
-        "queries", arm, scene, DesiredPath(tip, tip[None]), required, np.eye(4)
-    )
-    rows = rows[:1] if motion == "none" else rows
+    path = DesiredPath(tip, tip[None])
+    return PlanningProblem("queries", arm, scene, path, required, np.eye(4))
+
+
+def _trajectory(rows: Any) -> Trajectory:
     blank = np.zeros(len(rows))
-    trajectory = Trajectory(
-        blank.astype(bool), blank, rows[:, 0], rows[:, 1::2], rows[:, 2::2]
-    )
-    return Batch(problem, trajectory, motion, shape, link, excess, time, n, station, p)
+    return Trajectory(blank > 0.0, blank, rows[:, 0], rows[:, 1::2], rows[:, 2::2])
 
 
 # ---- the truth in ball arithmetic ----------------------------------------------------
@@ -473,4 +482,71 @@ def _nonnegative(matrix: Any, right: Any) -> Any:
             if rest < 0.5 * best:
                 best, found = rest, np.zeros(matrix.shape[1])
                 found[list(chosen)] = w
+    return found
+
+
+# ---- a sample on disk ----------------------------------------------------------------
+
+
+def as_data(batch: Batch, k: int) -> dict[str, Any]:
+    """One query as plain numbers that read back exactly."""
+    arm = batch.problem.manipulator
+    return {
+        "motion": batch.motion,
+        "shape": batch.shape[k],
+        "link_lengths": arm.link_lengths.tolist(),
+        "link_radius": arm.link_radius,
+        "required_clearance": batch.problem.required_clearance,
+        "rows": batch.trajectory.joints.tolist(),
+        "link": int(batch.link[k]),
+        "pieces": [
+            {"kind": type(piece).__name__}
+            | {key: np.asarray(value).tolist() for key, value in vars(piece).items()}
+            for piece in batch.problem.scene.obstacles[k].pieces
+        ],
+        "excess": float(batch.excess[k]),
+        "time": float(batch.time[k]),
+        "normal": batch.normal[k].tolist(),
+        "station": float(batch.station[k]),
+        "contact": batch.contact[k].tolist(),
+    }
+
+
+def from_data(data: dict[str, Any]) -> Batch:
+    """The query that `as_data` wrote, alone in its scene."""
+    kinds = {kind.__name__: kind for kind in (Hull, FlatCylinder, HalfSpacePiece)}
+    pieces = []
+    for entry in data["pieces"]:
+        values = {key: value for key, value in entry.items() if key != "kind"}
+        arrays = {
+            k: np.array(v) if isinstance(v, list) else v for k, v in values.items()
+        }
+        pieces.append(kinds[entry["kind"]](**arrays))
+    n = len(data["link_lengths"])
+    cables = CableLayout(0.02, 0.01, paper_hole_angles(n))
+    lengths, radius = np.array(data["link_lengths"]), data["link_radius"]
+    arm = Manipulator("sample", lengths, radius, 1.3, 1.3, (-5.0, 5.0), cables)
+    return Batch(
+        _problem(arm, [Body("b0", tuple(pieces))], data["required_clearance"]),
+        _trajectory(np.array(data["rows"])),
+        data["motion"],
+        [data["shape"]],
+        *(np.array([data[key]]) for key in ("link", "excess", "time", "normal")),
+        *(np.array([data[key]]) for key in ("station", "contact")),
+    )
+
+
+def sample() -> list[dict[str, Any]]:
+    """One query of every shape under every motion, on either side of the limit."""
+    rng, found = np.random.default_rng(2022), []
+    for motion in MOTIONS:
+        batch = make_batch(rng, motion, 400, 1e-12)
+        for shape in SHAPES:
+            for side in (-1.0, 1.0):
+                of = [
+                    k
+                    for k in range(400)
+                    if batch.shape[k] == shape and batch.excess[k] * side > 0.0
+                ]
+                found.append(as_data(batch, of[0]))
     return found
