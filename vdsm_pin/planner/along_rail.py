@@ -102,7 +102,7 @@ def along_rail(
     shapes = _shapes(problem, section, growth)
     yield _choice(problem, forbidden, shapes)
     if len(shapes) > 1:
-        for shape in shapes:
+        for shape in shapes[::-3]:
             yield _choice(problem, forbidden, [shape])
 
 

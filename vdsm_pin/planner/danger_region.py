@@ -98,9 +98,10 @@ class DangerRegion:
         outward = np.stack([np.cos(normals), np.sin(normals)], axis=1)
         corners = self.corners[np.argmax(outward @ self.corners.T, axis=1)]
         # Corners of a walk lie outside the arc, so that its chords do not cut in.
-        arcs = corners + self.radius / np.cos(0.5 * ARC_STEP) * outward
+        grown = self.radius / float(np.cos(0.5 * ARC_STEP))
+        arcs = corners + grown * outward
         # The straight sides passed on the way, each by its two ends.
-        sides = self.sides if sense > 0 else self.sides[:, ::-1]
+        sides = sides_of(self.corners, grown)[:, :: 1 if sense > 0 else -1]
         along = self.sides[:, 1] - self.sides[:, 0]
         bearings = np.arctan2(along[:, 1], along[:, 0]) - np.pi / 2.0
         when = np.mod(sense * (bearings - leave), 2.0 * np.pi)

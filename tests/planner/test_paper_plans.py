@@ -1,0 +1,289 @@
+"""Whole plans of the paper's rule: published numbers, random scenes, refusals."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfReach, PathBlocked
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.kinematics import joint_centres, link_angles
+from vdsm_pin.planner.pipeline import plan_paper
+from vdsm_pin.planner.records import Plan
+from vdsm_pin.planner.tip_path import nearest_station
+from vdsm_pin.problem import Approach, Blocked, PlanningProblem
+from vdsm_pin.scene import Box, Capsule, Cylinder, Obstacle, Prism, Scene, Sphere
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.link_clearance import link_clearance
+
+ALL = ["free", "obs1", "obs2", "obs2-small", "obs3"]
+X = np.array([1.0, 0.0, 0.0])
+Z = np.array([0.0, 0.0, 1.0])
+
+
+def paper(name: str) -> PlanningProblem:
+    return read_problem(f"paper/{name}").problem
+
+
+def planned(problem: PlanningProblem, margin: float = 0.0) -> Plan:
+    return plan_paper(problem, link_clearance(problem), margin)
+
+
+@cache
+def plan_of(name: str) -> Plan:
+    return planned(paper(name))
+
+
+def with_obstacles(*obstacles: Obstacle) -> PlanningProblem:
+    return replace(paper("free"), scene=Scene(obstacles))
+
+
+def pillar(y: float, z: float, radius: float) -> Cylinder:
+    return Cylinder("pillar", np.array([1.5, y, z]), X, 6.0, radius)
+
+
+def psi_deg(plan: Plan) -> FloatArray:
+    return np.rad2deg(link_angles(plan.trajectory.alpha, plan.trajectory.theta))
+
+
+def check_plan(plan: Plan) -> None:
+    """Everything a plan promises at its waypoints, from the joint values alone."""
+    problem, trajectory = plan.problem, plan.trajectory
+    arm, path = problem.manipulator, problem.path
+    psi = link_angles(trajectory.alpha, trajectory.theta)
+    assert psi.max() <= arm.max_link_angle
+    assert np.abs(trajectory.joints[:, 1:]).max() <= arm.max_joint_angle
+    assert np.abs(np.diff(trajectory.joints[:, 1:], axis=0)).max() <= np.deg2rad(5.0)
+    centres = joint_centres(arm, trajectory.x0, trajectory.alpha, trajectory.theta)
+    np.testing.assert_allclose(centres, plan.centres, atol=1e-12)
+    tip = centres[:, -1]
+    np.testing.assert_allclose(tip[0], path.start, atol=1e-12)
+    on = trajectory.on_path
+    np.testing.assert_allclose(path.at(trajectory.path_m[on]), tip[on], atol=1e-9)
+    steps = np.linalg.norm(np.diff(tip, axis=0), axis=1)
+    assert steps.max() <= path.spacing * (1.0 + 1e-9)
+    if problem.scene.obstacles:
+        clearance = link_clearance(problem)(centres).min()
+        assert clearance >= problem.required_clearance
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_paper_scenes_keep_every_promise(name: str) -> None:
+    check_plan(plan_of(name))
+
+
+@pytest.mark.parametrize(
+    ("name", "psi", "low", "high"),
+    [
+        ("free", 31.7, -98.45, 464.85),
+        ("obs1", 40.0, -98.45, 540.0),
+        ("obs2", 42.5, -98.45, 620.0),
+        ("obs2-small", 42.5, -98.45, 620.0),
+        ("obs3", 31.0, -98.45, 545.0),
+    ],
+)
+def test_published_ranges(name: str, psi: float, low: float, high: float) -> None:
+    plan = plan_of(name)
+    assert psi_deg(plan).max() <= psi
+    assert low <= plan.trajectory.x0.min() * 1e3
+    assert plan.trajectory.x0.max() * 1e3 <= high
+
+
+def test_free_changes_only_psi1_and_the_base() -> None:
+    plan = plan_of("free")
+    psi = psi_deg(plan)
+    assert psi[:, 0].max() == pytest.approx(31.65, abs=5e-3)
+    assert psi[:, 1:].max() < 1e-6
+    assert plan.trajectory.x0.min() * 1e3 == pytest.approx(-98.4, abs=0.05)
+    assert plan.trajectory.x0.max() * 1e3 == pytest.approx(464.8, abs=0.05)
+    assert not plan.notes
+
+
+def test_obs1_shows_the_printed_pattern_of_zero_angles() -> None:
+    plan = plan_of("obs1")
+    psi, on = psi_deg(plan), plan.trajectory.on_path
+    assert psi[:, 1:3].max() < 1e-6  # psi2 = psi3 = 0 always
+    a4 = np.flatnonzero(on[:-1] & ~on[1:])[0]
+    a5 = np.flatnonzero(~on[:-1] & on[1:])[1] + 1
+    tip = plan.tip_path.points
+    a6 = int(np.argmin(np.linalg.norm(tip - [3.126, 1.0, 1.3], axis=1)))
+    # psi6 comes up to 0.2 deg at A4 itself.
+    np.testing.assert_array_equal(psi[a4] > 0.5, [1, 0, 0, 0, 0, 0, 1, 1])
+    np.testing.assert_array_equal(psi[a5] > 0.05, [1, 0, 0, 1, 1, 1, 1, 1])
+    np.testing.assert_array_equal(psi[a6] > 0.05, [1, 0, 0, 1, 1, 1, 0, 0])
+
+
+def test_obs1_goes_back_round_the_base_facing_side() -> None:
+    plan = plan_of("obs1")
+    on, tip = plan.trajectory.on_path, plan.tip_path.points
+    left = np.flatnonzero(on[:-1] & ~on[1:])[0]
+    back = np.flatnonzero(~on[:-1] & on[1:])[1]
+    way = tip[left : back + 2, 1:] - [0.7, 0.6]
+    turn = np.unwrap(np.arctan2(way[:, 1], way[:, 0]))
+    assert turn[-1] - turn[0] == pytest.approx(-2.0 * np.pi)  # all round, clockwise
+    assert way[:, 0].min() < -0.26  # past the side that faces the base
+    retreat = 3.126 - tip[left : back + 2, 0]
+    assert retreat.max() == pytest.approx(0.1, rel=1e-6)
+
+
+def test_obs3_changes_only_psi1_and_one_of_the_middle_joints() -> None:
+    psi = psi_deg(plan_of("obs3"))
+    changed = np.flatnonzero(psi.max(axis=0) > 0.05) + 1
+    assert set(changed) <= {1, 4, 5, 6}
+    assert len(changed) == 2
+
+
+def test_obs2_begins_and_ends_at_its_equidistant_point() -> None:
+    plan = plan_of("obs2-small")
+    drawn = plan.tip_path.points[plan.trajectory.on_path]
+    np.testing.assert_allclose(drawn[[0, -1], 1:], 1.0, atol=1e-9)
+
+
+def test_undrawn_stretches_are_told() -> None:
+    plan = plan_of("obs2")
+    assert any("not drawn from 2.2000 m" in note for note in plan.notes)
+    failing = replace(plan.problem.path, blocked=Blocked.FAIL)
+    with pytest.raises(PathBlocked, match="blocked: fail"):
+        planned(replace(plan.problem, path=failing))
+
+
+def test_a_margin_is_kept_at_every_waypoint() -> None:
+    problem = paper("obs1")
+    plan = planned(problem, margin=0.004)
+    assert link_clearance(problem)(plan.centres).min() >= 0.0075
+
+
+def test_the_way_across_the_path_is_cut_out() -> None:
+    """A pillar on the path itself: its stretch is left out, the rest is drawn."""
+    plan = planned(with_obstacles(pillar(1.0, 0.6, 0.1)))
+    check_plan(plan)
+    stations = plan.trajectory.path_m[plan.trajectory.on_path]
+    gap = np.diff(np.sort(stations)).max()
+    assert 2.0 * (0.1 + 0.0615 + 0.0035) <= gap < 0.36
+
+
+def random_obstacle(rng: np.random.Generator, axis: str) -> Obstacle:
+    """A prismatic body along an axis, between the arm and its work."""
+    k = "xyz".index(axis)
+    rotation = np.roll(np.eye(3), -(k + 1), axis=0).T
+    size = float(rng.uniform(0.05, 0.4))
+    if axis == "x":
+        bearing, distance = rng.uniform(-np.pi, np.pi), rng.uniform(0.3, 1.6)
+        centre = [1.5, distance * np.cos(bearing), distance * np.sin(bearing)]
+    else:
+        offset = float(rng.choice([-1, 1]) * rng.uniform(0.2, 1.3))
+        centre = [rng.uniform(0.6, 2.9), 0.0, 0.0]
+        centre[1 if axis == "z" else 2] = offset
+    where = np.array(centre)
+    kind = rng.integers(4)
+    if kind == 0:
+        return Cylinder("body", where, np.eye(3)[k], 6.0, size)
+    if kind == 1:
+        return Capsule("body", where, np.eye(3)[k], 6.0, size)
+    if kind == 2:
+        half = np.array([size, rng.uniform(0.03, 0.4), 6.0])
+        return Box("body", where, rotation, half)
+    turns = 2.0 * np.pi * (np.arange(5) + rng.uniform(0.0, 0.7, 5)) / 5.0
+    polygon = size * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    return Prism("body", where, rotation, polygon, (-6.0, 6.0))
+
+
+def random_problem(axis: str, seed: int) -> PlanningProblem:
+    rng = np.random.default_rng(seed)
+    problem = with_obstacles(random_obstacle(rng, axis))
+    approach = list(Approach)[int(rng.integers(3))]
+    return replace(problem, path=replace(problem.path, approach=approach))
+
+
+def outcome(problem: PlanningProblem) -> bool:
+    """Whether there is a plan, which then keeps every promise."""
+    try:
+        plan = planned(problem)
+    except Infeasible as reason:
+        assert str(reason)
+        return False
+    check_plan(plan)
+    return True
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_random_prismatic_obstacles_give_a_good_plan_or_a_reason(axis: str) -> None:
+    solved = [outcome(random_problem(axis, seed)) for seed in range(5)]
+    assert sum(solved) >= 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_many_random_prismatic_obstacles(axis: str) -> None:
+    solved = [outcome(random_problem(axis, seed)) for seed in range(100, 500)]
+    assert sum(solved) >= 300
+
+
+def test_start_in_the_danger_region_is_refused() -> None:
+    with pytest.raises(PathBlocked, match="rail lies in its danger region"):
+        planned(with_obstacles(pillar(0.1, 0.0, 0.1)))
+    problem = with_obstacles(pillar(0.4, 0.4, 0.1))
+    start = replace(problem.path, start=np.array([3.126, 0.45, 0.4]))
+    with pytest.raises(PathBlocked, match="start lies in its danger region"):
+        planned(replace(problem, path=start))
+
+
+def test_path_wholly_in_the_danger_region_is_refused() -> None:
+    problem = with_obstacles(pillar(0.8, 0.0, 0.3))
+    points = np.array([[3.126, 0.7, 0.0], [3.126, 0.9, 0.0], [3.126, 0.8, 0.1]])
+    with pytest.raises(PathBlocked, match="no point of the path"):
+        planned(replace(problem, path=replace(problem.path, points=points)))
+
+
+def test_scenes_the_rule_does_not_cover_are_refused() -> None:
+    two = (pillar(0.7, 0.6, 0.2), replace(pillar(-0.3, 0.6, 0.2), name="second"))
+    with pytest.raises(NoPlanFound, match="2 obstacles"):
+        planned(with_obstacles(*two))
+    ball = Sphere("ball", np.array([2.0, 0.4, 0.4]), 0.2)
+    with pytest.raises(NoPlanFound, match="'ball' is not prismatic"):
+        planned(with_obstacles(ball))
+
+
+def test_obstacles_out_of_the_way_leave_the_arm_straight() -> None:
+    """Any scene will do as long as the straight arm stays clear of it."""
+    far = Sphere("ball", np.array([2.0, -1.5, -1.5]), 0.2)
+    beyond = Cylinder("behind", np.array([6.0, 0.5, 0.5]), X, 1.0, 0.2)
+    plan = planned(with_obstacles(far, beyond))
+    check_plan(plan)
+    assert psi_deg(plan)[:, 1:].max() < 1e-6
+
+
+def test_a_path_out_of_reach_is_refused_before_anything_else() -> None:
+    problem = with_obstacles(pillar(0.7, 0.6, 0.2))
+    points = np.array([[3.126, 0.0, 2.2]])
+    with pytest.raises(OutOfReach):
+        planned(replace(problem, path=replace(problem.path, points=points)))
+
+
+def test_an_open_path_is_drawn_from_its_first_corner_and_not_left() -> None:
+    problem = with_obstacles(pillar(0.7, 0.6, 0.2))
+    points = np.array([[3.126, -0.5, 1.0], [3.126, 0.3, 1.2], [3.126, 0.8, 1.3]])
+    path = replace(problem.path, points=points, closed=False)
+    plan = planned(replace(problem, path=path))
+    check_plan(plan)
+    tip = plan.tip_path.points
+    np.testing.assert_allclose(tip[-1], points[-1], atol=1e-12)
+    assert nearest_station(path) == 0.0
+
+
+def test_a_path_of_one_point_is_approached() -> None:
+    problem = with_obstacles(pillar(0.7, 0.6, 0.2))
+    points = np.array([[3.126, 1.0, 0.9]])
+    for closed in (False, True):
+        path = replace(problem.path, points=points, closed=closed)
+        plan = planned(replace(problem, path=path))
+        check_plan(plan)
+        assert plan.trajectory.on_path.sum() == 1
+
+
+def test_plans_are_the_same_every_time() -> None:
+    once, again = planned(paper("obs2-small")), plan_of("obs2-small")
+    np.testing.assert_array_equal(once.trajectory.joints, again.trajectory.joints)
+    assert TOLERANCES.planned_clearance < 1e-5
