@@ -174,6 +174,14 @@ def test_an_infeasible_problem_leaves_nothing(vdsm: Shell, tmp_path: Path) -> No
     assert not (tmp_path / "out").exists()
 
 
+def test_a_time_limit_ends_planning(vdsm: Shell, planned: Path, tmp_path: Path) -> None:
+    words = ["plan", planned / "near.yaml", "--out", tmp_path / "out"]
+    ran = vdsm(*words, "--time-limit", "0.001")
+    assert ran.status == 1
+    assert "time limit of 0.001 s" in one_message(ran)
+    assert not (tmp_path / "out").exists()
+
+
 def bad_inputs(folder: Path, planned: Path) -> dict[str, list[object]]:
     """Command lines with bad input, by the words their message must hold."""
     good, rows = planned / "near.yaml", planned / "trajectory.csv"

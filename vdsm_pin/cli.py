@@ -33,8 +33,11 @@ Problem = Annotated[
     str, typer.Argument(metavar="PROBLEM", help="A built-in name or a problem file.")
 ]
 OutFolder = Annotated[Path, typer.Option("--out", help="Folder for the results.")]
-Strategy = Annotated[str, typer.Option(help="paper, fewest or clearest.")]
+Strategy = Annotated[str, typer.Option(help="How to plan: paper or fewest.")]
 Trajectory = Annotated[Path, typer.Option(help="A trajectory.csv.")]
+TimeLimit = Annotated[
+    float | None, typer.Option(min=0.001, help="Seconds for each problem.")
+]
 DEFAULT_STRATEGY: Final = "paper"
 
 
@@ -43,35 +46,32 @@ def _examples(*lines: str) -> str:
     return "\n".join(["\b", "Examples:", *(f"  {line}" for line in lines)])
 
 
-@app.command(
-    epilog=_examples(
-        "vdsm plan paper/obs1 --out out/obs1",
-    ),
-)
+@app.command(epilog=_examples("vdsm plan paper/obs1 --out out/obs1"))
 def plan(
     context: typer.Context,
     problem: Problem,
     out: OutFolder,
     strategy: Strategy = DEFAULT_STRATEGY,
+    time_limit: TimeLimit = None,
 ) -> None:
     """Plan a motion.
 
     Writes trajectory.csv and plan.json, or nothing where there is no certified plan.
     """
     from vdsm_pin.io.problem_file import read_problem
-    from vdsm_pin.report.folder import check_output_folder
     from vdsm_pin.report.terminal import show_plan
-    from vdsm_pin.workflow import plan_to_folder
+    from vdsm_pin.workflow import plan_to_folder, within
 
-    check_output_folder(out)
-    file = plan_to_folder(read_problem(problem), strategy, out, context.obj)
+    source = read_problem(problem)
+    with within(time_limit):
+        file = plan_to_folder(source, strategy, out, context.obj)
     show_plan(file, out)
 
 
 @app.command(
     epilog=_examples(
-        "vdsm verify paper/obs1 --trajectory out/obs1/trajectory.csv --out out/obs1",
-    ),
+        "vdsm verify paper/obs1 --trajectory out/obs1/trajectory.csv --out out/obs1"
+    )
 )
 def verify(
     context: typer.Context,
@@ -96,14 +96,10 @@ def verify(
     Writes report.html, verification.json, clearance.csv, link_angles.csv, cables.csv.
     """
     from vdsm_pin.io.problem_file import read_problem
-    from vdsm_pin.report.folder import check_output_file, check_output_folder
     from vdsm_pin.report.terminal import show_verification
     from vdsm_pin.report.words import outcome
     from vdsm_pin.workflow import Order, error_box, verify_to_folder
 
-    check_output_folder(out)
-    if certificate is not None:
-        check_output_file(certificate)
     errors = error_box(joint_error_deg, base_error_mm, obstacle_error_mm)
     verified = verify_to_folder(
         Order(read_problem(problem), trajectory, out, context.obj, errors, certificate)
@@ -139,9 +135,7 @@ def batch(
     resume: Annotated[
         bool, typer.Option("--resume", help="Skip what is finished and intact.")
     ] = False,
-    time_limit: Annotated[
-        float | None, typer.Option(min=0.001, help="Seconds per problem.")
-    ] = None,
+    time_limit: TimeLimit = None,
 ) -> None:
     """Plan and verify many problems.
 
@@ -161,8 +155,7 @@ def batch(
     try:
         rows = run_batch(asked)
     except Interrupted as error:
-        typer.echo(f"vdsm: {error}", err=True)
-        raise typer.Exit(INTERRUPTED) from error
+        _fail(error, INTERRUPTED)
     passed = sum(outcome(row.outcome).passed for row in rows)
     typer.echo(f"{passed} of {len(rows)} certified; see {out / 'index.html'}")
     raise typer.Exit(PASSED if passed == len(rows) else NOT_PASSED)
@@ -179,9 +172,7 @@ def view(
     trajectory: Annotated[
         Path | None, typer.Option(help="A trajectory.csv; without it the start.")
     ] = None,
-    html: Annotated[
-        Path | None, typer.Option(help="Write one offline page and end.")
-    ] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a page and end.")] = None,
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port to serve on; 0 for any.")
     ] = 7000,
@@ -213,39 +204,25 @@ def problems(
     """List the built-in problems, or print one."""
     from vdsm_pin.io.problem_file import built_in_names, built_in_text
 
-    if show is not None:
-        typer.echo(built_in_text(show), nl=False)
-        return
-    for name in built_in_names():
-        typer.echo(name)
+    names = "\n".join(built_in_names()) + "\n"
+    typer.echo(names if show is None else built_in_text(show), nl=False)
 
 
-@app.command(
-    epilog=_examples(
-        "vdsm schema verification",
-    ),
-)
+@app.command(epilog=_examples("vdsm schema verification"))
 def schema(
     name: Annotated[
         str, typer.Argument(help="problem, plan, verification or manifest.")
     ] = "problem",
 ) -> None:
     """Print the JSON Schema of a file."""
+    from vdsm_pin.io.problem_file import problem_schema
     from vdsm_pin.report.files import PROBLEM, schema, schema_text
 
-    if name == PROBLEM:
-        from vdsm_pin.io.problem_file import problem_schema
-
-        typer.echo(schema_text(problem_schema()), nl=False)
-        return
-    typer.echo(schema_text(schema(name)), nl=False)
+    found = problem_schema() if name == PROBLEM else schema(name)
+    typer.echo(schema_text(found), nl=False)
 
 
-@app.command(
-    epilog=_examples(
-        "vdsm urdf hrm8 --out hrm8.urdf",
-    ),
-)
+@app.command(epilog=_examples("vdsm urdf hrm8 --out hrm8.urdf"))
 def urdf(
     name: Annotated[str, typer.Argument(help="A built-in arm.")],
     out: Annotated[Path, typer.Option("--out", help="The URDF file.")],
@@ -265,7 +242,7 @@ def urdf(
 @app.command(
     "check-certificate",
     epilog=_examples(
-        "vdsm check-certificate obs1.cert obs1.yaml out/obs1/trajectory.csv",
+        "vdsm check-certificate obs1.cert obs1.yaml out/obs1/trajectory.csv"
     ),
 )
 def check_certificate(
@@ -284,11 +261,7 @@ def check_certificate(
     raise typer.Exit(check([str(certificate), str(file), str(trajectory)]))
 
 
-@app.command(
-    epilog=_examples(
-        "vdsm diff out/monday out/tuesday",
-    ),
-)
+@app.command(epilog=_examples("vdsm diff out/monday out/tuesday"))
 def diff(
     old: Annotated[Path, typer.Argument(metavar="OLD")],
     new: Annotated[Path, typer.Argument(metavar="NEW")],
@@ -300,10 +273,8 @@ def diff(
     from vdsm_pin.report.diff import compare_folders, diff_lines
 
     changes = compare_folders(old, new)
-    for line in diff_lines(changes):
-        typer.echo(line)
-    worse = any(change.worse for change in changes)
-    raise typer.Exit(NOT_PASSED if worse else PASSED)
+    typer.echo("\n".join(diff_lines(changes)))
+    raise typer.Exit(NOT_PASSED if any(one.worse for one in changes) else PASSED)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

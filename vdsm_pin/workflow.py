@@ -4,8 +4,12 @@ Nothing is judged here: problems are read, planned, verified and written down.
 """
 
 import math
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import FrameType
 from typing import Final
 
 from pydantic import ValidationError
@@ -16,7 +20,7 @@ from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.report.facts import plan_file, verification_file
 from vdsm_pin.report.files import PlanFile, VerificationFile
-from vdsm_pin.report.folder import staged
+from vdsm_pin.report.folder import check_output_file, check_output_folder, staged
 from vdsm_pin.report.html import write_report
 from vdsm_pin.report.run_record import RunRecord, sha256_of
 from vdsm_pin.report.tables import ClearanceCsv, write_cables, write_link_angles
@@ -62,6 +66,30 @@ class Verified:
     records: Verification
 
 
+@contextmanager
+def within(seconds: float | None) -> Iterator[None]:
+    """End what is inside after a time, as soon as Python is between two calls.
+
+    Raises:
+        NoPlanFound: When the time is over.
+    """
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        message = f"no plan within the time limit of {seconds:g} s"
+        raise NoPlanFound(message)
+
+    if seconds is None:
+        yield
+        return
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
 def error_box(joint_deg: float, base_mm: float, obstacle_mm: float) -> ErrorBox:
     """The error box from what a user types."""
     return ErrorBox(
@@ -80,6 +108,7 @@ def plan_to_folder(
         Infeasible: If there is no certified plan.
         InvalidInput: If the folder cannot be written.
     """
+    check_output_folder(folder)
     robot = load_robot(source.problem.manipulator)
     refinement = plan_and_verify(source.problem, strategy, robot)
     if refinement.verification.verdict is not Verdict.CERTIFIED:
@@ -112,6 +141,9 @@ def verify_to_folder(order: Order) -> Verified:
         InvalidInput: If a file is bad or the folder cannot be written.
         VerificationFailed: If a check could not be carried out.
     """
+    check_output_folder(order.folder)
+    if order.certificate is not None:
+        check_output_file(order.certificate)
     problem = order.source.problem
     robot = load_robot(problem.manipulator)
     trajectory = read_trajectory(order.trajectory, problem.manipulator)

@@ -18,6 +18,7 @@ from vdsm_pin.report.words import (
     MISSING,
     OUTCOMES,
     check_title,
+    limit,
     outcome,
     percent,
     quantity,
@@ -40,6 +41,7 @@ def _environment() -> jinja2.Environment:
     )
     environment.filters |= {
         "quantity": quantity,
+        "limit": limit,
         "percent": percent,
         "title_of": check_title,
         "outcome": outcome,

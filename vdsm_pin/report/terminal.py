@@ -6,7 +6,7 @@ from pathlib import Path
 import typer
 
 from vdsm_pin.report.files import CheckRow, PlanFile, VerificationFile
-from vdsm_pin.report.words import check_title, outcome, percent, quantity
+from vdsm_pin.report.words import check_title, limit, outcome, percent, quantity
 
 
 def show_plan(file: PlanFile, folder: Path) -> None:
@@ -58,7 +58,7 @@ def _cells(check: CheckRow) -> tuple[str, str, str, str, str]:
     return (
         check_title(check.name),
         quantity(check.worst, check.unit),
-        quantity(check.limit, check.unit),
+        limit(check.limit, check.unit),
         str(check.count),
         f"{known.mark} {known.word}",
     )

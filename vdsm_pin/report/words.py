@@ -94,6 +94,11 @@ def quantity(value: float | None, unit: str) -> str:
     return text.replace("-", "−", 1) + suffix if text[0] == "-" else text + suffix
 
 
+def limit(value: float | None, unit: str) -> str:
+    """A check's limit; "none" where it only reports."""
+    return "none" if value is None else quantity(value, unit)
+
+
 def percent(share: float | None) -> str:
     """A share from 0 to 1 in percent, rounded down: 100 % means nothing is missing."""
     if share is None or math.isnan(share):

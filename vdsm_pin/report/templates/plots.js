@@ -214,7 +214,8 @@ class Plot {
   text(value) {
     if (!Number.isFinite(value)) return "not available";
     const digits = this.chart.whole ? 0 : 2;
-    return value.toFixed(digits).replace("-", "−") + this.chart.unit;
+    const text = value.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
+    return text + this.chart.unit;
   }
 
   cursor(time) {
