@@ -1,0 +1,22 @@
+"""Fig. 12: paths of all key points in obs2."""
+
+from matplotlib.figure import Figure
+
+from paper_figures.four_views import four_views
+from paper_figures.runs import Runs
+from paper_figures.style import save
+
+NAME = "fig12"
+
+
+def draw(runs: Runs) -> dict[str, Figure]:
+    """One figure per strategy."""
+    return {
+        f"{NAME}-{run.strategy}": four_views(run, single_joints=True)
+        for run in runs.both("obs2")
+    }
+
+
+if __name__ == "__main__":
+    for name, figure in draw(Runs()).items():
+        save(figure, name)

@@ -1,0 +1,81 @@
+"""Labels of dots, each put where it is clear of lines, dots and other labels."""
+
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from vdsm_pin.geometry.arrays import FloatArray
+
+POINTS_PER_INCH: Final = 72.0
+RADII: Final = (6.5, 9.0, 12.0)
+"""Distances from a dot at which its label is tried; [pt]."""
+
+TURNS: Final = 24
+"""Directions in which a label is tried."""
+
+ROOM: Final = 7.0
+"""Free space beyond this makes a place no better; [pt]."""
+
+
+def label_dots(
+    axes: Axes,
+    dots: FloatArray,
+    names: list[str],
+    lines: list[FloatArray],
+    size: float = 6.3,
+) -> None:
+    """Write a name beside each dot. The limits of the axes must be final.
+
+    Args:
+        axes: Where to write, with equal axes.
+        dots: Shape (n, 2); [mm].
+        names: One per dot.
+        lines: Polylines to keep clear of, each of shape (m, 2); [mm].
+        size: Of the letters; [pt].
+    """
+    to_points = axes.transData.transform
+    scale = POINTS_PER_INCH / axes.figure.dpi
+    busy = [to_points(_sampled(line)) * scale for line in lines]
+    obstacles = np.vstack([*busy, to_points(dots) * scale])
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    frame = to_points([[left, bottom], [right, top]]) * scale
+    turn = 2.0 * np.pi * np.arange(TURNS) / TURNS
+    around = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    tries = np.vstack([radius * around for radius in RADII])
+    for at, name in zip(dots, names, strict=True):
+        here = to_points(at) * scale
+        half = np.array([0.30 * size * len(name), 0.45 * size])
+        gaps = [_gap(obstacles, here + offset, half) for offset in tries]
+        inside = [
+            bool(
+                (here + offset - half >= frame[0]).all()
+                and (here + offset + half <= frame[1]).all()
+            )
+            for offset in tries
+        ]
+        far = np.linalg.norm(tries, axis=1)
+        score = np.minimum(gaps, ROOM) - 0.35 * far - 20.0 * ~np.array(inside)
+        offset = tries[int(np.argmax(score))]
+        axes.annotate(
+            name, at, offset, textcoords="offset points", ha="center", va="center",
+            size=size, zorder=9,
+        )  # fmt: skip
+        grid = np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1)])
+        obstacles = np.vstack([obstacles, here + offset + grid * half])
+
+
+def _gap(obstacles: FloatArray, centre: FloatArray, half: FloatArray) -> float:
+    """Distance of a label's box to the nearest thing, negative inside; [pt]."""
+    beyond = np.abs(obstacles - centre) - half
+    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+    return float((outside + np.minimum(beyond.max(axis=1), 0.0)).min())
+
+
+def _sampled(line: FloatArray) -> FloatArray:
+    """Points along a polyline, close enough for a label not to fit between; [mm]."""
+    parts = [
+        a + np.linspace(0.0, 1.0, 40)[:, None] * (b - a)
+        for a, b in zip(line[:-1], line[1:], strict=True)
+    ]
+    return np.vstack(parts)

@@ -1,0 +1,148 @@
+"""One look for all figures: typography, the paper's colours, files that stay small.
+
+Joint O_i, its link i and its link angle psi_i share a colour, as in the paper's figures:
+orange for the first, pink for the long links, blue for the short ones, black for the
+tip. Pink and blue run from light to dark so that neighbours can be told apart.
+"""
+
+from pathlib import Path
+from typing import Any, Final
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from PIL import Image
+
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.report.palette import oklch
+
+REPORTS: Final = Path(__file__).resolve().parents[2] / "reports" / "paper"
+"""Where the figures are committed."""
+
+WIDTH: Final = 7.2
+"""Width of a printed figure; [inch]."""
+
+DPI: Final = 150
+"""Resolution of the PNG pictures; [dots per inch]."""
+
+PNG_COLOURS: Final = 256
+"""Palette size of the PNG pictures, enough for line drawings; [-]."""
+
+INK: Final = "#1d2129"
+FAINT: Final = "#9aa1ab"
+GRID: Final = "#e4e7eb"
+OBSTACLE: Final = "#8fd3cf"
+OBSTACLE_EDGE: Final = "#3d8f8a"
+DANGER: Final = "#dff3e2"
+DANGER_EDGE: Final = "#3f9a52"
+AUXILIARY: Final = "#d62828"
+LIMIT: Final = "#d62828"
+TIP: Final = "#111111"
+STRATEGY_COLOURS: Final = {"paper": "#6a6f7a", "fewest": "#1463b8"}
+
+_SETTINGS: Final[dict[str, Any]] = {
+    "font.family": "sans-serif",
+    # Verdana has the same widths, for viewers of the SVG without DejaVu.
+    "font.sans-serif": ["DejaVu Sans", "Verdana"],
+    "font.size": 7.0,
+    "axes.titlesize": 7.5,
+    "axes.titlelocation": "left",
+    "axes.titleweight": "bold",
+    "axes.titlepad": 5.0,
+    "axes.labelsize": 7.0,
+    "axes.labelpad": 2.0,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": FAINT,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.5,
+    "xtick.labelsize": 6.5,
+    "ytick.labelsize": 6.5,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.major.size": 2.5,
+    "ytick.major.size": 2.5,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "text.color": INK,
+    "lines.linewidth": 1.1,
+    "lines.solid_capstyle": "round",
+    "legend.fontsize": 6.5,
+    "legend.frameon": False,
+    "legend.handlelength": 1.6,
+    "legend.borderaxespad": 0.0,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "vdsm-pin",
+    "path.simplify": True,
+    "figure.dpi": DPI,
+}
+
+
+def sheet(height: float, width: float = WIDTH) -> Figure:
+    """An empty figure in the house style.
+
+    Args:
+        height: [inch].
+        width: [inch].
+    """
+    mpl.rcParams.update(_SETTINGS)
+    return Figure(figsize=(width, height))
+
+
+def place(
+    figure: Figure, left: float, bottom: float, width: float, height: float
+) -> Axes:
+    """Axes at a place of the sheet given in inches from its lower left corner."""
+    across, up = figure.get_size_inches()
+    return figure.add_axes((left / across, bottom / up, width / across, height / up))
+
+
+def key_colours(manipulator: Manipulator) -> tuple[str, ...]:
+    """Colours of O_1..O_{N+1}: orange, pink, two blues, black."""
+    n_pink = max(manipulator.n_links - 3, 0)
+    pink = [
+        oklch(0.80 - 0.36 * k / max(n_pink - 1, 1), 0.125 + 0.02 * (k % 2), 350 - 5 * k)
+        for k in range(n_pink)
+    ]
+    blue = [oklch(0.68, 0.12, 245.0), oklch(0.45, 0.16, 258.0)]
+    colours = [oklch(0.72, 0.17, 58.0), *pink, *blue]
+    return (*colours[: manipulator.n_links], TIP)
+
+
+def subscript(number: int) -> str:
+    """A number in subscript digits."""
+    return str(number).translate(str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉"))
+
+
+def panel_title(axes: Axes, letter: str, text: str) -> None:
+    """The panel's letter and what it shows."""
+    axes.set_title(f"({letter}) {text}")
+
+
+def save(figure: Figure, name: str, folder: Path = REPORTS) -> None:
+    """Write name.svg and name.png, the same bytes for the same drawing.
+
+    Args:
+        figure: What to write.
+        name: File name without its ending.
+        folder: Where to.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    figure.savefig(folder / f"{name}.svg", metadata={"Date": None, "Creator": None})
+    save_png(figure, folder / f"{name}.png")
+
+
+def save_png(figure: Figure, file: Path) -> None:
+    """Write a PNG picture with a palette, at print resolution."""
+    figure.savefig(file, dpi=DPI, metadata={"Software": None})
+    with Image.open(file) as picture:
+        few = picture.convert("RGB").quantize(
+            PNG_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE
+        )
+    few.save(file, optimize=True)
