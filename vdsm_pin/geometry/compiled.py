@@ -64,9 +64,8 @@ def compiled(function: F) -> F:
         config.CACHE_DIR = before
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def apart(typing_context: Any) -> Any:
-    """Called in a compiled function, keeps it from being copied into its callers.
+def _apart(typing_context: Any) -> Any:
+    """Keep the function that calls this from being copied into its callers.
 
     Without it every large function is optimised again inside every other one, and
     compiling takes minutes.
@@ -77,3 +76,6 @@ def apart(typing_context: Any) -> Any:
         return context.get_dummy_value()
 
     return numba.types.void(), generate
+
+
+apart: Callable[[], None] = cast(Any, intrinsic)(_apart)

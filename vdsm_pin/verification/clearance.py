@@ -154,8 +154,11 @@ def _new_results(
     )
 
 
-def _chunk(results: Results, first: int, count: int) -> ClearanceChunk:
-    numbers = results.numbers[:count]
+def _chunk(results: Results, task: Task, first: int, count: int) -> ClearanceChunk:
+    numbers = results.numbers[:count].copy()
+    # In a pair of links the sweep moves the second one against the first.
+    swapped = np.flatnonzero(task.pairs.frame != BASE)
+    numbers[:, swapped, 3:] = np.roll(numbers[:, swapped, 3:], 3, axis=2)
     columns = [frozen(numbers[..., c]) for c in range(3)]
     return ClearanceChunk(
         first_interval=first,
@@ -211,7 +214,7 @@ def prove_clearance(
         last = min(first + length, n_intervals)
         sweep(task, motion, desk, results, first, last, n_obstacles, False)
         for sink in sinks:
-            sink(_chunk(results, first, last - first))
+            sink(_chunk(results, task, first, last - first))
     for group in range(2):
         _narrow(task, motion, desk, results, group)
     return ClearanceProof(

@@ -7,6 +7,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput, VdsmError
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import RobotModel
 from vdsm_pin.trajectory import Trajectory
@@ -97,7 +98,7 @@ def verify(
         errors=box,
         pairs=proof.pairs,
         checks=tuple(checks),
-        closest=closest_approaches(proof),
+        closest=closest_approaches(problem, trajectory, proof),
         profile=proof.profile,
         coverage=tip.coverage,
         undrawn=tip.undrawn,
@@ -195,19 +196,45 @@ def _clearance_check(
     )
 
 
-def closest_approaches(proof: ClearanceProof) -> tuple[ClosestApproach, ...]:
+def _station(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    row: FloatArray,
+    link: int,
+    point: FloatArray,
+) -> float:
+    """Arc length along a link's axis of the place below its witness; [m]."""
+    k, t = int(row[AT_UPPER]), float(row[TIME])
+    after = min(k + 1, trajectory.n_samples - 1)
+    values = (trajectory.x0, trajectory.alpha, trajectory.theta)
+    now = [np.array([rows[k] + t * (rows[after] - rows[k])]) for rows in values]
+    centres = joint_centres(problem.manipulator, *now)[0]
+    length = float(problem.manipulator.link_lengths[link - 1])
+    axis = (centres[link] - centres[link - 1]) / length
+    along = float(axis @ (point - centres[link - 1]))
+    return min(max(along, 0.0), length)
+
+
+def closest_approaches(
+    problem: PlanningProblem, trajectory: Trajectory, proof: ClearanceProof
+) -> tuple[ClosestApproach, ...]:
     """The pairs that come nearest, by their proved lower bounds."""
-    order = np.argsort(proof.best[:, 0], kind="stable")[:CLOSEST]
-    return tuple(
-        ClosestApproach(
-            interval=int(row[AT_UPPER]),
-            time=float(row[TIME]),
-            pair=proof.pairs[pair],
-            lower=float(row[0]),
-            upper=float(row[UP]),
-            station=float("nan"),
-            link_point=frozen(row[OWN:OTHER]),
-            other_point=frozen(row[OTHER : OTHER + 3]),
+    rows = []
+    for k in np.argsort(proof.best[:, 0], kind="stable")[:CLOSEST]:
+        pair, row = proof.pairs[k], proof.best[k]
+        points = row[OWN:OTHER], row[OTHER : OTHER + 3]
+        # In a pair of links the sweep moves the second one against the first.
+        mine, theirs = points if pair.obstacle else points[::-1]
+        rows.append(
+            ClosestApproach(
+                interval=int(row[AT_UPPER]),
+                time=float(row[TIME]),
+                pair=pair,
+                lower=float(row[0]),
+                upper=float(row[UP]),
+                station=_station(problem, trajectory, row, pair.link, mine),
+                link_point=frozen(mine),
+                other_point=frozen(theirs),
+            )
         )
-        for pair, row in ((int(p), proof.best[p]) for p in order)
-    )
+    return tuple(rows)

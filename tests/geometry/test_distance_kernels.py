@@ -1,0 +1,171 @@
+"""Brackets of distances against closed forms that share nothing with the iteration."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
+from vdsm_pin.geometry.kernels import (
+    BRACKET,
+    FAR,
+    LOWER,
+    NEAR,
+    NORMAL,
+    SCRATCH_ROWS,
+    UPPER,
+    bracket,
+)
+from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
+from vdsm_pin.geometry.pieces import PackedPieces, coherent_order, pack_pieces
+
+GOAL = 1e-9
+
+
+def measure(pieces: PackedPieces, p: int, points: FloatArray) -> FloatArray:
+    out = np.zeros(BRACKET + 4)
+    out[NORMAL:NEAR] = [0.3, -0.5, 0.7]
+    scratch = np.zeros((SCRATCH_ROWS, 3))
+    bracket(pieces, p, np.ascontiguousarray(points), len(points), GOAL, scratch, out)
+    return out
+
+
+def to_cylinder(piece: FlatCylinder) -> Callable[[FloatArray], float]:
+    def distance(x: FloatArray) -> float:
+        along = float((x - piece.centre) @ piece.axis)
+        across = float(np.linalg.norm(x - piece.centre - along * piece.axis))
+        beyond = max(0.0, abs(along) - piece.half_length)
+        return float(np.hypot(beyond, max(0.0, across - piece.radius)))
+
+    return distance
+
+
+def to_box(rotation: FloatArray, centre: FloatArray, half: FloatArray):
+    def distance(x: FloatArray) -> float:
+        local = np.abs(rotation.T @ (x - centre)) - half
+        return float(np.linalg.norm(np.maximum(local, 0.0)))
+
+    return distance
+
+
+def least_on_segment(
+    distance: Callable[[FloatArray], float], ends: FloatArray
+) -> float:
+    """Least distance on a segment: convex in the parameter, so thirds find it."""
+    low, high = 0.0, 1.0
+    for _ in range(130):
+        a, b = low + (high - low) / 3.0, high - (high - low) / 3.0
+        at = [distance(ends[0] + t * (ends[1] - ends[0])) for t in (a, b)]
+        low, high = (low, b) if at[0] <= at[1] else (a, high)
+    return distance(ends[0] + 0.5 * (low + high) * (ends[1] - ends[0]))
+
+
+def random_rotation(rng: np.random.Generator) -> FloatArray:
+    q, r = np.linalg.qr(rng.normal(size=(3, 3)))
+    return np.asarray(q * np.sign(np.diag(r)))
+
+
+def assert_brackets(out: FloatArray, truth: float) -> None:
+    assert out[LOWER] <= truth + 1e-12
+    assert out[UPPER] >= truth - 1e-12
+    assert out[UPPER] - out[LOWER] <= 2.0 * GOAL
+    assert np.linalg.norm(out[NORMAL:NEAR]) == pytest.approx(1.0, abs=1e-14)
+
+
+def test_segment_and_flat_cylinder() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(150):
+        axis = random_rotation(rng)[0]
+        piece = FlatCylinder(rng.uniform(-1, 1, 3), axis, *rng.uniform(0.05, 1.0, 2))
+        ends = rng.uniform(-2, 2, (2, 3))
+        truth = least_on_segment(to_cylinder(piece), ends)
+        if truth > GOAL:
+            assert_brackets(measure(pack_pieces([[piece]]), 0, ends), truth)
+
+
+def test_segment_and_box() -> None:
+    rng = np.random.default_rng(2)
+    corners = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
+    for _ in range(150):
+        turn, centre = random_rotation(rng), rng.uniform(-1, 1, 3)
+        half, ends = rng.uniform(0.01, 1.0, 3), rng.uniform(-2, 2, (2, 3))
+        piece = Hull(centre + (corners * half) @ turn.T)
+        truth = least_on_segment(to_box(turn, centre, half), ends)
+        if truth > GOAL:
+            assert_brackets(measure(pack_pieces([[piece]]), 0, ends), truth)
+
+
+@pytest.mark.parametrize("gap", [1e-3, 1e-6, 1e-9, 1e-12])
+def test_parallel_and_rim_contacts(gap: float) -> None:
+    """A segment beside a cylinder, over its cap, and opposite its rim."""
+    piece = FlatCylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.0, 0.5)
+    pieces = pack_pieces([[piece]])
+    slant = np.array([1.0, 0.0, 1.0]) / np.sqrt(2.0)
+    rim = np.array([0.5, 0.0, 1.0]) + gap * slant
+    across = np.array([0.0, 1.0, 0.0])
+    for ends in (
+        np.array([[0.5 + gap, 0.0, -0.7], [0.5 + gap, 0.0, 0.8]]),
+        np.array([[-0.2, 0.1, 1.0 + gap], [0.3, -0.2, 1.0 + gap]]),
+        np.array([rim - across, rim + across]),
+    ):
+        out = measure(pieces, 0, ends)
+        assert out[LOWER] <= gap + 1e-15
+        assert out[UPPER] >= gap - 1e-15
+        # The direction of a vector as short as the gap is known to ulp / gap only.
+        assert out[UPPER] - out[LOWER] <= max(2.0 * GOAL, 1e-16 / gap)
+
+
+def test_meeting_bodies_have_no_positive_bound() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(100):
+        centre = rng.uniform(-1, 1, 3)
+        hull = Hull(centre + rng.uniform(-0.5, 0.5, (8, 3)), 0.05)
+        inner = hull.points[:4].mean(axis=0)
+        ends = np.array([inner, rng.uniform(-3, 3, 3)])
+        out = measure(pack_pieces([[hull]]), 0, ends)
+        assert out[LOWER] <= out[UPPER] <= 0.0 + 1e-12
+        assert np.isfinite(out[LOWER])
+
+
+def test_half_space_is_exact() -> None:
+    normal = np.array([0.0, 0.6, 0.8])
+    pieces = pack_pieces([[HalfSpacePiece(normal, -0.5)]])
+    out = measure(pieces, 0, np.array([[1.0, 0.0, 0.0], [2.0, 1.0, 1.0]]))
+    assert out[LOWER] == out[UPPER] == pytest.approx(0.5, abs=1e-15)
+    np.testing.assert_allclose(out[NORMAL:NEAR], -normal)
+    assert normal @ out[FAR:BRACKET] == pytest.approx(-0.5, abs=1e-15)
+
+
+def test_rounded_hulls_lose_their_radius() -> None:
+    sphere = pack_pieces([[Hull(np.zeros((1, 3)), 0.25)]])
+    out = measure(sphere, 0, np.array([[1.0, -1.0, 0.0], [1.0, 1.0, 0.0]]))
+    assert_brackets(out, 0.75)
+    np.testing.assert_allclose(out[FAR:BRACKET], [0.25, 0.0, 0.0], atol=1e-8)
+
+
+def test_the_hierarchy_finds_the_nearest_of_many_pieces() -> None:
+    rng = np.random.default_rng(4)
+    centres = rng.uniform(-2, 2, (300, 1, 3))
+    group: list[Piece] = [Hull(c + rng.uniform(-0.1, 0.1, (3, 3))) for c in centres]
+    many, single = pack_pieces([group]), pack_pieces([[piece] for piece in group])
+    assert sorted(many.order) == list(range(300))
+    scratch, stack = np.zeros((SCRATCH_ROWS + 2, 3)), np.zeros(STACK, np.int64)
+    for _ in range(20):
+        ends = rng.uniform(-3, 3, (2, 3))
+        out, trial = np.ones(BRACKET + 4), np.zeros(BRACKET + 4)
+        obstacle_bracket(many, 0, ends, 2, GOAL, scratch, stack, trial, out)
+        each = np.array([measure(single, p, ends)[:2] for p in range(300)])
+        if each[:, 1].min() > GOAL:
+            assert out[LOWER] == pytest.approx(each[:, 0].min(), abs=2.0 * GOAL)
+            assert out[UPPER] >= each[:, 0].min() - 1e-12
+        else:
+            assert out[LOWER] <= 0.0
+
+
+def test_coherent_order_is_a_permutation_with_compact_halves() -> None:
+    points = np.random.default_rng(5).uniform(0, 1, (1000, 3))
+    order = coherent_order(points)
+    assert sorted(order) == list(range(1000))
+    spread = np.ptp(points[order].reshape(8, 125, 3), axis=1).prod(axis=1)
+    assert spread.sum() <= 1.0

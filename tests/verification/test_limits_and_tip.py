@@ -1,0 +1,168 @@
+"""Limits, tip and coverage: kept, broken at one place, and stated exactly."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vdsm_pin.kinematics import joint_angles, joint_centres
+from vdsm_pin.manipulator import built_in
+from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.scene import Scene
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.limits import check_limits, extremes
+from vdsm_pin.verification.records import Check, Verdict
+from vdsm_pin.verification.tip import check_tip, coverage
+
+ARM = built_in("hrm8")
+SQUARE = np.array([[3.1, 0, 0], [3.1, 0.4, 0], [3.1, 0.4, 0.4], [3.1, 0, 0.4]])
+
+
+def drawing(n: int = 161, laps: float = 1.0) -> tuple[PlanningProblem, Trajectory]:
+    """The straight arm's tip drawing a closed square of side 0.4 m."""
+    path = DesiredPath(SQUARE[0], SQUARE, closed=True, required_coverage=1.0)
+    stations = np.linspace(0.0, laps * path.length, n)
+    tips = path.at(np.mod(stations, path.length))
+    tips[-1] = path.at(np.array([np.mod(stations[-1], path.length)]))[0]
+    x0 = tips[:, 0] - np.sqrt(ARM.total_length**2 - (tips[:, 1:] ** 2).sum(axis=1))
+    base = np.column_stack([x0, np.zeros((n, 2))])
+    centres = base[:, None] + ARM.ratios[:, None] * (tips - base)[:, None]
+    alpha, theta = joint_angles(ARM, centres)
+    problem = PlanningProblem("p", ARM, Scene(), path, 0.0, np.eye(4))
+    return problem, Trajectory(np.ones(n, bool), stations, x0, alpha, theta)
+
+
+def named(checks: tuple[Check, ...], words: str) -> Check:
+    (found,) = [check for check in checks if words in check.name]
+    return found
+
+
+def test_a_drawn_square_passes_and_is_covered() -> None:
+    problem, motion = drawing()
+    report = check_tip(problem, motion)
+    assert {check.verdict for check in report.checks} == {Verdict.CERTIFIED}
+    assert report.coverage == pytest.approx(1.0, abs=1e-12)
+    assert report.coverage <= 1.0
+    assert report.undrawn.shape == (0, 2)
+    limits = check_limits(problem, motion)
+    assert {check.verdict for check in limits} == {Verdict.CERTIFIED}
+
+
+def test_the_deviation_bounds_the_tip_between_the_rows() -> None:
+    problem, motion = drawing(41)
+    bound = check_tip(problem, motion).deviation
+    worst = 0.0
+    for t in np.linspace(0.0, 1.0, 41):
+        now = [
+            v[:-1] + t * (v[1:] - v[:-1])
+            for v in (motion.x0, motion.alpha, motion.theta, motion.path_m)
+        ]
+        tips = joint_centres(ARM, *now[:3])[:, -1]
+        goal = problem.path.at(np.mod(now[3], problem.path.length))
+        worst = max(worst, float(np.linalg.norm(tips - goal, axis=1).max()))
+    assert 0.0 < worst <= bound <= 20.0 * worst
+
+
+def test_a_corner_skipped_between_rows_shows_in_the_deviation() -> None:
+    problem, motion = drawing(4 * 40 + 1)
+    keep = np.ones(motion.n_samples, bool)
+    keep[40] = False  # the corner at 0.4 m
+    cut = Trajectory(*(getattr(motion, n)[keep] for n in
+                       ("on_path", "path_m", "x0", "alpha", "theta")))  # fmt: skip
+    # The chord misses the corner by 10 mm / sqrt 2.
+    assert check_tip(problem, cut).deviation == pytest.approx(7.07e-3, abs=2e-4)
+
+
+@pytest.mark.parametrize("laps", [0.5, 1.25])
+def test_coverage_counts_each_place_once(laps: float) -> None:
+    problem, motion = drawing(201, laps)
+    share, gaps = coverage(problem.path, motion)
+    assert share == pytest.approx(min(1.0, laps), abs=1e-9)
+    assert len(gaps) == (1 if laps < 1.0 else 0)
+    if laps < 1.0:
+        np.testing.assert_allclose(gaps, [[0.8, 1.6]], atol=1e-9)
+        row = named(check_tip(problem, motion).checks, "drawn")
+        assert row.verdict is Verdict.REFUTED
+
+
+def test_a_tip_off_the_path_by_two_micrometres_is_refuted_at_its_row() -> None:
+    problem, motion = drawing()
+    x0 = motion.x0.copy()
+    x0[17] += 2e-6
+    row = named(
+        check_tip(problem, replace(motion, x0=x0)).checks, "path at the waypoints"
+    )
+    assert row.verdict is Verdict.REFUTED
+    assert row.where == "waypoint 17"
+    assert row.worst == pytest.approx(2e-6, rel=1e-6)
+
+
+def test_a_wrong_start_is_refuted() -> None:
+    problem, motion = drawing()
+    moved = replace(problem, path=replace(problem.path, start=SQUARE[0] + 2e-6))
+    assert named(check_tip(moved, motion).checks, "start").verdict is Verdict.REFUTED
+    joints = motion.joints[0].copy()
+    given = replace(problem, path=replace(problem.path, start_joints=joints))
+    good = named(check_tip(given, motion).checks, "joints at")
+    assert good.verdict is Verdict.CERTIFIED
+    joints[3] += 1e-6
+    given = replace(problem, path=replace(problem.path, start_joints=joints))
+    bad = named(check_tip(given, motion).checks, "joints at")
+    assert bad.verdict is Verdict.REFUTED
+
+
+def test_nothing_on_the_path_is_not_a_pass() -> None:
+    problem, motion = drawing()
+    off = replace(motion, on_path=np.zeros(motion.n_samples, bool))
+    report = check_tip(problem, off)
+    assert named(report.checks, "path at the waypoints").verdict is Verdict.UNDECIDED
+    assert named(report.checks, "between").verdict is Verdict.UNDECIDED
+    assert report.coverage == 0.0
+
+
+@pytest.mark.parametrize(
+    ("field", "joint", "words"), [("alpha", 3, "alpha in"), ("theta", 6, "theta in")]
+)
+def test_one_angle_past_its_limit_is_found(field: str, joint: int, words: str) -> None:
+    problem, motion = drawing()
+    for past, verdict in ((2e-9, Verdict.REFUTED), (-1e-12, Verdict.CERTIFIED)):
+        values = getattr(motion, field).copy()
+        values[9, joint - 1] = -(ARM.max_joint_angle + past)
+        row = named(check_limits(problem, replace(motion, **{field: values})), words)
+        assert row.verdict is verdict
+        assert row.where == f"waypoint 9, {field}{joint}"
+
+
+def test_the_cone_is_judged_apart_from_the_box() -> None:
+    problem, motion = drawing()
+    alpha, theta = motion.alpha.copy(), motion.theta.copy()
+    alpha[5, 2] = theta[5, 2] = np.deg2rad(40.0)
+    rows = check_limits(problem, replace(motion, alpha=alpha, theta=theta))
+    assert named(rows, "alpha in").verdict is Verdict.CERTIFIED
+    cone = named(rows, "psi")
+    assert cone.verdict is Verdict.REFUTED
+    truth = np.arccos(np.cos(np.deg2rad(40.0)) ** 2)
+    assert cone.worst == pytest.approx(truth, abs=1e-12)
+
+
+def test_psi_over_an_interval_is_largest_at_an_end() -> None:
+    rng = np.random.default_rng(0)
+    a, b = rng.uniform(-1.5, 1.5, (2, 20_000, 2))
+    t = rng.uniform(0.0, 1.0, (20_000, 1))
+    psi = [np.arccos(np.cos(q).prod(axis=1)) for q in (a, b, a + t * (b - a))]
+    assert (psi[2] <= np.maximum(psi[0], psi[1]) + 1e-12).all()
+
+
+def test_base_and_steps_are_judged() -> None:
+    problem, motion = drawing()
+    x0 = motion.x0.copy()
+    x0[3] = -5.1
+    rail = named(check_limits(problem, replace(motion, x0=x0)), "rail")
+    assert rail.verdict is Verdict.REFUTED
+    assert (rail.worst, rail.limit) == (-5.1, -5.0)
+    alpha = motion.alpha.copy()
+    alpha[4:, 0] += np.deg2rad(5.5)
+    step = named(check_limits(problem, replace(motion, alpha=alpha)), "row to row")
+    assert step.verdict is Verdict.REFUTED
+    assert step.where == "waypoint 3, joint 1"
+    assert extremes(motion).x0_min == motion.x0.min()
