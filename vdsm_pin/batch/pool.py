@@ -13,6 +13,8 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, Final, Generic, TypeVar
 
+from vdsm_pin.errors import VdsmError
+
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
@@ -60,7 +62,7 @@ class _Worker(Generic[Task]):
         self.pipe.close()
 
 
-class WorkerFailed(RuntimeError):
+class WorkerFailed(VdsmError):
     """A worker process ended before it was ready: no task can run."""
 
 
