@@ -1,0 +1,116 @@
+"""For which turns of the prism of obs2 does the paper's rule find a plan?
+
+    python analysis/obs2_orientations.py --out reports/paper
+
+The paper gives a triangular prism with a tangent circle of radius 200 about (400, 400)
+and not how it is turned. The triangle is taken as equilateral, turned from 0 to 105 deg
+(it repeats after 120), in both readings of the circle. "Waypoints kept" are checked by
+the clearance function; the proof between them is the verifier's.
+"""
+
+import argparse
+import json
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.errors import Infeasible
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.kinematics import link_angles
+from vdsm_pin.planner.pipeline import plan_paper
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.scene import Prism, Scene
+from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.link_clearance import link_clearance
+
+TURNS_DEG: Final = tuple(range(0, 120, 15))
+READINGS: Final = {"inscribed": 0.400, "circumscribed": 0.200}
+"""Distance of the corners from the axis; [m]."""
+AXIS: Final = (0.400, 0.400)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One turn in one reading.
+
+    Args:
+        circle: The reading.
+        turn_deg: Bearing of the first corner from y to z.
+        outcome: "plan", or why there is none.
+        psi_deg: Largest link angle.
+        x0_max_mm: Largest base position.
+        drawn_percent: Part of the desired path between drawn waypoints.
+    """
+
+    circle: str
+    turn_deg: float
+    outcome: str
+    psi_deg: float | None = None
+    x0_max_mm: float | None = None
+    drawn_percent: float | None = None
+
+
+def turned(problem: PlanningProblem, corners_at: float, turn: float) -> PlanningProblem:
+    """obs2 with an equilateral prism turned; [m], [rad]."""
+    prism = problem.scene.obstacles[0]
+    assert isinstance(prism, Prism)
+    bearings = turn + 2.0 * np.pi * np.arange(3) / 3.0
+    offsets = np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+    polygon = np.array(AXIS) + corners_at * offsets
+    return replace(problem, scene=Scene((replace(prism, polygon=polygon),)))
+
+
+def row_of(circle: str, turn_deg: float) -> Row:
+    """Plan one turn."""
+    problem = read_problem("paper/obs2").problem
+    problem = turned(problem, READINGS[circle], float(np.deg2rad(turn_deg)))
+    try:
+        plan = plan_paper(problem, link_clearance(problem), 0.0)
+    except Infeasible as reason:
+        return Row(circle, turn_deg, str(reason))
+    trajectory = plan.trajectory
+    psi = np.rad2deg(link_angles(trajectory.alpha, trajectory.theta).max())
+    both = trajectory.on_path[1:] & trajectory.on_path[:-1]
+    advance = np.mod(np.diff(trajectory.path_m)[both], problem.path.length)
+    drawn = 100.0 * float(advance.sum()) / problem.path.length
+    x0_max = float(trajectory.x0.max()) * MM_PER_M
+    return Row(circle, turn_deg, "plan", float(psi), x0_max, drawn)
+
+
+def markdown(rows: list[Row]) -> str:
+    """The table for reading."""
+    lines = [
+        "# obs2: turns of the prism",
+        "",
+        "Made by `python analysis/obs2_orientations.py --out reports/paper`.",
+        "",
+        "| circle | turn [deg] | outcome | max psi [deg] | x0 max [mm] | drawn [%] |",
+        "|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        numbers = ["-", "-", "-"]
+        if row.psi_deg is not None:
+            numbers = [f"{row.psi_deg:.2f}", f"{row.x0_max_mm:.1f}"]
+            numbers.append(f"{row.drawn_percent:.2f}")
+        cells = [row.circle, f"{row.turn_deg:g}", row.outcome, *numbers]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Write both files and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("reports/paper"))
+    folder = parser.parse_args().out
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = [row_of(circle, turn) for circle in READINGS for turn in TURNS_DEG]
+    text = json.dumps([asdict(row) for row in rows], indent=1) + "\n"
+    (folder / "obs2_orientations.json").write_text(text, encoding="utf-8")
+    (folder / "obs2_orientations.md").write_text(markdown(rows), encoding="utf-8")
+    print(markdown(rows))
+
+
+if __name__ == "__main__":
+    main()
