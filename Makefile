@@ -24,6 +24,10 @@ check: lint test
 urdf: $(VENV)/.installed
 	$(BIN)/vdsm urdf hrm8 --out urdf/hrm8.urdf
 
+figures: $(VENV)/.installed
+	$(BIN)/python analysis/figures.py --out reports/paper
+	$(BIN)/python analysis/readme_strip.py --out reports
+
 dist: $(VENV)/.installed
 	.ci/test-wheel
 

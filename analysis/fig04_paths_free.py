@@ -1,7 +1,6 @@
 """Fig. 4: paths of all key points without obstacles, in four views."""
 
 from matplotlib.figure import Figure
-
 from paper_figures.four_views import four_views
 from paper_figures.runs import Runs
 from paper_figures.style import save

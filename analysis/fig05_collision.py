@@ -2,7 +2,6 @@
 
 import numpy as np
 from matplotlib.figure import Figure
-
 from paper_figures import style
 from paper_figures.runs import SCENE_TITLES, Runs
 from paper_figures.scenery import (
@@ -15,6 +14,7 @@ from paper_figures.scenery import (
 )
 from paper_figures.style import save
 from paper_figures.views import OBLIQUE, SIDE, TOP
+
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.lift import lift
 from vdsm_pin.planner.scale import scale

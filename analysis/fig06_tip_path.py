@@ -1,15 +1,15 @@
-"""Fig. 6: the tip's path in the projection, with obstacle, danger region and moments."""
+"""Fig. 6: the tip's path in the projection, with obstacle and danger region."""
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-
 from paper_figures import style
 from paper_figures.marks import marks
 from paper_figures.runs import STRATEGIES, Run, Runs
 from paper_figures.scenery import draw_section, square, zone
 from paper_figures.style import save
 from paper_figures.views import SIDE, thin
+
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.units import MM_PER_M
 
@@ -57,7 +57,7 @@ def draw_panel(axes: Axes, run: Run) -> None:
 
 
 def _equidistant_line(axes: Axes, run: Run) -> None:
-    """The auxiliary line from the start through the obstacle's centre (paper, 4.2.2)."""
+    """The line from the start through the obstacle's centre (paper, 4.2.2)."""
     start, section = run.problem.path.start[1:], zone(run.problem, "x", 0.0)
     if section is None:
         return

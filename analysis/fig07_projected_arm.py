@@ -1,7 +1,6 @@
 """Fig. 7: the projected arm with the tip at A4 and at A5, in obs1."""
 
 from matplotlib.figure import Figure
-
 from paper_figures import style
 from paper_figures.marks import row_of
 from paper_figures.projections import HIGH, LOW, draw_background, draw_chain

@@ -4,7 +4,6 @@ import numpy as np
 import shapely
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-
 from paper_figures import style
 from paper_figures.labels import label_dots
 from paper_figures.marks import row_of
@@ -13,6 +12,7 @@ from paper_figures.runs import Run, Runs
 from paper_figures.steps import Slide, slides, sliding_region
 from paper_figures.style import save
 from paper_figures.views import SIDE
+
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.units import MM_PER_M
 

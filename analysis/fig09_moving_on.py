@@ -1,7 +1,6 @@
 """Fig. 9: the projected arm while the tip moves from A5 to A6, in obs1."""
 
 from matplotlib.figure import Figure
-
 from paper_figures import style
 from paper_figures.marks import row_of
 from paper_figures.projections import (

@@ -1,7 +1,6 @@
 """Fig. 14: psi_i and x0 over the motion, in every environment."""
 
 from matplotlib.figure import Figure
-
 from paper_figures import style
 from paper_figures.curves import (
     angle_legend,

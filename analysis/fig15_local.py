@@ -2,7 +2,6 @@
 
 import numpy as np
 from matplotlib.figure import Figure
-
 from paper_figures import style
 from paper_figures.curves import (
     angle_legend,
@@ -12,6 +11,7 @@ from paper_figures.curves import (
 )
 from paper_figures.runs import Run, Runs
 from paper_figures.style import save
+
 from vdsm_pin.tolerances import TOLERANCES
 
 NAME = "fig15"

@@ -5,12 +5,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-
 from paper_figures import style
 from paper_figures.curves import MM_PER_DEG, TOP_DEG, base_axis, draw_limit
 from paper_figures.paper_says import MAX_PSI_DEG, X0_MAX_MM, X0_MIN_MM
 from paper_figures.runs import SCENES, STRATEGIES, Run, Runs, degrees
 from paper_figures.style import save
+
 from vdsm_pin.units import MM_PER_M
 
 NAME = "fig16"
@@ -88,8 +88,8 @@ def _legend(figure: Figure, height: float, pitch: float) -> None:
     handles.append(Line2D([], [], color=style.LIMIT, linewidth=0.8, dashes=(4, 2)))
     names.append("limit of ψ")
     figure.legend(
-        handles, names, loc="upper left", bbox_to_anchor=(0.56, (pitch - 0.25) / height),
-        labelspacing=0.9,
+        handles, names, loc="upper left", labelspacing=0.9,
+        bbox_to_anchor=(0.56, (pitch - 0.25) / height),
     )  # fmt: skip
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-
 from paper_figures import style
 from paper_figures.curves import draw_limit, draw_moments, shade_detours
 from paper_figures.distances import AXES, axis_distance
@@ -11,6 +10,7 @@ from paper_figures.paper_says import AXIS_DISTANCE_MM
 from paper_figures.runs import STRATEGIES, Run, Runs
 from paper_figures.style import save
 from paper_figures.views import thin
+
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.units import MM_PER_M
 

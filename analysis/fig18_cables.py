@@ -4,12 +4,12 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-
 from paper_figures import style
 from paper_figures.curves import draw_moments, shade_detours
 from paper_figures.runs import Run, Runs
 from paper_figures.style import save
 from paper_figures.views import thin
+
 from vdsm_pin.cables import cable_lengths
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.report.palette import oklch

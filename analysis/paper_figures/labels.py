@@ -1,5 +1,6 @@
 """Labels of dots, each put where it is clear of lines, dots and other labels."""
 
+import itertools
 from typing import Final
 
 import numpy as np
@@ -76,6 +77,6 @@ def _sampled(line: FloatArray) -> FloatArray:
     """Points along a polyline, close enough for a label not to fit between; [mm]."""
     parts = [
         a + np.linspace(0.0, 1.0, 40)[:, None] * (b - a)
-        for a, b in zip(line[:-1], line[1:], strict=True)
+        for a, b in itertools.pairwise(line)
     ]
     return np.vstack(parts)

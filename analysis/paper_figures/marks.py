@@ -29,7 +29,7 @@ def marks(run: Run) -> tuple[Mark, ...]:
     """The named moments of a motion, in order.
 
     A4 is where the tip leaves the path on its way, or the arm changes sides, and A5
-    where it takes the path up again. In obs2 the paper counts all moments on as B1, B2..
+    where it takes the path up again. In obs2 the paper counts all moments: B1, B2..
     """
     rows = run.trajectory
     drawn = np.flatnonzero(rows.on_path)

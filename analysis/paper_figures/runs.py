@@ -11,7 +11,7 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.refinement import plan_and_verify
+from vdsm_pin.refinement import Refinement, plan_and_verify
 from vdsm_pin.robot_model import RobotModel, load_robot
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import Verification
@@ -38,16 +38,22 @@ class Run:
     Args:
         scene: Name of the scene.
         strategy: Name of the strategy.
-        plan: What was planned.
-        verification: How it was certified.
-        margin: What the planner kept beyond the required clearance; [m].
+        refinement: The certified plan and how it came about.
     """
 
     scene: str
     strategy: str
-    plan: Plan
-    verification: Verification
-    margin: float
+    refinement: Refinement
+
+    @property
+    def plan(self) -> Plan:
+        """What was planned."""
+        return self.refinement.plan
+
+    @property
+    def verification(self) -> Verification:
+        """How it was certified."""
+        return self.refinement.verification
 
     @property
     def problem(self) -> PlanningProblem:
@@ -103,10 +109,7 @@ class Runs:
             arm = problem.manipulator
             robot = self._robots.setdefault(arm.name, load_robot(arm))
             found = plan_and_verify(problem, strategy, robot)
-            margin = found.rounds[-1].margin
-            self._made[key] = Run(
-                scene, strategy, found.plan, found.verification, margin
-            )
+            self._made[key] = Run(scene, strategy, found)
         return self._made[key]
 
     def both(self, scene: str) -> tuple[Run, ...]:

@@ -1,5 +1,6 @@
 """Drawing of obstacles, danger regions, paths and the arm at its true thickness."""
 
+import itertools
 from dataclasses import dataclass
 from typing import Final
 
@@ -275,10 +276,7 @@ def _parts(
     covered = hidden(view, problem, 0.5 * (points[1:] + points[:-1]))
     cuts = np.flatnonzero(np.diff(covered)) + 1
     bounds = [0, *cuts.tolist(), PIECES]
-    return [
-        (bool(covered[a]), points[[a, b]])
-        for a, b in zip(bounds[:-1], bounds[1:], strict=True)
-    ]
+    return [(bool(covered[a]), points[[a, b]]) for a, b in itertools.pairwise(bounds)]
 
 
 def _shade(colour: tuple[float, float, float], factor: float) -> tuple[float, ...]:

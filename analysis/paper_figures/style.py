@@ -1,8 +1,8 @@
 """One look for all figures: typography, the paper's colours, files that stay small.
 
-Joint O_i, its link i and its link angle psi_i share a colour, as in the paper's figures:
-orange for the first, pink for the long links, blue for the short ones, black for the
-tip. Pink and blue run from light to dark so that neighbours can be told apart.
+Joint O_i, its link i and its link angle psi_i share a colour, as in the paper's
+figures: orange for the first, pink for the long links, blue for the short ones, black
+for the tip. Pink and blue run from light to dark so that neighbours can be told apart.
 """
 
 from pathlib import Path

@@ -1,0 +1,51 @@
+"""Every figure and the page that shows them: `make figures`.
+
+python analysis/figures.py --out reports/paper
+"""
+
+import argparse
+import importlib
+import time
+from pathlib import Path
+from typing import Final
+
+from paper_figures import numbers, style
+from paper_figures.page import page
+from paper_figures.runs import Runs
+
+SCRIPTS: Final = (
+    "fig04_paths_free",
+    "fig05_collision",
+    "fig06_tip_path",
+    "fig07_projected_arm",
+    "fig08_step5",
+    "fig09_moving_on",
+    "fig11_paths_obs1",
+    "fig12_paths_obs2",
+    "fig13_paths_obs3",
+    "fig14_link_angles",
+    "fig15_local",
+    "fig16_ranges",
+    "fig17_clearance",
+    "fig18_cables",
+)
+
+
+def main(runs: Runs | None = None) -> None:
+    """Draw everything and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=style.REPORTS)
+    folder = parser.parse_args().out
+    runs = runs or Runs()
+    for script in SCRIPTS:
+        begin = time.perf_counter()
+        for name, figure in importlib.import_module(script).draw(runs).items():
+            style.save(figure, name, folder)
+        print(f"{script}: {time.perf_counter() - begin:.1f} s", flush=True)
+    found = numbers.numbers(runs)
+    numbers.write(found, folder / "numbers.json")
+    (folder / "README.md").write_text(page(found), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
