@@ -1,0 +1,63 @@
+"""Refinement: what is missing is added, and nothing uncertified is handed out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import vdsm_pin.refinement as refinement
+from vdsm_pin.errors import Infeasible, NoPlanFound
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.planner.pipeline import plan_paper
+from vdsm_pin.planner.records import LinkClearance, Plan
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.verification.records import Verdict
+
+
+def short(name: str) -> PlanningProblem:
+    """A paper scene with a short piece of its path, to keep the test quick."""
+    problem = read_problem(f"paper/{name}").problem
+    points = np.array([[3.126, 0.9, 0.9], [3.126, 1.0, 1.0]])
+    return replace(problem, path=replace(problem.path, points=points, closed=False))
+
+
+def test_missing_clearance_between_waypoints_is_added_to_the_margin() -> None:
+    problem = short("obs3")
+    result = refinement.plan_and_verify(
+        problem, "paper", load_robot(problem.manipulator)
+    )
+    assert result.verification.verdict is Verdict.CERTIFIED
+    assert [one.verdict for one in result.rounds[:-1]] == [Verdict.REFUTED] * (
+        len(result.rounds) - 1
+    )
+    assert len(result.rounds) >= 2  # between waypoints the bent arm swings closer
+    margins = [one.margin for one in result.rounds]
+    assert margins == sorted(margins)
+    assert "round 1" in result.plan.notes[-1]
+    assert result.rounds[-1].clearance >= problem.required_clearance
+
+
+def test_a_plan_that_cannot_be_certified_is_not_handed_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A planner that ignores the obstacle and the margin never gets through."""
+
+    def blind(
+        problem: PlanningProblem, clearance: LinkClearance, margin: float
+    ) -> Plan:
+        free = replace(problem, scene=read_problem("paper/free").problem.scene)
+        return plan_paper(free, clearance, margin)
+
+    monkeypatch.setattr(refinement, "strategy", lambda name: blind)
+    problem = short("obs3")
+    with pytest.raises(NoPlanFound, match="refuted"):
+        refinement.plan_and_verify(problem, "paper", load_robot(problem.manipulator))
+
+
+def test_reasons_of_the_planner_pass_through() -> None:
+    problem = short("obs3")
+    start = replace(problem.path, start=np.array([3.126, 0.0, 2.5]))
+    problem = replace(problem, path=start)
+    with pytest.raises(Infeasible, match="beyond the reach"):
+        refinement.plan_and_verify(problem, "paper", load_robot(problem.manipulator))
