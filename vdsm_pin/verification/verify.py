@@ -178,7 +178,7 @@ def _clearance_check(
         verdict = Verdict.UNDECIDED
     # A refuted motion is as bad as its witness, another one as good as its proof.
     column = UP if verdict is Verdict.REFUTED else 0
-    pair = int(mine[np.argmin(proof.best[mine, column])])
+    pair = int(mine[np.argmin(proof.best[mine, UP])])
     row = proof.best[pair]
     at, when = int(row[AT_UPPER]), row[TIME]
     where = f"interval {at} at {when:.4f}, link {proof.pairs[pair].link}"
@@ -189,7 +189,7 @@ def _clearance_check(
         name=name,
         verdict=verdict,
         count=int(counts.sum()),
-        worst=float(row[column]),
+        worst=float(proof.best[mine, column].min()),
         limit=needed,
         unit="m",
         where=where,
@@ -218,9 +218,13 @@ def _station(
 def closest_approaches(
     problem: PlanningProblem, trajectory: Trajectory, proof: ClearanceProof
 ) -> tuple[ClosestApproach, ...]:
-    """The pairs that come nearest, by their proved lower bounds."""
+    """The pairs that come nearest, by their upper bounds.
+
+    The lower bound of the nearest is narrowed; another pair's may lie below it by the
+    width of that bracket.
+    """
     rows = []
-    for k in np.argsort(proof.best[:, 0], kind="stable")[:CLOSEST]:
+    for k in np.argsort(proof.best[:, UP], kind="stable")[:CLOSEST]:
         pair, row = proof.pairs[k], proof.best[k]
         points = row[OWN:OTHER], row[OTHER : OTHER + 3]
         # In a pair of links the sweep moves the second one against the first.
