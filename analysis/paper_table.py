@@ -84,15 +84,6 @@ def changed(psi: FloatArray) -> str:
     return ", ".join(f"psi{joint}" for joint in joints)
 
 
-def angles(psi: FloatArray) -> str:
-    """The link angles of one waypoint that are not zero; psi of shape (N,); [rad]."""
-    return ", ".join(
-        f"psi{i} = {np.rad2deg(value):.1f}"
-        for i, value in enumerate(psi, start=1)
-        if value > TOLERANCES.changed_angle
-    )
-
-
 def moments(trajectory: Trajectory, tip: FloatArray) -> dict[str, int]:
     """Waypoints A4 and A5 (leaving and rejoining the path) and A6 (the far corner)."""
     on = trajectory.on_path

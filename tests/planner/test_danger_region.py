@@ -5,9 +5,9 @@ import pytest
 import shapely
 
 from vdsm_pin.planner.danger_region import DangerRegion
-from vdsm_pin.planner.detours import Shadow
 from vdsm_pin.planner.region_kernels import leave_along, reach_along_circle
 from vdsm_pin.planner.sections import Section
+from vdsm_pin.planner.shadow import Shadow
 
 SHAPES = {
     "disc": [[0.7, 0.6]],

@@ -14,14 +14,10 @@ import numpy as np
 from vdsm_pin.errors import PathBlocked
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.danger_region import DangerRegion
-from vdsm_pin.planner.detours import (
-    Shadow,
-    detour_route,
-    first_station,
-    path_rows,
-)
+from vdsm_pin.planner.detours import detour_route, first_station, path_rows
 from vdsm_pin.planner.project import project
 from vdsm_pin.planner.sections import Section, grown_by
+from vdsm_pin.planner.shadow import Shadow
 from vdsm_pin.planner.side_rules import SideRule, anchors, choose_rule, slid, stands
 from vdsm_pin.planner.tip_path import Route
 from vdsm_pin.problem import PlanningProblem

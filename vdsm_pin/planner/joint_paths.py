@@ -5,7 +5,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.danger_region import DangerRegion
-from vdsm_pin.planner.region_kernels import slide_chains
+from vdsm_pin.planner.sliding_kernels import slide_chains
 
 
 def chain_ratios(manipulator: Manipulator) -> FloatArray:

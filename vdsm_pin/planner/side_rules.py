@@ -19,7 +19,7 @@ from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.danger_region import DangerRegion
 from vdsm_pin.planner.joint_paths import chain_ratios, slide_joints
 from vdsm_pin.planner.project import project
-from vdsm_pin.planner.region_kernels import reach_of_rule, standing
+from vdsm_pin.planner.sliding_kernels import reach_of_rule, standing
 from vdsm_pin.problem import PlanningProblem
 
 GROWTHS: Final = (0.0, 0.01, 0.02, 0.03, 0.04, 0.06, 0.08, 0.1, 0.12, 0.15)

@@ -1,0 +1,78 @@
+"""What an obstacle along the rail hides from P_1, and how a path passes through it.
+
+Seen along X, the straight arm is a ray from P_1, and the danger region throws a shadow:
+a tip outside it is reached straight.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.planner.danger_region import DangerRegion
+
+
+@dataclass(frozen=True)
+class Visit:
+    """Waypoints first to last (included) of the path that lie in the shadow in a row.
+
+    Args:
+        first: First waypoint.
+        last: Last waypoint.
+        entry: Edge by which the path came in, 1 or -1; 0 if it begins inside.
+        exit: Edge by which it leaves; 0 if it ends inside.
+    """
+
+    first: int
+    last: int
+    entry: int
+    exit: int
+
+
+@dataclass(frozen=True)
+class Shadow:
+    """What the danger region hides from P_1.
+
+    Args:
+        region: The danger region; P_1, the origin, lies outside.
+    """
+
+    region: DangerRegion
+
+    def side(self, points: FloatArray) -> IntArray:
+        """1 left of the ray from P_1 through the region's centre, else -1, (n,)."""
+        centre = self.region.centre
+        left = centre[0] * points[:, 1] - centre[1] * points[:, 0]
+        return np.where(left > 0.0, 1, -1)
+
+    def covers(self, points: FloatArray) -> BoolArray:
+        """Whether the straight arm to points outside the region would meet it, (n,)."""
+        origin = np.zeros(2)
+        (low, low_normal), (high, high_normal) = (
+            self.region.tangent(origin, 1),
+            self.region.tangent(origin, -1),
+        )
+        radius = self.region.radius
+        right = low + radius * np.array([np.cos(low_normal), np.sin(low_normal)])
+        left = high + radius * np.array([np.cos(high_normal), np.sin(high_normal)])
+        x, y = points[:, 0], points[:, 1]
+        between = (right[0] * y - right[1] * x > 0.0) & (left[0] * y - left[1] * x < 0)
+        # Outside the region but inside the wedge: beyond it iff beyond its chord.
+        chord = left - right
+        beyond = chord[0] * (y - right[1]) - chord[1] * (x - right[0]) < 0.0
+        return np.asarray(between & beyond & ~self.region.contains(points))
+
+    def visits(self, points: FloatArray) -> list[Visit]:
+        """Stays in the shadow along a sequence of points outside or inside, (n, 2)."""
+        covered = self.covers(points)
+        inside, side = self.region.contains(points), self.side(points)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], covered, [False]])))
+        found = []
+        for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
+            entry = exit_ = 0
+            if first > 0 and not inside[first - 1]:
+                entry = int(side[first - 1])
+            if last + 1 < len(points) and not inside[last + 1]:
+                exit_ = int(side[last + 1])
+            found.append(Visit(int(first), int(last), entry, exit_))
+        return found
