@@ -1,0 +1,61 @@
+"""What the verifier writes, the checker accepts: all shapes, errors, one row."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from oracles.certificate_cases import SHAPES, random_case
+from oracles.certificate_mutations import forged
+from oracles.certificate_oracle import sha256
+
+from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.io.trajectory_file import read_trajectory
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
+from vdsm_pin.verification.records import ErrorBox
+from vdsm_pin.verification.verify import verify
+
+
+def written(case: object, path: Path) -> None:
+    """A certificate by the verifier of a case that need not draw its path."""
+    file = read_problem(case.problem)
+    arm = file.problem.manipulator
+    trajectory = read_trajectory(case.trajectory, arm)
+    box = ErrorBox(*case.writer.errors)
+    found = verify(file.problem, trajectory, load_robot(arm), errors=box)
+    kept = [
+        c for c in found.checks if not c.name.startswith(("tip", "change", "joints at"))
+    ]
+    assert all(c.verdict == "certified" for c in kept), kept
+    object.__setattr__(found, "checks", tuple(kept))
+    digest = sha256(case.trajectory.read_bytes())
+    write_certificate(path, found, Hashes(file.sha256, digest, "0" * 64))
+
+
+@pytest.mark.parametrize("seed", range(len(SHAPES)))
+def test_the_verifiers_certificate_is_accepted(seed: int, tmp_path: Path) -> None:
+    rng = np.random.default_rng(seed)
+    case = random_case(rng, tmp_path, [SHAPES[seed], SHAPES[(seed + 3) % len(SHAPES)]])
+    written(case, case.certificate)
+    outcome = check_certificate(case.certificate, case.problem, case.trajectory)
+    assert outcome.accepted, outcome.reason
+
+
+def test_mutations_of_the_verifiers_certificate_are_rejected(tmp_path: Path) -> None:
+    rng = np.random.default_rng(9)
+    case = random_case(rng, tmp_path, ["mesh_stl", "prism_notched"])
+    written(case, case.certificate)
+    text = case.certificate.read_text().splitlines()
+    lines, accepted = [json.loads(line) for line in text[:-1]], 0
+    for _ in range(60):
+        _, content, _ = forged(lines, rng)
+        case.certificate.write_bytes(content)
+        try:
+            files = case.certificate, case.problem, case.trajectory
+            accepted += check_certificate(*files).accepted
+        except InvalidFile:
+            continue
+    assert accepted < 12  # changes by an ulp leave the claims true
