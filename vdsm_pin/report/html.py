@@ -1,6 +1,6 @@
 """HTML pages: report.html, the 3D view, index.html; each is one file, no request."""
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -128,9 +128,19 @@ def message_page(message: str, live: str) -> str:
     return _rendered("message.html.j2", message=message, live=live)
 
 
-def write_index(path: Path, rows: Sequence[BatchRow]) -> None:
-    """index.html of a batch; durations stand in timing.js beside it."""
+def write_index(
+    path: Path, rows: Sequence[BatchRow], with_files: Container[str]
+) -> None:
+    """index.html of a batch; durations stand in timing.js beside it.
+
+    Args:
+        path: The page.
+        rows: One per problem.
+        with_files: The folders whose reports and pictures were kept.
+    """
     counts = {word: sum(row.outcome == word for row in rows) for word in OUTCOMES}
     passed = sum(count for word, count in counts.items() if outcome(word).passed)
-    page = _rendered("index.html.j2", rows=rows, counts=counts, passed=passed)
+    page = _rendered(
+        "index.html.j2", rows=rows, counts=counts, passed=passed, with_files=with_files
+    )
     path.write_text(page, encoding="utf-8")

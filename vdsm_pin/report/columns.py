@@ -1,0 +1,37 @@
+"""rows.parquet: every row of a batch in one columnar file, for pandas and its kin.
+
+Written where pyarrow is installed (the extra `parquet`); summary.csv says the same.
+"""
+
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Final
+
+from vdsm_pin.io.atomic import atomic_path
+from vdsm_pin.report.files import BatchRow
+
+COLUMNS: Final = "rows.parquet"
+
+
+def write_columns(path: Path, rows: Sequence[BatchRow]) -> bool:
+    """Write the rows, in their order, if there is pyarrow.
+
+    Returns:
+        Whether the file was written.
+    """
+    if find_spec("pyarrow") is None:
+        return False
+    import pyarrow
+    from pyarrow import parquet
+
+    fields = BatchRow.model_fields
+    kinds = {float: pyarrow.float64(), int: pyarrow.int64()}
+    schema = pyarrow.schema(
+        [(name, _kind(field.annotation, kinds)) for name, field in fields.items()]
+    )
+    columns = [[getattr(row, name) for row in rows] for name in fields]
+    table = pyarrow.table(columns, schema=schema)
+    with atomic_path(path) as aside:
+        parquet.write_table(table, aside, compression="zstd")
+    return True
