@@ -107,10 +107,9 @@ class Judge:
         required: FloatArray | None = None,
         bend: FloatArray | None = None,
     ) -> BoolArray:
-        """Which intervals of the motion are clear, shape (n - 1,).
+        """Which intervals are clear, shape (n,).
 
         Args:
-            knots: The motion.
             intervals: Straight lines in the chart.
             required: Clearance to keep in each interval; [m].
             bend: Largest link angle in each interval; [rad].
@@ -127,6 +126,8 @@ class Judge:
         ends = np.flatnonzero(~intervals.continued())
         c1[ends], r1[ends] = self._states(intervals, ends, high[ends], most[ends] + tol)
         good &= (r0 >= need - tol) & (r1 >= need - tol)
+        number, low, high = number[good], low[good], high[good]
+        c0, c1, r0, r1 = c0[good], c1[good], r0[good], r1[good]
         for _ in range(16):
             way = np.linalg.norm(c1 - c0, axis=2).max(axis=1)
             need_here = need[number]

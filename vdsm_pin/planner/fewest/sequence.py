@@ -169,12 +169,13 @@ class Planner:
     ) -> Sequence:
         """Drawn legs with the shortest ways between them."""
         legs: list[Leg] = []
-        at = self.home
+        at, left = self.home, runs[0].layers[0] if runs else 0
         for run in runs:
             way = self.way(at, run.nodes[0])
             assert way is not None
             if len(way) > 1:
-                legs.append(Leg(False, way, (run.layers[0],) * len(way)))
+                marks = (left,) * (len(way) - 1) + (run.layers[0],)
+                legs.append(Leg(False, way, marks))
             legs.append(run)
-            at = run.nodes[-1]
+            at, left = run.nodes[-1], run.layers[-1]
         return Sequence(tuple(legs), skipped, cost)

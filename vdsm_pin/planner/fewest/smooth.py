@@ -223,7 +223,7 @@ def _stepped_back(knots: Knots, begin: int, end: int, depth: float) -> Knots:
         np.concatenate(
             [
                 knots.stations[:begin],
-                np.append(np.full(count, knots.stations[end]), knots.stations[end]),
+                np.append(np.full(count, knots.stations[begin]), knots.stations[end]),
                 knots.stations[end + 1 :],
             ]
         ),

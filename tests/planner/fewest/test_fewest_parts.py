@@ -1,0 +1,189 @@
+import itertools
+
+import numpy as np
+import pytest
+from scenes_for_fewest import problem, straight_arm
+
+from vdsm_pin.kinematics import joint_angles, link_angles
+from vdsm_pin.manipulator import built_in
+from vdsm_pin.planner.fewest.bounds import least_changed, prove_tips
+from vdsm_pin.planner.fewest.clear import Judge
+from vdsm_pin.planner.fewest.growth import vary
+from vdsm_pin.planner.fewest.kernels import pose_shapes
+from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.planner.fewest.nearby import FAR, nearby
+from vdsm_pin.planner.fewest.route import path_rows
+from vdsm_pin.planner.fewest.shapes import Shapes, one_knee_shapes
+from vdsm_pin.scene import Box, Capsule, Cylinder, HalfSpace, Sphere
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.link_clearance import link_clearance
+
+ARM = built_in("hrm8")
+PILLAR = Cylinder(
+    "pillar", np.array([1.563, 0.7, 0.6]), np.array([1.0, 0, 0]), 4.5, 0.2
+)
+
+
+def posed(tips: np.ndarray) -> tuple[Shapes, np.ndarray, np.ndarray, np.ndarray]:
+    shapes = one_knee_shapes(ARM, ARM.max_link_angle, 0.08, 8)
+    node, ends, bends = pose_shapes(
+        tips, shapes.knees, shapes.slopes, ARM.stations, ARM.max_link_angle, -5.0, 5.0
+    )
+    return shapes, node, ends, bends
+
+
+def test_a_shape_reaches_its_tip_with_links_of_their_length_and_one_knee() -> None:
+    rng = np.random.default_rng(0)
+    tips = np.column_stack([rng.uniform(2, 4, 12), rng.uniform(-1.4, 1.4, (12, 2))])
+    shapes, node, ends, bends = posed(tips)
+    assert len(node) > 2000
+    at = tips[node // shapes.size]
+    offsets = shapes.offsets(ARM, at, node % shapes.size)
+    still = Intervals(at, at, offsets, offsets)
+    centres = still.centres(ARM, np.arange(len(at)), np.zeros(len(at)))
+    lengths = np.linalg.norm(np.diff(centres, axis=1), axis=2)
+    np.testing.assert_allclose(lengths, np.tile(ARM.link_lengths, (len(at), 1)), 1e-12)
+    np.testing.assert_array_equal(centres[:, -1], at)
+    np.testing.assert_allclose(centres[:, 0, 1:], 0.0, atol=1e-15)
+    angles = link_angles(*joint_angles(ARM, centres))
+    knee = shapes.knees[node % shapes.size, 0]
+    for joint in range(1, ARM.n_links):
+        assert angles[knee != joint, joint].max() < 1e-7
+    rows = np.arange(len(at))
+    np.testing.assert_allclose(angles[rows, knee], bends.max(axis=1, where=np.stack(
+        [knee == 0, np.zeros_like(knee, bool), knee > 0], axis=1), initial=0.0),
+        atol=1e-7)  # fmt: skip
+    np.testing.assert_allclose(ends[rows, 1], centres[rows, knee], atol=1e-12)
+
+
+def test_the_lattice_of_shapes_is_a_symmetric_graph() -> None:
+    shapes = one_knee_shapes(ARM, ARM.max_link_angle, 0.08, 8)
+    own = np.repeat(np.arange(shapes.size), np.diff(shapes.first))
+    pairs = set(zip(own.tolist(), shapes.neighbours.tolist(), strict=True))
+    assert all((b, a) in pairs for a, b in pairs)
+    assert not any(a == b for a, b in pairs)
+
+
+def test_bounds_from_boxes_never_exceed_the_clearance_and_are_exact_when_near() -> None:
+    rng = np.random.default_rng(1)
+    axis = np.array([0.6, 0.0, 0.8])
+    task = problem(
+        PILLAR,
+        Sphere("ball", np.array([2.0, -0.5, 0.3]), 0.15),
+        Capsule("rod", np.array([1.0, 0.4, -0.5]), axis, 0.8, 0.05),
+        Cylinder("post", np.array([2.5, 0.2, -1.0]), axis, 0.6, 0.1),
+        Box("crate", np.array([0.5, -1, 0.5]), np.eye(3), np.array([0.2, 0.3, 0.1])),
+        HalfSpace("floor", np.array([0.0, 0, -1.5]), np.array([0.0, 0, 1])),
+    )
+    exact = link_clearance(task)
+    segments = rng.uniform([-1, -1.5, -1.5], [4, 1.5, 1.5], (4000, 2, 3))
+    truth, bound = exact(segments)[:, 0], nearby(task, exact)(segments)[:, 0]
+    # Below zero the clearance function promises the sign alone.
+    apart, near = truth > 0.0, bound < FAR
+    assert (bound[apart] <= truth[apart] + 1e-8).all()
+    assert (bound[~apart] <= 0.0).all()
+    assert 0.1 < near.mean() < 0.9
+    np.testing.assert_allclose(bound[near & apart], truth[near & apart], atol=1e-8)
+
+
+def test_a_motion_through_a_thin_plate_is_refused_though_both_ends_are_clear() -> None:
+    plate = Box("plate", np.array([2.9, 0.3, 0.0]), np.eye(3), np.array([2, 0.002, 2]))
+    task = problem(plate)
+    judge = Judge(task, link_clearance(task), 0.0, 0.0, 2e-3)
+    a, b = np.array([[3.126, 0.15, 0.0]]), np.array([[3.126, 1.0, 0.0]])
+    zero = np.zeros((1, 9, 2))
+    assert not judge.clear(Intervals(a, b, zero, zero))[0]
+    assert judge.clear(Intervals(a, a - 0.02, zero, zero))[0]
+    # Both sides: with the plate out of the way the same motion is clear.
+    free = problem()
+    judge = Judge(free, link_clearance(free), 0.0, 0.0, 2e-3)
+    assert judge.clear(Intervals(a, b, zero, zero))[0]
+
+
+def test_a_motion_past_a_limit_is_refused() -> None:
+    task = problem()
+    judge = Judge(task, link_clearance(task), 0.0, 0.0, 2e-3)
+    zero = np.zeros((1, 9, 2))
+    reach = ARM.total_length * np.sin(ARM.max_link_angle)
+    a = np.array([[3.126, 1.0, 0.0]])
+    inside, outside = a.copy(), a.copy()
+    inside[0, 1], outside[0, 1] = reach - 1e-6, reach + 1e-6
+    assert judge.clear(Intervals(a, inside, zero, zero))[0]
+    assert not judge.clear(Intervals(a, outside, zero, zero))[0]
+
+
+def test_two_changed_angles_are_proved_needed_only_where_no_single_one_does() -> None:
+    task = problem(PILLAR)
+    clearance = link_clearance(task)
+    tips = task.path.at(np.arange(0.0, 6.0, 0.05))
+    least = least_changed(task, clearance, tips)
+    straight = clearance(straight_arm(task, tips)).min(axis=1)
+    assert (least[straight >= task.required_clearance] == 1).all()
+    assert set(least.tolist()) == {1, 2}
+    # The oracle: every single bend on a fine grid of what "one angle" can mean.
+    for tip, bound in zip(tips, least, strict=True):
+        reachable = []
+        for joint in range(8):
+            rest = ARM.total_length - ARM.stations[joint]
+            sine = np.hypot(*tip[1:]) / rest
+            if sine > np.sin(ARM.max_link_angle):
+                continue
+            planar = np.zeros((9, 2))
+            share = (ARM.stations[joint:] - ARM.stations[joint]) / rest
+            planar[joint:] = share[:, None] * tip[1:]
+            x = np.where(
+                np.arange(9) >= joint,
+                tip[0] - np.sqrt(1 - sine**2) * (ARM.total_length - ARM.stations),
+                tip[0] - np.sqrt(1 - sine**2) * rest
+                - (ARM.stations[joint] - ARM.stations),
+            )  # fmt: skip
+            centres = np.column_stack([x, planar])[None]
+            reachable.append(clearance(centres).min() >= task.required_clearance)
+        assert any(reachable) == (bound == 1)
+
+
+def test_tips_are_proved_out_of_reach_on_the_right_side_of_both_limits() -> None:
+    ball = Sphere("ball", np.array([3.126, 0.5, 0.0]), 0.1)
+    task = problem(ball)
+    margin = 0.1 + ARM.link_radius + task.required_clearance
+    y = [0.5 + margin + 1e-6, 0.5 + margin - 1e-6, 2.966, 2.967]
+    tips = np.column_stack([np.full(4, 3.126), y, np.zeros(4)])
+    proof = prove_tips(task, link_clearance(task), tips)
+    assert proof.buried.tolist() == [False, True, False, False]
+    assert proof.far.tolist() == [False, False, False, True]
+
+
+def test_children_differ_from_their_parent_between_two_of_its_knees_only() -> None:
+    rng = np.random.default_rng(2)
+    n = 500
+    parents = np.zeros((n, 9, 2))
+    hat = np.minimum(ARM.stations / ARM.stations[4],
+                     (ARM.total_length - ARM.stations)
+                     / (ARM.total_length - ARM.stations[4]))  # fmt: skip
+    parents += hat[:, None] * np.array([0.3, -0.1])
+    children = vary(
+        parents, ARM.stations, np.zeros((n, 2)), rng.random(n), rng.random(n),
+        rng.normal(size=(n, 2)) * 0.1,
+    )  # fmt: skip
+    np.testing.assert_array_equal(children[:, [0, -1]], 0.0)
+    slopes = np.diff(children, axis=1) / ARM.link_lengths[:, None]
+    bent = np.abs(np.diff(slopes, axis=1)).max(axis=2) > TOLERANCES.straight_slope
+    assert bent.sum(axis=1).max() == 2
+    assert bent.sum(axis=1).min() <= 1
+
+
+@pytest.mark.parametrize("spacing", [0.01, 0.0333, 0.7])
+def test_rows_of_the_path_hold_every_corner_and_keep_the_spacing(
+    spacing: float,
+) -> None:
+    task = problem(start=(3.126, 0.4, 0.0))
+    path = task.path
+    rows = path_rows(type(path)(path.start, path.points, path.closed, spacing=spacing))
+    gaps = np.linalg.norm(np.diff(rows.tips, axis=0), axis=1)
+    assert gaps.max() <= spacing + 1e-12
+    np.testing.assert_allclose(rows.tips[0], [3.126, 0.4, -0.2], atol=1e-12)
+    np.testing.assert_allclose(rows.tips[-1], rows.tips[0], atol=1e-12)
+    for corner in path.points:
+        assert np.linalg.norm(rows.tips - corner, axis=1).min() < 1e-12
+    for a, b in itertools.pairwise(rows.stations):
+        assert b > a

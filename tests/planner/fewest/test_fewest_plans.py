@@ -1,0 +1,157 @@
+import numpy as np
+import pytest
+from scenes_for_fewest import problem, random_problem
+
+from vdsm_pin.errors import NoPlanFound, OutOfReach, PathBlocked
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.kinematics import joint_centres, link_angles
+from vdsm_pin.manipulator import built_in
+from vdsm_pin.planner.fewest.strategy import plan_clearest, plan_fewest
+from vdsm_pin.planner.records import Plan
+from vdsm_pin.problem import Blocked, PlanningProblem
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.scene import Box, Cylinder, HalfSpace, Sphere
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.verify import verify
+
+ARM = built_in("hrm8")
+
+
+def planned(task: PlanningProblem) -> Plan:
+    return plan_fewest(task, link_clearance(task), 0.0)
+
+
+def mean_changed(plan: Plan) -> float:
+    angles = link_angles(plan.trajectory.alpha, plan.trajectory.theta)
+    changed = (angles > TOLERANCES.changed_angle).sum(axis=1)
+    return float(changed[plan.trajectory.on_path].mean())
+
+
+@pytest.mark.parametrize(
+    ("name", "most_changed", "most_bent"),
+    [
+        ("free", 1.0, 31.7),
+        ("obs1", 1.5, 42.5),
+        ("obs2", 2.2, 42.5),
+        ("obs2-small", 1.7, 34.0),
+        ("obs3", 1.6, 34.0),
+    ],
+)
+def test_the_papers_square_is_drawn_whole_certified_and_sparse(
+    name: str, most_changed: float, most_bent: float
+) -> None:
+    task = read_problem(f"paper/{name}").problem
+    plan = planned(task)
+    result = verify(task, plan.trajectory, load_robot(task.manipulator))
+    assert result.verdict is Verdict.CERTIFIED
+    assert result.coverage == pytest.approx(1.0, abs=1e-9)
+    assert mean_changed(plan) <= most_changed
+    angles = link_angles(plan.trajectory.alpha, plan.trajectory.theta)
+    assert np.rad2deg(angles.max()) <= most_bent
+    for values in (plan.trajectory.alpha, plan.trajectory.theta):
+        assert np.rad2deg(np.abs(np.diff(values, axis=0)).max()) <= 5.0
+
+
+def test_the_tip_is_on_the_path_wherever_a_row_says_so() -> None:
+    task = read_problem("paper/obs1").problem
+    trajectory = planned(task).trajectory
+    centres = joint_centres(ARM, trajectory.x0, trajectory.alpha, trajectory.theta)
+    drawn = trajectory.on_path
+    stations = np.mod(trajectory.path_m[drawn], task.path.length)
+    gap = np.linalg.norm(centres[drawn, -1] - task.path.at(stations), axis=1)
+    assert gap.max() < TOLERANCES.tip_on_path
+
+
+def test_two_runs_give_the_same_plan_to_the_last_bit() -> None:
+    task = random_problem(1, clutter=True)
+    first, second = planned(task), planned(task)
+    np.testing.assert_array_equal(first.trajectory.joints, second.trajectory.joints)
+    assert first.notes == second.notes
+
+
+@pytest.mark.parametrize("clutter", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_random_scenes_are_drawn_whole_and_certified(seed: int, clutter: bool) -> None:
+    task = random_problem(seed, clutter=clutter)
+    plan = planned(task)
+    result = verify(task, plan.trajectory, load_robot(task.manipulator))
+    assert result.verdict is Verdict.CERTIFIED
+    assert result.coverage == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("clutter", [False, True])
+def test_hundreds_of_random_scenes_are_drawn_whole(clutter: bool) -> None:
+    missed, changed = [], []
+    for seed in range(200):
+        task = random_problem(seed, clutter=clutter)
+        plan = planned(task)
+        result = verify(task, plan.trajectory, load_robot(task.manipulator))
+        changed.append(mean_changed(plan))
+        if result.verdict is not Verdict.CERTIFIED or result.coverage < 1.0 - 1e-9:
+            missed.append(seed)
+    assert len(missed) <= (6 if clutter else 0), missed
+    assert np.mean(changed) <= (2.3 if clutter else 1.9)
+
+
+def test_a_path_beyond_the_curled_reach_is_proved_out_of_reach() -> None:
+    points = np.array([[3.126, 2.5, 2.0], [3.126, 2.6, 2.0]])
+    with pytest.raises(OutOfReach):
+        planned(problem(points=points, closed=False))
+
+
+def test_a_path_into_an_obstacle_is_refused_or_drawn_up_to_it() -> None:
+    ball = Sphere("ball", np.array([3.126, 1.0, 0.5]), 0.1)
+    with pytest.raises(PathBlocked, match="ball"):
+        planned(problem(ball, blocked=Blocked.FAIL))
+    task = problem(ball)
+    plan = planned(task)
+    assert any("not drawn" in note and "proved" in note for note in plan.notes)
+    result = verify(task, plan.trajectory, load_robot(task.manipulator))
+    assert result.verdict is Verdict.CERTIFIED
+    # The chord of the sphere grown by body and clearance, to one row on either side.
+    lost = 2.0 * (0.1 + 0.0615 + 0.0035)
+    assert 1.0 - result.coverage == pytest.approx(lost / 6.0, abs=0.021 / 6.0)
+
+
+def test_a_path_behind_a_wall_is_not_found_and_says_what_stands_in_the_way() -> None:
+    wall = HalfSpace("wall", np.array([0.0, 0.4, 0.0]), np.array([0.0, -1.0, 0.0]))
+    task = problem(wall, blocked=Blocked.FAIL)
+    with pytest.raises(PathBlocked, match="wall"):
+        planned(task)
+    plate = Box("plate", np.array([0.0, 0.4, 0.0]), np.eye(3), np.array([9, 0.01, 9]))
+    points = np.array([[3.126, 0.6, 0.0], [3.126, 0.9, 0.0]])
+    with pytest.raises(NoPlanFound, match="plate"):
+        planned(problem(plate, points=points, closed=False))
+
+
+def test_an_arm_that_starts_in_an_obstacle_is_refused_with_link_and_name() -> None:
+    post = Cylinder("post", np.array([1.0, 0.1, 0]), np.array([0, 0, 1.0]), 1.0, 0.05)
+    with pytest.raises(PathBlocked, match="post"):
+        planned(problem(post))
+
+
+def test_an_arm_that_starts_bent_starts_there() -> None:
+    alpha, theta = np.zeros((1, 8)), np.zeros((1, 8))
+    alpha[0, [2, 5]], theta[0, 3] = 0.3, -0.2
+    centres = joint_centres(ARM, np.array([0.1]), alpha, theta)
+    angles = np.stack([alpha, theta], axis=2).ravel()
+    joints = np.concatenate([[0.1], angles])
+    start = tuple(centres[0, -1].tolist())
+    task = problem(start=start, start_joints=joints)
+    plan = planned(task)
+    np.testing.assert_allclose(plan.trajectory.joints[0], joints, atol=1e-9)
+    result = verify(task, plan.trajectory, load_robot(task.manipulator))
+    assert result.verdict is Verdict.CERTIFIED
+    assert result.coverage == pytest.approx(1.0, abs=1e-9)
+
+
+def test_clearest_keeps_more_clearance_than_fewest() -> None:
+    task = read_problem("paper/obs3").problem
+    clearance = link_clearance(task)
+    wide = plan_clearest(task, clearance, 0.0)
+    lean = plan_fewest(task, clearance, 0.0)
+    assert clearance(wide.centres).min() > clearance(lean.centres).min() + 0.02
+    assert mean_changed(wide) >= mean_changed(lean)
