@@ -174,9 +174,10 @@ def _rotation(rpy_deg: Any) -> Matrix:
 
 
 def _without_repeats(points: list[Any], *, cyclic: bool) -> list[Any]:
-    """Corners without those equal to the one before."""
-    before = [points[-1] if cyclic else None, *points[:-1]]
-    return [a for a, b in zip(points, before, strict=True) if a != b] or points[:1]
+    """Corners without those equal to the one before; of a closed line, the last too."""
+    before = [None, *points[:-1]]
+    kept = [a for a, b in zip(points, before, strict=True) if a != b]
+    return kept[:-1] if cyclic and len(kept) > 1 and kept[-1] == kept[0] else kept
 
 
 def _use_up(data: dict[str, Any], kind: str, *ignored: str) -> None:

@@ -108,6 +108,29 @@ def test_both_read_the_built_in_problems_alike(name: str) -> None:
     assert_same_problem(find_problem(name))
 
 
+CLOSING_CORNERS = """\
+vdsm_problem: 1
+name: repeats
+length_unit: mm
+manipulator: hrm8
+obstacles:
+  - {name: bar, shape: prism, axis: x, from: 0, to: 100,
+     polygon: [[900, 900], [900, 900], [990, 900], [990, 990], [900, 900]]}
+tip_path:
+  start: [3126, 0, 0]
+  points: [[3126, 0, 0], [3126, 90, 0], [3126, 90, 0], [3126, 90, 90], [3126, 0, 0]]
+  closed: true
+required_clearance: 1
+"""
+
+
+def test_both_drop_repeated_and_closing_corners_alike(tmp_path: Path) -> None:
+    path = tmp_path / "repeats.yaml"
+    path.write_text(CLOSING_CORNERS, encoding="utf-8")
+    assert_same_problem(path)
+    assert len(read_problem(path).problem.path.points) == 3
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_both_read_every_shape_in_any_pose_alike(tmp_path: Path, seed: int) -> None:
     path, rng = write_everything(tmp_path), np.random.default_rng(seed)
