@@ -168,7 +168,7 @@ def test_a_spoilt_motion_is_refuted_and_still_reported(
 
 def test_an_infeasible_problem_leaves_nothing(vdsm: Shell, tmp_path: Path) -> None:
     problem = write_problem(tmp_path / "far.yaml", OUT_OF_REACH)
-    ran = vdsm("plan", problem, "--out", tmp_path / "out")
+    ran = vdsm("plan", problem, "--out", tmp_path / "out", "--strategy", "paper")
     assert ran.status == 1
     assert "reach" in one_message(ran)
     assert not (tmp_path / "out").exists()

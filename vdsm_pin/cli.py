@@ -38,7 +38,7 @@ Trajectory = Annotated[Path, typer.Option(help="A trajectory.csv.")]
 TimeLimit = Annotated[
     float | None, typer.Option(min=0.001, help="Seconds for each problem.")
 ]
-DEFAULT_STRATEGY: Final = "paper"
+DEFAULT_STRATEGY: Final = "fewest"
 
 
 def _examples(*lines: str) -> str:
