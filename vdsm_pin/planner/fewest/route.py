@@ -140,8 +140,13 @@ def tip_route(
     if ring:
         pairs.append((k, n - 1))
     if back > 0.0:
-        tips, more = _behind(tips, ring, k, coarse, back)
+        chain = tips
+        tips, more = _behind(chain, ring, k, coarse, back)
         pairs += more
+        lattice, more = _beside(chain, coarse)
+        m = len(tips)
+        pairs += [(a if a < n else a - n + m, b + m) for a, b in more]
+        tips = np.vstack([tips, lattice])
     shut = np.zeros(len(chosen), dtype=np.bool_)
     for i, (a, b) in enumerate(itertools.pairwise(chosen)):
         shut[i + 1] = closed[a : b + 1].any()
@@ -149,6 +154,8 @@ def tip_route(
     return _linked(tips, np.arange(k, n), rows.stations[chosen], shut, links)
 
 
+MOST_BESIDE = 16
+"""Largest number of tips along a side of the lattice beside the chain."""
 SHEET_STRIDE = 4
 """Only every fourth tip of the chain has tips behind it; the search is for ways."""
 
@@ -174,6 +181,41 @@ def _behind(
             nearest = int(np.argmin(np.abs(np.array(feet) - entry)))
             pairs.append((first + nearest, first + len(feet) - 1))
     return np.vstack(sheet), pairs
+
+
+def _beside(
+    tips: FloatArray, coarse: float
+) -> tuple[FloatArray, list[tuple[int, int]]]:
+    """A lattice of tips across the rail about the chain, and what joins them.
+
+    Args:
+        tips: The chain, shape (n, 3); [m].
+        coarse: Distance of its tips; [m].
+
+    Returns:
+        The lattice, shape (m, 3), and pairs (a, b): b counts in the lattice, and a in
+        the chain, or in the lattice from n on.
+    """
+    step, n = SHEET_STRIDE * coarse, len(tips)
+    low = np.minimum(tips[:, 1:].min(axis=0), 0.0) - step
+    high = np.maximum(tips[:, 1:].max(axis=0), 0.0) + step
+    counts = np.minimum(np.ceil((high - low) / step).astype(np.int64) + 1, MOST_BESIDE)
+    sides = [np.linspace(low[c], high[c], counts[c]) for c in range(2)]
+    flat = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2)
+    lattice = np.column_stack([np.full(len(flat), tips[:, 0].min()), flat])
+    number = np.arange(len(flat)).reshape(*counts)
+    pairs = [
+        (n + int(a), int(b))
+        for one, other in (
+            (number[:-1], number[1:]),
+            (number[:, :-1], number[:, 1:]),
+        )
+        for a, b in zip(one.ravel(), other.ravel(), strict=True)
+    ]
+    for foot in (*range(0, n - 1, SHEET_STRIDE), n - 1):
+        gap = np.linalg.norm(flat - tips[foot, 1:], axis=1)
+        pairs += [(foot, int(i)) for i in np.argsort(gap, kind="stable")[:2]]
+    return lattice, pairs
 
 
 def _linked(
