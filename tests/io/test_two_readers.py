@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from problem_texts import TETRAHEDRON, binary_stl, edited, write_everything
 
-from vdsm_pin import certificate_files as checker
 from vdsm_pin import scene
+from vdsm_pin.certificate_checker import files as checker
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull
 from vdsm_pin.io.problem_file import built_in_names, find_problem, read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory

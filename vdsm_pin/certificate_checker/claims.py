@@ -20,7 +20,7 @@ from typing import Any, Final
 
 from flint import arb, arb_mat, ctx
 
-from vdsm_pin.certificate_balls import (
+from vdsm_pin.certificate_checker.balls import (
     SLACK,
     Ball,
     Matrix,
@@ -37,8 +37,14 @@ from vdsm_pin.certificate_balls import (
     turn,
     unit,
 )
-from vdsm_pin.certificate_files import Problem, Row, read_lines, read_rows, reading
-from vdsm_pin.certificate_solids import Mesh, solid
+from vdsm_pin.certificate_checker.files import (
+    Problem,
+    Row,
+    read_lines,
+    read_rows,
+    reading,
+)
+from vdsm_pin.certificate_checker.solids import Mesh, solid
 from vdsm_pin.errors import InvalidFile
 
 PRECISION: Final = 128  # bits of a ball: lengths are known to about 1e-35 m
@@ -467,7 +473,3 @@ def main(arguments: Sequence[str]) -> int:
     notes = "".join(f"; {name} is a surface only" for name in outcome.surfaces)
     sys.stdout.write(f"{verdict} ({found} recomputed{notes})\n")
     return 0 if outcome.accepted else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

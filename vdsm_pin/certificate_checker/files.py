@@ -21,7 +21,7 @@ import numpy as np
 import yaml
 from flint import arb
 
-from vdsm_pin.certificate_balls import (
+from vdsm_pin.certificate_checker.balls import (
     Ball,
     Matrix,
     claim,

@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from flint import arb, arb_mat
 
-from vdsm_pin import certificate_files as files
-from vdsm_pin.certificate_balls import (
+from vdsm_pin.certificate_checker import files
+from vdsm_pin.certificate_checker.balls import (
     SLACK,
     Ball,
     Matrix,
