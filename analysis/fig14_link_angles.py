@@ -18,8 +18,8 @@ WIDTH, HEIGHT = 2.98, 1.22  # of one panel; [inch]
 
 def draw(runs: Runs) -> dict[str, Figure]:
     """Environments in rows, strategies in columns."""
-    pitch = HEIGHT + 0.42
-    figure = style.sheet(len(SCENES) * pitch + 0.62)
+    pitch = HEIGHT + 0.50
+    figure = style.sheet(len(SCENES) * pitch + 0.50)
     for r, scene in enumerate(SCENES):
         for k, strategy in enumerate(STRATEGIES):
             run = runs(scene, strategy)

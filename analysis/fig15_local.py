@@ -23,7 +23,7 @@ WIDTH, HEIGHT = 1.58, 1.55  # of one panel; [inch]
 def draw(runs: Runs) -> dict[str, Figure]:
     """Four places in columns, the strategies in rows."""
     first = {scene: runs.both(scene) for scene in ("obs1", "obs2", "obs3")}
-    places = (("obs1", 0, "leaving"), ("obs2", 0, "first bend"),
+    places = (("obs1", -1, "about A₅"), ("obs2", 0, "first bend"),
               ("obs2", -1, "last bend"), ("obs3", 0, "column"))  # fmt: skip
     pitch = HEIGHT + 0.60
     figure = style.sheet(2.0 * pitch + 0.28)

@@ -32,7 +32,7 @@ def draw(runs: Runs) -> dict[str, Figure]:
             _bars(axes, run, (j - 0.5) * BAR)
         _printed(axes, scene, both[0].problem.manipulator.n_links)
         draw_limit(axes, float(np.rad2deg(both[0].problem.manipulator.max_link_angle)))
-        axes.set_ylim(-11.0, TOP_DEG + 4.0)
+        axes.set_ylim(-12.0, TOP_DEG + 3.0)
         axes.axhline(0.0, color=style.INK, linewidth=0.6)
         base_axis(axes, labelled=k % 2 == 1 or k == len(SCENES) - 1)
         axes.grid(visible=True, axis="y")
@@ -54,15 +54,19 @@ def _bars(axes: Axes, run: Run, shift: float) -> None:
     at = np.arange(len(low))
     colour = style.STRATEGY_COLOURS[run.strategy]
     axes.bar(at + shift, high - low, 0.94 * BAR, bottom=low, color=colour, zorder=3)
-    for x, bottom, top in zip(at, low, high, strict=True):
-        is_base = x == len(at) - 1
-        text = f"{top * MM_PER_DEG:.0f}" if is_base else f"{top:.0f}"
-        axes.text(x + shift, top + 0.8, text, ha="center", va="bottom", size=4.8)
-        if is_base and bottom < 0.0:
-            axes.text(
-                x + shift, bottom - 0.8, f"{bottom * MM_PER_DEG:.0f}", ha="center",
-                va="top", size=4.8,
-            )  # fmt: skip
+    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.2}
+    for x, top in enumerate(high[:-1]):
+        axes.text(
+            x + shift, top + 0.9, f"{top:.0f}", ha="center", va="bottom", size=4.8,
+            bbox=box, zorder=6,
+        )  # fmt: skip
+    # Numbers of x0 are wider than a bar: they run outwards from the middle.
+    x, side = at[-1] + np.sign(shift) * 0.03, "right" if shift < 0.0 else "left"
+    for value, up in ((high[-1], 0.9), (low[-1], -0.9)):
+        axes.text(
+            x, value + up, f"{value * MM_PER_DEG:.0f}", ha=side, size=4.8, bbox=box,
+            va="bottom" if up > 0.0 else "top", zorder=6,
+        )  # fmt: skip
     names = [f"ψ{style.subscript(i)}" for i in range(1, len(at))]
     axes.set_xticks(at, [*names, "x₀"])
     axes.tick_params(axis="x", length=0)

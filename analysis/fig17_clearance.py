@@ -3,6 +3,7 @@
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
 from paper_figures import style
 from paper_figures.curves import draw_limit, draw_moments, shade_detours
 from paper_figures.distances import AXES, axis_distance
@@ -11,19 +12,20 @@ from paper_figures.runs import STRATEGIES, Run, Runs
 from paper_figures.style import save
 from paper_figures.views import thin
 
-from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.units import MM_PER_M
 
 NAME = "fig17"
 SCENES = tuple(AXES)
 WIDTH, HEIGHT = 1.60, 1.30  # of one panel; [inch]
-TOP_AXIS, TOP_SURFACE = 900.0, 700.0  # [mm]
+TOP_AXIS = 900.0  # [mm]
+SURFACE = (1.0, 1_000.0)  # ends of the logarithmic axis; [mm]
+DECADE = 150.0  # makes a decade as long as 150 waypoints, for thinning
 
 
 def draw(runs: Runs) -> dict[str, Figure]:
     """Environments in columns; to the axis above, between surfaces below."""
     pitch = HEIGHT + 0.56
-    figure = style.sheet(4.0 * pitch - 0.05)
+    figure = style.sheet(4.0 * pitch + 0.18)
     for k, scene in enumerate(SCENES):
         left = 0.44 + k * (WIDTH + 0.10)
         for r, strategy in enumerate(STRATEGIES):
@@ -36,6 +38,7 @@ def draw(runs: Runs) -> dict[str, Figure]:
             for axes, letter in zip((above, below), letters, strict=True):
                 axes.set_title(f"({letter}) {scene}, ‘{strategy}’", pad=11.0)
                 axes.grid(visible=True, axis="y")
+                axes.xaxis.set_major_locator(MultipleLocator(300))
                 if k > 0:
                     axes.tick_params(labelleft=False)
             if k == 0:
@@ -55,40 +58,42 @@ def _axis_panel(axes: Axes, run: Run) -> None:
     axes.set_xlim(0, rows[-1])
     axes.set_ylim(0.0, TOP_AXIS)
     draw_limit(axes, AXIS_DISTANCE_MM)
-    _least(axes, rows, distance)
+    k = int(np.argmin(distance))
+    axes.plot(rows[k], distance[k], "o", color=style.INK, markersize=2.6, zorder=6)
+    _note(axes, f"least {distance[k]:.1f}")
     shade_detours(axes, run)
     draw_moments(axes, run, size=5.2)
 
 
 def _surface_panel(axes: Axes, run: Run) -> None:
-    """Proved brackets of the clearance between surfaces, over each interval."""
+    """Proved brackets of the clearance over each interval, and the sharpened least."""
     profile = run.verification.profile
     first = profile.first_interval
     lower = profile.obstacle_lower.min(axis=1) * MM_PER_M
     upper = profile.obstacle_upper.min(axis=1) * MM_PER_M
     colour = style.STRATEGY_COLOURS[run.strategy]
-    axes.fill_between(
-        first, lower, np.maximum(upper, lower), color=colour, alpha=0.3, linewidth=0,
-        zorder=2, step="post",
-    )  # fmt: skip
-    line = thin(np.column_stack([first, lower]))
-    axes.plot(*line.T, color=colour, zorder=3)
+    for values, look in ((upper, {"alpha": 0.4, "linewidth": 0.7}), (lower, {})):
+        shown = np.maximum(values, SURFACE[0])
+        line = thin(np.column_stack([first, DECADE * np.log10(shown)]))
+        axes.plot(line[:, 0], 10.0 ** (line[:, 1] / DECADE), color=colour, **look)
+    axes.set_yscale("log")
     axes.set_xlim(0, run.trajectory.n_samples - 1)
-    axes.set_ylim(0.0, TOP_SURFACE)
+    axes.set_ylim(*SURFACE)
     draw_limit(axes, run.problem.required_clearance * MM_PER_M)
-    _least(axes, first, lower)
+    near = next(one for one in run.verification.closest if one.pair.obstacle)
+    least = near.lower * MM_PER_M
+    axes.plot(near.interval, least, "o", color=style.INK, markersize=2.6, zorder=6)
+    _note(axes, f"at least {least:.1f}")
     shade_detours(axes, run)
     draw_moments(axes, run, size=5.2)
 
 
-def _least(axes: Axes, rows: FloatArray, values: FloatArray) -> None:
-    """The smallest value with its number."""
-    k = int(np.argmin(values))
-    axes.plot(rows[k], values[k], "o", color=style.INK, markersize=2.6, zorder=6)
+def _note(axes: Axes, text: str) -> None:
+    """A number in the upper right corner."""
     axes.text(
-        0.97, 0.93, f"least {values[k]:.1f}", transform=axes.transAxes, ha="right",
-        va="top", size=6.3, zorder=7,
+        0.97, 0.93, text, transform=axes.transAxes, ha="right", va="top", size=6.3,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8},
+        zorder=7,
     )  # fmt: skip
 
 

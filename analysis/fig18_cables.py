@@ -41,7 +41,7 @@ def hole_colour(angle: float) -> str:
 def draw(runs: Runs) -> dict[str, Figure]:
     """One panel per strategy, and the holes in their colours."""
     both = runs.both("obs1")
-    pitch = HEIGHT + 0.44
+    pitch = HEIGHT + 0.52
     figure = style.sheet(len(both) * pitch + 0.26)
     for k, run in enumerate(both):
         low = 0.36 + (len(both) - 1 - k) * pitch

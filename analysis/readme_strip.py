@@ -19,7 +19,7 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray
 
 NAME: Final = "readme"
 STILLS: Final = 5
-WIDTH, HEIGHT = 12.0, 2.55  # of the strip; [inch]
+WIDTH, HEIGHT = 12.0, 2.05  # of the strip; [inch]
 CAMERA: Final = oblique(50.0, 20.0)
 CORNERS: Final = np.array([[0.0, -0.55, -0.30], [3.20, 1.10, 1.40]])
 """What every still shows: low and high corner, shape (2, 3); [m]."""
@@ -47,7 +47,7 @@ def draw(runs: Runs) -> dict[str, Figure]:
         axes.set_aspect("equal")
         axes.axis("off")
         axes.set_xlim(corners[:, 0].min(), corners[:, 0].max())
-        axes.set_ylim(corners[:, 1].min(), corners[:, 1].max())
+        axes.set_ylim(corners[:, 1].min(), corners[:, 1].max() - 420.0)
         _still(axes, CAMERA, run, int(row))
         share = row / (run.trajectory.n_samples - 1)
         angles = int((run.psi[row, 1:] > np.deg2rad(0.05)).sum())

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from paper_figures import style
-from paper_figures.marks import marks
+from paper_figures.marks import Mark, marks
 from paper_figures.runs import Run, degrees
 from paper_figures.views import thin
 from vdsm_pin.geometry.arrays import FloatArray
@@ -16,8 +16,11 @@ from vdsm_pin.units import MM_PER_M
 MM_PER_DEG: Final = 15.0
 """The paper's scale of x0 against psi in Fig. 14; [mm/deg]."""
 
-TOP_DEG: Final = 48.0
-"""Upper end of the axis of psi, above the cone of 42.5; [deg]."""
+TOP_DEG: Final = 57.0
+"""Upper end of the axis of psi: above the cone, and 855 mm for x0; [deg]."""
+
+LETTER: Final = 0.0092
+"""Width of a letter of a moment's name over its size; [inch/pt]."""
 
 LOW_DEG: Final = -9.0
 """Lower end, below x0 = -98 mm; [deg]."""
@@ -68,23 +71,45 @@ def draw_limit(axes: Axes, value: float) -> None:
 def draw_moments(axes: Axes, run: Run, size: float = 6.0) -> None:
     """The named moments as thin vertical lines with their names above the axes."""
     first, last = axes.get_xlim()
-    letters_apart = 0.022 * (last - first) * style.WIDTH / 3.0
-    placed: list[tuple[float, str]] = []
+    figure = axes.get_figure()
+    assert figure is not None
+    width = axes.get_position().width * figure.get_size_inches()[0]
+    letter = LETTER * size * (last - first) / width
+    # Left to right; a label that would touch the one before is joined to it.
+    groups: list[list[Mark]] = []
     for mark in marks(run):
         if not first <= mark.row <= last:
             continue
         axes.axvline(mark.row, color=style.FAINT, linewidth=0.5, zorder=1)
-        if placed and mark.row - placed[-1][0] < 1.6 * letters_apart:
-            # Too near to the one before: one label for both, between them.
-            where, name = placed[-1]
-            placed[-1] = (where, f"{name} {mark.name}")
-        else:
-            placed.append((mark.row, mark.name))
-    for where, name in placed:
+        group = [mark]
+        while groups:
+            before, _ = _span(groups[-1], letter, first, last)
+            here, _ = _span(group, letter, first, last)
+            reach = 0.5 * letter * (_letters(groups[-1]) + _letters(group) + 1)
+            if here - before >= reach:
+                break
+            group = groups.pop() + group
+        groups.append(group)
+    for group in groups:
+        middle, name = _span(group, letter, first, last)
         axes.annotate(
-            name, (where, 1.0), (0.0, 1.5), xycoords=("data", "axes fraction"),
+            name, (middle, 1.0), (0.0, 1.5), xycoords=("data", "axes fraction"),
             textcoords="offset points", ha="center", va="bottom", size=size,
         )  # fmt: skip
+
+
+def _letters(group: list[Mark]) -> int:
+    return sum(len(mark.name) + 1 for mark in group) - 1
+
+
+def _span(
+    group: list[Mark], letter: float, first: float, last: float
+) -> tuple[float, str]:
+    """Middle of a label, kept within the axes, and its text."""
+    middle = 0.5 * (group[0].row + group[-1].row)
+    half = 0.5 * letter * _letters(group)
+    middle = min(max(middle, first + half), last - half)
+    return middle, " ".join(mark.name for mark in group)
 
 
 def shade_detours(axes: Axes, run: Run) -> None:
