@@ -129,15 +129,17 @@ def message_page(message: str, live: str) -> str:
 
 
 def write_index(
-    path: Path, rows: Sequence[BatchRow], with_files: Container[str]
+    path: Path, rows: Sequence[BatchRow], with_files: Container[str] | None = None
 ) -> None:
     """index.html of a batch; durations stand in timing.js beside it.
 
     Args:
         path: The page.
         rows: One per problem.
-        with_files: The folders whose reports and pictures were kept.
+        with_files: The folders whose reports and pictures were kept; None for all.
     """
+    if with_files is None:
+        with_files = {row.folder for row in rows}
     counts = {word: sum(row.outcome == word for row in rows) for word in OUTCOMES}
     passed = sum(count for word, count in counts.items() if outcome(word).passed)
     page = _rendered(
