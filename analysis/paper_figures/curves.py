@@ -19,7 +19,7 @@ MM_PER_DEG: Final = 15.0
 TOP_DEG: Final = 57.0
 """Upper end of the axis of psi: above the cone, and 855 mm for x0; [deg]."""
 
-LETTER: Final = 0.0092
+LETTER: Final = 0.0075
 """Width of a letter of a moment's name over its size; [inch/pt]."""
 
 LOW_DEG: Final = -9.0

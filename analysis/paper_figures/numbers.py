@@ -48,7 +48,6 @@ def run_facts(run: Run) -> dict[str, Any]:
         "x0_max": _round(rows.x0.max() * MM_PER_M),
         "drawn": _round(100.0 * run.verification.coverage),
         "moments": {mark.name: named(psi[mark.row]) for mark in marks(run)},
-        "notes": list(run.plan.notes),
     }
     if to_obstacles:
         facts["clearance"] = _round(min(to_obstacles) * MM_PER_M)

@@ -3,6 +3,8 @@
 import importlib
 import json
 import sys
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +15,19 @@ pytest.importorskip("matplotlib")
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "analysis"))
 
+from matplotlib.figure import Figure  # noqa: E402
 from paper_figures import numbers as page_numbers  # noqa: E402
 from paper_figures.page import page  # noqa: E402
 from paper_figures.runs import SCENES, Run, Runs  # noqa: E402
-from paper_figures.style import REPORTS, key_colours, save_png  # noqa: E402
+from paper_figures.scenery import draw_arm  # noqa: E402
+from paper_figures.style import (  # noqa: E402
+    REPORTS,
+    key_colours,
+    place,
+    save,
+    sheet,
+)
+from paper_figures.views import SIDE  # noqa: E402
 
 from vdsm_pin.manipulator import built_in  # noqa: E402
 
@@ -48,18 +59,28 @@ def runs() -> Runs:
     return Runs(COARSE)
 
 
+@pytest.fixture(scope="module")
+def drawn(runs: Runs) -> Callable[[str], dict[str, Figure]]:
+    """Figures by script, each drawn once."""
+    return cache(lambda script: importlib.import_module(script).draw(runs))
+
+
+Drawn = Callable[[str], dict[str, Figure]]
+
+
 @pytest.mark.parametrize("script", sorted(PANELS))
-def test_a_figure_has_its_panels(script: str, runs: Runs) -> None:
-    figures = importlib.import_module(script).draw(runs)
+def test_a_figure_has_its_panels(script: str, drawn: Drawn) -> None:
+    figures = drawn(script)
     assert {name: len(figure.axes) for name, figure in figures.items()} == PANELS[
         script
     ]
 
 
-def test_views_along_axes_are_drawn_to_scale(runs: Runs) -> None:
-    figure = importlib.import_module("fig11_paths_obs1").draw(runs)["fig11-paper"]
+def test_views_along_axes_are_drawn_to_scale(drawn: Drawn) -> None:
+    figure = drawn("fig11_paths_obs1")["fig11-paper"]
     front, side, top = figure.axes[:3]
-    figure.canvas.draw()
+    for axes in (front, side, top):
+        axes.apply_aspect()
     scales = [axes.bbox.width / np.ptp(axes.get_xlim()) for axes in (front, side, top)]
     scales += [
         axes.bbox.height / np.ptp(axes.get_ylim()) for axes in (front, side, top)
@@ -67,9 +88,9 @@ def test_views_along_axes_are_drawn_to_scale(runs: Runs) -> None:
     np.testing.assert_allclose(scales, scales[0], rtol=1e-9)
 
 
-def test_side_view_draws_every_key_point_where_it_is(runs: Runs) -> None:
+def test_side_view_draws_every_key_point_where_it_is(runs: Runs, drawn: Drawn) -> None:
     run = runs("obs1", "paper")
-    figure = importlib.import_module("fig11_paths_obs1").draw(runs)["fig11-paper"]
+    figure = drawn("fig11_paths_obs1")["fig11-paper"]
     colours = key_colours(run.problem.manipulator)
     lines = {line.get_color(): line for line in figure.axes[1].lines}
     for i, colour in enumerate(colours):
@@ -79,8 +100,8 @@ def test_side_view_draws_every_key_point_where_it_is(runs: Runs) -> None:
         np.testing.assert_allclose(drawn.max(axis=0), wanted.max(axis=0), atol=0.5)
 
 
-def test_link_angle_panels_show_limit_and_extremes(runs: Runs) -> None:
-    figure = importlib.import_module("fig14_link_angles").draw(runs)["fig14"]
+def test_link_angle_panels_show_limit_and_extremes(runs: Runs, drawn: Drawn) -> None:
+    figure = drawn("fig14_link_angles")["fig14"]
     run, axes = runs("obs1", "paper"), figure.axes[0]
     curves = {line.get_color(): np.asarray(line.get_ydata()) for line in axes.lines}
     cone = [y for y in curves.values() if np.allclose(y, 42.5)]
@@ -131,10 +152,14 @@ def test_moments_come_in_order_and_the_corner_is_where_it_is(runs: Runs) -> None
 
 
 def test_pictures_are_the_same_bytes_each_time(runs: Runs, tmp_path: Path) -> None:
-    script = importlib.import_module("fig07_projected_arm")
-    for name in ("a.png", "b.png"):
-        save_png(script.draw(runs)["fig07"], tmp_path / name)
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    run = runs("obs1", "paper")
+    for name in ("a", "b"):
+        figure = sheet(1.0, 1.0)
+        draw_arm(place(figure, 0.1, 0.1, 0.8, 0.8), SIDE, run.problem, run.centres[9])
+        save(figure, name, tmp_path)
+    for ending in ("png", "svg"):
+        first, second = (tmp_path / f"{name}.{ending}" for name in "ab")
+        assert first.read_bytes() == second.read_bytes()
 
 
 def test_the_page_follows_from_its_numbers() -> None:
