@@ -33,8 +33,8 @@ def mean_changed(plan: Plan) -> float:
     ("name", "most_changed", "most_bent"),
     [
         ("free", 1.0, 31.7),
-        ("obs1", 1.5, 42.5),
-        ("obs2", 2.2, 42.5),
+        ("obs1", 1.5, 34.0),
+        ("obs2", 2.2, 34.0),
         ("obs2-small", 1.7, 34.0),
         ("obs3", 1.6, 34.0),
     ],

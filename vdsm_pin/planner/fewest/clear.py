@@ -25,6 +25,7 @@ class Judge:
         slack: Kept for what happens between two rows; [m].
         finest: Way of the body below which an interval between two clear
             configurations counts as clear; [m].
+        ease: Part of the largest link angle that may be used; [-].
     """
 
     def __init__(
@@ -34,11 +35,12 @@ class Judge:
         margin: float,
         slack: float,
         finest: float,
+        ease: float = 1.0,
     ) -> None:
         self.problem, self.clearance = problem, clearance
         self.required = problem.required_clearance + margin + slack
         self.slack, self.finest = slack, finest
-        self.limit = link_limit(problem)
+        self.limit = ease * link_limit(problem)
 
     def look(
         self, tips: FloatArray, offsets: FloatArray

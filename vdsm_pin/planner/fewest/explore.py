@@ -38,6 +38,7 @@ class Level:
         grow: Rounds of growing shapes into what is not drawn.
         slack: Clearance kept for what happens between two rows; [m].
         finest: Way of the body between two looks at the clearance; [m].
+        ease: Part of the largest link angle that may be used; [-].
     """
 
     step: float
@@ -48,12 +49,14 @@ class Level:
     grow: int
     slack: float = 3e-4
     finest: float = 2e-3
+    ease: float = 1.0
 
 
 SEED: Final = 0
 """Seed of the growth of shapes; the same problem gives the same plan."""
 
 LEVELS: Final = (
+    Level(0.06, 0.026, 8, 20, 0.0, 1, ease=0.79),
     Level(0.08, 0.026, 8, 40, 0.0, 2),
     Level(0.08, 0.026, 8, 40, 1.0, 2),
     Level(0.05, 0.016, 10, 60, 1.0, 3),
@@ -101,7 +104,7 @@ def explore(
     if proof.closed.all():
         return best
     for level in LEVELS:
-        judge = Judge(problem, clearance, margin, level.slack, level.finest)
+        judge = Judge(problem, clearance, margin, level.slack, level.finest, level.ease)
         found = _look(judge, level, rows, proof, taste)
         now = Outcome(judge, found, rows, proof)
         LOGGER.debug("%s: %.4f m missing", level, now.missing)
@@ -123,7 +126,7 @@ def _look(
     shapes = one_knee_shapes(arm, judge.limit, level.step, level.joints)
     route = tip_route(problem, rows, proof.closed, coarse, back)
     roadmap = build_roadmap(
-        problem, judge.clearance, judge.required, route, shapes, taste
+        problem, judge.clearance, judge.required, route, shapes, taste, judge.limit
     )
     roadmap, home = with_start(judge, roadmap, taste)
     rng = np.random.default_rng(SEED)

@@ -82,6 +82,7 @@ def build_roadmap(
     route: TipRoute,
     shapes: Shapes,
     taste: Taste,
+    limit: float,
 ) -> Roadmap:
     """Every shape at every tip that keeps limits and clearance."""
     arm = problem.manipulator
@@ -90,7 +91,7 @@ def build_roadmap(
         shapes.knees,
         shapes.slopes,
         arm.stations,
-        link_limit(problem),
+        limit,
         *arm.base_range,
     )
     single = bool((shapes.knees[:, 0] == shapes.knees[:, 1]).all())
@@ -105,7 +106,7 @@ def build_roadmap(
         room[keep],
         required,
         taste,
-        link_limit(problem),
+        limit,
     )
 
 
