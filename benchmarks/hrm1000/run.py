@@ -75,7 +75,9 @@ def attempt(problem: PlanningProblem, family: str, name: str) -> Outcome:
 
 
 def solved(outcome: Outcome, limit: float) -> bool:
-    """Certified, whole and in time."""
+    """Certified, whole and in time; for the family `infeasible`, refused."""
+    if outcome.family == "infeasible":
+        return outcome.answer in ("infeasible", "not found")
     whole = outcome.coverage >= 1.0 - TOLERANCES.on_path_length
     return outcome.answer == "certified" and whole and outcome.plan_s <= limit
 
@@ -83,8 +85,8 @@ def solved(outcome: Outcome, limit: float) -> bool:
 def table(outcomes: list[Outcome], limit: float) -> str:
     """The results family by family as Markdown."""
     lines = [
-        "| family | strategy | problems | solved | not found | infeasible | changed "
-        "angles | largest psi [deg] | least clearance [mm] | median [s] | p95 [s] |",
+        "| family | strategy | problems | solved or rightly refused | not found "
+        "| infeasible | changed angles | largest psi [deg] | least clearance [mm] | median [s] | p95 [s] |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for family, name in sorted({(o.family, o.strategy) for o in outcomes}):
@@ -93,7 +95,7 @@ def table(outcomes: list[Outcome], limit: float) -> str:
         answers = Counter(o.answer for o in own)
         times = [o.plan_s for o in own]
         figures = ["-", "-", "-"]
-        if done:
+        if done and family != "infeasible":
             figures = [
                 f"{np.mean([o.changed for o in done]):.2f}",
                 f"{max(o.psi_deg for o in done):.1f}",
