@@ -86,7 +86,8 @@ def table(outcomes: list[Outcome], limit: float) -> str:
     """The results family by family as Markdown."""
     lines = [
         "| family | strategy | problems | solved or rightly refused | not found "
-        "| infeasible | changed angles | largest psi [deg] | least clearance [mm] | median [s] | p95 [s] |",
+        "| infeasible | changed angles | largest psi [deg] | least clearance [mm] "
+        "| median [s] | p95 [s] |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for family, name in sorted({(o.family, o.strategy) for o in outcomes}):
