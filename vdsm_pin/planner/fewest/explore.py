@@ -12,7 +12,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.fewest.bounds import TipProof, prove_tips
 from vdsm_pin.planner.fewest.clear import Judge
-from vdsm_pin.planner.fewest.growth import fill
+from vdsm_pin.planner.fewest.graft import fill
 from vdsm_pin.planner.fewest.home import with_start
 from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste, build_roadmap
 from vdsm_pin.planner.fewest.route import PathRows, path_rows, tip_route

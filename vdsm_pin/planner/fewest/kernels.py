@@ -1,6 +1,4 @@
-"""Compiled loops of the search: poses of shapes, the stage programme, shortest ways."""
-
-import heapq
+"""Compiled loops of the search: poses of shapes, the stage programme."""
 
 import numpy as np
 
@@ -91,7 +89,8 @@ def _angle(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> 
 
 
 @compiled
-def _is_blocked(u: int, v: int, flagged: BoolArray, blocked: IntArray) -> bool:
+def is_blocked(u: int, v: int, flagged: BoolArray, blocked: IntArray) -> bool:
+    """Whether the edge of two nodes is among the sorted keys of blocked ones."""
     if not (flagged[u] and flagged[v]):
         return False
     key = min(u, v) * flagged.size + max(u, v)
@@ -131,12 +130,12 @@ def _settle(
                 if u < 0:
                     continue
                 value = cost[u] + turn_cost * change[e] + still_cost
-                if value < cost[v] - EPS and not _is_blocked(u, v, flagged, blocked):
+                if value < cost[v] - EPS and not is_blocked(u, v, flagged, blocked):
                     cost[v], parent[v], better = value, u, True
             if straight >= 0 and v != straight and lean[v] <= NEAR:
                 a, b = (straight, v) if cost[straight] < cost[v] else (v, straight)
                 value = cost[a] + turn_cost * lean[v] + still_cost
-                if value < cost[b] - EPS and not _is_blocked(a, b, flagged, blocked):
+                if value < cost[b] - EPS and not is_blocked(a, b, flagged, blocked):
                     cost[b], parent[b], better = value, a, True
         sweep += 1
 
@@ -205,20 +204,20 @@ def stage_programme(
                 c = shape_of[v]
                 drawn = node_cost[v] * gap[k]
                 u = index[before * n_shapes + c]
-                if u >= 0 and not _is_blocked(u, v, flagged, blocked):
+                if u >= 0 and not is_blocked(u, v, flagged, blocked):
                     cost[v], parent[v] = cost[u] + drawn, u
                 for e in range(first[c], first[c + 1]):
                     u = index[before * n_shapes + neighbours[e]]
                     if u < 0:
                         continue
                     value = cost[u] + drawn + turn_cost * change[e]
-                    if value < cost[v] and not _is_blocked(u, v, flagged, blocked):
+                    if value < cost[v] and not is_blocked(u, v, flagged, blocked):
                         cost[v], parent[v] = value, u
                 if c > 0 and lean[v] <= NEAR:
                     u = index[before * n_shapes]
                     if u >= 0:
                         value = cost[u] + drawn + turn_cost * lean[v]
-                        if value < cost[v] and not _is_blocked(u, v, flagged, blocked):
+                        if value < cost[v] and not is_blocked(u, v, flagged, blocked):
                             cost[v], parent[v] = value, u
                 if c == 0:
                     for u in range(layer_first[before], layer_first[before + 1]):
@@ -226,7 +225,7 @@ def stage_programme(
                         if (
                             lean[u] <= NEAR
                             and value < cost[v]
-                            and not _is_blocked(u, v, flagged, blocked)
+                            and not is_blocked(u, v, flagged, blocked)
                         ):
                             cost[v], parent[v] = value, u
             at_home += skip_cost * gap[k]
@@ -250,107 +249,3 @@ def stage_programme(
                 turn_cost, still_cost, flagged, blocked, cost, parent,
             )  # fmt: skip
     return cost, parent, home_cost, home_from
-
-
-@compiled
-def shortest_ways(
-    source: int,
-    target: int,
-    n_shapes: int,
-    n_lattice: int,
-    index: IntArray,
-    node: IntArray,
-    tip_first: IntArray,
-    tip_links: IntArray,
-    tip_gap: FloatArray,
-    first: IntArray,
-    neighbours: IntArray,
-    change: FloatArray,
-    lean: FloatArray,
-    strain: FloatArray,
-    tip_nodes: IntArray,
-    arm: float,
-    flagged: BoolArray,
-    blocked: IntArray,
-) -> tuple[FloatArray, IntArray]:
-    """Shortest ways over the whole graph from one node (Dijkstra).
-
-    A move is either of the tip with the shape kept, or of the shape with the tip at
-    rest.
-
-    Args:
-        source: Node to start from.
-        target: Node at which to stop, or -1 for all.
-        n_shapes: Number of shapes n.
-        n_lattice: Number of shapes that exist at every tip; the others come after.
-        index: Node of each (tip, shape) or -1, shape (k * n,).
-        node: Number tip * n + shape of each node, shape (v,).
-        tip_first: Neighbour rows of the tips, shape (k + 1,).
-        tip_links: Neighbouring tips.
-        tip_gap: Distances to them; [m].
-        first: Neighbour rows of the shapes.
-        neighbours: See `Shapes`.
-        change: See `Shapes`.
-        lean: Sum of the knees' angles, joint 1 left out, shape (v,); [rad].
-        strain: Length added for entering a node, shape (v,); [m].
-        tip_nodes: Where each tip's nodes begin, shape (k + 1,).
-        arm: Length that turns a change into a distance; [m].
-        flagged: Nodes with a blocked edge, shape (v,).
-        blocked: Sorted keys of blocked edges.
-
-    Returns:
-        Length of the way to each node (inf: none) [m], and the node before.
-    """
-    length = np.full(node.size, np.inf)
-    before = np.full(node.size, -1)
-    done = np.zeros(node.size, dtype=np.bool_)
-    length[source] = 0.0
-    heap = [(0.0, source)]
-    while len(heap) > 0:
-        reached, u = heapq.heappop(heap)
-        if done[u]:
-            continue
-        done[u] = True
-        if u == target:
-            break
-        tip, c = node[u] // n_shapes, node[u] % n_shapes
-        for e in range(tip_first[tip], tip_first[tip + 1]):
-            v = index[tip_links[e] * n_shapes + c]
-            if v < 0 or done[v]:
-                continue
-            value = reached + tip_gap[e] + strain[v]
-            if value < length[v] and not _is_blocked(u, v, flagged, blocked):
-                length[v], before[v] = value, u
-                heapq.heappush(heap, (value, v))
-        for e in range(first[c], first[c + 1]):
-            v = index[tip * n_shapes + neighbours[e]]
-            if v >= 0 and not done[v]:
-                value = reached + arm * change[e] + strain[v]
-                if value < length[v] and not _is_blocked(u, v, flagged, blocked):
-                    length[v], before[v] = value, u
-                    heapq.heappush(heap, (value, v))
-            # Grown shapes live at one tip only: the tip moves as the shape changes.
-            if c < n_lattice and neighbours[e] < n_lattice:
-                continue
-            for g in range(tip_first[tip], tip_first[tip + 1]):
-                v = index[tip_links[g] * n_shapes + neighbours[e]]
-                if v < 0 or done[v]:
-                    continue
-                value = reached + arm * change[e] + tip_gap[g] + strain[v]
-                if value < length[v] and not _is_blocked(u, v, flagged, blocked):
-                    length[v], before[v] = value, u
-                    heapq.heappush(heap, (value, v))
-        low, high = tip_nodes[tip], tip_nodes[tip + 1]
-        if c > 0:
-            high = low
-            v = index[tip * n_shapes]
-            if v >= 0 and lean[u] <= NEAR:
-                low, high = v, v + 1
-        for v in range(low, high):
-            value = reached + arm * (lean[v] + lean[u]) + strain[v]
-            if done[v] or value >= length[v] or lean[v] > NEAR:
-                continue
-            if not _is_blocked(u, v, flagged, blocked):
-                length[v], before[v] = value, u
-                heapq.heappush(heap, (value, v))
-    return length, before

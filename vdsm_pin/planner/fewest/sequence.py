@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.planner.fewest.kernels import shortest_ways, stage_programme
+from vdsm_pin.planner.fewest.kernels import stage_programme
 from vdsm_pin.planner.fewest.roadmap import Blocked, Roadmap
+from vdsm_pin.planner.fewest.ways import shortest_ways
 
 TURN_COST = 0.15
 """Cost of turning by a radian, in metres drawn with one changed angle more."""

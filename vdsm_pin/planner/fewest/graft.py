@@ -1,0 +1,135 @@
+"""Grown shapes tied into the graph, where stretches of the path are not drawn."""
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.planner.fewest.clear import Judge
+from vdsm_pin.planner.fewest.growth import POPULATION, Garden, Grown
+from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste, extended
+
+
+def graft(
+    judge: Judge,
+    roadmap: Roadmap,
+    grown: list[Grown],
+    roots: list[IntArray],
+    taste: Taste,
+) -> Roadmap:
+    """The roadmap with grown configurations, tied to what is near them.
+
+    Args:
+        judge: Says what is clear.
+        roadmap: The graph before.
+        grown: Trees, each rooted in nodes of the graph.
+        roots: For each tree the nodes of its roots.
+        taste: What the strategy prefers.
+    """
+    shapes, route = roadmap.shapes, roadmap.route
+    tips, offsets, links = [], [], []
+    first = shapes.size
+    for tree, nodes in zip(grown, roots, strict=True):
+        ids = first + np.arange(len(tree.layer))
+        root = roadmap.node[nodes[np.maximum(-1 - tree.parent, 0)]] % shapes.size
+        up = np.where(tree.parent >= 0, first + tree.parent, root)
+        links.append(np.column_stack([ids, up, np.full(len(ids), shapes.step)]))
+        tip = route.layers[tree.layer]
+        tips.append(tip)
+        offsets.append(tree.offsets)
+        first += len(ids)
+    every, places = np.concatenate(offsets), np.concatenate(tips)
+    links.append(_ties(judge, roadmap, places, every))
+    positions = route.tips[places]
+    room, _, _ = judge.look(positions, every)
+    bends = judge.bends(positions, every)
+    return extended(
+        roadmap, places, bends, room, shapes.with_grown(every, np.vstack(links)),
+        judge.required, taste, judge.limit,
+    )  # fmt: skip
+
+
+TIES = 4
+"""Nodes of the graph tied to each grown configuration at its tip."""
+TIE_LENGTH = 0.08
+"""Largest move of a joint along a tie over the arm's length; [-]."""
+
+
+def _ties(
+    judge: Judge, roadmap: Roadmap, places: IntArray, grown: FloatArray
+) -> FloatArray:
+    """Clear links from grown configurations to the nearest ones at the same tip."""
+    arm, shapes = judge.problem.manipulator, roadmap.shapes
+    rows, tips, here, there = [], [], [], []
+    for tip in np.unique(places):
+        own = np.flatnonzero(places == tip)
+        nodes = np.arange(roadmap.tip_nodes[tip], roadmap.tip_nodes[tip + 1])
+        shape = np.concatenate([roadmap.node[nodes] % shapes.size, shapes.size + own])
+        position = np.broadcast_to(roadmap.route.tips[tip], (len(nodes), 3))
+        around = shapes.offsets(arm, position, shape[: len(nodes)])
+        around = np.concatenate([around, grown[own]])
+        gap = np.abs(grown[own][:, None] - around[None]).max(axis=(2, 3))
+        gap[np.arange(len(own)), len(nodes) + np.arange(len(own))] = np.inf
+        near = np.argsort(gap, axis=1, kind="stable")[:, :TIES]
+        mine, column = np.repeat(np.arange(len(own)), near.shape[1]), near.ravel()
+        close = gap[mine, column] <= TIE_LENGTH * arm.total_length
+        mine, column = mine[close], column[close]
+        rows.append(
+            np.column_stack([shapes.size + own[mine], shape[column], gap[mine, column]])
+        )
+        tips.append(np.broadcast_to(roadmap.route.tips[tip], (len(mine), 3)))
+        here.append(grown[own[mine]])
+        there.append(around[column])
+    every = np.concatenate(tips)
+    lines = Intervals(every, every, np.concatenate(here), np.concatenate(there))
+    good = judge.clear(lines) if len(every) else np.zeros(0, bool)
+    return np.concatenate(rows)[good]
+
+
+def fill(
+    judge: Judge,
+    roadmap: Roadmap,
+    home: FloatArray,
+    skipped: tuple[int, ...],
+    rng: np.random.Generator,
+    taste: Taste,
+) -> Roadmap | None:
+    """The roadmap with what could be grown into the stretches not drawn.
+
+    Args:
+        judge: Says what is clear.
+        roadmap: The graph before.
+        home: Length of the way to each node, inf if none, shape (v,); [m].
+        skipped: Layers k whose stretch from layer k - 1 is not drawn.
+        rng: Source of chance.
+        taste: What the strategy prefers.
+
+    Returns:
+        None if nothing grew.
+    """
+    route, arm = roadmap.route, judge.problem.manipulator
+    marks = np.array(skipped)
+    breaks = np.flatnonzero(np.diff(marks) > 1) + 1
+    trees, roots = [], []
+    for stretch in np.split(marks, breaks):
+        ends = (int(stretch[0]) - 1, int(stretch[-1]))
+        crossed = False
+        for first, last in (ends, ends[::-1]):
+            if crossed:
+                break
+            tip = route.layers[first]
+            nodes = np.arange(roadmap.tip_nodes[tip], roadmap.tip_nodes[tip + 1])
+            nodes = nodes[np.isfinite(home[nodes])]
+            if len(nodes) > POPULATION:
+                nodes = rng.choice(nodes, POPULATION, replace=False)
+            if not len(nodes):
+                continue
+            position = np.broadcast_to(route.tips[tip], (len(nodes), 3))
+            shape = roadmap.node[nodes] % roadmap.shapes.size
+            offsets = roadmap.shapes.offsets(arm, position, shape)
+            garden = Garden(judge, route.tips[route.layers], rng)
+            tree = garden.grow(offsets, first, last)
+            if len(tree.layer):
+                trees.append(tree)
+                roots.append(nodes)
+                crossed = bool((tree.layer == last).any())
+    return graft(judge, roadmap, trees, roots, taste) if trees else None
