@@ -118,6 +118,7 @@ def verification(
         profile=profile,
         coverage=0.873,
         undrawn=np.array([[1.0, 1.5]]),
+        tip_deviation=2e-6,
         joint_error=joint_error,
     )
 

@@ -76,6 +76,7 @@ def test_undefined_numbers_become_null_and_never_pass() -> None:
         checks=checks,
         closest=(),
         profile=judged.profile,
+        tip_deviation=math.nan,
         coverage=math.nan,
         undrawn=np.zeros((0, 2)),
         joint_error=math.nan,

@@ -9,6 +9,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
 from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.robot_model import load_robot
 from vdsm_pin.scene import Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Scene, Sphere
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import (
@@ -18,6 +19,7 @@ from vdsm_pin.verification.clearance import (
 )
 from vdsm_pin.verification.inside import check_inside
 from vdsm_pin.verification.records import ClearanceChunk, ErrorBox, Verdict
+from vdsm_pin.verification.verify import verify
 
 ARM = built_in("hrm8")
 NOMINAL = ErrorBox()
@@ -232,10 +234,12 @@ def test_an_arm_inside_a_closed_mesh_is_refuted() -> None:
         assert check.verdict is verdict
 
 
-def test_an_open_mesh_says_so() -> None:
+def test_an_open_mesh_is_judged_as_a_surface_and_the_row_says_so() -> None:
     still = trajectory(np.zeros(1), np.zeros((1, 8)), np.zeros((1, 8)))
     mesh = replace(cube(5.0, np.zeros(3)), watertight=False)
-    (check,) = check_inside(problem_with(mesh), still)
-    assert check.verdict is Verdict.CERTIFIED
-    assert "surfaces" in check.name
-    assert "cube" in check.where
+    problem = problem_with(mesh)
+    assert check_inside(problem, still) == ()
+    rows = {row.name: row for row in verify(problem, still, load_robot(ARM)).checks}
+    clearance = rows["clearance from obstacles"]
+    assert clearance.verdict is Verdict.CERTIFIED
+    assert "cube is not closed: judged as a surface" in clearance.where

@@ -15,6 +15,10 @@ CHUNK: Final = 8192
 """Rows held in memory at a time."""
 
 
+NAME: Final = "angles recovered from the cable lengths"
+"""Name of the row."""
+
+
 def check_cables(problem: PlanningProblem, trajectory: Trajectory) -> Check:
     """Turn every row into cable lengths and these into angles again.
 
@@ -46,7 +50,7 @@ def check_cables(problem: PlanningProblem, trajectory: Trajectory) -> Check:
             where = f"waypoint {first + row}, {('alpha', 'theta')[kind]}{joint + 1}"
     limit = TOLERANCES.cable_round_trip
     return Check(
-        name="angles recovered from the cable lengths",
+        name=NAME,
         verdict=Verdict.CERTIFIED if worst <= limit else Verdict.REFUTED,
         count=trajectory.alpha.size + trajectory.theta.size,
         worst=worst,

@@ -35,7 +35,6 @@ from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.search import Motion, Task
 from vdsm_pin.verification.slices import BASE
 from vdsm_pin.verification.sweep import new_desk
-from vdsm_pin.verification.tip import check_tip
 
 CHUNK: Final = 512
 """Intervals recorded at once."""
@@ -119,7 +118,7 @@ def _header(
             "x0_min_m": found.x0_min,
             "x0_max_m": found.x0_max,
         },
-        "tip_deviation_m": check_tip(problem, trajectory).deviation,
+        "tip_deviation_m": verification.tip_deviation,
         "coverage": verification.coverage,
     }
 

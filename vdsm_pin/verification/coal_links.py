@@ -52,6 +52,10 @@ class LinkDistances:
         return np.where(np.isfinite(self.distance), difference, np.inf)
 
 
+NAME: Final = "distances between links by Coal against the closed form"
+"""Name of the row."""
+
+
 def check_coal_links(
     robot: RobotModel, problem: PlanningProblem, trajectory: Trajectory
 ) -> tuple[Check, ...]:
@@ -86,7 +90,7 @@ def check_coal_links(
             )
     agreed = worst <= TOLERANCES.coal_agreement
     check = Check(
-        name="distances between links by Coal against the closed form",
+        name=NAME,
         verdict=Verdict.CERTIFIED if agreed else Verdict.UNDECIDED,
         count=count,
         worst=worst,

@@ -15,6 +15,10 @@ CHUNK: Final = 4096
 """Rows held in memory at a time."""
 
 
+NAME: Final = "joint centres by Pinocchio against the closed form"
+"""Name of the row."""
+
+
 def check_fk(
     robot: RobotModel, problem: PlanningProblem, trajectory: Trajectory
 ) -> Check:
@@ -43,7 +47,7 @@ def check_fk(
             row, joint = first + int(here), int(centre)
     passed = worst <= TOLERANCES.joint_centre
     return Check(
-        name="joint centres by Pinocchio against the closed form",
+        name=NAME,
         verdict=Verdict.CERTIFIED if passed else Verdict.REFUTED,
         count=trajectory.n_samples * (problem.manipulator.n_links + 1),
         worst=worst,

@@ -170,6 +170,8 @@ class Verification:
         closest: The closest approaches over the whole motion, nearest first, one per
             pair at most, ten at most; the first is the minimum clearance.
         profile: Brackets along the motion.
+        tip_deviation: Bound of the distance from the desired path on the intervals
+            that draw it; 0 where there is none; [m].
         coverage: Proved part of the desired path that is drawn, 0 to 1; [-].
         undrawn: Stretches not drawn, arc lengths from and to, shape (k, 2); [m].
         joint_error: Largest joint error still certified; 0 if none is; NaN if it was
@@ -183,6 +185,7 @@ class Verification:
     checks: tuple[Check, ...]
     closest: tuple[ClosestApproach, ...]
     profile: ClearanceProfile
+    tip_deviation: float
     coverage: float
     undrawn: FloatArray
     joint_error: float

@@ -36,6 +36,7 @@ from vdsm_pin.verification.slices import (
 BLOCK: Final = 32
 """Intervals whose configurations are computed at once: they fit the cache."""
 
+LOW: Final = 0
 AT_LOWER: Final = 1
 UP: Final = 2
 AT_UPPER: Final = 3

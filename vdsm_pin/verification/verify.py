@@ -1,6 +1,7 @@
 """The judgement of a trajectory: every check, one row each, in a fixed order."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -10,12 +11,16 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.scene import Mesh
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.cable_check import check_cables
+from vdsm_pin.verification import (
+    cable_check,
+    coal_clearance,
+    coal_links,
+    fk,
+    inside,
+)
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
-from vdsm_pin.verification.coal_clearance import check_coal
-from vdsm_pin.verification.fk import check_fk
-from vdsm_pin.verification.inside import check_inside
 from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.records import (
     Check,
@@ -29,6 +34,7 @@ from vdsm_pin.verification.records import (
 from vdsm_pin.verification.robust import largest_joint_error
 from vdsm_pin.verification.sweep import (
     AT_UPPER,
+    LOW,
     OTHER,
     OWN,
     TIME,
@@ -76,18 +82,22 @@ def verify(
     tip = check_tip(problem, trajectory)
     clearance = _clearance_checks(problem, proof)
     checks = [
-        *_guarded(
-            "joint centres by Pinocchio", lambda: check_fk(robot, problem, trajectory)
-        ),
+        *_guarded(fk.NAME, lambda: fk.check_fk(robot, problem, trajectory)),
         *check_limits(problem, trajectory),
         *tip.checks,
         *clearance,
-        *_guarded("arm outside the meshes", lambda: check_inside(problem, trajectory)),
+        *_guarded(inside.NAME, lambda: inside.check_inside(problem, trajectory)),
         *_guarded(
-            "clearances by Coal",
-            lambda: check_coal(robot, problem, trajectory, kept.proved),
+            coal_clearance.NAME,
+            lambda: coal_clearance.check_coal(robot, problem, trajectory, kept.proved),
         ),
-        *_guarded("cable lengths", lambda: check_cables(problem, trajectory)),
+        *_guarded(
+            coal_links.NAME,
+            lambda: coal_links.check_coal_links(robot, problem, trajectory),
+        ),
+        *_guarded(
+            cable_check.NAME, lambda: cable_check.check_cables(problem, trajectory)
+        ),
     ]
     largest = float("nan")
     if joint_error:
@@ -100,6 +110,7 @@ def verify(
         checks=tuple(checks),
         closest=closest_approaches(problem, trajectory, proof),
         profile=proof.profile,
+        tip_deviation=tip.deviation,
         coverage=tip.coverage,
         undrawn=tip.undrawn,
         joint_error=largest,
@@ -164,6 +175,13 @@ def _clearance_checks(
     ):
         if mine.any():
             rows.append(_clearance_check(proof, np.flatnonzero(mine), name, needed))
+    surfaces = [
+        f"; {obstacle.name} is not closed: judged as a surface without an inside"
+        for obstacle in problem.scene.obstacles
+        if isinstance(obstacle, Mesh) and not obstacle.watertight
+    ]
+    if surfaces:
+        rows[0] = replace(rows[0], where=rows[0].where + "".join(surfaces))
     return tuple(rows)
 
 
@@ -177,8 +195,8 @@ def _clearance_check(
     elif counts[2]:
         verdict = Verdict.UNDECIDED
     # A refuted motion is as bad as its witness, another one as good as its proof.
-    column = UP if verdict is Verdict.REFUTED else 0
-    pair = int(mine[np.argmin(proof.best[mine, UP])])
+    column = UP if verdict is Verdict.REFUTED else LOW
+    pair = int(mine[np.argmin(proof.best[mine, column])])
     row = proof.best[pair]
     at, when = int(row[AT_UPPER]), row[TIME]
     where = f"interval {at} at {when:.4f}, link {proof.pairs[pair].link}"
@@ -189,7 +207,7 @@ def _clearance_check(
         name=name,
         verdict=verdict,
         count=int(counts.sum()),
-        worst=float(proof.best[mine, column].min()),
+        worst=float(row[column]),
         limit=needed,
         unit="m",
         where=where,
@@ -234,7 +252,7 @@ def closest_approaches(
                 interval=int(row[AT_UPPER]),
                 time=float(row[TIME]),
                 pair=pair,
-                lower=float(row[0]),
+                lower=float(row[LOW]),
                 upper=float(row[UP]),
                 station=_station(problem, trajectory, row, pair.link, mine),
                 link_point=frozen(mine),
