@@ -28,6 +28,10 @@ figures: $(VENV)/.installed
 	$(BIN)/python analysis/figures.py --out reports/paper
 	$(BIN)/python analysis/readme_strip.py --out reports
 
+report: figures
+	$(BIN)/python analysis/paper_table.py --out reports/paper
+	$(BIN)/python analysis/obs2_orientations.py --out reports/paper
+
 dist: $(VENV)/.installed
 	.ci/test-wheel
 
