@@ -7,7 +7,7 @@ import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Final, NoReturn
+from typing import Annotated, Final, Literal, NoReturn
 
 import typer
 
@@ -136,6 +136,16 @@ def batch(
         bool, typer.Option("--resume", help="Skip what is finished and intact.")
     ] = False,
     time_limit: TimeLimit = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="A Dask scheduler, as tcp://host:8786; no --jobs."
+        ),
+    ] = None,
+    keep: Annotated[
+        Literal["all", "failed", "none"],
+        typer.Option(help="Whose files stay; every problem keeps its row."),
+    ] = "all",
 ) -> None:
     """Plan and verify many problems.
 
@@ -151,6 +161,8 @@ def batch(
         jobs=jobs,
         resume=resume,
         time_limit=time_limit,
+        scheduler=scheduler,
+        keep=keep,
     )
     try:
         rows = run_batch(asked)

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import junitparser
 import pytest
+from batch_folders import tree
 from problem_files import NEAR, OUT_OF_REACH, write_problem
 
 from vdsm_pin.batch.run import Batch, expanded, run_batch
@@ -22,15 +23,6 @@ from vdsm_pin.errors import InvalidFile, InvalidInput, UnknownName
 from vdsm_pin.report.tables import read_summary
 
 NAMES = ("good", "other", "far", "bad")
-
-
-def tree(folder: Path) -> dict[str, bytes]:
-    """Every file but the timings, by its path in the folder."""
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.name not in ("timing.json", "timing.js", ".lock")
-    }
 
 
 @pytest.fixture(scope="module")
@@ -220,3 +212,23 @@ def test_no_process_outlives_a_killed_batch(problems: Path, tmp_path: Path) -> N
     while any(Path(f"/proc/{pid}/exe").exists() for pid in workers):
         assert time.monotonic() < until, "a worker lives on"
         time.sleep(0.1)
+
+
+@pytest.mark.parametrize("keep", ["failed", "none"])
+def test_what_is_not_kept_leaves_its_row(
+    problems: Path, reference: Path, tmp_path: Path, keep: str
+) -> None:
+    out = tmp_path / "out"
+    run_batch(Batch((str(problems),), out, "paper", keep=keep))
+    kept = sorted(path.name for path in (out / "good").iterdir())
+    assert kept == ["manifest.json", "timing.json"]
+    assert read_summary(out / "summary.csv") == read_summary(reference / "summary.csv")
+    assert "good/report.html" not in (out / "index.html").read_text(encoding="utf-8")
+    assert "good/report.html" in (reference / "index.html").read_text(encoding="utf-8")
+
+
+def test_columns_and_summary_say_the_same(reference: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    rows = parquet.read_table(reference / "rows.parquet").to_pylist()
+    written = read_summary(reference / "summary.csv")
+    assert rows == [row.model_dump() for row in written]

@@ -109,6 +109,40 @@ def run_tasks(
             worker.give_up()
 
 
+class WarmProcess(Generic[Task, Result]):
+    """One process that stays warm between the tasks it is given one at a time.
+
+    Args:
+        perform: A function of a module; importing it is what warms the process.
+    """
+
+    def __init__(self, perform: Callable[[Task], Result]) -> None:
+        self._perform = perform
+        self._worker: _Worker[Task] | None = None
+
+    def run(self, task: Task, time_limit: float | None) -> Ended[Task, Result]:
+        """Perform a task; a process that is lost with it is replaced for the next.
+
+        Raises:
+            WorkerFailed: If the process ends before it is ready.
+        """
+        worker = self._worker = self._worker or _start(self._perform)
+        waiting = [task]
+        most = _memory_limit(os.cpu_count() or 1)
+        ended: Ended[Task, Result] | None = None
+        try:
+            while ended is None:
+                _feed([worker], waiting, time_limit or float("inf"))
+                wait([worker.pipe], timeout=_pause([worker]))
+                ended = _look_at(worker, most)
+        finally:
+            if ended is None and not worker.pipe.closed:
+                worker.give_up()
+            if worker.pipe.closed:
+                self._worker = None
+        return ended
+
+
 def _start(perform: Callable[[Task], Result]) -> _Worker[Task]:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()

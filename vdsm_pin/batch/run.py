@@ -14,12 +14,14 @@ from typing import Final
 from vdsm_pin.batch.pool import Ended, run_tasks
 from vdsm_pin.batch.progress import Progress
 from vdsm_pin.batch.task import (
+    ALL,
     MANIFEST,
     TIMING,
     Done,
     Task,
     failed_row,
     folder_names,
+    keeps_files,
     perform,
     write_manifest,
 )
@@ -27,6 +29,7 @@ from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
 from vdsm_pin.io.atomic import atomic_path, write_text
 from vdsm_pin.io.problem_file import built_in_names
 from vdsm_pin.planner.strategies import strategy
+from vdsm_pin.report.columns import COLUMNS, write_columns
 from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.folder import check_output_folder
 from vdsm_pin.report.html import write_index
@@ -49,6 +52,8 @@ class Batch:
         jobs: Number of processes.
         resume: Whether finished and intact results stay.
         time_limit: For each problem; [s].
+        scheduler: Address of a Dask scheduler whose workers do it; None for here.
+        keep: Whose files stay: "all", "failed" (all that did not pass) or "none".
     """
 
     problems: tuple[str, ...]
@@ -57,6 +62,8 @@ class Batch:
     jobs: int = 1
     resume: bool = False
     time_limit: float | None = None
+    scheduler: str | None = None
+    keep: str = ALL
 
 
 class Interrupted(VdsmError):
@@ -83,20 +90,27 @@ def run_batch(batch: Batch) -> tuple[BatchRow, ...]:
         stopped = False
         with Progress(len(tasks)) as progress:
             try:
-                for ended in run_tasks(
-                    tasks, perform, jobs=batch.jobs, time_limit=batch.time_limit
-                ):
+                for ended in _all_ended(batch, tasks):
                     done = _settle(ended)
                     rows.append(done.row)
                     progress.show(done)
             except KeyboardInterrupt:
                 stopped = True
         shutil.rmtree(batch.folder / _ASIDE, ignore_errors=True)
-        _write_summaries(batch.folder, rows)
+        _write_summaries(batch, rows)
     if stopped:
         message = f"stopped; {len(rows)} of {len(tasks)} problems are finished"
         raise Interrupted(message + ", --resume does the rest")
     return tuple(rows)
+
+
+def _all_ended(batch: Batch, tasks: list[Task]) -> Iterator[Ended[Task, Done]]:
+    """The tasks as they end, here or on a cluster."""
+    if batch.scheduler is None:
+        return run_tasks(tasks, perform, jobs=batch.jobs, time_limit=batch.time_limit)
+    from vdsm_pin.batch.cluster import run_on_cluster
+
+    return run_on_cluster(tasks, batch.scheduler, time_limit=batch.time_limit)
 
 
 def expanded(problems: tuple[str, ...]) -> tuple[str, ...]:
@@ -131,7 +145,10 @@ def _tasks(batch: Batch) -> list[Task]:
             what = "exists and is not a result of a batch; nothing was overwritten"
             raise InvalidFile(file=final, problem=what)
         aside = batch.folder / _ASIDE / name
-        tasks.append(Task(problem, batch.strategy, name, final, aside, batch.resume))
+        task = Task(
+            problem, batch.strategy, name, final, aside, batch.resume, batch.keep
+        )
+        tasks.append(task)
     return tasks
 
 
@@ -150,13 +167,17 @@ def _settle(ended: Ended[Task, Done]) -> Done:
     return done
 
 
-def _write_summaries(folder: Path, rows: list[BatchRow]) -> None:
+def _write_summaries(batch: Batch, rows: list[BatchRow]) -> None:
+    folder = batch.folder
     ordered = sorted(rows, key=lambda row: row.folder)
     with atomic_path(folder / SUMMARY) as path:
         write_summary(path, ordered)
+    write_columns(folder / COLUMNS, ordered)
     write_text(folder / "junit.xml", junit_text(ordered))
     with atomic_path(folder / "index.html") as path:
-        write_index(path, ordered)
+        write_index(
+            path, ordered, {r.folder for r in rows if keeps_files(batch.keep, r)}
+        )
     seconds = {row.folder: _seconds(folder / row.folder) for row in ordered}
     known = {name: value for name, value in seconds.items() if value is not None}
     script = f"window.vdsmTiming = {json.dumps(known, indent=1)};\n"

@@ -17,11 +17,19 @@ from vdsm_pin.report.facts import batch_row
 from vdsm_pin.report.files import BatchRow, ManifestFile
 from vdsm_pin.report.picture import picture
 from vdsm_pin.report.run_record import sha256_of, versions
+from vdsm_pin.report.words import outcome
 from vdsm_pin.workflow import TRAJECTORY, Order, plan_to_folder, verify_to_folder
 
 MANIFEST: Final = "manifest.json"
 TIMING: Final = "timing.json"
 """Seconds of one problem; the only file that differs from run to run."""
+
+
+ALL: Final = "all"
+FAILED: Final = "failed"
+NONE: Final = "none"
+KEEP: Final = (ALL, FAILED, NONE)
+"""Whose files stay: every problem's, those of problems that did not pass, nobody's."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +43,7 @@ class Task:
         final: Where the folder shall be.
         aside: Where the worker writes it.
         resume: Whether a finished and intact folder may stay.
+        keep: Which problems keep their files: "all", "failed" or "none".
     """
 
     problem: str
@@ -43,11 +52,12 @@ class Task:
     final: Path
     aside: Path
     resume: bool
+    keep: str = ALL
 
     @property
     def settings(self) -> dict[str, str]:
         """What a finished folder must agree with to be kept."""
-        return {"strategy": self.strategy} | versions()
+        return {"strategy": self.strategy, "keep": self.keep} | versions()
 
     @property
     def command(self) -> str:
@@ -88,7 +98,7 @@ def perform(task: Task) -> Done:
         row = failed_row(task, "error", str(error))
     except Exception as error:  # noqa: BLE001  a batch outlives any one problem
         row = failed_row(task, "error", f"{type(error).__name__}: {error}")
-    if not row.waypoints:
+    if not row.waypoints or not keeps_files(task.keep, row):
         shutil.rmtree(task.aside, ignore_errors=True)
     write_manifest(task, row, digest)
     seconds = {"seconds": round(time.perf_counter() - started, 3)}
@@ -96,14 +106,19 @@ def perform(task: Task) -> Done:
     return Done(row, kept=False)
 
 
-def failed_row(task: Task, outcome: str, reason: str) -> BatchRow:
+def keeps_files(keep: str, row: BatchRow) -> bool:
+    """Whether the files of a problem stay beside its manifest."""
+    return keep == ALL or (keep == FAILED and not outcome(row.outcome).passed)
+
+
+def failed_row(task: Task, word: str, reason: str) -> BatchRow:
     """The row of a problem without a verified motion."""
     return BatchRow.model_validate(
         {
             "folder": task.folder,
             "problem": task.problem,
             "strategy": task.strategy,
-            "outcome": outcome,
+            "outcome": word,
             "reason": reason,
         }
     )

@@ -6,7 +6,7 @@ Written where pyarrow is installed (the extra `parquet`); summary.csv says the s
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.report.files import BatchRow
@@ -25,13 +25,21 @@ def write_columns(path: Path, rows: Sequence[BatchRow]) -> bool:
     import pyarrow
     from pyarrow import parquet
 
-    fields = BatchRow.model_fields
-    kinds = {float: pyarrow.float64(), int: pyarrow.int64()}
+    kinds = {"number": pyarrow.float64(), "integer": pyarrow.int64()}
+    fields = BatchRow.model_json_schema()["properties"]
     schema = pyarrow.schema(
-        [(name, _kind(field.annotation, kinds)) for name, field in fields.items()]
+        [
+            (name, kinds.get(_kind(field), pyarrow.string()))
+            for name, field in fields.items()
+        ]
     )
     columns = [[getattr(row, name) for row in rows] for name in fields]
     table = pyarrow.table(columns, schema=schema)
     with atomic_path(path) as aside:
         parquet.write_table(table, aside, compression="zstd")
     return True
+
+
+def _kind(field: dict[str, Any]) -> str:
+    """JSON type of a field that may be null."""
+    return str(field.get("type") or field.get("anyOf", [{}])[0].get("type"))

@@ -1,0 +1,129 @@
+"""Oracle: the bytes of the same batch done here by one process."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from batch_folders import tree
+from problem_files import NEAR, OUT_OF_REACH, write_problem
+
+from vdsm_pin.batch.run import Batch, run_batch
+from vdsm_pin.errors import InvalidInput
+
+distributed = pytest.importorskip("distributed")
+
+N_GOOD = 9
+PATIENCE = 90.0  # seconds a scheduler or worker may take to come up on a busy machine
+NEEDS = ["--host", "127.0.0.1", "--no-dashboard"]
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def started(module: str, *words: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", f"distributed.cli.{module}", *NEEDS, *words]
+    return subprocess.Popen(command, stderr=subprocess.DEVNULL)
+
+
+def ended(processes: list[subprocess.Popen[bytes]]) -> None:
+    for process in processes:
+        process.kill()
+        process.wait()
+
+
+def worker(address: str, folder: Path, *words: str) -> subprocess.Popen[bytes]:
+    aside = ["--nthreads", "1", "--local-directory", str(folder)]
+    return started("dask_worker", address, *aside, *words)
+
+
+@pytest.fixture
+def scheduler(tmp_path: Path) -> Iterator[str]:
+    """Address of a scheduler without workers."""
+    file = tmp_path / "scheduler.json"
+    process = started("dask_scheduler", "--port", "0", "--scheduler-file", str(file))
+    try:
+        until(file.exists)
+        with distributed.Client(scheduler_file=str(file), set_as_default=False) as c:
+            yield c.scheduler.address
+    finally:
+        ended([process])
+
+
+@pytest.fixture
+def problems(tmp_path: Path) -> Path:
+    """Nine problems to solve, one out of reach, one broken file."""
+    folder = tmp_path / "problems"
+    folder.mkdir()
+    for k in range(N_GOOD):
+        text = NEAR.replace("[2000, 900", f"[{2000 + 20 * k}, 900")
+        write_problem(folder / f"good{k}.yaml", text)
+    write_problem(folder / "far.yaml", OUT_OF_REACH)
+    write_problem(folder / "bad.yaml", "vdsm_problem: 1\n")
+    return folder
+
+
+@pytest.mark.slow
+def test_a_lost_worker_changes_no_byte(
+    problems: Path, scheduler: str, tmp_path: Path
+) -> None:
+    here, there = tmp_path / "here", tmp_path / "there"
+    run_batch(Batch((str(problems),), here, "paper"))
+    workers = [worker(scheduler, tmp_path, "--no-nanny") for _ in range(3)]
+    busy = threading.Event()
+
+    def kill_one() -> None:
+        """Kill the worker whose attempt has just begun to write."""
+        attempts = there / ".unfinished"
+        until(lambda: attempts.is_dir() and any(attempts.iterdir()))
+        until(lambda: any(there.glob("*/manifest.json")))
+        os.kill(workers[0].pid, signal.SIGKILL)
+        busy.set()
+
+    try:
+        with distributed.Client(scheduler, set_as_default=False) as client:
+            client.wait_for_workers(3, timeout=PATIENCE)
+        killer = threading.Thread(target=kill_one)
+        killer.start()
+        rows = run_batch(Batch((str(problems),), there, "paper", scheduler=scheduler))
+        killer.join()
+        assert busy.is_set()
+        assert workers[0].wait() == -signal.SIGKILL
+    finally:
+        ended(workers)
+    assert len(rows) == N_GOOD + 2
+    assert tree(there) == tree(here)
+
+
+@pytest.mark.slow
+def test_a_worker_that_may_not_start_processes_is_told_how(
+    problems: Path, scheduler: str, tmp_path: Path
+) -> None:
+    workers = [worker(scheduler, tmp_path)]
+    try:
+        with pytest.raises(InvalidInput, match="--no-nanny"):
+            run_batch(
+                Batch((str(problems),), tmp_path / "out", "paper", scheduler=scheduler)
+            )
+    finally:
+        ended(workers)
+
+
+def test_no_scheduler_is_a_message(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vdsm_pin.batch.cluster._CONNECT", "1s")
+    asked = Batch(
+        ("paper/free",), tmp_path / "out", "paper", scheduler="tcp://127.0.0.1:9"
+    )
+    with pytest.raises(InvalidInput, match="no Dask scheduler answers"):
+        run_batch(asked)
