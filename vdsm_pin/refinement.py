@@ -90,7 +90,7 @@ def plan_and_verify(
             plan = plan_with(problem, clearance, margin)
         except Infeasible as error:
             if rounds:
-                error.add_note(_story(rounds))
+                error.args = (f"{error}; before that {_story(rounds)}",)
             raise
         verification = verify(problem, plan.trajectory, robot)
         rounds.append(_round(margin, verification))

@@ -99,40 +99,24 @@ def closest_row(verification: Verification, approach: ClosestApproach) -> Closes
 
 
 def nearest_to_obstacle(verification: Verification) -> int | None:
-    """Index of the closest approach to an obstacle; None where none is listed."""
+    """Index of the closest approach to an obstacle; None without obstacles."""
     near = (i for i, row in enumerate(verification.closest) if row.pair.obstacle)
     return next(near, None)
 
 
 def min_clearance(verification: Verification) -> MinClearance | None:
     """The smallest clearance from any obstacle; None where there is no obstacle."""
-    names = verification.problem.scene.names
-    if not names:
-        return None
     index = nearest_to_obstacle(verification)
     if index is None:
-        return _from_profile(verification, names)
-    # Rows are sorted by their lower bounds: no other pair has a smaller one.
+        return None
     row = verification.closest[index]
+    lower = min(near.lower for near in verification.closest if near.pair.obstacle)
     return MinClearance(
-        lower=finite(row.lower),
+        lower=finite(lower),
         upper=finite(row.upper),
         link=row.pair.link,
         obstacle=row.pair.label,
         waypoint=row.interval,
-    )
-
-
-def _from_profile(verification: Verification, names: tuple[str, ...]) -> MinClearance:
-    """The same where links come nearer to each other than to any obstacle."""
-    profile = verification.profile
-    k, obstacle = divmod(int(np.argmin(profile.obstacle_lower)), len(names))
-    return MinClearance(
-        lower=finite(float(profile.obstacle_lower[k, obstacle])),
-        upper=finite(float(profile.obstacle_upper.min())),
-        link=int(np.argmin(profile.link_lower[k])) + 1,
-        obstacle=names[obstacle],
-        waypoint=int(profile.first_interval[k]),
     )
 
 

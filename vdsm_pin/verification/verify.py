@@ -236,13 +236,15 @@ def _station(
 def closest_approaches(
     problem: PlanningProblem, trajectory: Trajectory, proof: ClearanceProof
 ) -> tuple[ClosestApproach, ...]:
-    """The pairs that come nearest, by their upper bounds.
+    """The pairs that come nearest, by their upper bounds; obstacles first.
 
-    The lower bound of the nearest is narrowed; another pair's may lie below it by the
-    width of that bracket.
+    Links keep near each other all the time, which is
+    rarely news. The lower bound of the nearest is narrowed; another may lie below
+    it by the width of that bracket.
     """
     rows = []
-    for k in np.argsort(proof.best[:, UP], kind="stable")[:CLOSEST]:
+    of_links = [not pair.obstacle for pair in proof.pairs]
+    for k in np.lexsort((proof.best[:, UP], of_links))[:CLOSEST]:
         pair, row = proof.pairs[k], proof.best[k]
         points = row[OWN:OTHER], row[OTHER : OTHER + 3]
         # In a pair of links the sweep moves the second one against the first.
