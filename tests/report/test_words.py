@@ -23,6 +23,7 @@ from vdsm_pin.report.words import OUTCOMES, outcome, percent, quantity
         (math.nan, "m", "not available"),
         (None, "rad", "not available"),
         (3.0, "s", "3.000 s"),
+        (0.873, "share", "87.3 %"),
     ],
 )
 def test_quantities_read_as_people_write_them(

@@ -1,23 +1,34 @@
-"""Strategies by name: the one place where a new way of planning is added."""
+"""Strategies by name: the one place where a new way of planning is added.
+
+A strategy is imported when it is asked for, so that its name costs nothing.
+"""
 
 from collections.abc import Callable, Mapping
+from importlib import import_module
 from types import MappingProxyType
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias, cast
 
 from vdsm_pin.errors import UnknownName
-from vdsm_pin.planner.fewest.strategy import plan_clearest, plan_fewest
-from vdsm_pin.planner.pipeline import plan_paper
-from vdsm_pin.planner.records import LinkClearance, Plan
-from vdsm_pin.problem import PlanningProblem
 
-Strategy: TypeAlias = Callable[[PlanningProblem, LinkClearance, float], Plan]
+if TYPE_CHECKING:
+    from vdsm_pin.planner.records import LinkClearance, Plan
+    from vdsm_pin.problem import PlanningProblem
+
+Strategy: TypeAlias = "Callable[[PlanningProblem, LinkClearance, float], Plan]"
 """(problem, clearance, margin) -> plan. `margin` is what the strategy shall keep beyond
 the required clearance [m]; the refinement raises it where verification asks for it."""
 
-STRATEGIES: Final[Mapping[str, Strategy]] = MappingProxyType(
-    {"fewest": plan_fewest, "clearest": plan_clearest, "paper": plan_paper}
+STRATEGIES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "fewest": "vdsm_pin.planner.fewest.strategy:plan_fewest",
+        "clearest": "vdsm_pin.planner.fewest.strategy:plan_clearest",
+        "paper": "vdsm_pin.planner.pipeline:plan_paper",
+    }
 )
-"""Every strategy a user may name."""
+"""Module and function of every strategy a user may name; the first is the default."""
+
+DEFAULT_STRATEGY: Final = next(iter(STRATEGIES))
+"""What plans where no strategy is named."""
 
 
 def strategy(name: str) -> Strategy:
@@ -28,4 +39,5 @@ def strategy(name: str) -> Strategy:
     """
     if name not in STRATEGIES:
         raise UnknownName(kind="strategy", name=name, known=tuple(STRATEGIES))
-    return STRATEGIES[name]
+    module, function = STRATEGIES[name].split(":")
+    return cast("Strategy", getattr(import_module(module), function))

@@ -45,7 +45,7 @@ class _Measure:
 
 _MEASURES: Final = (
     _Measure("min_clearance_lower_m", "smallest proved clearance", "m", True),
-    _Measure("coverage", "coverage of the desired path", "%", True),
+    _Measure("coverage", "desired path drawn", "%", True),
     _Measure("joint_error_rad", "largest proved joint error", "rad", True),
     _Measure("changed_angles_mean_on_path", "changed link angles", "-", False),
 )

@@ -32,7 +32,7 @@ class CheckRow(FileModel):
     count: int = Field(description="items checked")
     worst: FiniteFloat | None = Field(description="null where there is none; SI")
     limit: FiniteFloat | None = Field(description="null where there is none; SI")
-    unit: str = Field(description="m, rad or -")
+    unit: str = Field(description="m, rad, share (of a whole) or -")
     where: str = Field(description="place of the worst case")
 
 

@@ -6,34 +6,45 @@ from pathlib import Path
 import typer
 
 from vdsm_pin.report.files import CheckRow, PlanFile, VerificationFile
-from vdsm_pin.report.words import check_title, limit, outcome, percent, quantity
+from vdsm_pin.report.words import (
+    MISSING,
+    check_title,
+    limit,
+    measured,
+    outcome,
+    percent,
+    quantity,
+)
 
 
 def show_plan(file: PlanFile, folder: Path) -> None:
     """One plan in a few lines."""
     motion = file.motion
-    typer.echo(_headline(file.verdict, f"{file.problem}, planned by {file.strategy!r}"))
+    typer.echo(_headline(file.verdict, f"{file.problem}, planned by {file.strategy}"))
     changed = motion.changed_angles_mean_on_path
-    mean = "none" if changed is None else f"{changed:.2f} on average"
-    rows = (
+    mean = MISSING if changed is None else f"{changed:.2f} on average on the path"
+    ends = (measured(x0, "m") for x0 in (motion.x0_min_m, motion.x0_max_m))
+    _facts(
         ("waypoints", f"{motion.waypoints}, {motion.on_path_waypoints} on the path"),
-        ("coverage", percent(file.coverage)),
-        ("largest link angle", quantity(max(motion.max_link_angle_rad), "rad")),
+        ("desired path drawn", percent(file.coverage)),
+        ("largest link angle", measured(max(motion.max_link_angle_rad), "rad")),
         ("changed link angles", f"{mean}, {motion.changed_angles_max} at most"),
-        (
-            "base",
-            f"{quantity(motion.x0_min_m, 'm')} to {quantity(motion.x0_max_m, 'm')}",
-        ),
+        ("base travel", " to ".join(ends)),
+        *(("note", note) for note in file.notes),
+        ("files in", str(folder)),
     )
-    for name, value in rows:
-        typer.echo(f"  {name:<20} {value}")
-    for note in file.notes:
-        typer.echo(f"  note: {note}")
-    typer.echo(f"  files in {folder}")
 
 
-def show_verification(file: VerificationFile, folder: Path) -> None:
-    """One verification: the verdict, why, and every check."""
+def show_verification(
+    file: VerificationFile, folder: Path, *more: tuple[str, str]
+) -> None:
+    """One verification: the verdict, why, every check, and where the files are.
+
+    Args:
+        file: What verification.json says.
+        folder: Where it stands.
+        more: Names and values of further lines.
+    """
     typer.echo(_headline(file.verdict, file.problem))
     typer.echo(f"  {file.reason}")
     if sys.stdout.isatty():
@@ -41,10 +52,16 @@ def show_verification(file: VerificationFile, folder: Path) -> None:
     else:
         _plain_checks(file.checks)
     if file.joint_error_rad is not None:
-        error = quantity(file.joint_error_rad, "rad")
-        typer.echo(f"  survives joint errors of ±{error}")
-    typer.echo(f"  coverage {percent(file.coverage)} of the desired path")
-    typer.echo(f"  report: {folder / 'report.html'}")
+        error = measured(file.joint_error_rad, "rad")
+        more = (("largest proved joint error", f"±{error}"), *more)
+    _facts(*more, ("report", str(folder / "report.html")))
+
+
+def _facts(*rows: tuple[str, str]) -> None:
+    """Names and values in two columns."""
+    width = max(len(name) for name, _ in rows)
+    for name, value in rows:
+        typer.echo(f"  {name:<{width}}  {value}")
 
 
 def _headline(word: str, subject: str) -> str:

@@ -17,6 +17,7 @@ _SHARE_DIGITS: Final = 9
 _DISPLAY_UNITS: Final[Mapping[str, tuple[float, str]]] = MappingProxyType(
     {"m": (MM_PER_M, " mm"), "rad": (math.degrees(1.0), "°"), "-": (1.0, "")}
 )
+_SHARE: Final = "share"  # the unit of a part of a whole, 0 to 1; people read percent
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,13 +76,15 @@ def quantity(value: float | None, unit: str) -> str:
 
     Args:
         value: In SI; None or NaN where there is none.
-        unit: "m", "rad" or "-"; any other unit is printed as it is.
+        unit: "m", "rad", "share" or "-"; any other unit is printed as it is.
 
     Returns:
         For instance "3.500 mm", "42.500°", "1.2e-10 mm" or "not available".
     """
     if value is None or math.isnan(value):
         return MISSING
+    if unit == _SHARE:
+        return percent(value)
     factor, suffix = _DISPLAY_UNITS.get(unit, (1.0, f" {unit}"))
     shown = value * factor
     if math.isinf(shown):
@@ -94,9 +97,17 @@ def quantity(value: float | None, unit: str) -> str:
     return text.replace("-", "−", 1) + suffix if text[0] == "-" else text + suffix
 
 
+def measured(value: float | None, unit: str) -> str:
+    """The same of a length or an angle of the motion, where rounding noise is zero."""
+    if value is None or math.isnan(value):
+        return MISSING
+    factor, _ = _DISPLAY_UNITS.get(unit, (1.0, ""))
+    return quantity(value if abs(value) * factor >= _SMALLEST_FIXED else 0.0, unit)
+
+
 def limit(value: float | None, unit: str) -> str:
-    """A check's limit; "none" where it only reports."""
-    return "none" if value is None else quantity(value, unit)
+    """A check's limit, or that it only reports."""
+    return "no limit asked" if value is None else quantity(value, unit)
 
 
 def percent(share: float | None) -> str:

@@ -37,7 +37,7 @@ class Check:
         count: Items checked.
         worst: The worst value found or bounded; NaN where there is none.
         limit: What it was held against; NaN where there is none.
-        unit: SI unit of both ("m", "rad", "-").
+        unit: SI unit of both ("m", "rad"), "share" of a whole, or "-".
         where: The place of the worst case in words, joints and links from 1.
     """
 

@@ -262,7 +262,7 @@ def check_tip(problem: PlanningProblem, trajectory: Trajectory) -> TipReport:
         count=1,
         worst=share,
         limit=needed,
-        unit="-",
+        unit="share",
     )
     start = _start_checks(problem, trajectory, tips)
     checks = (*start, _row_check(problem, trajectory, tips), between, covered)

@@ -122,18 +122,14 @@ def notes_of(
     tips = centres[on_path, -1]
     least = np.minimum(least_changed(problem, clearance, tips), changed)
     notes.append(
-        f"changed link angles on the path: {changed.mean():.3f} on average, "
-        f"{changed.max()} at most"
-    )
-    notes.append(
-        f"proved minimal at {int((changed == least).sum())} of {len(changed)} "
-        "waypoints on the path: fewer would break a limit or the clearance there"
+        "the number of changed link angles is proved minimal at "
+        f"{int((changed == least).sum())} of {len(changed)} waypoints on the path: "
+        "fewer would break a limit or the clearance there"
     )
     ways = _ways(on_path)
     if len(ways) > 1:
-        notes.append(
-            f"the tip leaves the path {len(ways) - 1} times to let the arm change sides"
-        )
+        often = "once" if len(ways) == 2 else f"{len(ways) - 1} times"
+        notes.append(f"the tip leaves the path {often} to let the arm change sides")
     retreat = problem.path.retreat
     back = _farthest_back(trajectory, centres[:, -1], ways)
     if back > retreat + TOLERANCES.tip_on_path:
