@@ -238,12 +238,11 @@ def closest_approaches(
 ) -> tuple[ClosestApproach, ...]:
     """The pairs that come nearest, by their upper bounds; obstacles first.
 
-    Links keep near each other all the time, which is
-    rarely news. The lower bound of the nearest is narrowed; another may lie below
-    it by the width of that bracket.
+    Links keep near each other all the time, which is rarely news. The lower bound of
+    the nearest is narrowed; another may lie below it by the width of that bracket.
     """
     rows = []
-    of_links = [not pair.obstacle for pair in proof.pairs]
+    of_links = np.array([not pair.obstacle for pair in proof.pairs])
     for k in np.lexsort((proof.best[:, UP], of_links))[:CLOSEST]:
         pair, row = proof.pairs[k], proof.best[k]
         points = row[OWN:OTHER], row[OTHER : OTHER + 3]
