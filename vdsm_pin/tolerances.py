@@ -117,6 +117,13 @@ class Tolerances:
     5 deg is asked for; the reserve covers the rounding of a CSV many times over.
     """
 
+    planned_stray: float = 1e-5
+    """How far from its path a planner lets the tip stray between two waypoints; [m].
+
+    The arm draws straight lines in joint space, not in space. On a path 10 mm a row
+    the straight arm strays by 7e-6 m; ten times less would take three times the rows.
+    """
+
     result_change: float = 1e-6
     """Difference of two results below which `vdsm diff` calls them equal; SI."""
 

@@ -64,9 +64,28 @@ def check_plan(plan: Plan) -> None:
     np.testing.assert_allclose(path.at(trajectory.path_m[on]), tip[on], atol=1e-9)
     steps = np.linalg.norm(np.diff(tip, axis=0), axis=1)
     assert steps.max() <= path.spacing * (1.0 + 1e-9)
+    check_between_waypoints(plan)
     if problem.scene.obstacles:
         clearance = link_clearance(problem)(centres).min()
         assert clearance >= problem.required_clearance
+
+
+def check_between_waypoints(plan: Plan) -> None:
+    """Where the path is drawn the tip stays on its chords, and corners are rows."""
+    arm, path, rows = plan.problem.manipulator, plan.problem.path, plan.trajectory
+    drawn = np.flatnonzero(rows.on_path[:-1] & rows.on_path[1:])
+    joints, tip = rows.joints, plan.tip_path.points
+    for part in (0.25, 0.5, 0.75):
+        between = joints[drawn] + part * (joints[drawn + 1] - joints[drawn])
+        reached = joint_centres(arm, between[:, 0], between[:, 1::2], between[:, 2::2])
+        chord = tip[drawn] + part * (tip[drawn + 1] - tip[drawn])
+        strayed = np.linalg.norm(reached[:, -1] - chord, axis=1)
+        assert strayed.max(initial=0.0) <= TOLERANCES.planned_stray
+    turn = max(path.length, path.spacing)
+    run = np.mod(np.diff(rows.path_m)[drawn], turn)
+    for station in path.corner_stations:
+        ahead = np.mod(station - rows.path_m[drawn], turn)
+        assert not ((ahead > 1e-9) & (ahead < run - 1e-9)).any()
 
 
 @pytest.mark.parametrize("name", ALL)

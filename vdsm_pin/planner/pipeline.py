@@ -8,6 +8,7 @@ import numpy as np
 from vdsm_pin.cables import cable_lengths
 from vdsm_pin.errors import Infeasible, NoPlanFound, PathBlocked
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.avoidance import Avoidance, Straight, avoidances
 from vdsm_pin.planner.feasibility import check_feasibility
 from vdsm_pin.planner.lift import lift
@@ -20,7 +21,7 @@ from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 
-SUBDIVISIONS: Final = 4
+SUBDIVISIONS: Final = 6
 """Rounds of inserting waypoints; a motion still too fast after them has a jump."""
 
 
@@ -98,7 +99,10 @@ def _best_motion(
 
 
 def _motion(problem: PlanningProblem, avoidance: Avoidance) -> Motion:
-    """Steps 2 to 7 for one avoidance; rows are inserted where joints move fast."""
+    """Steps 2 to 7 for one avoidance; rows are inserted where joints move fast.
+
+    They are also where the tip would stray from its path between two rows.
+    """
     manipulator = problem.manipulator
     route = avoidance.route()  # Step 4
     for _ in range(SUBDIVISIONS):
@@ -108,11 +112,19 @@ def _motion(problem: PlanningProblem, avoidance: Avoidance) -> Motion:
         planar = avoidance.joints(route, reference)  # Step 5
         centres = lift(manipulator, planar, points[:, 0])  # Step 6
         trajectory = solve(manipulator, route, centres)  # Step 7
-        steps = _joint_steps(trajectory)
-        if (steps <= TOLERANCES.planned_step).all():
-            return Motion(route, centres, trajectory)
-        pieces = np.ceil(steps / TOLERANCES.planned_step).astype(np.int64)
+        steps, strays = _intervals(manipulator, trajectory)
+        turns = steps / TOLERANCES.planned_step
+        # Halving an interval leaves a quarter of the way by which the tip strays. A
+        # jump is not filled with rows for the tip's sake.
+        bows = np.sqrt(strays / TOLERANCES.planned_stray)
+        needed = bows if (turns <= 1.0).all() else turns
+        motion = Motion(route, centres, trajectory)
+        if (needed <= 1.0).all():
+            return motion
+        pieces = np.ceil(needed).astype(np.int64)
         route = subdivided(problem.path, route, np.maximum(pieces, 1))
+    if (turns <= 1.0).all():  # the tip strays a little more than was aimed at
+        return motion
     message = (
         f"a joint turns by {np.rad2deg(steps.max()):.1f} deg at once near waypoint "
         f"{int(np.argmax(steps))}: the paper's rule is not continuous there"
@@ -120,11 +132,24 @@ def _motion(problem: PlanningProblem, avoidance: Avoidance) -> Motion:
     raise NoPlanFound(message)
 
 
-def _joint_steps(trajectory: Trajectory) -> FloatArray:
-    """Largest change of a joint angle per interval, shape (n_samples - 1,); [rad]."""
-    yaw = np.abs(np.diff(trajectory.alpha, axis=0)).max(axis=1)
-    pitch = np.abs(np.diff(trajectory.theta, axis=0)).max(axis=1)
-    return np.asarray(np.maximum(yaw, pitch))
+def _intervals(
+    manipulator: Manipulator, trajectory: Trajectory
+) -> tuple[FloatArray, FloatArray]:
+    """How far joints turn and the tip may stray from its path between two waypoints.
+
+    The tip's second derivative is at most M = sum of L_l W_l^2, where W_l is how much
+    all joints up to link l turn; so the tip stays within M / 8 of its chord.
+
+    Returns:
+        Largest change of a joint angle [rad], and M / 8 where the path is drawn, 0
+        elsewhere [m], each of shape (n_samples - 1,).
+    """
+    yaw = np.abs(np.diff(trajectory.alpha, axis=0))
+    pitch = np.abs(np.diff(trajectory.theta, axis=0))
+    turning = np.cumsum(yaw + pitch, axis=1)
+    bound = (turning * turning) @ manipulator.link_lengths / 8.0
+    drawn = trajectory.on_path[1:] & trajectory.on_path[:-1]
+    return np.maximum(yaw, pitch).max(axis=1), np.where(drawn, bound, 0.0)
 
 
 def _refuse_touch(problem: PlanningProblem, clearance: float) -> None:
