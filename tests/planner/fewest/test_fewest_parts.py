@@ -2,11 +2,11 @@ import itertools
 
 import numpy as np
 import pytest
-from scenes_for_fewest import problem, straight_arm
+from scenes_for_fewest import problem
 
 from vdsm_pin.kinematics import joint_angles, link_angles
 from vdsm_pin.manipulator import built_in
-from vdsm_pin.planner.fewest.bounds import least_changed, prove_tips
+from vdsm_pin.planner.fewest.bounds import prove_tips
 from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.growth import vary
 from vdsm_pin.planner.fewest.kernels import pose_shapes
@@ -110,36 +110,6 @@ def test_a_motion_past_a_limit_is_refused() -> None:
     inside[0, 1], outside[0, 1] = reach - 1e-6, reach + 1e-6
     assert judge.clear(Intervals(a, inside, zero, zero))[0]
     assert not judge.clear(Intervals(a, outside, zero, zero))[0]
-
-
-def test_two_changed_angles_are_proved_needed_only_where_no_single_one_does() -> None:
-    task = problem(PILLAR)
-    clearance = link_clearance(task)
-    tips = task.path.at(np.arange(0.0, 6.0, 0.05))
-    least = least_changed(task, clearance, tips)
-    straight = clearance(straight_arm(task, tips)).min(axis=1)
-    assert (least[straight >= task.required_clearance] == 1).all()
-    assert set(least.tolist()) == {1, 2}
-    # The oracle: every single bend on a fine grid of what "one angle" can mean.
-    for tip, bound in zip(tips, least, strict=True):
-        reachable = []
-        for joint in range(8):
-            rest = ARM.total_length - ARM.stations[joint]
-            sine = np.hypot(*tip[1:]) / rest
-            if sine > np.sin(ARM.max_link_angle):
-                continue
-            planar = np.zeros((9, 2))
-            share = (ARM.stations[joint:] - ARM.stations[joint]) / rest
-            planar[joint:] = share[:, None] * tip[1:]
-            x = np.where(
-                np.arange(9) >= joint,
-                tip[0] - np.sqrt(1 - sine**2) * (ARM.total_length - ARM.stations),
-                tip[0] - np.sqrt(1 - sine**2) * rest
-                - (ARM.stations[joint] - ARM.stations),
-            )  # fmt: skip
-            centres = np.column_stack([x, planar])[None]
-            reachable.append(clearance(centres).min() >= task.required_clearance)
-        assert any(reachable) == (bound == 1)
 
 
 def test_tips_are_proved_out_of_reach_on_the_right_side_of_both_limits() -> None:

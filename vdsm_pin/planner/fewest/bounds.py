@@ -1,9 +1,10 @@
 """What can be proved about a problem: tips no arm reaches, angles no plan can spare.
 
 Every proof here rests on a necessary condition. A tip beyond the curled reach or within
-an obstacle's margin cannot be drawn. An arm without a changed link angle lies on the
-rail, and an arm with one lies on it up to that joint: N postures for each tip, and
-where none of them is clear a second angle must change.
+an obstacle's margin cannot be drawn. An arm without a changed link angle lies along the
+rail, and an arm with one lies along it up to that joint, but for a sway that is bounded
+(`sway.py`): N postures for each tip, and where none of them comes near being clear a
+second angle must change.
 """
 
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.planner.feasibility import curled_reach
 from vdsm_pin.planner.fewest.kernels import pose_shapes
+from vdsm_pin.planner.fewest.sway import sway
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
@@ -121,28 +123,36 @@ def least_changed(
         tips: Shape (n, 3); [m].
 
     Returns:
-        0 where the tip is on the rail, 1 elsewhere, and 2 where every posture with one
-        changed angle breaks a limit or the clearance.
+        0 where the tip is within the sway of unchanged angles of the rail, 1 elsewhere,
+        and 2 where every posture with one changed angle breaks a limit or the clearance
+        whatever the unchanged ones do below their threshold.
     """
     arm = problem.manipulator
-    n_links, required = arm.n_links, problem.required_clearance
-    knees = np.repeat(np.arange(n_links)[:, None], 2, axis=1)
+    n_links = arm.n_links
     off = np.hypot(tips[:, 1], tips[:, 2])
-    least = np.where(off > arm.total_length * TOLERANCES.changed_angle, 1, 0)
-    node, ends, _ = pose_shapes(
+    slack = sway(arm, off)
+    least = np.where(off > slack.straight, 1, 0)
+    if np.isnan(slack.bend).any():
+        return least
+    reserve = float(np.nanmax(slack.body, initial=0.0))
+    low, high = arm.base_range
+    knees = np.repeat(np.arange(n_links)[:, None], 2, axis=1)
+    node, ends, bends = pose_shapes(
         np.ascontiguousarray(tips), knees, np.zeros((n_links, 4)), arm.stations,
-        arm.max_link_angle + TOLERANCES.joint_limit, *arm.base_range,
+        float(slack.bend.max()), low - reserve, high + reserve,
     )  # fmt: skip
-    ends = np.ascontiguousarray(ends[:, [0, 1, 3]])
-    tip = node // n_links
-    room = clearance(ends).min(axis=1)
+    possible = bends.max(axis=1, initial=0.0) <= slack.bend[node % n_links]
+    node, ends = node[possible], np.ascontiguousarray(ends[possible][:, [0, 1, 3]])
+    tip, joint = node // n_links, node % n_links
+    required = problem.required_clearance - TOLERANCES.bracket_gap
     free = np.zeros(len(tips), dtype=np.bool_)
-    free[tip[room >= required]] = True
+    free[tip[clearance(ends).min(axis=1) >= required]] = True
     doubtful = np.flatnonzero(~free[tip])
     for part in (0, 1):
         segments = ends[doubtful, part : part + 2]
         upper = upper_clearance(problem, segments).min(axis=1, initial=np.inf)
-        doubtful = doubtful[~(upper < required - TOLERANCES.bracket_gap)]
+        upper = upper + slack.body[tip[doubtful], joint[doubtful]]
+        doubtful = doubtful[~(upper < required)]
     free[tip[doubtful]] = True
     return np.asarray(np.where(free | (least == 0), least, 2))
 

@@ -120,11 +120,19 @@ def notes_of(
     angles = link_angles_at(centres[on_path])
     changed = (angles > TOLERANCES.changed_angle).sum(axis=1)
     tips = centres[on_path, -1]
-    least = np.minimum(least_changed(problem, clearance, tips), changed)
+    least = least_changed(problem, clearance, tips)
+    if (changed < least).any():
+        worst = int(np.flatnonzero(changed < least)[0])
+        message = (
+            f"internal error: at tip {tips[worst].tolist()} the plan changes "
+            f"{changed[worst]} link angles and {least[worst]} were proved necessary"
+        )
+        raise RuntimeError(message)
     notes.append(
         "the number of changed link angles is proved minimal at "
         f"{int((changed == least).sum())} of {len(changed)} waypoints on the path: "
-        "fewer would break a limit or the clearance there"
+        f"fewer, counting up to {np.rad2deg(TOLERANCES.changed_angle):.2g} deg as "
+        "unchanged, would break a limit or the clearance there"
     )
     ways = _ways(on_path)
     if len(ways) > 1:
