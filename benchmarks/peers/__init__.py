@@ -1,0 +1,1 @@
+"""What users would use instead, behind one call each."""
