@@ -12,6 +12,7 @@ from typing import Annotated, Final, Literal, NoReturn
 import typer
 
 from vdsm_pin.errors import InvalidInput, VdsmError
+from vdsm_pin.planner.strategies import DEFAULT_STRATEGY, STRATEGIES
 
 PASSED: Final = 0
 NOT_PASSED: Final = 1
@@ -33,12 +34,11 @@ Problem = Annotated[
     str, typer.Argument(metavar="PROBLEM", help="A built-in name or a problem file.")
 ]
 OutFolder = Annotated[Path, typer.Option("--out", help="Folder for the results.")]
-Strategy = Annotated[str, typer.Option(help="How to plan: paper or fewest.")]
+Strategy = Annotated[str, typer.Option(help=f"How to plan: {', '.join(STRATEGIES)}.")]
 Trajectory = Annotated[Path, typer.Option(help="A trajectory.csv.")]
 TimeLimit = Annotated[
     float | None, typer.Option(min=0.001, help="Seconds for each problem.")
 ]
-DEFAULT_STRATEGY: Final = "fewest"
 
 
 def _examples(*lines: str) -> str:
@@ -90,6 +90,10 @@ def verify(
     certificate: Annotated[
         Path | None, typer.Option(help="Write the proof to this file.")
     ] = None,
+    pdf: Annotated[
+        Path | None,
+        typer.Option(help="Print the report to this file; needs Chromium or Chrome."),
+    ] = None,
 ) -> None:
     """Verify a trajectory of any planner.
 
@@ -102,15 +106,24 @@ def verify(
 
     errors = error_box(joint_error_deg, base_error_mm, obstacle_error_mm)
     verified = verify_to_folder(
-        Order(read_problem(problem), trajectory, out, context.obj, errors, certificate)
+        Order(
+            source=read_problem(problem),
+            trajectory=trajectory,
+            folder=out,
+            command=context.obj,
+            errors=errors,
+            certificate=certificate,
+            pdf=pdf,
+        )
     )
     file = verified.file
-    show_verification(file, out)
+    written: list[tuple[str, str]] = []
     if certificate is not None:
-        written = file.verdict == "certified"
-        typer.echo(
-            f"  certificate: {certificate if written else 'none, not certified'}"
-        )
+        proof = str(certificate) if file.verdict == "certified" else "none: no proof"
+        written.append(("certificate", proof))
+    if pdf is not None:
+        written.append(("report on paper", str(pdf)))
+    show_verification(file, out, *written)
     raise typer.Exit(PASSED if outcome(file.verdict).passed else NOT_PASSED)
 
 

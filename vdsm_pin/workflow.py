@@ -22,6 +22,7 @@ from vdsm_pin.report.facts import plan_file, verification_file
 from vdsm_pin.report.files import PlanFile, VerificationFile
 from vdsm_pin.report.folder import check_output_file, check_output_folder, staged
 from vdsm_pin.report.html import write_report
+from vdsm_pin.report.pdf import find_browser, print_page
 from vdsm_pin.report.run_record import RunRecord, sha256_of
 from vdsm_pin.report.tables import ClearanceCsv, write_cables, write_link_angles
 from vdsm_pin.robot_model import RobotModel, load_robot
@@ -48,6 +49,7 @@ class Order:
         command: The exact command line, for the report.
         errors: The error box the proof shall cover.
         certificate: Where the certificate of a certified motion goes; None for none.
+        pdf: Where the report on paper goes; None for none.
     """
 
     source: ProblemFile
@@ -56,6 +58,7 @@ class Order:
     command: str
     errors: ErrorBox = field(default_factory=ErrorBox)
     certificate: Path | None = None
+    pdf: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -141,9 +144,7 @@ def verify_to_folder(order: Order) -> Verified:
         InvalidInput: If a file is bad or the folder cannot be written.
         VerificationFailed: If a check could not be carried out.
     """
-    check_output_folder(order.folder)
-    if order.certificate is not None:
-        check_output_file(order.certificate)
+    _check_outputs(order)
     problem = order.source.problem
     robot = load_robot(problem.manipulator)
     trajectory = read_trajectory(order.trajectory, problem.manipulator)
@@ -167,7 +168,19 @@ def verify_to_folder(order: Order) -> Verified:
         # Last inside: a certificate that cannot be written leaves no half of a result.
         if order.certificate is not None and verification.verdict is Verdict.CERTIFIED:
             write_certificate(order.certificate, verification, _certified(record))
+    if order.pdf is not None:
+        print_page(order.folder / REPORT, order.pdf)
     return Verified(file, verification)
+
+
+def _check_outputs(order: Order) -> None:
+    """Refuse what cannot be written before any work is done."""
+    check_output_folder(order.folder)
+    for file in (order.certificate, order.pdf):
+        if file is not None:
+            check_output_file(file)
+    if order.pdf is not None:
+        find_browser()
 
 
 def planned_by(trajectory: Path) -> PlanFile | None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import jinja2
+from markupsafe import Markup
 
 from vdsm_pin import __version__
 from vdsm_pin.errors import VerificationFailed
@@ -19,6 +20,7 @@ from vdsm_pin.report.words import (
     OUTCOMES,
     check_title,
     limit,
+    measured,
     outcome,
     percent,
     quantity,
@@ -46,6 +48,8 @@ def _environment() -> jinja2.Environment:
         "title_of": check_title,
         "outcome": outcome,
         "point": _point,
+        "measured": measured,
+        "css_text": _css_text,
     }
     environment.globals |= {
         "asset": _asset,
@@ -77,6 +81,12 @@ def _point(point: Point | None) -> str:
     if point is None:
         return MISSING
     return ", ".join(f"{value * MM_PER_M:.1f}".replace("-", "−") for value in point)
+
+
+def _css_text(text: str) -> Markup:
+    """The inside of a CSS string; whatever is not a letter or digit is escaped."""
+    signs = (sign if sign.isalnum() else f"\\{ord(sign):x} " for sign in text)
+    return Markup("".join(signs))
 
 
 def _rendered(template: str, **values: Any) -> str:
