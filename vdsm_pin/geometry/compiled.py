@@ -14,6 +14,9 @@ from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
 import numba
+from numba._dynfunc import make_function
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 from numba.extending import intrinsic
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -48,20 +51,86 @@ def _folder(path: Path) -> Path | None:
     return folder
 
 
+class _PartLibrary(JITCodeLibrary):
+    """A function's code as other compiled functions use it: to link, not to run."""
+
+    def finalize(self) -> None:
+        """Leave optimising and translating to whoever is called from Python."""
+        self._finalized = True
+
+
+class _WholeLibrary(JITCodeLibrary):
+    """The code of a function with that of all that it calls."""
+
+    def finalize(self) -> None:
+        """Link every part once, whoever calls it, then optimise and translate."""
+        found: dict[Any, None] = {}
+        waiting = self._linking_libraries[::-1]
+        while waiting:
+            library = waiting.pop()
+            if library not in found:
+                found[library] = None
+                if isinstance(library, _PartLibrary):
+                    waiting += library._linking_libraries[::-1]
+        self._linking_libraries = list(found)
+        super().finalize()  # type: ignore[no-untyped-call]
+
+
+def _not_executable(library: Any, description: Any, environment: Any) -> Any:
+    """What stands for a part's entry point; numba knows it by its identity."""
+    name = description.qualname
+    return make_function(description.lookup_module(), name, name, 0, environment, ())
+
+
+class _PartCompiler(Compiler):
+    """numba's own steps, with a part as their result."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)  # type: ignore[no-untyped-call]
+        library: Any = _PartLibrary
+        self.state.library = library(self.state.targetctx.codegen(), "part")
+        self.state.targetctx.get_executable = _not_executable
+
+
+class _WholeCompiler(Compiler):
+    """numba's own steps, with parts brought together."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)  # type: ignore[no-untyped-call]
+        library: Any = _WholeLibrary
+        self.state.library = library(self.state.targetctx.codegen(), "whole")
+        self.state.library.enable_object_caching()
+
+
 def compiled(function: F) -> F:
     """Compile a function, keeping its type and a copy of the machine code on disk.
+
+    Left to itself numba optimises and translates each function with all that it calls,
+    even where only compiled code calls it: with functions ten deep everything is done
+    ten times over. Here that is done for what Python calls, once.
 
     No fast-math: the bounds rest on every operation being rounded once, as written.
     The GIL is released, divisions by zero give inf or nan as numpy's do.
     """
     config: Any = numba.config
+    njit: Any = numba.njit
     before, folder = config.CACHE_DIR, _folder(Path(function.__code__.co_filename))
     config.CACHE_DIR = str(folder) if folder else before
+    common = {"nogil": True, "fastmath": False, "error_model": "numpy"}
     try:
-        jit = numba.njit(cache=True, nogil=True, fastmath=False, error_model="numpy")
-        return cast(F, jit(function))
+        whole = njit(cache=True, pipeline_class=_WholeCompiler, **common)(function)
     finally:
         config.CACHE_DIR = before
+    part = njit(
+        pipeline_class=_PartCompiler,
+        no_cpython_wrapper=True,
+        no_cfunc_wrapper=True,
+        **common,
+    )(function)
+    # What a call in compiled code asks for.
+    whole.get_call_template = part.get_call_template
+    whole.get_overload = part.get_overload
+    return cast(F, whole)
 
 
 def _apart(typing_context: Any) -> Any:
