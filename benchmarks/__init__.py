@@ -1,0 +1,1 @@
+"""Timing and success rates by the public API; never run by the tests."""

@@ -2,10 +2,12 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem, random_problem
 
-from vdsm_pin.errors import NoPlanFound, OutOfReach, PathBlocked
+from vdsm_pin.errors import NoPlanFound, OutOfReach, OutOfTime, PathBlocked
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.kinematics import joint_centres, link_angles
 from vdsm_pin.manipulator import built_in
+from vdsm_pin.planner.budget import within_time
 from vdsm_pin.planner.fewest.strategy import plan_clearest, plan_fewest
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem import Blocked, PlanningProblem
@@ -62,6 +64,16 @@ def test_the_tip_is_on_the_path_wherever_a_row_says_so() -> None:
     stations = np.mod(trajectory.path_m[drawn], task.path.length)
     gap = np.linalg.norm(centres[drawn, -1] - task.path.at(stations), axis=1)
     assert gap.max() < TOLERANCES.tip_on_path
+
+
+def test_a_single_point_is_a_path() -> None:
+    ball = Sphere("ball", np.array([2.0, 0.3, 0.3]), 0.1)
+    task = problem(ball, points=np.array([[3.126, 0.5, 0.5]]), closed=False)
+    plan = planned(task)
+    assert plan.trajectory.on_path.sum() == 2
+    result = verify(task, plan.trajectory, load_robot(task.manipulator))
+    assert result.verdict is Verdict.CERTIFIED
+    assert result.coverage == 1.0
 
 
 def test_two_runs_give_the_same_plan_to_the_last_bit() -> None:
@@ -155,3 +167,24 @@ def test_clearest_keeps_more_clearance_than_fewest() -> None:
     lean = plan_fewest(task, clearance, 0.0)
     assert clearance(wide.centres).min() > clearance(lean.centres).min() + 0.02
     assert mean_changed(wide) >= mean_changed(lean)
+
+
+def test_a_time_limit_stops_and_tells_how_far_it_came_and_never_steers() -> None:
+    task = random_problem(1, clutter=True)
+    clearance = link_clearance(task)
+    limited = plan_fewest(task, within_time(clearance, 1000.0), 0.0)
+    free = plan_fewest(task, clearance, 0.0)
+    np.testing.assert_array_equal(limited.trajectory.joints, free.trajectory.joints)
+    calls = 0
+
+    def slow(centres: FloatArray) -> FloatArray:
+        nonlocal calls
+        calls += 1
+        if calls > 3:
+            raise OutOfTime(0.5)
+        return clearance(centres)
+
+    with pytest.raises(OutOfTime, match=r"limit of 0\.5 s; drew 0\.000 m of 6\.000 m"):
+        plan_fewest(task, slow, 0.0)
+    with pytest.raises(OutOfTime, match="limit of 0 s"):
+        plan_fewest(task, within_time(clearance, 0.0), 0.0)

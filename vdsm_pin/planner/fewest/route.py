@@ -86,6 +86,10 @@ def path_rows(path: DesiredPath) -> PathRows:
         side[-1] = b
         stations.append(side)
         corner.append(np.arange(1, count + 1) == count)
+    if not path.length > 0.0:
+        # A single point is drawn by resting there: two rows at one place.
+        stations.append(corners[:1])
+        corner.append(np.ones(1, dtype=np.bool_))
     every = np.concatenate(stations)
     wrapped = np.where(every > path.length, every - path.length, every)
     return PathRows(every, path.at(wrapped), np.concatenate(corner))

@@ -19,6 +19,8 @@ WAY_COST = 0.05
 """Cost of a metre of way off the path."""
 SKIP_COST = 1000.0
 """Cost of a metre not drawn."""
+REST = 0.01
+"""Length that drawing a single point counts for; [m]."""
 DISTRUST = 0.05
 """Length added, with the distance, to a way between two tips that was blocked; [m]."""
 ARM = 1.0
@@ -63,6 +65,8 @@ class Planner:
         self.blocked = Blocked.none(len(roadmap.node))
         route = roadmap.route
         self.gap = np.concatenate([[0.0], np.diff(route.stations)])
+        # Resting at a single point costs like a stretch, or it would be left out.
+        self.gap[1:][self.gap[1:] == 0.0] = REST
         self.way_gaps = route.gaps.copy()
         self.from_home, _ = self.ways(home)
 
