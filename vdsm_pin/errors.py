@@ -10,7 +10,8 @@
     │   ├── LinkTooShort      a projected gap exceeds its link
     │   ├── LimitExceeded     a joint limit would be broken
     │   ├── PathBlocked       the tip's route meets the danger region
-    │   └── NoPlanFound       the budget ended without a plan; not a proof
+    │   └── NoPlanFound       the search ended without a plan; not a proof
+    │       └── OutOfTime     the time limit ended it
     └── VerificationFailed    exit 1: a check could not be carried out
 
 Messages say what, where, how much and against what; the same facts are attributes.
@@ -118,6 +119,20 @@ class PathBlocked(Infeasible):
 
 class NoPlanFound(Infeasible):
     """The search ended without a plan; this proves nothing about the problem."""
+
+
+class OutOfTime(NoPlanFound):
+    """The time limit ended the search.
+
+    Args:
+        limit: The time limit; [s].
+        reached: How far the search had come, in words; empty if nobody knows.
+    """
+
+    def __init__(self, limit: float, reached: str = "") -> None:
+        self.limit, self.reached = limit, reached
+        message = f"no plan within the time limit of {limit:g} s"
+        super().__init__(f"{message}; {reached}" if reached else message)
 
 
 class VerificationFailed(VdsmError):

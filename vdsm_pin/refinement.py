@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.errors import Infeasible, NoPlanFound
+from vdsm_pin.planner.budget import within_time
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.problem import PlanningProblem
@@ -65,7 +66,11 @@ class Refinement:
 
 
 def plan_and_verify(
-    problem: PlanningProblem, strategy_name: str, robot: RobotModel
+    problem: PlanningProblem,
+    strategy_name: str,
+    robot: RobotModel,
+    *,
+    time_limit: float | None = None,
 ) -> Refinement:
     """Plan by a strategy until the verification certifies the plan.
 
@@ -73,16 +78,19 @@ def plan_and_verify(
         problem: What is asked.
         strategy_name: A name in `STRATEGIES`.
         robot: The arm as Pinocchio and Coal see it.
+        time_limit: For planning in all rounds, without the last proof; None for none;
+            [s].
 
     Returns:
         The certified plan.
 
     Raises:
         UnknownName: If there is no such strategy.
-        Infeasible: If the strategy has no plan, or none that is certified.
+        Infeasible: If the strategy has no plan, or none that is certified;
+            `OutOfTime` if the limit ended the planning.
     """
     plan_with = strategy(strategy_name)
-    clearance = link_clearance(problem)
+    clearance = within_time(link_clearance(problem), time_limit)
     rounds: list[Round] = []
     margin = 0.0
     while True:

@@ -5,6 +5,8 @@ more than half the way between them needs no further look. The rest is halved. T
 planner's check; the proof over continuous time is the verifier's.
 """
 
+from typing import Final
+
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
@@ -13,6 +15,11 @@ from vdsm_pin.planner.fewest.roadmap import link_limit
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
+
+HALVINGS: Final = 16
+"""Halvings of an interval; the body moves 65,536 times less in what is left then."""
+LONG_WAY: Final = 0.2
+"""Way of the body above which the middle is looked at whatever the clearance; [m]."""
 
 
 class Judge:
@@ -122,7 +129,7 @@ class Judge:
         number = np.arange(count)
         low, high = np.zeros(count), np.ones(count)
         good = np.ones(count, dtype=np.bool_)
-        tol = 1e-9
+        tol = TOLERANCES.on_boundary
         c0, r0 = self._states(intervals, number, low, most + tol)
         c1, r1 = np.roll(c0, -1, axis=0), np.roll(r0, -1)
         ends = np.flatnonzero(~intervals.continued())
@@ -130,16 +137,16 @@ class Judge:
         good &= (r0 >= need - tol) & (r1 >= need - tol)
         number, low, high = number[good], low[good], high[good]
         c0, c1, r0, r1 = c0[good], c1[good], r0[good], r1[good]
-        for _ in range(16):
+        for _ in range(HALVINGS):
             way = np.linalg.norm(c1 - c0, axis=2).max(axis=1)
             need_here = need[number]
             least = (r0 + r1 - way) / 2.0
             open_ = (least < need_here) & (way > self.finest)
             # A long interval may hide a bend or a curve: look at its middle anyway.
-            open_ |= way > 0.2
+            open_ |= way > LONG_WAY
             open_ &= good[number]
             if not open_.any():
-                break
+                return good
             number, low, high = number[open_], low[open_], high[open_]
             c0, c1, r0, r1 = c0[open_], c1[open_], r0[open_], r1[open_]
             middle = (low + high) / 2.0
@@ -150,4 +157,5 @@ class Judge:
             low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
             c0, c1 = np.concatenate([c0, cm]), np.concatenate([cm, c1])
             r0, r1 = np.concatenate([r0, rm]), np.concatenate([rm, r1])
+        good[number] = False  # not settled after all halvings: not known to be clear
         return good

@@ -38,12 +38,20 @@ def refuse(problem: PlanningProblem, outcome: Outcome) -> None:
     if none_open or (length > 0.0 and 1.0 - shut / length < demanded(problem)):
         raise _proved(problem, rows, proof)
     if outcome.found is None:
-        raise NoPlanFound(_stuck(problem, outcome, 0.0))
-    skipped = outcome.found.sequence.skipped
+        raise NoPlanFound(how_far(problem, outcome))
+    share = 1.0 if not length > 0.0 else _drawn(problem, outcome) / length
+    if share < demanded(problem) - TOLERANCES.coverage:
+        raise NoPlanFound(how_far(problem, outcome))
+
+
+def _drawn(problem: PlanningProblem, outcome: Outcome) -> float:
+    """Length of the path that the motion found draws; [m]."""
+    if outcome.found is None:
+        return 0.0
     stations = outcome.found.roadmap.route.stations
+    skipped = outcome.found.sequence.skipped
     undrawn = sum(float(stations[k] - stations[k - 1]) for k in skipped)
-    if length > 0.0 and 1.0 - undrawn / length < demanded(problem) - 1e-12:
-        raise NoPlanFound(_stuck(problem, outcome, length - undrawn))
+    return problem.path.length - undrawn
 
 
 def _either_end(closed: BoolArray) -> BoolArray:
@@ -78,8 +86,9 @@ def _proved(problem: PlanningProblem, rows: PathRows, proof: TipProof) -> Infeas
     )
 
 
-def _stuck(problem: PlanningProblem, outcome: Outcome, drawn: float) -> str:
+def how_far(problem: PlanningProblem, outcome: Outcome) -> str:
     """Where the search came to an end, in words; not a proof."""
+    drawn = _drawn(problem, outcome)
     route = None if outcome.found is None else outcome.found.roadmap.route
     station, tip = 0.0, outcome.rows.tips[0]
     if outcome.found is not None and route is not None:

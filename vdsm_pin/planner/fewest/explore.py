@@ -4,6 +4,7 @@ Everything is counted, nothing is timed: the same problem gives the same plan.
 """
 
 import logging
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -88,7 +89,7 @@ class Outcome:
 
 def explore(
     problem: PlanningProblem, clearance: LinkClearance, margin: float, taste: Taste
-) -> Outcome:
+) -> Iterator[Outcome]:
     """Search level by level until all that can be drawn is drawn.
 
     Args:
@@ -96,13 +97,18 @@ def explore(
         clearance: The clearance function.
         margin: Kept beyond the required clearance; [m].
         taste: What the strategy prefers.
+
+    Yields:
+        Outcomes, each better than the one before; the first is what is known before
+        any search.
     """
     rows = path_rows(problem.path)
     proof = prove_tips(problem, clearance, rows.tips)
     judge = Judge(problem, clearance, margin, LEVELS[0].slack, LEVELS[0].finest)
     best = Outcome(judge, None, rows, proof)
+    yield best
     if proof.closed.all():
-        return best
+        return
     for level in LEVELS:
         judge = Judge(problem, clearance, margin, level.slack, level.finest, level.ease)
         found = _look(judge, level, rows, proof, taste)
@@ -110,9 +116,9 @@ def explore(
         LOGGER.debug("%s: %.4f m missing", level, now.missing)
         if now.missing < best.missing:
             best = now
+            yield best
         if not best.missing > 0.0:
-            break
-    return best
+            return
 
 
 def _look(

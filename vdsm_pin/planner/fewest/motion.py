@@ -9,9 +9,11 @@ there; where one knee turns into another, both are bent on the way and no third 
 
 import itertools
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
+from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.kinematics import joint_angles, joint_centres
 from vdsm_pin.manipulator import Manipulator
@@ -19,6 +21,9 @@ from vdsm_pin.planner.fewest.roadmap import Roadmap
 from vdsm_pin.planner.fewest.sequence import Sequence
 from vdsm_pin.planner.lift import rises_squared
 from vdsm_pin.tolerances import TOLERANCES
+
+ROUNDS: Final = 12
+"""Rounds of adding rows; each at least reaches what it aims at in smooth stretches."""
 
 
 @dataclass(frozen=True)
@@ -214,10 +219,13 @@ def dense_rows(
         turn: Largest change of a joint angle between two rows; [rad].
         stray: Largest distance of a joint centre, midway between two rows in joint
             space, from where the chart has it; [m].
+
+    Raises:
+        NoPlanFound: If no number of rows is enough, as where a joint angle jumps.
     """
     way = np.linalg.norm(np.diff(knots.tips, axis=0), axis=1)
     counts = np.maximum(1, np.ceil(way / spacing - 1e-9)).astype(np.int64)
-    for _ in range(12):
+    for _ in range(ROUNDS):
         rows = rows_at(manipulator, knots, *spread(counts))
         alpha, theta = joint_angles(manipulator, rows.centres)
         step = np.maximum(
@@ -228,10 +236,14 @@ def dense_rows(
         excess = np.zeros(len(counts))
         np.maximum.at(excess, rows.interval[:-1], np.maximum(step / turn, bow))
         if (excess <= 1.0).all():
-            break
+            return rows
         more = np.ceil(counts * excess * 1.05).astype(np.int64)
         counts = np.where(excess > 1.0, np.maximum(more, counts + 1), counts)
-    return rows
+    message = (
+        f"after {ROUNDS} rounds of adding rows {int((excess > 1.0).sum())} stretches "
+        f"still turn or stray {excess.max():.2f} times as far as a row may"
+    )
+    raise NoPlanFound(message)
 
 
 def _stray(

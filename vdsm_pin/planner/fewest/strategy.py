@@ -1,28 +1,23 @@
 """The strategies `fewest` and `clearest`: search, smooth, write down, explain."""
 
-import logging
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.cables import cable_lengths
+from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.kinematics import joint_angles
-from vdsm_pin.planner.fewest.clear import Judge
-from vdsm_pin.planner.fewest.explain import notes_of, refuse
-from vdsm_pin.planner.fewest.explore import explore
+from vdsm_pin.planner.fewest.explain import how_far, notes_of, refuse
+from vdsm_pin.planner.fewest.explore import Outcome, explore
 from vdsm_pin.planner.fewest.motion import Knots, Rows, dense_rows
 from vdsm_pin.planner.fewest.nearby import nearby
 from vdsm_pin.planner.fewest.roadmap import Taste
 from vdsm_pin.planner.fewest.smooth import lifted, smooth, straightened
 from vdsm_pin.planner.records import LinkClearance, Plan, TipPath
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
-
-LOGGER = logging.getLogger(__name__)
-
-TURN: Final = float(np.deg2rad(4.5))
-"""Largest change of a joint between two rows; the limit for users is 5 deg; [rad]."""
 
 FEWEST: Final = Taste()
 CLEAREST: Final = Taste(angle=0.2, room=0.2, room_cost=8.0)
@@ -68,14 +63,32 @@ def _plan(
     taste: Taste,
 ) -> Plan:
     quick = nearby(problem, clearance)
-    outcome = explore(problem, quick, margin, taste)
-    refuse(problem, outcome)
+    best: Outcome | None = None
+    try:
+        for outcome in explore(problem, quick, margin, taste):
+            best = outcome
+        assert best is not None
+        refuse(problem, best)
+        return _written(problem, quick, name, taste, best)
+    except OutOfTime as error:
+        reached = "" if best is None else how_far(problem, best)
+        raise OutOfTime(error.limit, reached) from None
+
+
+def _written(
+    problem: PlanningProblem,
+    clearance: LinkClearance,
+    name: str,
+    taste: Taste,
+    outcome: Outcome,
+) -> Plan:
+    """What was found, smoothed and row by row."""
     assert outcome.found is not None
-    judge: Judge = outcome.judge
+    judge, arm = outcome.judge, problem.manipulator
     knots = smooth(judge, outcome.found.knots, taste)
     knots = lifted(judge, straightened(knots))
-    arm = problem.manipulator
-    rows = dense_rows(arm, knots, problem.path.spacing, TURN, judge.slack)
+    turn = TOLERANCES.planned_step
+    rows = dense_rows(arm, knots, problem.path.spacing, turn, judge.slack)
     alpha, theta = joint_angles(arm, rows.centres)
     stations, on_path = _stations(knots, rows)
     trajectory = Trajectory(on_path, stations, rows.centres[:, 0, 0], alpha, theta)
@@ -86,7 +99,7 @@ def _plan(
         rows.centres,
         trajectory,
         cable_lengths(arm, alpha, theta),
-        notes_of(problem, quick, outcome, trajectory, rows.centres),
+        notes_of(problem, clearance, outcome, trajectory, rows.centres),
     )
 
 
