@@ -8,7 +8,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import link_angles
-from vdsm_pin.report.facts import cables, changed_angles, straight_arm
+from vdsm_pin.report.facts import cables, changed_angles, min_clearance, straight_arm
 from vdsm_pin.report.palette import link_colours, oklch
 from vdsm_pin.report.thinning import Thinned
 from vdsm_pin.units import MM_PER_M
@@ -99,6 +99,11 @@ def _clearance_charts(
     hues = [oklch(0.62, 0.13, 30.0 + 360.0 * i / count) for i in range(count)]
     links = [f"link {i + 1}" for i in range(profile.link_lower.shape[1])]
     note = "Solid: proved lower bound. Dashed: proved upper bound."
+    # What is proved for the whole motion holds in every interval of it.
+    least = min_clearance(verification)
+    proved = -np.inf if least is None or least.lower is None else least.lower
+    link_lower = np.maximum(profile.link_lower, proved)
+    obstacle_lower = np.maximum(profile.obstacle_lower, proved)
     return [
         common
         | {
@@ -108,7 +113,7 @@ def _clearance_charts(
             "series": _brackets(
                 links,
                 link_colours(len(links)),
-                shown.least(profile.link_lower, profile.first_interval),
+                shown.least(link_lower, profile.first_interval),
                 shown.least(profile.link_upper, profile.first_interval),
             ),
         },
@@ -120,7 +125,7 @@ def _clearance_charts(
             "series": _brackets(
                 list(scene.names),
                 tuple(hues),
-                shown.least(profile.obstacle_lower, profile.first_interval),
+                shown.least(obstacle_lower, profile.first_interval),
                 shown.least(profile.obstacle_upper, profile.first_interval),
             ),
         },

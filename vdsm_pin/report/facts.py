@@ -1,6 +1,9 @@
 """Records to file models: one place where a verification becomes words and rows."""
 
 import math
+import re
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -31,6 +34,9 @@ from vdsm_pin.verification.records import (
     Verdict,
     Verification,
 )
+
+_PASSED: Final = Verdict.CERTIFIED
+_MOMENT: Final = re.compile(r"(?:waypoint|interval) (\d+)(?: at (\d*\.\d+))?")
 
 
 def finite(value: float) -> float | None:
@@ -98,6 +104,36 @@ def closest_row(verification: Verification, approach: ClosestApproach) -> Closes
     )
 
 
+def moment(where: str) -> float | None:
+    """When the worst case of a check happens, in rows; None where it has no time.
+
+    Args:
+        where: The place in words, as checks name it: "waypoint 7, .." or
+            "interval 7 at 0.2500, ..".
+    """
+    found = _MOMENT.match(where)
+    return None if found is None else int(found[1]) + float(found[2] or 0.0)
+
+
+@dataclass(frozen=True)
+class Failing:
+    """A check that did not pass, and when its worst case happens, in rows."""
+
+    name: str
+    verdict: str
+    time: float | None
+
+
+def failing(verification: Verification) -> tuple[Failing, ...]:
+    """The checks that did not pass: what decides the verdict first."""
+    bad = [check for check in verification.checks if check.verdict is not _PASSED]
+    bad.sort(key=lambda check: check.verdict is not verification.verdict)
+    return tuple(
+        Failing(check_title(check.name), check.verdict.value, moment(check.where))
+        for check in bad
+    )
+
+
 def nearest_to_obstacle(verification: Verification) -> int | None:
     """Index of the closest approach to an obstacle; None without obstacles."""
     near = (i for i, row in enumerate(verification.closest) if row.pair.obstacle)
@@ -129,13 +165,16 @@ def reason(verification: Verification) -> str:
         return "No check was carried out, so nothing is proved."
     first = bad[0]
     found = f"{check_title(first.name)} is {quantity(first.worst, first.unit)}"
-    if not math.isnan(first.limit):
+    if math.isnan(first.worst):
+        found = f"{check_title(first.name)}: there is nothing to judge it by"
+    elif not math.isnan(first.limit):
         found += f" against a limit of {quantity(first.limit, first.unit)}"
     if first.where:
         found += f" ({first.where})"
     others = f", and {len(bad) - 1} more" if len(bad) > 1 else ""
     if verification.verdict is Verdict.REFUTED:
-        return f"The motion breaks {len(bad)} of its checks: {found}{others}."
+        count = len(verification.checks)
+        return f"The motion breaks {len(bad)} of its {count} checks: {found}{others}."
     return f"The proof is not complete: {found}{others}. This counts as not passed."
 
 

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from vdsm_pin import __version__
 from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.report.facts import nearest_to_obstacle
+from vdsm_pin.report.facts import failing, moment, nearest_to_obstacle
 from vdsm_pin.report.files import BatchRow, PlanFile, Point, VerificationFile
 from vdsm_pin.report.page_data import report_data, view_data
 from vdsm_pin.report.words import (
@@ -49,6 +49,7 @@ def _environment() -> jinja2.Environment:
         "outcome": outcome,
         "point": _point,
         "measured": measured,
+        "moment": moment,
         "css_text": _css_text,
     }
     environment.globals |= {
@@ -117,6 +118,7 @@ def write_report(
         charts=data.charts,
         complete=data.complete,
         worst=nearest_to_obstacle(verification),
+        failing=failing(verification),
     )
     path.write_text(page, encoding="utf-8")
 

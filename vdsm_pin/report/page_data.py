@@ -1,7 +1,7 @@
 """What a page's scripts read: the scene, the motion, the plots, as one JSON value."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.charts import charts, packed
+from vdsm_pin.report.facts import failing
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import surface
 from vdsm_pin.report.thinning import Thinned, thinned
@@ -93,6 +94,9 @@ def report_data(verification: Verification) -> PageData:
             "scene": scene_data(verification.problem),
             "motion": motion_data(verification.trajectory, shown),
             "closest": [closest_data(row) for row in verification.closest],
+            "marks": [
+                asdict(one) for one in failing(verification) if one.time is not None
+            ],
             "charts": plots,
         }
     )
@@ -107,6 +111,7 @@ def view_data(problem: PlanningProblem, trajectory: Trajectory) -> str:
             "scene": scene_data(problem),
             "motion": motion_data(trajectory, shown),
             "closest": [],
+            "marks": [],
             "charts": [],
         }
     )

@@ -151,7 +151,12 @@ class ArmView {
     this.witness = new Group();
     this.ends = [new Mesh(ball, ink), new Mesh(ball, ink)];
     this.ends.forEach((end) => (end.renderOrder = 9));
-    this.witness.add(...this.ends);
+    this.span = this.line([[0, 0, 0], [0, 0, 0]], 0xe03131);
+    this.span.material.depthTest = false;
+    this.span.material.transparent = true;
+    this.span.renderOrder = 9;
+    this.span.frustumCulled = false;
+    this.witness.add(...this.ends, this.span);
     this.root.add(this.witness);
   }
 
@@ -182,7 +187,7 @@ class ArmView {
     const reach = world.getSize(new Vector3()).length();
     const wide = Math.max(1, 1.45 / Math.max(this.camera.aspect, 0.5));
     const away = new Vector3(...directions[name]).transformDirection(this.root.matrixWorld);
-    this.camera.position.copy(middle).addScaledVector(away, 1.22 * reach * wide);
+    this.camera.position.copy(middle).addScaledVector(away, 1.08 * reach * wide);
     this.viewer.controls.target.copy(middle);
     this.viewer.controls.update();
     this.viewer.set_dirty();
@@ -200,8 +205,9 @@ class ArmView {
       this.joints[i].quaternion.setFromUnitVectors(new Vector3(1, 0, 0), axis);
     });
     this.tip.position.copy(points[points.length - 1]);
+    this.witness.visible = Boolean(this.shown);
     const due = this.shown && Math.abs(time - this.shown.time) < 1.5;
-    this.witness.visible = Boolean(due);
+    for (const part of this.witness.children) part.material.opacity = due ? 1 : 0.35;
     this.tipNow = points[points.length - 1].toArray();
     this.viewer.set_dirty();
   }
@@ -212,6 +218,8 @@ class ArmView {
     if (!this.shown) return;
     this.ends[0].position.set(...this.shown.linkPoint);
     this.ends[1].position.set(...this.shown.otherPoint);
+    const [a, b] = this.ends.map((end) => end.position);
+    this.span.geometry.setFromPoints([a, b]);
     this.viewer.set_dirty();
   }
 

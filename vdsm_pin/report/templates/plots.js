@@ -40,8 +40,9 @@ function shortNumber(value) {
 }
 
 class Plot {
-  constructor(figure, chart, motion) {
+  constructor(figure, chart, motion, marks) {
     this.chart = chart;
+    this.marks = marks;
     this.motion = motion;
     this.isolated = null;
     this.series = chart.series.map((one) => ({
@@ -110,6 +111,7 @@ class Plot {
     this.axes();
     for (const { value, label: text } of this.limits) this.limit(value, text);
     this.lines = this.series.map((one) => this.line(one));
+    for (const mark of this.marks) this.mark(mark);
     this.rule = element("line", { y1: top, y2: height - bottom, class: "cursor" }, this.svg);
     this.tip = element("g", { class: "hover", visibility: "hidden" }, this.svg);
     element("rect", { rx: 4, height: 20, y: -10 }, this.tip);
@@ -148,6 +150,17 @@ class Plot {
     element("text", { x: end - 4, y: up ? y - 4 : y + 13, class: "limit-text end" }, this.svg, text);
   }
 
+  // Where a check failed: a line through the plot with a flag on top.
+  mark({ time, verdict, name }) {
+    const x = this.x(time);
+    const group = element("g", {}, this.svg);
+    element("title", {}, group, `${name}: ${verdict} at ${time.toFixed(2)}`);
+    const ends = { x1: x, x2: x, y1: FRAME.top, y2: FRAME.height - FRAME.bottom };
+    element("line", { ...ends, class: `mark ${verdict}` }, group);
+    const flag = `M${x - 6} ${FRAME.top - 10}h12l-6 10z`;
+    element("path", { d: flag, class: `flag ${verdict}` }, group);
+  }
+
   path(values, step) {
     const rows = this.motion.rows;
     let text = "";
@@ -171,6 +184,10 @@ class Plot {
       element("path", { d: this.path(one.upper, one.step), class: "upper" }, group);
     const dash = one.dash ? { "stroke-dasharray": one.dash } : {};
     element("path", { d: this.path(one.values, one.step), ...dash }, group);
+    if (this.motion.rows.length === 1 && Number.isFinite(one.values[0])) {
+      const place = { cx: this.x(0), cy: this.y(one.values[0]), r: 4 };
+      element("circle", { ...place, style: `fill:${one.colour}` }, group);
+    }
     return group;
   }
 

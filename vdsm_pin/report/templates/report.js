@@ -11,8 +11,14 @@
   const figures = document.querySelectorAll("[data-chart]");
   const plots = [...figures].map((figure) => {
     const chart = data.charts.find((one) => one.id === figure.dataset.chart);
-    return new Plot(figure, chart, motion);
+    return new Plot(figure, chart, motion, data.marks);
   });
+
+  let started = false;
+  function reveal(button) {
+    if (started && button.dataset.scroll !== undefined)
+      pane.scrollIntoView({ behavior: "smooth", block: "center" });
+  }
 
   // Jump to a closest approach and mark its two points.
   for (const button of document.querySelectorAll("[data-approach]"))
@@ -21,8 +27,17 @@
       motion.play(false);
       if (view) view.showWitness(approach);
       motion.go(approach.time);
-      if (button.dataset.scroll !== undefined)
-        pane.scrollIntoView({ behavior: "smooth", block: "center" });
+      reveal(button);
+    });
+  // Jump to the worst case of a check; where two bodies meet, mark the points.
+  for (const button of document.querySelectorAll("[data-go]"))
+    button.addEventListener("click", () => {
+      const time = Number(button.dataset.go);
+      const approach = data.closest.find((one) => Math.abs(one.time - time) < 0.01);
+      motion.play(false);
+      if (view && approach) view.showWitness(approach);
+      motion.go(time);
+      reveal(button);
     });
   for (const button of document.querySelectorAll("[data-look]"))
     button.addEventListener("click", () => view && view.look(button.dataset.look));
@@ -36,7 +51,11 @@
     document.querySelectorAll("details").forEach((one) => (one.open = true));
   });
 
+  // Begin where the verdict was decided, else where the arm comes nearest.
   const worst = document.querySelector("[data-worst]");
   if (worst) worst.click();
+  const first = document.querySelector("[data-first]");
+  if (first) first.click();
+  started = true;
   window.vdsm = { motion, view, plots, data };
 })();
