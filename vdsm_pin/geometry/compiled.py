@@ -63,16 +63,23 @@ class _WholeLibrary(JITCodeLibrary):
     """The code of a function with that of all that it calls."""
 
     def finalize(self) -> None:
-        """Link every part once, whoever calls it, then optimise and translate."""
-        found: dict[Any, None] = {}
-        waiting = self._linking_libraries[::-1]
-        while waiting:
-            library = waiting.pop()
-            if library not in found:
-                found[library] = None
-                if isinstance(library, _PartLibrary):
-                    waiting += library._linking_libraries[::-1]
-        self._linking_libraries = list(found)
+        """Link every part once, then optimise and translate.
+
+        Callers come before what they call: the linker leaves out what nobody asks for.
+        """
+        order: list[Any] = []
+
+        def visit(libraries: list[Any]) -> None:
+            for library in libraries:
+                if library not in seen:
+                    seen.add(library)
+                    if isinstance(library, _PartLibrary):
+                        visit(library._linking_libraries)
+                    order.append(library)
+
+        seen: set[Any] = set()
+        visit(self._linking_libraries)
+        self._linking_libraries = order[::-1]
         super().finalize()  # type: ignore[no-untyped-call]
 
 

@@ -115,7 +115,7 @@ def _deviation(
     path, stations = problem.path, trajectory.path_m
     rows = np.linalg.norm(tips - path.at(_wrapped(path, stations)), axis=1)
     if trajectory.n_samples == 1:
-        return float(rows[0]), 0
+        return float(rows[0]) + TOLERANCES.arithmetic, 0
     run, start = _runs(path, stations)[intervals], _wrapped(path, stations)[intervals]
     ends = np.maximum(rows[intervals], rows[intervals + 1])
     corners = _corner_deviation(path, tips, start, run, intervals)
