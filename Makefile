@@ -32,6 +32,9 @@ report: figures
 	$(BIN)/python analysis/paper_table.py --out reports/paper
 	$(BIN)/python analysis/obs2_orientations.py --out reports/paper
 
+bench: $(VENV)/.installed
+	$(BIN)/python -m benchmarks.report --save reports/performance
+
 dist: $(VENV)/.installed
 	.ci/test-wheel
 
@@ -42,4 +45,6 @@ clean:
 $(VENV)/.installed: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	@echo "compiling what runs fast, once: about a minute"
+	-@$(BIN)/vdsm batch paper/free paper/obs1 --out $(VENV)/warm >/dev/null
 	touch $@
