@@ -12,6 +12,7 @@ from vdsm_pin.planner.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Plan
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import load_robot
+from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.records import Verdict
 
 
@@ -22,7 +23,17 @@ def short(name: str) -> PlanningProblem:
     return replace(problem, path=replace(problem.path, points=points, closed=False))
 
 
-def test_missing_clearance_between_waypoints_is_added_to_the_margin() -> None:
+def test_missing_clearance_between_waypoints_is_added_to_the_margin(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Without its reserve the planner comes too close between waypoints."""
+
+    def close(
+        problem: PlanningProblem, clearance: LinkClearance, margin: float
+    ) -> Plan:
+        return plan_paper(problem, clearance, margin - TOLERANCES.planned_reserve)
+
+    monkeypatch.setattr(refinement, "strategy", lambda name: close)
     problem = short("obs3")
     result = refinement.plan_and_verify(
         problem, "paper", load_robot(problem.manipulator)

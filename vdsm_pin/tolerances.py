@@ -124,6 +124,14 @@ class Tolerances:
     the straight arm strays by 7e-6 m; ten times less would take three times the rows.
     """
 
+    planned_reserve: float = 1e-4
+    """What the paper's planner keeps beyond that for the way between waypoints; [m].
+
+    A joint that slides 10 mm a row on a region of radius 125 mm cuts 0.1 mm off it;
+    where that is not enough the refinement adds to it. It also makes proofs cheap: they
+    cut time finely where the clearance just suffices.
+    """
+
     result_change: float = 1e-6
     """Difference of two results below which `vdsm diff` calls them equal; SI."""
 

@@ -183,6 +183,19 @@ def test_the_way_across_the_path_is_cut_out() -> None:
     assert 2.0 * (0.1 + 0.0615 + 0.0035) <= gap < 0.36
 
 
+def test_an_approach_that_ends_on_the_danger_region_is_straight() -> None:
+    """The path begins behind the pillar; its first drawable point is in front of it."""
+    problem = with_obstacles(pillar(-0.243, 1.2008, 0.34))
+    path = replace(problem.path, approach=Approach.NEAREST_EQUIDISTANT)
+    plan = planned(replace(problem, path=path))
+    check_plan(plan)
+    assert len(plan.notes) == 1
+    joined = int(np.argmax(plan.trajectory.on_path))
+    tip = plan.tip_path.points[: joined + 1, 1:]
+    way = np.linalg.norm(np.diff(tip, axis=0), axis=1).sum()
+    assert way == pytest.approx(np.linalg.norm(tip[-1] - tip[0]))
+
+
 def random_obstacle(rng: np.random.Generator, axis: str) -> Obstacle:
     """A prismatic body along an axis, between the arm and its work."""
     k = "xyz".index(axis)

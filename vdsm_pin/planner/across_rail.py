@@ -21,10 +21,9 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.danger_region import DangerRegion
 from vdsm_pin.planner.project import project
 from vdsm_pin.planner.scale import scale
-from vdsm_pin.planner.sections import VIEWS, Section, grown_by
+from vdsm_pin.planner.sections import VIEWS, Section, grown_by, planned_gap
 from vdsm_pin.planner.tip_path import Route, drawn_rows, straight_route
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.tolerances import TOLERANCES
 
 SCAN: Final = 12
 """Moves of the bend tried before the first clear one is narrowed down."""
@@ -72,8 +71,7 @@ class AcrossRail:
     def clearance(self, centres: FloatArray) -> float:
         """From the section and its lee, taken as endless, less the margin."""
         chains = np.ascontiguousarray(centres[..., [0, 1 + self.axis]])
-        needed = self.problem.required_clearance + TOLERANCES.planned_clearance
-        reserve = self.region.radius - needed
+        reserve = self.region.radius - planned_gap(self.problem)
         return float(self.region.core_distance(chains).min()) - reserve
 
     def joints(self, route: Route, reference: FloatArray) -> FloatArray:

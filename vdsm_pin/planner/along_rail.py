@@ -16,12 +16,11 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.danger_region import DangerRegion
 from vdsm_pin.planner.detours import detour_route, first_station, path_rows
 from vdsm_pin.planner.project import project
-from vdsm_pin.planner.sections import Section, grown_by
+from vdsm_pin.planner.sections import Section, grown_by, planned_gap
 from vdsm_pin.planner.shadow import Shadow
 from vdsm_pin.planner.side_rules import SideRule, anchors, choose_rule, slid, stands
 from vdsm_pin.planner.tip_path import Route
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.tolerances import TOLERANCES
 
 ROUNDINGS: Final = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.75, 1.0)
 """How far corners are blunted, tried in this order; [-]."""
@@ -50,8 +49,7 @@ class AlongRail:
     def clearance(self, centres: FloatArray) -> float:
         """From the section, taken as endless along the rail, less the margin."""
         distance = self.forbidden.core_distance(project(centres)).min()
-        needed = self.problem.required_clearance + TOLERANCES.planned_clearance
-        reserve = self.forbidden.radius - needed
+        reserve = self.forbidden.radius - planned_gap(self.problem)
         return float(distance) - reserve
 
     def joints(self, route: Route, reference: FloatArray) -> FloatArray:

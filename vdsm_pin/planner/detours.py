@@ -264,7 +264,10 @@ def _ways_round(
 ) -> list[FloatArray]:
     """The straight line where it is clear, and the taut ways round either side."""
     straight = np.stack([begin, end])
-    clear = region.core_distance(straight[None])[0] >= region.radius
+    clear = (
+        region.core_distance(straight[None])[0]
+        >= region.radius - TOLERANCES.on_boundary
+    )
     ways = [region.walk(begin, end, sense) for sense in (1, -1)]
     return [straight, *ways] if clear else ways
 

@@ -24,6 +24,10 @@ from vdsm_pin.trajectory import Trajectory
 SUBDIVISIONS: Final = 6
 """Rounds of inserting waypoints; a motion still too fast after them has a jump."""
 
+GRAZE: Final = 1e-3
+"""A motion that misses the clearance by less is planned once more with this much on
+top; [m]."""
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -72,18 +76,30 @@ def plan_paper(
 
 
 def _best_motion(
-    problem: PlanningProblem, clearance: LinkClearance, margin: float
+    problem: PlanningProblem,
+    clearance: LinkClearance,
+    margin: float,
+    reserve: float = 0.0,
 ) -> Motion:
-    """The first motion that draws the whole path, else the one that draws most."""
+    """The first motion that draws the whole path, else the one that draws most.
+
+    Args:
+        problem: What is asked.
+        clearance: Clearance of every link at given joint centres.
+        margin: Aimed at beyond the required clearance; [m].
+        reserve: Part of the margin that rows between judged ones may use up; [m].
+    """
     motion = _motion(problem, straight := Straight(problem, clearance))
     if straight.clearance(motion.centres) >= problem.required_clearance + margin:
         return motion
     best: Motion | None = None
-    missing, reason = np.inf, None
+    missing, reason, grazing = np.inf, None, np.inf
     for avoidance in avoidances(problem, margin):
         try:
             motion = _motion(problem, avoidance)
-            _refuse_touch(problem, avoidance.clearance(motion.centres))
+            kept = avoidance.clearance(motion.centres) + reserve
+            grazing = min(grazing, problem.required_clearance - kept)
+            _refuse_touch(problem, kept)
         except Infeasible as error:
             reason = reason or error
             continue
@@ -92,6 +108,8 @@ def _best_motion(
             best, missing = motion, undrawn
         if missing == 0.0:
             break
+    if best is None and reserve == 0.0 and grazing <= GRAZE:
+        return _best_motion(problem, clearance, margin + GRAZE, GRAZE)
     if best is None:
         raise reason or NoPlanFound("the paper's rule offers no way round")
     _refuse_gaps(problem, best)

@@ -93,8 +93,13 @@ def section_along(obstacle: Obstacle, axis: str) -> Section | None:
 
 def grown_by(problem: PlanningProblem, margin: float) -> float:
     """How far the axis of a link stays from an obstacle's surface; [m]."""
-    body = problem.manipulator.link_radius
-    return body + problem.required_clearance + margin + TOLERANCES.planned_clearance
+    return problem.manipulator.link_radius + planned_gap(problem) + margin
+
+
+def planned_gap(problem: PlanningProblem) -> float:
+    """Clearance aimed at: the required one and the reserves, no margin; [m]."""
+    reserves = TOLERANCES.planned_clearance + TOLERANCES.planned_reserve
+    return problem.required_clearance + reserves
 
 
 def _parallel(direction: FloatArray, unit: FloatArray) -> bool:
