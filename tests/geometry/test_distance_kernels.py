@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+import coal
 import numpy as np
 import pytest
 
@@ -94,6 +95,42 @@ def test_segment_and_box() -> None:
         truth = least_on_segment(to_box(turn, centre, half), ends)
         if truth > GOAL:
             assert_brackets(measure(pack_pieces([[piece]]), 0, ends), truth)
+
+
+def test_brackets_hold_the_distances_of_coal() -> None:
+    """Coal's capsule against its cylinder and box, within 0.1 um."""
+    rng, request = np.random.default_rng(7), coal.DistanceRequest()
+    request.gjk_tolerance = 1e-9
+    radius, agreed = 0.05, 1e-7
+    corners = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
+    compared = 0
+    for trial in range(200):
+        turn, centre = random_rotation(rng), rng.uniform(-1, 1, 3)
+        turn[:, 2] *= np.linalg.det(turn)
+        half, ends = rng.uniform(0.05, 1.0, 3), rng.uniform(-2, 2, (2, 3))
+        if trial % 2:
+            piece: Piece = Hull(centre + (corners * half) @ turn.T)
+            body = coal.Box(*(2.0 * half))
+        else:
+            piece = FlatCylinder(centre, turn[:, 2], half[0], half[1])
+            body = coal.Cylinder(half[1], 2.0 * half[0])
+        along = ends[1] - ends[0]
+        length = float(np.linalg.norm(along))
+        across = np.cross(along, rng.normal(size=3))
+        across /= np.linalg.norm(across)
+        axes = np.stack([across, np.cross(along / length, across), along / length], 1)
+        capsule = coal.Capsule(radius, length)
+        place = coal.Transform3s(axes, ends.mean(axis=0))
+        distance = coal.distance(
+            capsule, place, body, coal.Transform3s(turn, centre), request,
+            result := coal.DistanceResult(),
+        )  # fmt: skip
+        assert result.min_distance == distance
+        if distance > agreed:
+            out = measure(pack_pieces([[piece]]), 0, ends)
+            assert out[LOWER] - agreed <= distance + radius <= out[UPPER] + agreed
+            compared += 1
+    assert compared > 100
 
 
 @pytest.mark.parametrize("gap", [1e-3, 1e-6, 1e-9, 1e-12])

@@ -82,7 +82,8 @@ def test_brackets_hold_a_dense_estimate(seed: int) -> None:
     assert (chunk.lower[:, :8] <= least + 1e-11).all()
     apart = sampled.min() > 0.0
     if apart:
-        assert (chunk.upper[:, :8] >= least - 1e-11).all() or least.min() > 0.0
+        # A thousandth of an interval away from the least place nothing rises by 10 um.
+        assert (chunk.upper[:, :8] >= least - 1e-5).all()
         assert proof.best[:8, 2].min() >= least.min() - 1e-7
         assert proof.best[:8, 0].min() >= least.min() - 2e-6
     assert (proof.counts.sum(axis=1) == 5).all()

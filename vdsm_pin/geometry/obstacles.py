@@ -189,12 +189,27 @@ def push_children(
 
 
 @compiled
+def _left_of(a: FloatArray, b: FloatArray, x: float, y: float) -> bool:
+    """Whether a point of the xy plane lies left of an edge and at its height.
+
+    The lower end belongs to the edge, the upper one does not, and the ends are put in
+    order first: both triangles of an edge get the same answer.
+    """
+    if a[1] > b[1]:
+        a, b = b, a
+    if not a[1] <= y < b[1]:
+        return False
+    return (b[0] - a[0]) * (y - a[1]) > (b[1] - a[1]) * (x - a[0])
+
+
+@compiled
 def crossings(pieces: PackedPieces, obstacle: int, x: float, y: float, z: float) -> int:
     """Triangles of a mesh that the ray from a point along +z passes through.
 
-    Edges count half-open, so a ray through an edge or corner crosses once; in floating
-    point this is a guess near edges, `verification/inside.py` is exact.
+    Edges count half-open: a ray through an edge or corner that two triangles share
+    crosses once. Heights are rounded; `verification/inside.py` is exact.
     """
+    apart()
     count = 0
     for p in range(pieces.first_piece[obstacle], pieces.first_piece[obstacle + 1]):
         start = pieces.first_point[p]
@@ -205,11 +220,12 @@ def crossings(pieces: PackedPieces, obstacle: int, x: float, y: float, z: float)
         )
         if max(a[2], b[2], c[2]) < z:
             continue
+        if not _left_of(a, b, x, y) ^ _left_of(b, c, x, y) ^ _left_of(c, a, x, y):
+            continue
         u = (b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)
         v = (c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)
         w = (a[0] - x) * (b[1] - y) - (a[1] - y) * (b[0] - x)
-        if not ((u > 0.0 and v > 0.0 and w > 0.0) or (u < 0.0 and v < 0.0 and w < 0.0)):
-            continue
-        if (u * a[2] + v * b[2] + w * c[2]) / (u + v + w) > z:
+        whole = u + v + w
+        if whole != 0.0 and (u * a[2] + v * b[2] + w * c[2]) / whole > z:
             count += 1
     return count

@@ -55,15 +55,18 @@ def _interval(rows: Rows, local: int) -> Ends:
 
 
 @compiled
-def _instant(rows: Rows, local: int) -> Ends:
-    """One row of a block at both ends."""
-    at = local
-    return Ends(
-        np.stack((rows.centres[at], rows.centres[at])),
-        np.stack((rows.frames[at], rows.frames[at])),
-        rows.bends[0],
-        rows.drifts[0],
-    )
+def _hold(rows: Rows, local: int, ends: Ends) -> None:
+    """Write one row of a block to both ends."""
+    apart()
+    n_links = rows.frames.shape[1]
+    for k in range(2):
+        for joint in range(n_links + 1):
+            for c in range(3):
+                ends.centres[k, joint, c] = rows.centres[local, joint, c]
+        for link in range(n_links):
+            for r in range(3):
+                for c in range(3):
+                    ends.frames[k, link, r, c] = rows.frames[local, link, r, c]
 
 
 @compiled
@@ -118,8 +121,8 @@ def _renew(task: Task, desk: Desk, results: Results, local: int, pair: int) -> N
         start = max(start, n[0] * p[0] + n[1] * p[1] + n[2] * p[2])
         end = max(end, n[0] * q[0] + n[1] * q[1] + n[2] * q[2])
     time = 1.0 if end > start else 0.0
-    at = _instant(desk.rows, local + int(time))
-    slice_bound(task.pieces, task.pairs, task.rules, at, space, pair, 0.0)
+    _hold(desk.rows, local + int(time), desk.ends)
+    slice_bound(task.pieces, task.pairs, task.rules, desk.ends, space, pair, 0.0)
     upper = space.out[UPPER] - task.rules.radius + task.rules.pad
     group = 0 if task.pairs.frame[pair] == BASE else 1
     results.limit[group] = min(results.limit[group], space.out[LOWER])
@@ -159,7 +162,8 @@ def _sweep_pair(
     rows, rules, frame = desk.rows, task.rules, task.pairs.frame[pair]
     required, group = task.pairs.required[pair], 0 if frame == BASE else 1
     lost, rise = losses(rules, frame), rules.pad - rules.radius
-    errors = np.array([rules.joint_error, rules.base_error])
+    errors, nowhere = np.zeros(2), np.zeros(1)
+    errors[0], errors[1], nowhere[0] = rules.joint_error, rules.base_error, -np.inf
     nominal = rules.joint_error + rules.base_error + rules.obstacle_error == 0.0
     local = 0
     while True:
@@ -178,7 +182,7 @@ def _sweep_pair(
             lost,
             rise,
             threshold,
-            limit if nominal else np.full(1, -np.inf),
+            limit if nominal else nowhere,
             desk.space.scratch,
             desk.runs,
             local,

@@ -25,7 +25,7 @@ from vdsm_pin.verification.records import (
     ErrorBox,
     Pair,
 )
-from vdsm_pin.verification.search import Motion, Task, push, tighten
+from vdsm_pin.verification.search import Motion, Task
 from vdsm_pin.verification.slices import BASE, Pairs, Rules
 from vdsm_pin.verification.sweep import (
     AT_LOWER,
@@ -33,12 +33,10 @@ from vdsm_pin.verification.sweep import (
     BEST,
     BLOCK,
     TIME,
-    UP,
     Desk,
     Results,
-    drop_candidates,
+    narrow,
     new_desk,
-    place_witness,
 )
 
 BUDGET: Final = 20_000
@@ -230,38 +228,27 @@ def _narrow(
     task: Task, motion: Motion, desk: Desk, results: Results, group: int
 ) -> None:
     """Narrow the least bracket over the obstacles (group 0) or over the links (1)."""
-    drop_candidates(task, results)
-    rows = results.candidates[: results.tally[0]]
-    own = (task.pairs.frame[rows[:, 2].astype(np.int64)] != BASE) == bool(group)
-    rows = rows[own]
-    heap = np.zeros((len(rows) + BUDGET, 5))
-    count = 0
-    for row in rows:
-        count = push(heap, count, row)
     mine = (task.pairs.frame != BASE) == bool(group)
-    if not count or not mine.any():
+    if not mine.any():
         return
+    heap = np.zeros((int(results.tally[0]) + BUDGET, 5))
     witnesses = np.zeros((len(mine), 10))
     witnesses[:, [0, 9]] = np.inf
     witnesses[0, 9] = results.limit[group]
-    count = tighten(
-        task,
-        motion,
-        desk.ends,
-        desk.space,
-        heap,
-        count,
-        TOLERANCES.least_bracket,
-        witnesses,
-    )
+    count = narrow(task, motion, desk, results, group, heap, witnesses)
+    if not count:
+        return
     results.limit[group] = witnesses[:, 9].min()
-    for pair in np.flatnonzero(witnesses[:, 0] < results.best[:, UP]):
-        place_witness(task, motion, desk, results, int(pair), witnesses[pair])
     least = np.full(len(mine), results.limit[group] - results.gap)
     np.minimum.at(least, heap[:count, 2].astype(np.int64), heap[:count, 0])
     least = np.minimum(least, results.overflow[group])
+    of_candidates = results.candidates[: results.tally[0], 2].astype(np.int64)
     touched = np.zeros(len(mine), bool)
-    touched[rows[:, 2].astype(np.int64)] = True
+    touched[of_candidates[mine[of_candidates]]] = True
+    if group == 0:
+        # Every interval keeps what the narrowing proved of all of them.
+        lower = results.profile[:, 0]
+        np.maximum(lower, least[mine].min(), out=lower)
     results.best[touched, 0] = np.maximum(results.best[touched, 0], least[touched])
 
 

@@ -55,7 +55,7 @@ class Witness(NamedTuple):
 
     Args:
         value: Upper bound, its time, and the least instant lower bound, shape (3,).
-        points: Core points of the link and of the partner, shape (2, 3); [m].
+        points: Core points of the link and of the partner, shape (6,); [m].
     """
 
     value: FloatArray
@@ -65,7 +65,10 @@ class Witness(NamedTuple):
 @compiled
 def new_witness() -> Witness:
     """A witness of nothing: infinite bounds."""
-    return Witness(np.array([np.inf, 0.0, np.inf]), np.zeros((2, 3)))
+    apart()
+    value = np.zeros(3)
+    value[0] = value[2] = np.inf
+    return Witness(value, np.zeros(6))
 
 
 @compiled
@@ -158,8 +161,8 @@ def examine(
     upper = space.out[UPPER] - task.rules.radius + task.rules.pad
     if upper < witness.value[0]:
         witness.value[0], witness.value[1] = upper, t
-        witness.points[0] = space.out[NEAR : NEAR + 3]
-        witness.points[1] = space.out[NEAR + 3 : BRACKET]
+        for c in range(NEAR, BRACKET):
+            witness.points[c - NEAR] = space.out[c]
     witness.value[2] = min(witness.value[2], instant[KEY])
     return float(instant[KEY])
 
@@ -216,6 +219,7 @@ def resolve(
     """
     apart()
     required = task.pairs.required[int(row[PAIR])]
+    rounding = task.rules.pad + task.rules.goal
     examine(task, motion, ends, space, row, 0.0, witness)
     examine(task, motion, ends, space, row, 1.0, witness)
     bound_between(task, motion, ends, space, row)
@@ -227,8 +231,13 @@ def resolve(
         if witness.value[0] < required:
             verdict = REFUTED
             break
-        # No slice can prove more than its instants, so there is nothing to hope for.
-        if witness.value[2] < required or count + 2 > heap.shape[0]:
+        # No slice can prove more than its instants: there is nothing to hope for where
+        # they fall short, or where slices already prove as much but for rounding.
+        least = witness.value[2]
+        if least < required or least - heap[0, KEY] <= rounding:
+            verdict = UNDECIDED
+            break
+        if count + 2 > heap.shape[0]:
             verdict = UNDECIDED
             break
         count = pop(heap, count, row)
@@ -290,6 +299,7 @@ def tighten(
         keep[9] = min(keep[9], witness.value[2])
         if witness.value[0] < keep[0]:
             keep[0], keep[1], keep[2] = witness.value[0], row[INTERVAL], middle
-            keep[3:6], keep[6:9] = witness.points[0], witness.points[1]
+            for c in range(6):
+                keep[3 + c] = witness.points[c]
         count = split(task, motion, ends, space, row, heap, count)
     return count

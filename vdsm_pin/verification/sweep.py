@@ -24,6 +24,8 @@ from vdsm_pin.verification.search import (
     Motion,
     Task,
     bound_between,
+    push,
+    tighten,
 )
 from vdsm_pin.verification.slices import (
     BASE,
@@ -180,18 +182,18 @@ def surface_points(
         centres: Joint centres, shape (N + 1, 3); [m].
         frames: Link frames, shape (N, 3, 3); [-].
         frame: Frame of the partner.
-        core: Point on the link's axis, then on the partner, shape (2, 3); [m].
+        core: Point on the link's axis, then on the partner, shape (6,); [m].
         out: Result, shape (6,); [m].
     """
     apart()
     gap = 0.0
     for c in range(3):
-        gap += (core[1, c] - core[0, c]) ** 2
+        gap += (core[3 + c] - core[c]) ** 2
     gap = sqrt(gap)
     share = task.rules.radius / gap if gap > 0.0 else 0.0
-    moved = core[0] + share * (core[1] - core[0])
-    base_direction(frames, frame, moved, out[:3])
-    base_direction(frames, frame, core[1], out[3:6])
+    near, far = core[:3], core[3:6]
+    base_direction(frames, frame, near + share * (far - near), out[:3])
+    base_direction(frames, frame, far, out[3:6])
     if frame != BASE:
         for c in range(3):
             out[c] += centres[frame, c]
@@ -295,10 +297,8 @@ def _place_run(
         out[:] = runs[local, 3:9]
         return
     row = local + int(runs[local, 2])
-    core = runs[local, 3:9].copy().reshape(2, 3)
-    surface_points(
-        task, rows.centres[row], rows.frames[row], task.pairs.frame[pair], core, out
-    )
+    frame, core = task.pairs.frame[pair], runs[local, 3:9]
+    surface_points(task, rows.centres[row], rows.frames[row], frame, core, out)
 
 
 @compiled
@@ -371,12 +371,51 @@ def place_witness(
     bound_between(task, motion, desk.ends, desk.space, row)
     best = results.best[pair]
     best[UP], best[AT_UPPER], best[TIME] = found[0], found[1], found[2]
-    core = found[3:9].copy().reshape(2, 3)
     surface_points(
         task,
         desk.ends.centres[0],
         desk.ends.frames[0],
         task.pairs.frame[pair],
-        core,
+        found[3:9],
         best[OWN : OWN + 6],
     )
+
+
+@compiled
+def narrow(
+    task: Task,
+    motion: Motion,
+    desk: Desk,
+    results: Results,
+    group: int,
+    heap: FloatArray,
+    witnesses: FloatArray,
+) -> int:
+    """Narrow the least bracket over the obstacles (group 0) or over the links (1).
+
+    Args:
+        task: The scene, pairs and rules.
+        motion: Rows of joint values.
+        desk: Working space.
+        results: Holds the candidates; best upper bounds are improved.
+        group: Which pairs.
+        heap: Room for the candidates and the budget of slices.
+        witnesses: As for `tighten`.
+
+    Returns:
+        Number of slices in the heap, 0 without candidates.
+    """
+    drop_candidates(task, results)
+    count = 0
+    for k in range(results.tally[0]):
+        row = results.candidates[k]
+        if (task.pairs.frame[int(row[PAIR])] == BASE) == (group == 0):
+            count = push(heap, count, row)
+    if count == 0:
+        return 0
+    ends, space = desk.ends, desk.space
+    count = tighten(task, motion, ends, space, heap, count, results.gap, witnesses)
+    for pair in range(witnesses.shape[0]):
+        if witnesses[pair, 0] < results.best[pair, UP]:
+            place_witness(task, motion, desk, results, pair, witnesses[pair])
+    return count
