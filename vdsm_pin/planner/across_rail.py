@@ -10,7 +10,6 @@ it would have to withdraw.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -18,6 +17,7 @@ import shapely
 
 from vdsm_pin.errors import PathBlocked
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.planner.bend_kernels import clear_bends, least_moves
 from vdsm_pin.planner.danger_region import DangerRegion
 from vdsm_pin.planner.project import project
 from vdsm_pin.planner.scale import scale
@@ -88,26 +88,26 @@ class AcrossRail:
 
     def _least_move(self, reference: FloatArray, tip_x: FloatArray) -> FloatArray:
         """Smallest move of the bend that clears the region, (n,); [m]."""
-        farthest = self._farthest(reference)
-        scan = np.linspace(0.0, 1.0, SCAN + 1)
-        low, high = np.zeros(len(tip_x)), np.full(len(tip_x), np.nan)
-        for before, after in pairwise(scan):
-            open_ = np.flatnonzero(np.isnan(high))
-            moved = self._moved(reference[open_], after * farthest[open_])
-            clear = self.clear(moved, tip_x[open_])
-            low[open_[clear]], high[open_[clear]] = before, after
-        if np.isnan(high).any():
-            sample = int(np.argmax(np.isnan(high)))
+        moves = least_moves(
+            self.region.corners,
+            self.region.radius,
+            self._pieces,
+            self.axis,
+            reference[:, self.bend - 1],
+            reference[:, -1],
+            tip_x,
+            self.side * self._farthest(reference),
+            SCAN,
+            HALVINGS,
+        )
+        if np.isnan(moves).any():
+            sample = int(np.argmax(np.isnan(moves)))
             reason = (
                 f"joint {self.bend} cannot lead the arm round it within the limit of "
                 f"psi_1 with the tip at {reference[sample, -1].tolist()} m"
             )
             raise PathBlocked(obstacle=self.region.name, reason=reason)
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            clear = self.clear(self._moved(reference, middle * farthest), tip_x)
-            low, high = np.where(clear, low, middle), np.where(clear, middle, high)
-        return high * farthest
+        return np.asarray(self.side * moves)
 
     def _farthest(self, reference: FloatArray) -> FloatArray:
         """Largest move of the bend that leaves psi_1 within its cone, (n,); [m]."""
@@ -134,20 +134,20 @@ class AcrossRail:
 
     def clear(self, planar: FloatArray, tip_x: FloatArray) -> BoolArray:
         """Whether the arm of one bend stays out of the region, (n,)."""
-        manipulator, b = self.problem.manipulator, self.bend - 1
-        corners = planar[:, [0, b, -1]]
-        lengths = np.diff(manipulator.stations[[0, b, -1]])
-        squares = lengths**2 - (np.diff(corners, axis=1) ** 2).sum(axis=2)
-        able = (squares > 0.0).all(axis=1)
-        rises = np.sqrt(np.maximum(squares, 0.0))
-        chain = np.zeros((len(tip_x), 3, 2))
-        chain[..., 1] = corners[..., self.axis]
-        chain[:, 2, 0] = tip_x
-        chain[:, 1, 0] = tip_x - rises[:, 1]
-        chain[:, 0, 0] = chain[:, 1, 0] - rises[:, 0]
-        return np.asarray(
-            able & (self.region.core_distance(chain) >= self.region.radius)
+        return clear_bends(
+            self.region.corners,
+            self.region.radius,
+            self._pieces,
+            self.axis,
+            planar[:, self.bend - 1],
+            planar[:, -1],
+            tip_x,
         )
+
+    @property
+    def _pieces(self) -> FloatArray:
+        """Lengths of the two straight pieces, shape (2,); [m]."""
+        return np.diff(self.problem.manipulator.stations[[0, self.bend - 1, -1]])
 
     def largest_angle(self) -> float:
         """Largest link angle over a few waypoints; infinite where there is none; [rad].
