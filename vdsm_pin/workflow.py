@@ -14,7 +14,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from vdsm_pin.errors import NoPlanFound
+from vdsm_pin.errors import NoPlanFound, OutOfTime
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.refinement import plan_and_verify
@@ -74,16 +74,16 @@ def within(seconds: float | None) -> Iterator[None]:
     """End what is inside after a time, as soon as Python is between two calls.
 
     Raises:
-        NoPlanFound: When the time is over.
+        OutOfTime: When the time is over.
     """
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        message = f"no plan within the time limit of {seconds:g} s"
-        raise NoPlanFound(message)
-
     if seconds is None:
         yield
         return
+    limit = seconds
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        raise OutOfTime(limit)  # a strategy that hears it adds how far it came
+
     before = signal.signal(signal.SIGALRM, stop)
     signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
