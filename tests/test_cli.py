@@ -16,6 +16,7 @@ import pytest
 from problem_files import NEAR, OUT_OF_REACH, write_problem
 
 from vdsm_pin.cli import app, main
+from vdsm_pin.planner.strategies import STRATEGIES, strategy
 from vdsm_pin.report.files import schema
 
 COMMANDS = [
@@ -205,6 +206,7 @@ def bad_inputs(folder: Path, planned: Path) -> dict[str, list[object]]:
         "folder": [*verify, folder],
         "near.yaml": [*verify, good],
         "is a folder, expected a file": [*verify, rows, "--certificate", folder],
+        ": is a folder, expected": [*verify, rows, "--pdf", folder],
         "unknown schema": ["schema", "poem"],
         "unknown manipulator": ["urdf", "octopus", "--out", folder / "o.urdf"],
         "neither summary.csv": ["diff", folder, folder],
@@ -271,6 +273,39 @@ def test_a_view_is_written_as_one_page(
     )  # fmt: skip
     assert ran.status == 0
     assert "MeshCat" in (tmp_path / "view.html").read_text(encoding="utf-8")
+
+
+def test_the_help_names_every_strategy(vdsm: Shell) -> None:
+    for command in ("plan", "batch"):
+        text = " ".join(vdsm(command, "--help").out.split())
+        assert f"How to plan: {', '.join(STRATEGIES)}" in text
+    assert all(callable(strategy(name)) for name in STRATEGIES)
+
+
+def test_without_a_browser_nothing_is_verified_for_paper(
+    vdsm: Shell, planned: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CHROMIUM", str(tmp_path / "absent"))
+    ran = vdsm(
+        "verify", planned / "near.yaml", "--trajectory", planned / "trajectory.csv",
+        "--out", tmp_path / "out", "--pdf", tmp_path / "report.pdf",
+    )  # fmt: skip
+    assert ran.status == 2
+    assert "--pdf needs Chromium" in one_message(ran)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_certificate_is_checked_against_a_built_in_problem(
+    vdsm: Shell, planned: Path, tmp_path: Path
+) -> None:
+    empty = tmp_path / "empty.cert"
+    empty.write_text("")
+    rows = planned / "trajectory.csv"
+    by_name = vdsm("check-certificate", empty, "paper/free", rows)
+    assert "does not exist" not in by_name.out + by_name.err
+    unknown = vdsm("check-certificate", empty, "paper/obs9", rows)
+    assert unknown.status == 2
+    assert "built-in problems: paper/free" in one_message(unknown)
 
 
 def test_a_result_does_not_differ_from_itself(vdsm: Shell, planned: Path) -> None:

@@ -7,6 +7,7 @@ Screenshots stay in test-output/.
 import os
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.report.facts import batch_row, verification_file
 from vdsm_pin.report.html import write_index, write_report
 from vdsm_pin.report.picture import picture
+from vdsm_pin.verification.records import Check, Verdict
 
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium")
 SHOTS = Path(__file__).parents[2] / "test-output"
@@ -166,8 +168,13 @@ def test_hovering_names_a_value(report: Watched) -> None:
     assert "mm at" in text
 
 
-def test_dark_and_narrow_pages_work(browser: Any, tmp_path: Path) -> None:
+def test_dark_and_narrow_pages_work_and_show_what_failed(
+    browser: Any, tmp_path: Path
+) -> None:
     judged = made_up.verification(n=40)
+    late = Check("late", Verdict.UNDECIDED, 1, 2.0, 1.0, "m", "waypoint 30")
+    bad = Check("bad", Verdict.REFUTED, 1, 2.0, 1.0, "m", "interval 17 at 0.2500, x")
+    judged = replace(judged, checks=(*judged.checks, late, bad))
     path = tmp_path / "report.html"
     write_report(path, judged, verification_file(judged, made_up.RECORD))
     size = {"width": 420, "height": 800}
@@ -176,6 +183,16 @@ def test_dark_and_narrow_pages_work(browser: Any, tmp_path: Path) -> None:
     watched.shot("report-dark-narrow")
     width = watched.page.evaluate("document.documentElement.scrollWidth")
     assert width <= 420, "the page scrolls sideways"
+    assert time_of(watched) == 17.25, "the page opens where the verdict was decided"
+    flags = watched.page.locator("[data-chart=psi] .flag")
+    assert flags.count() == 2
+    assert watched.page.locator("[data-chart=psi] .flag.refuted").count() == 1
+    watched.page.evaluate("vdsm.motion.go(3)")
+    watched.page.locator(".banner button").click()
+    assert time_of(watched) == 17.25
+    assert watched.page.evaluate("vdsm.view.ends[0].material.opacity") == 1
+    watched.page.locator("tr.undecided button").click()
+    assert time_of(watched) == 30.0
     assert watched.errors == []
 
 
