@@ -199,7 +199,7 @@ def _left_of(a: FloatArray, b: FloatArray, x: float, y: float) -> bool:
         a, b = b, a
     if not a[1] <= y < b[1]:
         return False
-    return (b[0] - a[0]) * (y - a[1]) > (b[1] - a[1]) * (x - a[0])
+    return bool((b[0] - a[0]) * (y - a[1]) > (b[1] - a[1]) * (x - a[0]))
 
 
 @compiled
