@@ -8,9 +8,6 @@ from typing import Final
 class Tolerances:
     """The numbers that decide between equal and different."""
 
-    sine_excess: float = 1e-12
-    """Excess of a sine over 1 that counts as rounding; [-]."""
-
     joint_centre: float = 1e-9
     """Joint centres by Pinocchio against the closed form; [m].
 

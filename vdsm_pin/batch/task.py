@@ -28,7 +28,6 @@ TIMING: Final = "timing.json"
 ALL: Final = "all"
 FAILED: Final = "failed"
 NONE: Final = "none"
-KEEP: Final = (ALL, FAILED, NONE)
 """Whose files stay: every problem's, those of problems that did not pass, nobody's."""
 
 

@@ -17,26 +17,6 @@ def frozen(value: Any, dtype: type[Any] = np.float64) -> npt.NDArray[Any]:
     return array
 
 
-def checked_arcsin(value: FloatArray, tolerance: float) -> FloatArray:
-    """Arcsine that forgives rounding and nothing more.
-
-    Args:
-        value: Sines, any shape; [-].
-        tolerance: Excess over 1 that counts as rounding; [-].
-
-    Returns:
-        Angles in [-pi/2, pi/2], same shape; [rad].
-
-    Raises:
-        ValueError: If an entry exceeds 1 by more than the tolerance, or is NaN.
-    """
-    excess = np.abs(value) - 1.0
-    if not (excess <= tolerance).all():
-        message = f"sine out of domain by {np.max(excess):.3e} (> {tolerance:.1e})"
-        raise ValueError(message)
-    return np.asarray(np.arcsin(np.clip(value, -1.0, 1.0)))
-
-
 def rotation_from_rpy(rpy: FloatArray) -> FloatArray:
     """Rotation matrix Rz(yaw) @ Ry(pitch) @ Rx(roll), the URDF order.
 

@@ -87,18 +87,3 @@ def sha256_of(parts: Iterable[bytes]) -> str:
     for part in parts:
         digest.update(part)
     return digest.hexdigest()
-
-
-def sha256_of_file(path: Path) -> str:
-    """SHA-256 of a file of any size, in hexadecimal.
-
-    Raises:
-        InvalidFile: If it cannot be read.
-    """
-    check_is_file(path)
-    try:
-        with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InvalidFile(file=path, problem=f"cannot be read: {reason}") from None
