@@ -93,7 +93,7 @@ def verification(
     closest = tuple(
         ClosestApproach(
             interval=min(17 * i, intervals - 1),
-            time=0.25,
+            share=0.25,
             pair=pair,
             lower=0.0041 + 0.01 * i,
             upper=0.0042 + 0.01 * i,
@@ -123,10 +123,16 @@ def verification(
     )
 
 
-def chunk(first: int, m: int, pairs: int) -> ClearanceChunk:
+def chunk(first: int, m: int, pairs: int, share: float = 0.0) -> ClearanceChunk:
     values = np.linspace(0.1, 0.2, m * pairs).reshape(m, pairs)
     points = np.stack([values] * 3, axis=2)
     verdicts = np.arange(m * pairs).reshape(m, pairs) % 3
     return ClearanceChunk(
-        first, values, values + 0.01, values * 0, verdicts, points, points + 1.0
+        first,
+        values,
+        values + 0.01,
+        0.0 * values + share,
+        verdicts,
+        points,
+        points + 1.0,
     )

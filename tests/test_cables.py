@@ -214,16 +214,18 @@ def test_contradicting_lengths_are_refused_by_link(link: int) -> None:
     lengths[1500, link - 1] += [1e-9, 0.0, 0.0]
     with pytest.raises(InconsistentCables) as caught:
         angles_from_cables(HRM8, lengths)
-    assert (caught.value.sample, caught.value.link) == (1500, link)
+    assert (caught.value.waypoint, caught.value.link) == (1500, link)
     assert caught.value.residual > caught.value.tolerance
-    assert f"sample 1500: the cable lengths of link {link} fit no" in str(caught.value)
+    assert f"waypoint 1500: the cable lengths of link {link} fit no" in str(
+        caught.value
+    )
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 0.0, -1.0, 1e300])
 def test_impossible_lengths_are_refused(bad: float) -> None:
     lengths = cable_lengths(HRM8, *np.zeros((2, 4, 8)))
     lengths[2, 3, 1] = bad
-    with pytest.raises(InconsistentCables, match=r"sample 2: .* link 4"):
+    with pytest.raises(InconsistentCables, match=r"waypoint 2: .* link 4"):
         angles_from_cables(HRM8, lengths)
 
 

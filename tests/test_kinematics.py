@@ -91,6 +91,6 @@ def test_centres_a_link_length_apart_or_refused_by_name() -> None:
     x0, alpha, theta = samples("uniform", 3)
     centres = joint_centres(HRM8, x0, alpha, theta)
     centres[1, 4] += [1e-6, 0.0, 0.0]
-    with pytest.raises(LinkTooShort, match="sample 1") as caught:
+    with pytest.raises(LinkTooShort, match="waypoint 1") as caught:
         joint_angles(HRM8, centres)
     assert caught.value.link in (4, 5)

@@ -101,7 +101,7 @@ def angles_from_cables(
 
 
 def _peel(
-    holes: FloatArray, guesses: FloatArray, left: FloatArray, first_sample: int
+    holes: FloatArray, guesses: FloatArray, left: FloatArray, first_waypoint: int
 ) -> FloatArray:
     """Solve joint by joint; a solved joint's spans come off all cables through it.
 
@@ -109,7 +109,7 @@ def _peel(
         holes: Constants of all holes, shape (3N, 7); [m^2].
         guesses: First guesses as linear maps of spans, shape (N, 2, 3); [1/m].
         left: Cable lengths inside the joints, shape (3N, n), used up; [m].
-        first_sample: Number of the first column, for messages.
+        first_waypoint: Number of the first column, for messages.
 
     Returns:
         tan(alpha / 2) and tan(theta / 2), shape (2, N, n); [-].
@@ -132,7 +132,7 @@ def _peel(
             u[k], v[k] = _search(holes[own], spans[:, k])
             if np.isnan(u[k]):
                 raise InconsistentCables(
-                    sample=first_sample + int(k),
+                    waypoint=first_waypoint + int(k),
                     link=i + 1,
                     residual=float(residual[k]),
                     tolerance=TOLERANCES.cable_length,

@@ -236,7 +236,7 @@ def problems(
 @app.command(epilog=_examples("vdsm schema verification"))
 def schema(
     name: Annotated[
-        str, typer.Argument(help="problem, plan, verification or manifest.")
+        str, typer.Argument(help="problem, plan, verification, manifest or timing.")
     ] = "problem",
 ) -> None:
     """Print the JSON Schema of a file."""

@@ -53,13 +53,13 @@ class InconsistentCables(InvalidInput):
     """Three cable lengths of a link that no two joint angles give."""
 
     def __init__(
-        self, *, sample: int, link: int, residual: float, tolerance: float
+        self, *, waypoint: int, link: int, residual: float, tolerance: float
     ) -> None:
-        self.sample, self.link = sample, link
+        self.waypoint, self.link = waypoint, link
         self.residual, self.tolerance = residual, tolerance
         message = (
-            f"sample {sample}: the cable lengths of link {link} fit no joint angles; "
-            f"the nearest leave {residual:.3e} m (tolerance {tolerance:.1e} m)"
+            f"waypoint {waypoint}: the cable lengths of link {link} fit no joint "
+            f"angles; the nearest leave {residual:.3e} m (tolerance {tolerance:.1e} m)"
         )
         super().__init__(message)
 
@@ -72,11 +72,11 @@ class OutOfReach(Infeasible):
     """A tip position lies farther from the rail than the arm reaches."""
 
     def __init__(
-        self, *, sample: int, distance: float, reach: float, reason: str
+        self, *, waypoint: int, distance: float, reach: float, reason: str
     ) -> None:
-        self.sample, self.distance, self.reach = sample, distance, reach
+        self.waypoint, self.distance, self.reach = waypoint, distance, reach
         message = (
-            f"tip waypoint {sample} lies {distance:.6f} m from the rail, "
+            f"waypoint {waypoint}: the tip lies {distance:.6f} m from the rail, "
             f"beyond the reach of {reach:.6f} m ({reason})"
         )
         super().__init__(message)
@@ -85,10 +85,10 @@ class OutOfReach(Infeasible):
 class LinkTooShort(Infeasible):
     """The projections of two adjacent joints are farther apart than the link."""
 
-    def __init__(self, *, sample: int, link: int, gap: float, length: float) -> None:
-        self.sample, self.link, self.gap, self.length = sample, link, gap, length
+    def __init__(self, *, waypoint: int, link: int, gap: float, length: float) -> None:
+        self.waypoint, self.link, self.gap, self.length = waypoint, link, gap, length
         message = (
-            f"sample {sample}: projected gap {gap:.6f} m exceeds "
+            f"waypoint {waypoint}: projected gap {gap:.6f} m exceeds "
             f"link {link} of length {length:.6f} m (excess {gap - length:.3e} m)"
         )
         super().__init__(message)
@@ -98,12 +98,12 @@ class LimitExceeded(Infeasible):
     """A configuration breaks a joint limit."""
 
     def __init__(
-        self, *, sample: int, quantity: str, value: float, limit: float, unit: str
+        self, *, waypoint: int, quantity: str, value: float, limit: float, unit: str
     ) -> None:
-        self.sample, self.quantity = sample, quantity
+        self.waypoint, self.quantity = waypoint, quantity
         self.value, self.limit, self.unit = value, limit, unit
         message = (
-            f"sample {sample}: {quantity} is {value:.4f} {unit}, "
+            f"waypoint {waypoint}: {quantity} is {value:.4f} {unit}, "
             f"the limit is {limit:.4f} {unit}"
         )
         super().__init__(message)

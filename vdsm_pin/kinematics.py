@@ -104,7 +104,7 @@ def joint_angles(
 
 
 def _link_directions(
-    manipulator: Manipulator, centres: FloatArray, first_sample: int
+    manipulator: Manipulator, centres: FloatArray, first_waypoint: int
 ) -> FloatArray:
     """Unit vectors along the links, shape (N, 3, n_samples); [-].
 
@@ -116,11 +116,11 @@ def _link_directions(
     spans = np.sqrt(np.einsum("icn,icn->in", links, links))
     residual = np.abs(spans - manipulator.link_lengths[:, None])
     if not (residual <= TOLERANCES.joint_centre).all():
-        link, sample = np.unravel_index(int(np.argmax(residual)), residual.shape)
+        link, waypoint = np.unravel_index(int(np.argmax(residual)), residual.shape)
         raise LinkTooShort(
-            sample=first_sample + int(sample),
+            waypoint=first_waypoint + int(waypoint),
             link=int(link) + 1,
-            gap=float(spans[link, sample]),
+            gap=float(spans[link, waypoint]),
             length=float(manipulator.link_lengths[link]),
         )
     return np.asarray(links / spans[:, None])

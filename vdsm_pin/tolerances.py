@@ -1,127 +1,134 @@
 """Every tolerance of the package, with its unit and its reason."""
 
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+from typing import Any, Final
+
+
+def _held(value: float, unit: str) -> Any:
+    """A field with its unit: m, rad, - or the ones it serves."""
+    return field(default=value, metadata={"unit": unit})
 
 
 @dataclass(frozen=True, slots=True)
 class Tolerances:
     """The numbers that decide between equal and different."""
 
-    joint_centre: float = 1e-9
+    joint_centre: float = _held(1e-9, "m")
     """Joint centres by Pinocchio against the closed form; [m].
 
     Both are sums of at most 40 products of order 1 m; 1e-12 is seen, 1e-9 promised.
     """
 
-    tip_on_path: float = 1e-6
+    tip_on_path: float = _held(1e-6, "m")
     """Tip against the desired path at a waypoint marked on_path; [m]."""
 
-    cable_round_trip: float = 1e-9
+    cable_round_trip: float = _held(1e-9, "rad")
     """Angles recovered from cable lengths; [rad]."""
 
-    cable_length: float = 1e-11
+    cable_length: float = _held(1e-11, "m")
     """Length by which three cables of a link may contradict each other; [m].
 
     Rounding of a 20 m cable summed over 40 joints is 1e-13 m; on a hole circle of
     10 mm, 1e-11 m are the promised 1e-9 rad.
     """
 
-    cable_step: float = 1e-7
+    cable_step: float = _held(1e-7, "-")
     """Newton step in tan(angle / 2) after which the next one is rounding; [-].
 
     The steps converge quadratically: the error after a step of 1e-7 is about 1e-14.
     """
 
-    joint_limit: float = 1e-9
+    joint_limit: float = _held(1e-9, "rad")
     """Excess over theta/alpha/psi that counts as rounding of a CSV; [rad]."""
 
-    base_limit: float = 1e-9
+    base_limit: float = _held(1e-9, "m")
     """Excess over the x0 range that counts as rounding of a CSV; [m]."""
 
-    changed_angle: float = 8.726646259971648e-4
+    changed_angle: float = _held(8.726646259971648e-4, "rad")
     """A link angle above this counts as changed: 0.05 deg; [rad]."""
 
-    row_change: float = 8.726646259971648e-2
+    row_change: float = _held(8.726646259971648e-2, "rad")
     """Largest change of a joint angle from row to row: 5 deg; [rad]."""
 
-    start_joints: float = 1e-9
+    start_joints: float = _held(1e-9, "m or rad")
     """Joint values of the first row against those of the problem; [m] and [rad]."""
 
-    coverage: float = 1e-9
+    coverage: float = _held(1e-9, "-")
     """Coverage below the required one that counts as rounding of a CSV; [-]."""
 
-    joint_error: float = 1e-5
+    joint_error: float = _held(1e-5, "rad")
     """Width to which the largest certified joint error is bisected; [rad]."""
 
-    least_bracket: float = 1e-6
+    least_bracket: float = _held(1e-6, "m")
     """Width to which the bracket of the least clearance is narrowed; [m]."""
 
-    coal_gjk: float = 1e-8
+    coal_gjk: float = _held(1e-8, "m")
     """Coal's gjk_tolerance: 1e-6 is 1.5e-6 m unsafe, 1e-12 returns NaN; [m]."""
 
-    coal_agreement: float = 5e-6
+    coal_agreement: float = _held(5e-6, "m")
     """Coal's distance against our bracket: beyond it the row is undecided; [m]."""
 
-    bracket_gap: float = 1e-9
+    bracket_gap: float = _held(1e-9, "m")
     """Upper minus lower at which a distance bracket counts as closed; [m]."""
 
-    arithmetic: float = 1e-11
+    arithmetic: float = _held(1e-11, "m")
     """Bound of all rounding in one clearance evaluation for scenes within 100 m; [m].
 
     A coordinate is a sum of at most 40 terms below 100 m, each within 8 ulp of
     1.4e-14 m: 40 * 8 * 1.4e-14 = 4.5e-12 m.
     """
 
-    scene_extent: float = 100.0
+    scene_extent: float = _held(100.0, "m")
     """Largest coordinate in the base frame, for which `arithmetic` is derived; [m]."""
 
-    mesh_size_low: float = 1.0 / 300.0
+    mesh_size_low: float = _held(1.0 / 300.0, "-")
     """Mesh diagonal over arm length below which the unit is taken to be wrong; [-].
 
     A millimetre taken for a metre is off by 1000; parts that matter to an arm are
     between a tenth and a few times its length.
     """
 
-    mesh_size_high: float = 30.0
+    mesh_size_high: float = _held(30.0, "-")
     """Mesh diagonal over arm length above which the unit is taken to be wrong; [-]."""
 
-    straight_slope: float = 1e-10
+    straight_slope: float = _held(1e-10, "-")
     """Change of a link's slope dy/dL or dz/dL that counts as none; [-].
 
     Sums of a few products of order 1 leave 1e-15; over 3 m of arm 1e-10 moves the body
     by 3e-10 m, far below every clearance that is planned for.
     """
 
-    on_path_length: float = 1e-9
+    on_path_length: float = _held(1e-9, "m")
     """Arc lengths closer than this are the same place on the desired path; [m]."""
 
-    parallel: float = 1e-9
+    parallel: float = _held(1e-9, "-")
     """Sine of the angle below which two directions count as parallel; [-]."""
 
-    on_boundary: float = 1e-9
+    on_boundary: float = _held(1e-9, "m")
     """A point this little inside a planner's danger region is on its boundary; [m]."""
 
-    planned_clearance: float = 1e-6
+    planned_clearance: float = _held(1e-6, "m")
     """What a planner keeps beyond the clearance asked for; [m].
 
     Proved lower bounds and the digits of a CSV stay a hundred times closer than this.
     """
 
-    planned_step: float = 8.552113334772214e-2
+    planned_step: float = _held(8.552113334772214e-2, "rad")
     """Largest change of a joint angle per row the planner leaves: 4.9 deg; [rad].
 
     5 deg is asked for; the reserve covers the rounding of a CSV many times over.
     """
 
-    planned_stray: float = 1e-5
+    planned_stray: float = _held(1e-5, "m")
     """How far from its path a planner lets the tip stray between two waypoints; [m].
 
     The arm draws straight lines in joint space, not in space. On a path 10 mm a row
     the straight arm strays by 7e-6 m; ten times less would take three times the rows.
     """
 
-    planned_reserve: float = 1e-4
+    planned_reserve: float = _held(1e-4, "m")
     """What the paper's planner keeps beyond that for the way between waypoints; [m].
 
     A joint that slides 10 mm a row on a region of radius 125 mm cuts 0.1 mm off it;
@@ -129,9 +136,14 @@ class Tolerances:
     cut time finely where the clearance just suffices.
     """
 
-    result_change: float = 1e-6
+    result_change: float = _held(1e-6, "m, rad or -")
     """Difference of two results below which `vdsm diff` calls them equal; SI."""
 
 
 TOLERANCES: Final = Tolerances()
 """The values in force. Reports print them all."""
+
+UNITS: Final[Mapping[str, str]] = MappingProxyType(
+    {one.name: one.metadata.get("unit", "") for one in fields(Tolerances)}
+)
+"""The unit of every tolerance, by name."""

@@ -68,7 +68,7 @@ def test_both_reaches_have_two_sides(factor_of, inside: bool) -> None:
             check_feasibility(HRM8, path)
         between = radius + excess <= curled_reach(HRM8)
         assert ("straight arm" in str(error.value)) is between
-        assert error.value.sample == 1
+        assert error.value.waypoint == 1
 
 
 def test_projection_drops_x() -> None:
@@ -117,7 +117,7 @@ def test_a_gap_as_long_as_its_link_is_the_limit(excess: float, fits: bool) -> No
     with pytest.raises(LinkTooShort) as error:
         lift(two, planar, np.array([2.0]))
     assert error.value.link == 2
-    assert error.value.sample == 0
+    assert error.value.waypoint == 0
 
 
 @pytest.mark.parametrize("kind", ["disc", "stadium", "triangle"])
@@ -185,7 +185,7 @@ def test_limits_have_two_sides(quantity: str, excess: float) -> None:
         return
     with pytest.raises(LimitExceeded) as error:
         check_limits(HRM8, x0, alpha, theta)
-    assert error.value.sample == 1
+    assert error.value.waypoint == 1
     if quantity in ("psi", "x0"):
         assert quantity in error.value.quantity
 

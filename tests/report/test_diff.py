@@ -40,7 +40,7 @@ def test_equal_folders_have_no_difference(tmp_path: Path) -> None:
         ({"coverage": 0.8}, True),
         ({"changed_angles_mean_on_path": 1.0}, False),
         ({"changed_angles_mean_on_path": 7.0}, True),
-        ({"joint_error_rad": 0.001}, True),
+        ({"max_joint_error_rad": 0.001}, True),
     ],
 )
 def test_each_change_is_named_with_its_direction(

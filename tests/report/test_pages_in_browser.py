@@ -172,8 +172,8 @@ def test_dark_and_narrow_pages_work_and_show_what_failed(
     browser: Any, tmp_path: Path
 ) -> None:
     judged = made_up.verification(n=40)
-    late = Check("late", Verdict.UNDECIDED, 1, 2.0, 1.0, "m", "waypoint 30")
-    bad = Check("bad", Verdict.REFUTED, 1, 2.0, 1.0, "m", "interval 17 at 0.2500, x")
+    late = Check("late", Verdict.UNDECIDED, 1, 2.0, 1.0, "m", moment=30.0)
+    bad = Check("bad", Verdict.REFUTED, 1, 2.0, 1.0, "m", "x", 17.25)
     judged = replace(judged, checks=(*judged.checks, late, bad))
     path = tmp_path / "report.html"
     write_report(path, judged, verification_file(judged, made_up.RECORD))

@@ -95,7 +95,7 @@ def test_the_reason_names_the_check_that_failed() -> None:
     certified = written(made_up.verification())
     assert "at least 4.100 mm" in certified.reason
     free = written(made_up.verification(scene=Scene()))
-    assert free.min_clearance_m is None
+    assert free.min_clearance is None
     assert free.verdict == "certified"
 
 
@@ -117,4 +117,4 @@ def test_links_near_each_other_do_not_hide_the_obstacles() -> None:
     judged = made_up.verification()
     near = replace(judged.closest[0], pair=Pair(1, other_link=3), lower=0.001)
     both = written(replace(judged, closest=(near, *judged.closest)))
-    assert both.min_clearance_m == written(judged).min_clearance_m
+    assert both.min_clearance == written(judged).min_clearance

@@ -15,6 +15,7 @@ from vdsm_pin.report.tables import (
     write_link_angles,
     write_summary,
 )
+from vdsm_pin.verification.records import Pair
 
 
 def read(path: Path) -> list[dict[str, str]]:
@@ -27,20 +28,31 @@ def test_clearance_rows_are_complete_and_in_order(tmp_path: Path) -> None:
     pairs = judged.pairs
     with ClearanceCsv(tmp_path / "c.csv", judged.problem, pairs) as sink:
         sink(made_up.chunk(0, 3, len(pairs)))
-        sink(made_up.chunk(3, 2, len(pairs)))
+        sink(made_up.chunk(3, 2, len(pairs), 0.5))
     rows = read(tmp_path / "c.csv")
     assert len(rows) == 5 * len(pairs)
     assert [int(row["interval"]) for row in rows[:: len(pairs)]] == [0, 1, 2, 3, 4]
-    assert [row["obstacle"] for row in rows[: len(pairs)]] == [p.label for p in pairs]
+    assert [row["obstacle"] for row in rows[: len(pairs)]] == [
+        pair.obstacle for pair in pairs
+    ]
+    assert [float(row["moment"]) for row in rows[:: len(pairs)]] == [0, 1, 2, 3.5, 4.5]
     first = made_up.chunk(0, 3, len(pairs))
     lower = [float(row["lower_m"]) for row in rows[: 3 * len(pairs)]]
     np.testing.assert_allclose(lower, first.lower.ravel(), rtol=1e-8)
     assert {row["verdict"] for row in rows} == {"certified", "refuted", "undecided"}
 
 
+def test_a_pair_of_links_is_told_by_its_numbers(tmp_path: Path) -> None:
+    judged = made_up.verification()
+    with ClearanceCsv(tmp_path / "c.csv", judged.problem, [Pair(2, other_link=5)]) as c:
+        c(made_up.chunk(0, 1, 1))
+    (row,) = read(tmp_path / "c.csv")
+    assert (row["link"], row["obstacle"], row["other_link"]) == ("2", "", "5")
+
+
 def test_obstacle_names_with_commas_stay_one_field(tmp_path: Path) -> None:
     judged = made_up.verification()
-    pair = type(judged.pairs[0])(1, 'a, "b"')
+    pair = Pair(1, 'a, "b"')
     with ClearanceCsv(tmp_path / "c.csv", judged.problem, [pair]) as sink:
         sink(made_up.chunk(0, 1, 1))
     assert read(tmp_path / "c.csv")[0]["obstacle"] == 'a, "b"'

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from vdsm_pin.report.words import OUTCOMES, outcome, percent, quantity
+from vdsm_pin.report.words import OUTCOMES, outcome, percent, place, quantity
 
 
 @pytest.mark.parametrize(
@@ -46,6 +46,23 @@ def test_quantities_read_as_people_write_them(
 )
 def test_percent_never_rounds_up_to_complete(share: float | None, text: str) -> None:
     assert percent(share) == text
+
+
+@pytest.mark.parametrize(
+    ("moment", "where", "text"),
+    [
+        (193.0, "", "waypoint 193"),
+        (190.0, "theta5", "waypoint 190, theta5"),
+        (193.25, "link 6 and pillar", "waypoint 193.25, link 6 and pillar"),
+        (7.5, "", "waypoint 7.5"),
+        (0.0, "", "waypoint 0"),
+        (12.999, "", "waypoint 13"),
+        (None, "not run: broken", "not run: broken"),
+        (None, "", ""),
+    ],
+)
+def test_a_place_is_when_and_where(moment: float | None, where: str, text: str) -> None:
+    assert place(moment, where) == text
 
 
 def test_only_certified_counts_as_passed() -> None:

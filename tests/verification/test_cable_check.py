@@ -63,4 +63,4 @@ def test_both_sides_of_the_tolerance(
     still = np.zeros((6, 8))
     check = check_cables(problem_for(HRM8), trajectory_of(still, still))
     assert (check.verdict is Verdict.CERTIFIED) == passes
-    assert check.where == "waypoint 3, theta6"
+    assert (check.moment, check.where) == (3.0, "theta6")

@@ -101,7 +101,7 @@ def test_coal_agrees_with_the_brackets_everywhere(shape: str) -> None:
     three = [replace(obstacle_of(shape, rng), name=f"number {k}") for k in range(3)]
     problem = problem_with(*three)
     found = list(coal_distances(ROBOT, problem, trajectory_of(25), np.inf))
-    assert sum(chunk.sample.size for chunk in found) == 25 * 8 * 3
+    assert sum(chunk.waypoint.size for chunk in found) == 25 * 8 * 3
     for chunk in found:
         assert chunk.disagreement.max() < 2e-7
         apart = chunk.distance > 0.0
@@ -119,13 +119,13 @@ def test_culling_skips_only_what_is_far(shape: str) -> None:
     near = {
         (s, i)
         for chunk in full
-        for s, i, d in zip(chunk.sample, chunk.link, chunk.distance, strict=True)
+        for s, i, d in zip(chunk.waypoint, chunk.link, chunk.distance, strict=True)
         if d <= reach
     }
     seen = {
         (s, i)
         for chunk in culled
-        for s, i in zip(chunk.sample, chunk.link, strict=True)
+        for s, i in zip(chunk.waypoint, chunk.link, strict=True)
     }
     assert near <= seen
     assert {i for _, i in seen} == set(range(8)), "every pair at least once"
@@ -210,7 +210,7 @@ def test_an_interval_proof_above_coal_is_noticed() -> None:
     proved[0, 3] = 0.01 + 1e-5
     (check,) = check_coal(ROBOT, problem, STRAIGHT, proved)
     assert check.verdict is Verdict.UNDECIDED
-    assert "link 4, ball" in check.where
+    assert "link 4 and ball" in check.where
 
 
 def test_poses_come_from_pinocchio_and_match_the_centres() -> None:

@@ -64,7 +64,7 @@ def test_coal_agrees_on_every_pair(n_links: int) -> None:
     arm = coiling_arm(n_links)
     motion = trajectory_of(arm, 12, 1.3)
     found = list(link_distances(load_robot(arm), motion, np.inf))
-    count = sum(chunk.sample.size for chunk in found)
+    count = sum(chunk.waypoint.size for chunk in found)
     assert count == 12 * (n_links - 1) * (n_links - 2) // 2
     assert max(chunk.disagreement.max() for chunk in found) < 1e-12
     (check,) = check_coal_links(load_robot(arm), problem_for(arm), motion)

@@ -72,4 +72,4 @@ def test_missing_evidence_is_no_pass(monkeypatch: pytest.MonkeyPatch) -> None:
     check = check_fk(load_robot(HRM8), problem_for(HRM8), trajectory_of(5))
     assert check.verdict is Verdict.REFUTED
     assert check.worst == np.inf
-    assert check.where == "waypoint 2, joint centre O5"
+    assert (check.moment, check.where) == (2.0, "joint centre O5")

@@ -81,7 +81,7 @@ def test_coverage_counts_each_place_once(laps: float) -> None:
     assert len(gaps) == (1 if laps < 1.0 else 0)
     if laps < 1.0:
         np.testing.assert_allclose(gaps, [[0.8, 1.6]], atol=1e-9)
-        row = named(check_tip(problem, motion).checks, "drawn")
+        row = named(check_tip(problem, motion).checks, "coverage")
         assert row.verdict is Verdict.REFUTED
 
 
@@ -93,7 +93,7 @@ def test_a_tip_off_the_path_by_two_micrometres_is_refuted_at_its_row() -> None:
         check_tip(problem, replace(motion, x0=x0)).checks, "path at the waypoints"
     )
     assert row.verdict is Verdict.REFUTED
-    assert row.where == "waypoint 17"
+    assert row.moment == 17.0
     assert row.worst == pytest.approx(2e-6, rel=1e-6)
 
 
@@ -130,7 +130,7 @@ def test_one_angle_past_its_limit_is_found(field: str, joint: int, words: str) -
         values[9, joint - 1] = -(ARM.max_joint_angle + past)
         row = named(check_limits(problem, replace(motion, **{field: values})), words)
         assert row.verdict is verdict
-        assert row.where == f"waypoint 9, {field}{joint}"
+        assert (row.moment, row.where) == (9.0, f"{field}{joint}")
 
 
 def test_the_cone_is_judged_apart_from_the_box() -> None:
@@ -162,7 +162,9 @@ def test_base_and_steps_are_judged() -> None:
     assert (rail.worst, rail.limit) == (-5.1, -5.0)
     alpha = motion.alpha.copy()
     alpha[4:, 0] += np.deg2rad(5.5)
-    step = named(check_limits(problem, replace(motion, alpha=alpha)), "row to row")
+    step = named(
+        check_limits(problem, replace(motion, alpha=alpha)), "between waypoints"
+    )
     assert step.verdict is Verdict.REFUTED
-    assert step.where == "waypoint 3, joint 1"
+    assert (step.moment, step.where) == (3.0, "joint 1")
     assert extremes(motion).x0_min == motion.x0.min()

@@ -5,7 +5,8 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from vdsm_pin.batch.task import Done
-from vdsm_pin.report.words import outcome, quantity
+from vdsm_pin.report.files import BatchRow
+from vdsm_pin.report.words import outcome, quantity, term
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
@@ -51,10 +52,9 @@ class Progress:
         verdict = f"{known.mark} {known.word:<10}"
         tail = row.reason
         if known.passed:
-            clearance = quantity(row.min_clearance_lower_m, "m")
-            near = f"clearance {clearance}" if row.closest else "no obstacle"
-            tail = f"{near}, largest link angle "
-            tail += quantity(row.max_link_angle_rad, "rad")
+            near = _said(row, "min_clearance_lower_m", "m")
+            near = near if row.closest_link else "no obstacle"
+            tail = f"{near}, {_said(row, 'max_link_angle_rad', 'rad')}"
         kept = " (kept)" if done.kept else ""
         if self._bar is None:
             sys.stdout.write(f"{head} {verdict} {row.folder}{kept}  {tail}\n")
@@ -67,3 +67,7 @@ class Progress:
         )
         self._bar.console.print(line)
         self._bar.advance(self._bar.task_ids[0])
+
+
+def _said(row: BatchRow, key: str, unit: str) -> str:
+    return f"{term(key)} {quantity(getattr(row, key), unit)}"

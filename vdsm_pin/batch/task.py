@@ -1,7 +1,6 @@
 """One problem of a batch inside a worker: plan, verify, write its folder aside."""
 
 import hashlib
-import json
 import shlex
 import shutil
 import time
@@ -14,7 +13,7 @@ from pydantic import ValidationError
 from vdsm_pin.errors import Infeasible, VdsmError
 from vdsm_pin.io.problem_file import ProblemFile, read_problem
 from vdsm_pin.report.facts import batch_row
-from vdsm_pin.report.files import BatchRow, ManifestFile
+from vdsm_pin.report.files import BatchRow, ManifestFile, TimingFile
 from vdsm_pin.report.picture import picture
 from vdsm_pin.report.run_record import sha256_of, versions
 from vdsm_pin.report.words import outcome
@@ -100,8 +99,8 @@ def perform(task: Task) -> Done:
     if not row.waypoints or not keeps_files(task.keep, row):
         shutil.rmtree(task.aside, ignore_errors=True)
     write_manifest(task, row, digest)
-    seconds = {"seconds": round(time.perf_counter() - started, 3)}
-    (task.aside / TIMING).write_text(json.dumps(seconds) + "\n", encoding="utf-8")
+    timing = TimingFile(seconds=round(time.perf_counter() - started, 3))
+    (task.aside / TIMING).write_text(timing.text(), encoding="utf-8")
     return Done(row, kept=False)
 
 

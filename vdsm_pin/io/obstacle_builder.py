@@ -1,5 +1,6 @@
 """Obstacles of a problem file to solids in the base frame, in metres."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import singledispatchmethod
@@ -18,6 +19,7 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import UNITS_PER_METRE
 
 AXES: Final = {"x": 0, "y": 1, "z": 2}
+_LINK_NAME: Final = re.compile(r"link ?\d+", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -85,11 +87,14 @@ class ObstacleBuilder:
         """All obstacles, in file order.
 
         Raises:
-            InvalidFile: If one is not a solid, or two share a name.
+            InvalidFile: If one is not a solid, has a link's name, or two share one.
         """
         obstacles: list[scene.Obstacle] = []
         first: dict[str, int] = {}
         for i, model in enumerate(models):
+            if _LINK_NAME.fullmatch(model.name):
+                problem = f"is {model.name!r}, which is how links of the arm are named"
+                raise self.document.invalid(("obstacles", i, "name"), problem)
             if model.name in first:
                 problem = (
                     f"is {model.name!r}, which obstacles[{first[model.name]}] is "

@@ -45,7 +45,9 @@ def check_feasibility(manipulator: Manipulator, path: DesiredPath) -> None:
     curled, straight = curled_reach(manipulator), straight_reach(manipulator)
     if distance > curled:
         reason = "every joint at its limit, Eq. 4"
-        raise OutOfReach(sample=worst, distance=distance, reach=curled, reason=reason)
+        raise OutOfReach(waypoint=worst, distance=distance, reach=curled, reason=reason)
     if distance > straight:
         reason = f"straight arm; curled up it would reach {curled:.6f} m"
-        raise OutOfReach(sample=worst, distance=distance, reach=straight, reason=reason)
+        raise OutOfReach(
+            waypoint=worst, distance=distance, reach=straight, reason=reason
+        )

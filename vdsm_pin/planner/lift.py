@@ -41,11 +41,11 @@ def lift(manipulator: Manipulator, planar: FloatArray, tip_x: FloatArray) -> Flo
     """
     squares = rises_squared(manipulator, planar)
     if not (squares >= 0.0).all():
-        sample, link = np.unravel_index(int(np.argmin(squares)), squares.shape)
-        gap = np.linalg.norm(planar[sample, link + 1] - planar[sample, link])
+        waypoint, link = np.unravel_index(int(np.argmin(squares)), squares.shape)
+        gap = np.linalg.norm(planar[waypoint, link + 1] - planar[waypoint, link])
         length = float(manipulator.link_lengths[link])
         raise LinkTooShort(
-            sample=int(sample), link=int(link) + 1, gap=float(gap), length=length
+            waypoint=int(waypoint), link=int(link) + 1, gap=float(gap), length=length
         )
     rises = np.sqrt(squares)
     centres = np.zeros((*planar.shape[:2], 3))

@@ -43,7 +43,7 @@ def check_limits(
         theta: Pitch angles, shape (n_samples, N); [rad].
 
     Raises:
-        LimitExceeded: With the worst sample, the joint, the value and the limit.
+        LimitExceeded: With the worst waypoint, the joint, the value and the limit.
     """
     box, cone = manipulator.max_joint_angle, manipulator.max_link_angle
     for name, values, limit in (
@@ -52,11 +52,11 @@ def check_limits(
         ("|alpha|", np.abs(alpha), box),
     ):
         if not (values <= limit).all():
-            sample, joint = np.unravel_index(int(np.argmax(values)), values.shape)
+            waypoint, joint = np.unravel_index(int(np.argmax(values)), values.shape)
             raise LimitExceeded(
-                sample=int(sample),
+                waypoint=int(waypoint),
                 quantity=f"{name} of joint {joint + 1}",
-                value=float(np.rad2deg(values[sample, joint])),
+                value=float(np.rad2deg(values[waypoint, joint])),
                 limit=float(np.rad2deg(limit)),
                 unit="deg",
             )
@@ -68,5 +68,5 @@ def check_limits(
         if not kept:
             value = float(x0[worst])
             raise LimitExceeded(
-                sample=worst, quantity="x0", value=value, limit=limit, unit="m"
+                waypoint=worst, quantity="x0", value=value, limit=limit, unit="m"
             )

@@ -101,7 +101,7 @@ def _clearance_charts(
     note = "Solid: proved lower bound. Dashed: proved upper bound."
     # What is proved for the whole motion holds in every interval of it.
     least = min_clearance(verification)
-    proved = -np.inf if least is None or least.lower is None else least.lower
+    proved = -np.inf if least is None or least.lower_m is None else least.lower_m
     link_lower = np.maximum(profile.link_lower, proved)
     obstacle_lower = np.maximum(profile.obstacle_lower, proved)
     return [

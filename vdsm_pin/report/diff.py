@@ -11,7 +11,7 @@ from vdsm_pin.errors import InvalidFile
 from vdsm_pin.report.facts import batch_row
 from vdsm_pin.report.files import BatchRow, VerificationFile
 from vdsm_pin.report.tables import read_summary
-from vdsm_pin.report.words import outcome, percent, quantity
+from vdsm_pin.report.words import outcome, quantity, term
 from vdsm_pin.tolerances import TOLERANCES
 
 _ORDER: Final = ("error", "timeout", "refuted", "undecided", "infeasible", "certified")
@@ -35,19 +35,18 @@ class Change:
 
 @dataclass(frozen=True)
 class _Measure:
-    """A number of a row, its name, its unit, and whether more of it is better."""
+    """A number of a row, its unit, and whether more of it is better."""
 
     field: str
-    name: str
     unit: str
     more_is_better: bool
 
 
 _MEASURES: Final = (
-    _Measure("min_clearance_lower_m", "smallest proved clearance", "m", True),
-    _Measure("coverage", "desired path drawn", "%", True),
-    _Measure("joint_error_rad", "largest proved joint error", "rad", True),
-    _Measure("changed_angles_mean_on_path", "changed link angles", "-", False),
+    _Measure("min_clearance_lower_m", "m", True),
+    _Measure("coverage", "share", True),
+    _Measure("max_joint_error_rad", "rad", True),
+    _Measure("changed_angles_mean_on_path", "-", False),
 )
 
 
@@ -107,17 +106,14 @@ def _measured(
     first, second = getattr(old, measure.field), getattr(new, measure.field)
     if first is None and second is None:
         return None
-    what = f"{measure.name} {_shown(first, measure)} → {_shown(second, measure)}"
+    was, now = (quantity(value, measure.unit) for value in (first, second))
+    what = f"{term(measure.field)} {was} → {now}"
     if first is None or second is None:
         return Change(name, what, second is None)
     gain = second - first if measure.more_is_better else first - second
     if abs(gain) <= TOLERANCES.result_change:
         return None
     return Change(name, what, gain < 0.0)
-
-
-def _shown(value: float | None, measure: _Measure) -> str:
-    return percent(value) if measure.unit == "%" else quantity(value, measure.unit)
 
 
 def _rows(folder: Path) -> dict[str, BatchRow]:

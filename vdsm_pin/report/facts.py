@@ -1,8 +1,7 @@
 """Records to file models: one place where a verification becomes words and rows."""
 
 import math
-import re
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Final
 
 import numpy as np
@@ -22,11 +21,12 @@ from vdsm_pin.report.files import (
     MotionFacts,
     PlanFile,
     Point,
+    ToleranceRow,
     VerificationFile,
 )
-from vdsm_pin.report.run_record import RunRecord, machine, tolerances, versions
-from vdsm_pin.report.words import check_title, quantity
-from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.report.run_record import RunRecord, machine, versions
+from vdsm_pin.report.words import check_title, place, quantity
+from vdsm_pin.tolerances import TOLERANCES, UNITS
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import (
     Check,
@@ -36,7 +36,6 @@ from vdsm_pin.verification.records import (
 )
 
 _PASSED: Final = Verdict.CERTIFIED
-_MOMENT: Final = re.compile(r"(?:waypoint|interval) (\d+)(?: at (\d*\.\d+))?")
 
 
 def finite(value: float) -> float | None:
@@ -85,6 +84,7 @@ def check_row(check: Check) -> CheckRow:
         worst=finite(check.worst),
         limit=finite(check.limit),
         unit=check.unit,
+        moment=finite(check.moment),
         where=check.where,
     )
 
@@ -92,36 +92,26 @@ def check_row(check: Check) -> CheckRow:
 def closest_row(verification: Verification, approach: ClosestApproach) -> ClosestRow:
     """One closest approach as its row."""
     return ClosestRow(
-        waypoint=approach.interval,
-        time=approach.time,
+        interval=approach.interval,
+        moment=approach.moment,
         link=approach.pair.link,
-        obstacle=approach.pair.label,
-        lower=finite(approach.lower),
-        upper=finite(approach.upper),
-        station=finite(approach.station),
-        link_point=in_file_frame(verification, approach.link_point),
-        other_point=in_file_frame(verification, approach.other_point),
+        obstacle=approach.pair.obstacle or None,
+        other_link=approach.pair.other_link or None,
+        lower_m=finite(approach.lower),
+        upper_m=finite(approach.upper),
+        station_m=finite(approach.station),
+        link_point_m=in_file_frame(verification, approach.link_point),
+        other_point_m=in_file_frame(verification, approach.other_point),
     )
-
-
-def moment(where: str) -> float | None:
-    """When the worst case of a check happens, in rows; None where it has no time.
-
-    Args:
-        where: The place in words, as checks name it: "waypoint 7, .." or
-            "interval 7 at 0.2500, ..".
-    """
-    found = _MOMENT.match(where)
-    return None if found is None else int(found[1]) + float(found[2] or 0.0)
 
 
 @dataclass(frozen=True)
 class Failing:
-    """A check that did not pass, and when its worst case happens, in rows."""
+    """A check that did not pass, and when its worst case happens, in waypoints."""
 
     name: str
     verdict: str
-    time: float | None
+    moment: float | None
 
 
 def failing(verification: Verification) -> tuple[Failing, ...]:
@@ -129,7 +119,7 @@ def failing(verification: Verification) -> tuple[Failing, ...]:
     bad = [check for check in verification.checks if check.verdict is not _PASSED]
     bad.sort(key=lambda check: check.verdict is not verification.verdict)
     return tuple(
-        Failing(check_title(check.name), check.verdict.value, moment(check.where))
+        Failing(check_title(check.name), check.verdict.value, finite(check.moment))
         for check in bad
     )
 
@@ -148,11 +138,11 @@ def min_clearance(verification: Verification) -> MinClearance | None:
     row = verification.closest[index]
     lower = min(near.lower for near in verification.closest if near.pair.obstacle)
     return MinClearance(
-        lower=finite(lower),
-        upper=finite(row.upper),
+        lower_m=finite(lower),
+        upper_m=finite(row.upper),
+        moment=row.moment,
         link=row.pair.link,
-        obstacle=row.pair.label,
-        waypoint=row.interval,
+        obstacle=row.pair.obstacle,
     )
 
 
@@ -169,8 +159,9 @@ def reason(verification: Verification) -> str:
         found = f"{check_title(first.name)}: there is nothing to judge it by"
     elif not math.isnan(first.limit):
         found += f" against a limit of {quantity(first.limit, first.unit)}"
-    if first.where:
-        found += f" ({first.where})"
+    at = place(finite(first.moment), first.where)
+    if at:
+        found += f" ({at})"
     others = f", and {len(bad) - 1} more" if len(bad) > 1 else ""
     if verification.verdict is Verdict.REFUTED:
         count = len(verification.checks)
@@ -186,7 +177,7 @@ def _certified_sentence(verification: Verification) -> str:
     required = quantity(verification.problem.required_clearance, "m")
     return (
         f"All {count} checks passed; at every instant of the motion the arm keeps at "
-        f"least {quantity(smallest.lower, 'm')} from every obstacle; {required} are "
+        f"least {quantity(smallest.lower_m, 'm')} from every obstacle; {required} are "
         "required."
     )
 
@@ -210,16 +201,18 @@ def verification_file(
         verdict=verification.verdict.value,
         reason=reason(verification),
         checks=tuple(check_row(check) for check in verification.checks),
-        min_clearance_m=min_clearance(verification),
+        min_clearance=min_clearance(verification),
         required_clearance_m=verification.problem.required_clearance,
         closest=tuple(closest_row(verification, row) for row in verification.closest),
         coverage=finite(verification.coverage),
         path_length_m=verification.problem.path.length,
         undrawn_m=tuple((float(a), float(b)) for a, b in verification.undrawn),
-        errors=ErrorBoxRow(
-            joint_rad=errors.joint, base_m=errors.base, obstacle_m=errors.obstacle
+        error_box=ErrorBoxRow(
+            joint_error_rad=errors.joint,
+            base_error_m=errors.base,
+            obstacle_error_m=errors.obstacle,
         ),
-        joint_error_rad=finite(verification.joint_error),
+        max_joint_error_rad=finite(verification.joint_error),
         motion=motion_facts(verification.trajectory),
         hashes=hashes(record),
         versions=versions(),
@@ -227,6 +220,12 @@ def verification_file(
         tolerances=tolerances(),
         command=record.command,
     )
+
+
+def tolerances() -> dict[str, ToleranceRow]:
+    """Every tolerance in force, by name, with its unit."""
+    values = asdict(TOLERANCES)
+    return {name: ToleranceRow(value=values[name], unit=UNITS[name]) for name in values}
 
 
 def plan_file(
@@ -249,19 +248,20 @@ def plan_file(
 
 def batch_row(folder: str, strategy: str, file: VerificationFile) -> BatchRow:
     """The row of one verified problem."""
-    smallest, motion = file.min_clearance_m, file.motion
+    smallest, motion = file.min_clearance, file.motion
     return BatchRow(
         folder=folder,
         problem=file.problem,
         strategy=strategy,
         outcome=file.verdict,
-        min_clearance_lower_m=smallest.lower if smallest else None,
-        min_clearance_upper_m=smallest.upper if smallest else None,
-        closest=f"link {smallest.link}, {smallest.obstacle}" if smallest else "",
+        min_clearance_lower_m=smallest.lower_m if smallest else None,
+        min_clearance_upper_m=smallest.upper_m if smallest else None,
+        closest_link=smallest.link if smallest else None,
+        closest_obstacle=smallest.obstacle if smallest else None,
         coverage=file.coverage,
         max_link_angle_rad=max(motion.max_link_angle_rad),
         changed_angles_mean_on_path=motion.changed_angles_mean_on_path,
-        joint_error_rad=file.joint_error_rad,
+        max_joint_error_rad=file.max_joint_error_rad,
         x0_min_m=motion.x0_min_m,
         x0_max_m=motion.x0_max_m,
         waypoints=motion.waypoints,

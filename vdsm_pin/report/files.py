@@ -1,17 +1,32 @@
 """The JSON files as models: what is written is what `vdsm schema` describes."""
 
 import json
-from typing import Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from vdsm_pin.errors import UnknownName
 
 Point = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-VerdictWord = Literal["certified", "refuted", "undecided"]
+VerdictWord = Annotated[
+    Literal["certified", "refuted", "undecided"],
+    Field(description="only certified counts as passed"),
+]
 OutcomeWord = Literal[
     "certified", "refuted", "undecided", "infeasible", "error", "timeout"
 ]
+
+
+_MOMENT: Final = "in waypoints, 12.25 is a quarter of the way from 12 to 13"
+_LINK: Final = "links count from 1 at the base"
+_FRAME: Final = "in the frame of the problem file"
+_COVERAGE: Final = "proved share of the desired path that is drawn, 0 to 1"
+_CHANGED: Final = "mean number of changed link angles on the path"
+_JOINT_ERROR: Final = "largest joint error still certified; null where not sought"
+_PROBLEM: Final = "name of the problem"
+_STRATEGY: Final = "how it was planned"
+_VERSIONS: Final = "of everything a number may depend on"
+_COMMAND: Final = "exact command line"
 
 
 class FileModel(BaseModel):
@@ -25,148 +40,198 @@ class FileModel(BaseModel):
 
 
 class CheckRow(FileModel):
-    """One check."""
+    """One check; `worst` and `limit` are in `unit`."""
 
-    name: str
+    name: str = Field(description="what was checked")
     verdict: VerdictWord
     count: int = Field(description="items checked")
-    worst: FiniteFloat | None = Field(description="null where there is none; SI")
-    limit: FiniteFloat | None = Field(description="null where there is none; SI")
-    unit: str = Field(description="m, rad, share (of a whole) or -")
-    where: str = Field(description="place of the worst case")
+    worst: FiniteFloat | None = Field(description="worst value; null: there is none")
+    limit: FiniteFloat | None = Field(description="its limit; null: there is none")
+    unit: str = Field(description="m, rad, share (of a whole, 0 to 1) or - (a number)")
+    moment: FiniteFloat | None = Field(description=_MOMENT)
+    where: str = Field(description="place of the worst case in words, without moment")
 
 
 class ClosestRow(FileModel):
-    """One closest approach; points in the frame of the problem file, in metres."""
+    """One closest approach, of a link to an obstacle or to another link."""
 
-    waypoint: int = Field(description="rows waypoint and waypoint + 1 bound it, from 0")
-    time: FiniteFloat = Field(description="place between the two rows, 0 to 1")
-    link: int
-    obstacle: str = Field(description="an obstacle's name, or 'link k'")
-    lower: FiniteFloat | None = Field(description="proved lower bound; m")
-    upper: FiniteFloat | None = Field(description="proved upper bound; m")
-    station: FiniteFloat | None = Field(description="along the link's axis; m")
-    link_point: Point | None
-    other_point: Point | None
+    interval: int = Field(
+        description="the bracket holds from waypoint `interval` to the next one"
+    )
+    moment: FiniteFloat = Field(description=f"when upper_m was found; {_MOMENT}")
+    link: int = Field(description=_LINK)
+    obstacle: str | None = Field(description="its name; null in a pair of links")
+    other_link: int | None = Field(description="null unless a pair of links")
+    lower_m: FiniteFloat | None = Field(description="proved lower bound")
+    upper_m: FiniteFloat | None = Field(description="proved upper bound")
+    station_m: FiniteFloat | None = Field(
+        description="of link_point_m, along the link's axis from its first joint"
+    )
+    link_point_m: Point | None = Field(description=f"on the link; {_FRAME}")
+    other_point_m: Point | None = Field(description=f"on its partner; {_FRAME}")
 
 
 class MinClearance(FileModel):
-    """The smallest clearance of the whole motion as a proved bracket; [m]."""
+    """The smallest clearance from an obstacle in the whole motion."""
 
-    lower: FiniteFloat | None
-    upper: FiniteFloat | None
-    link: int
-    obstacle: str
-    waypoint: int
+    lower_m: FiniteFloat | None = Field(description="proved lower bound")
+    upper_m: FiniteFloat | None = Field(description="proved upper bound")
+    moment: FiniteFloat = Field(description=f"when upper_m was found; {_MOMENT}")
+    link: int = Field(description=_LINK)
+    obstacle: str = Field(description="name of the obstacle")
 
 
 class ErrorBoxRow(FileModel):
-    """The errors of the real arm that the clearance proof covers."""
+    """The errors of the real arm that the clearance proof was asked to cover."""
 
-    joint_rad: FiniteFloat
-    base_m: FiniteFloat
-    obstacle_m: FiniteFloat
+    joint_error_rad: FiniteFloat = Field(description="of every joint angle, either way")
+    base_error_m: FiniteFloat = Field(description="of x0, either way")
+    obstacle_error_m: FiniteFloat = Field(description="displacement of every surface")
+
+
+class ToleranceRow(FileModel):
+    """One tolerance in force."""
+
+    value: FiniteFloat = Field(description="in `unit`")
+    unit: str = Field(description="m, rad, - or those it serves")
 
 
 class MotionFacts(FileModel):
-    """What the arm does, measured on the rows of the trajectory."""
+    """What the arm does, measured at the waypoints."""
 
-    waypoints: int
-    on_path_waypoints: int
-    max_link_angle_rad: tuple[FiniteFloat, ...] = Field(description="per joint")
-    x0_min_m: FiniteFloat
-    x0_max_m: FiniteFloat
-    changed_angle_threshold_rad: FiniteFloat
-    changed_angles_mean_on_path: FiniteFloat | None = Field(
-        description="mean number of link angles above the threshold"
+    waypoints: int = Field(description="rows of the trajectory")
+    on_path_waypoints: int = Field(description="those with the tip on the desired path")
+    max_link_angle_rad: tuple[FiniteFloat, ...] = Field(
+        description="largest link angle psi of each joint, from the base to the tip"
     )
-    changed_angles_max: int
+    x0_min_m: FiniteFloat = Field(description="smallest base position")
+    x0_max_m: FiniteFloat = Field(description="largest base position")
+    changed_angle_threshold_rad: FiniteFloat = Field(
+        description="a link angle above it counts as changed"
+    )
+    changed_angles_mean_on_path: FiniteFloat | None = Field(
+        description=f"{_CHANGED}; null where no waypoint is on the path"
+    )
+    changed_angles_max: int = Field(description="most of them at any waypoint")
 
 
 class Hashes(FileModel):
     """SHA-256 of the inputs; empty where there was none."""
 
-    problem_sha256: str
-    trajectory_sha256: str
-    urdf_sha256: str
+    problem_sha256: str = Field(description="problem file and the meshes it names")
+    trajectory_sha256: str = Field(description="trajectory.csv")
+    urdf_sha256: str = Field(description="URDF of the arm")
 
 
 class VerificationFile(FileModel):
     """verification.json."""
 
-    vdsm_verification: Literal[1] = 1
-    problem: str
+    vdsm_verification: Literal[1] = Field(
+        default=1, description="version of this format"
+    )
+    problem: str = Field(description=_PROBLEM)
     verdict: VerdictWord
     reason: str = Field(description="the verdict in one sentence")
-    checks: tuple[CheckRow, ...]
-    min_clearance_m: MinClearance | None
-    required_clearance_m: FiniteFloat
-    closest: tuple[ClosestRow, ...]
-    coverage: FiniteFloat | None = Field(description="part of the desired path drawn")
-    path_length_m: FiniteFloat
-    undrawn_m: tuple[tuple[FiniteFloat, FiniteFloat], ...]
-    errors: ErrorBoxRow
-    joint_error_rad: FiniteFloat | None = Field(
-        description="largest joint error still certified; null where not sought"
+    checks: tuple[CheckRow, ...] = Field(description="every check, in a fixed order")
+    min_clearance: MinClearance | None = Field(
+        description="smallest clearance from an obstacle; null where there is none"
     )
+    required_clearance_m: FiniteFloat = Field(description="asked for by the problem")
+    closest: tuple[ClosestRow, ...] = Field(
+        description="ten closest approaches, obstacles first, each pair once"
+    )
+    coverage: FiniteFloat | None = Field(description=_COVERAGE)
+    path_length_m: FiniteFloat = Field(description="of the desired path")
+    undrawn_m: tuple[tuple[FiniteFloat, FiniteFloat], ...] = Field(
+        description="stretches of the desired path not drawn: arc lengths from and to"
+    )
+    error_box: ErrorBoxRow
+    max_joint_error_rad: FiniteFloat | None = Field(description=_JOINT_ERROR)
     motion: MotionFacts
     hashes: Hashes
-    versions: dict[str, str]
-    machine: str
-    tolerances: dict[str, FiniteFloat]
-    command: str
+    versions: dict[str, str] = Field(description=_VERSIONS)
+    machine: str = Field(description="system, architecture, processors")
+    tolerances: dict[str, ToleranceRow] = Field(description="in force, by name")
+    command: str = Field(description=_COMMAND)
 
 
 class PlanFile(FileModel):
     """plan.json."""
 
-    vdsm_plan: Literal[1] = 1
-    problem: str
-    strategy: str
+    vdsm_plan: Literal[1] = Field(default=1, description="version of this format")
+    problem: str = Field(description=_PROBLEM)
+    strategy: str = Field(description=_STRATEGY)
     verdict: VerdictWord
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = Field(description="what the strategy has to say")
     rounds: int = Field(description="rounds of plan, verify, larger margins")
-    coverage: FiniteFloat | None
+    coverage: FiniteFloat | None = Field(description=_COVERAGE)
     motion: MotionFacts
     hashes: Hashes
-    versions: dict[str, str]
-    command: str
+    versions: dict[str, str] = Field(description=_VERSIONS)
+    command: str = Field(description=_COMMAND)
 
 
 class BatchRow(FileModel):
     """One problem of a batch; what summary.csv shows."""
 
-    folder: str
-    problem: str
-    strategy: str
-    outcome: OutcomeWord
-    min_clearance_lower_m: FiniteFloat | None = None
-    min_clearance_upper_m: FiniteFloat | None = None
-    closest: str = ""
-    coverage: FiniteFloat | None = None
-    max_link_angle_rad: FiniteFloat | None = None
-    changed_angles_mean_on_path: FiniteFloat | None = None
-    joint_error_rad: FiniteFloat | None = None
-    x0_min_m: FiniteFloat | None = None
-    x0_max_m: FiniteFloat | None = None
-    waypoints: int | None = None
-    reason: str = ""
+    folder: str = Field(description="folder of its files")
+    problem: str = Field(description=_PROBLEM)
+    strategy: str = Field(description=_STRATEGY)
+    outcome: OutcomeWord = Field(
+        description="the verdict, or why there is none: infeasible, error, timeout"
+    )
+    min_clearance_lower_m: FiniteFloat | None = Field(
+        default=None,
+        description="smallest clearance from an obstacle, proved lower bound",
+    )
+    min_clearance_upper_m: FiniteFloat | None = Field(
+        default=None, description="the same, proved upper bound"
+    )
+    closest_link: int | None = Field(default=None, description=f"where it is; {_LINK}")
+    closest_obstacle: str | None = Field(
+        default=None, description="and to which obstacle"
+    )
+    coverage: FiniteFloat | None = Field(default=None, description=_COVERAGE)
+    max_link_angle_rad: FiniteFloat | None = Field(
+        default=None, description="largest link angle psi of any joint"
+    )
+    changed_angles_mean_on_path: FiniteFloat | None = Field(
+        default=None, description=_CHANGED
+    )
+    max_joint_error_rad: FiniteFloat | None = Field(
+        default=None, description=_JOINT_ERROR
+    )
+    x0_min_m: FiniteFloat | None = Field(
+        default=None, description="smallest base position"
+    )
+    x0_max_m: FiniteFloat | None = Field(
+        default=None, description="largest base position"
+    )
+    waypoints: int | None = Field(default=None, description="rows of the trajectory")
+    reason: str = Field(default="", description="the outcome in one sentence")
 
 
 class ManifestFile(FileModel):
     """manifest.json of one problem's folder; a folder with it is finished."""
 
-    vdsm_manifest: Literal[1] = 1
-    problem_sha256: str
-    settings: dict[str, str]
+    vdsm_manifest: Literal[1] = Field(default=1, description="version of this format")
+    problem_sha256: str = Field(description="problem file and the meshes it names")
+    settings: dict[str, str] = Field(description="what a result depends on besides")
     row: BatchRow
     files: dict[str, str] = Field(description="SHA-256 by file name")
+
+
+class TimingFile(FileModel):
+    """timing.json of one problem's folder, the only file that differs between runs."""
+
+    seconds: FiniteFloat = Field(description="time spent on the problem")
 
 
 _MODELS: Final[dict[str, type[FileModel]]] = {
     "verification": VerificationFile,
     "plan": PlanFile,
     "manifest": ManifestFile,
+    "timing": TimingFile,
 }
 PROBLEM: Final = "problem"
 """Name of the problem file's schema, which its reader knows."""

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from vdsm_pin import __version__
 from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.report.facts import failing, moment, nearest_to_obstacle
+from vdsm_pin.report.facts import failing, nearest_to_obstacle
 from vdsm_pin.report.files import BatchRow, PlanFile, Point, VerificationFile
 from vdsm_pin.report.page_data import report_data, view_data
 from vdsm_pin.report.words import (
@@ -23,7 +23,9 @@ from vdsm_pin.report.words import (
     measured,
     outcome,
     percent,
+    place,
     quantity,
+    term,
 )
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import MM_PER_M
@@ -49,8 +51,9 @@ def _environment() -> jinja2.Environment:
         "outcome": outcome,
         "point": _point,
         "measured": measured,
-        "moment": moment,
         "css_text": _css_text,
+        "term": term,
+        "place": place,
     }
     environment.globals |= {
         "asset": _asset,

@@ -61,7 +61,7 @@ def motion_data(trajectory: Trajectory, shown: Thinned) -> dict[str, Any]:
 def closest_data(approach: ClosestApproach) -> dict[str, Any]:
     """Where and when one closest approach happens; base frame, [m]."""
     return {
-        "time": approach.interval + approach.time,
+        "moment": approach.moment,
         "link": approach.pair.link,
         "other": approach.pair.label,
         "linkPoint": _point(approach.link_point),
@@ -95,7 +95,7 @@ def report_data(verification: Verification) -> PageData:
             "motion": motion_data(verification.trajectory, shown),
             "closest": [closest_data(row) for row in verification.closest],
             "marks": [
-                asdict(one) for one in failing(verification) if one.time is not None
+                asdict(one) for one in failing(verification) if one.moment is not None
             ],
             "charts": plots,
         }

@@ -3,14 +3,13 @@
 import hashlib
 import os
 import platform
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Final
 
 from vdsm_pin import __version__
-from vdsm_pin.tolerances import TOLERANCES
 
 _LIBRARIES: Final = ("pin", "coal", "numpy", "numba", "yourdfpy", "meshcat")
 
@@ -51,11 +50,6 @@ def machine() -> str:
     """The machine in one line: system, architecture, number of processors."""
     system = f"{platform.system()} {platform.machine()}"
     return f"{system}, {os.cpu_count() or 1} processors"
-
-
-def tolerances() -> dict[str, float]:
-    """Every tolerance in force, by name; SI."""
-    return {name: float(value) for name, value in asdict(TOLERANCES).items()}
 
 
 def sha256_of(path: Path) -> str:

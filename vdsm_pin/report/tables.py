@@ -17,10 +17,10 @@ from vdsm_pin.verification.records import ClearanceChunk, Pair, Verification
 
 _VERDICTS: Final = ("certified", "refuted", "undecided")
 _CLEARANCE_HEADER: Final = (
-    "interval,time,link,obstacle,lower_m,upper_m,verdict,"
-    "link_x_m,link_y_m,link_z_m,obstacle_x_m,obstacle_y_m,obstacle_z_m\n"
+    "interval,moment,link,obstacle,other_link,lower_m,upper_m,verdict,"
+    "link_x_m,link_y_m,link_z_m,other_x_m,other_y_m,other_z_m\n"
 )
-_CLEARANCE_ROW: Final = "%d,%.9g,%s,%.9g,%.9g,%s" + 6 * ",%.6f" + "\n"
+_CLEARANCE_ROW: Final = "%d,%.12g,%s,%.9g,%.9g,%s" + 6 * ",%.6f" + "\n"
 _HOLES: Final = ("a", "b", "c")
 
 
@@ -38,7 +38,10 @@ class ClearanceCsv:
     ) -> None:
         pose = problem.T_world_base
         self._rotation, self._shift = pose[:3, :3].T, pose[:3, 3]
-        self._partners = [f"{pair.link},{_quoted(pair.label)}" for pair in pairs]
+        self._partners = [
+            f"{pair.link},{_quoted(pair.obstacle)},{pair.other_link or ''}"
+            for pair in pairs
+        ]
         self._file = path.open("w", encoding="utf-8", newline="")
         self._file.write(_CLEARANCE_HEADER)
 
@@ -63,7 +66,7 @@ class ClearanceCsv:
         intervals = np.repeat(np.arange(n) + chunk.first_interval, m)
         rows = zip(
             intervals.tolist(),
-            chunk.time.ravel().tolist(),
+            (chunk.time.ravel() + intervals).tolist(),
             self._partners * n,
             chunk.lower.ravel().tolist(),
             chunk.upper.ravel().tolist(),

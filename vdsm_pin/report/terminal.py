@@ -14,6 +14,7 @@ from vdsm_pin.report.words import (
     outcome,
     percent,
     quantity,
+    term,
 )
 
 
@@ -25,10 +26,16 @@ def show_plan(file: PlanFile, folder: Path) -> None:
     mean = MISSING if changed is None else f"{changed:.2f} on average on the path"
     ends = (measured(x0, "m") for x0 in (motion.x0_min_m, motion.x0_max_m))
     _facts(
-        ("waypoints", f"{motion.waypoints}, {motion.on_path_waypoints} on the path"),
-        ("desired path drawn", percent(file.coverage)),
-        ("largest link angle", measured(max(motion.max_link_angle_rad), "rad")),
-        ("changed link angles", f"{mean}, {motion.changed_angles_max} at most"),
+        (
+            term("waypoints"),
+            f"{motion.waypoints}, {motion.on_path_waypoints} on the path",
+        ),
+        (term("coverage"), percent(file.coverage)),
+        (term("max_link_angle_rad"), measured(max(motion.max_link_angle_rad), "rad")),
+        (
+            term("changed_angles_mean_on_path"),
+            f"{mean}, {motion.changed_angles_max} at most",
+        ),
         ("base travel", " to ".join(ends)),
         *(("note", note) for note in file.notes),
         ("files in", str(folder)),
@@ -51,9 +58,9 @@ def show_verification(
         _rich_checks(file)
     else:
         _plain_checks(file.checks)
-    if file.joint_error_rad is not None:
-        error = measured(file.joint_error_rad, "rad")
-        more = (("largest proved joint error", f"±{error}"), *more)
+    if file.max_joint_error_rad is not None:
+        error = measured(file.max_joint_error_rad, "rad")
+        more = ((term("max_joint_error_rad"), f"±{error}"), *more)
     _facts(*more, ("report", str(folder / "report.html")))
 
 

@@ -14,10 +14,29 @@ MISSING: Final = "not available"
 _SMALLEST_FIXED: Final = 1e-3  # below this, three decimals would print 0.000
 _LARGE: Final = 1e3  # from here on, a tenth is fine enough
 _SHARE_DIGITS: Final = 9
+_MOMENT_DIGITS: Final = 2
 _DISPLAY_UNITS: Final[Mapping[str, tuple[float, str]]] = MappingProxyType(
     {"m": (MM_PER_M, " mm"), "rad": (math.degrees(1.0), "°"), "-": (1.0, "")}
 )
 _SHARE: Final = "share"  # the unit of a part of a whole, 0 to 1; people read percent
+
+TERMS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "min_clearance_lower_m": "smallest proved clearance",
+        "min_clearance_upper_m": "smallest clearance found",
+        "max_joint_error_rad": "largest proved joint error",
+        "coverage": "coverage of the desired path",
+        "changed_angles_mean_on_path": "changed link angles",
+        "max_link_angle_rad": "largest link angle ψ",
+        "x0_min_m": "smallest base position x₀",
+        "x0_max_m": "largest base position x₀",
+        "waypoints": "waypoints",
+        "problem": "problem",
+        "outcome": "outcome",
+        "seconds": "time",
+    }
+)
+"""What people read for a key of the files: one name on terminal, pages and in diffs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +135,25 @@ def percent(share: float | None) -> str:
         return MISSING
     whole = round(share, _SHARE_DIGITS)  # rounding noise of a sum is not a gap
     return f"{math.floor(whole * 1000.0) / 10.0:.1f} %"
+
+
+def term(key: str) -> str:
+    """The name of a key for people."""
+    return TERMS[key]
+
+
+def moment_text(moment: float | None) -> str:
+    """A moment of the motion: "waypoint 193" or, between two, "waypoint 193.25"."""
+    if moment is None:
+        return ""
+    return f"waypoint {round(moment, _MOMENT_DIGITS):.{_MOMENT_DIGITS}f}".rstrip(
+        "0"
+    ).rstrip(".")
+
+
+def place(moment: float | None, where: str) -> str:
+    """When and where something happens, in words; empty if neither is known."""
+    return ", ".join(part for part in (moment_text(moment), where) if part)
 
 
 def check_title(name: str) -> str:

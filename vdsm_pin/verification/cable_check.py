@@ -31,7 +31,7 @@ def check_cables(problem: PlanningProblem, trajectory: Trajectory) -> Check:
         domain in which lengths determine them, the motion cannot be driven by these
         cables: refuted.
     """
-    worst, where = -np.inf, ""
+    worst, where, moment = -np.inf, "", float("nan")
     for first in range(0, trajectory.n_samples, CHUNK):
         rows = slice(first, first + CHUNK)
         planned = np.stack([trajectory.alpha[rows], trajectory.theta[rows]])
@@ -40,14 +40,15 @@ def check_cables(problem: PlanningProblem, trajectory: Trajectory) -> Check:
             found = np.stack(angles_from_cables(problem.manipulator, lengths))
         except InconsistentCables as error:
             worst = float("inf")
-            where = f"waypoint {first + error.sample}, joint {error.link}"
+            where, moment = f"joint {error.link}", float(first + error.waypoint)
             break
         residual = np.abs(found - planned)
         residual[np.isnan(residual)] = np.inf
         kind, row, joint = np.unravel_index(int(np.argmax(residual)), residual.shape)
         if residual[kind, row, joint] > worst:
             worst = float(residual[kind, row, joint])
-            where = f"waypoint {first + row}, {('alpha', 'theta')[kind]}{joint + 1}"
+            where = f"{('alpha', 'theta')[kind]}{joint + 1}"
+            moment = float(first + row)
     limit = TOLERANCES.cable_round_trip
     return Check(
         name=NAME,
@@ -57,4 +58,5 @@ def check_cables(problem: PlanningProblem, trajectory: Trajectory) -> Check:
         limit=limit,
         unit="rad",
         where=where,
+        moment=moment,
     )

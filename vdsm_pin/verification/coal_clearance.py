@@ -41,7 +41,7 @@ class CoalDistances:
     """Measured distances between links and obstacles, with our brackets beside them.
 
     Args:
-        sample: Row of the trajectory, from 0, shape (m,).
+        waypoint: Row of the trajectory, from 0, shape (m,).
         link: Link, from 0, shape (m,).
         obstacle: Number of the obstacle in the scene, from 0, shape (m,).
         distance: By Coal; -inf where its answer is unusable, shape (m,); [m].
@@ -51,7 +51,7 @@ class CoalDistances:
         other_point: Coal's witness on the obstacle, shape (m, 3); [m].
     """
 
-    sample: IntArray
+    waypoint: IntArray
     link: IntArray
     obstacle: IntArray
     distance: FloatArray
@@ -100,7 +100,7 @@ def check_coal(
     scene, n_links = problem.scene, problem.manipulator.n_links
     if not scene.obstacles:
         return ()
-    count, worst, where = 0, -np.inf, ""
+    count, worst, where, moment = 0, -np.inf, "", float("nan")
     for found in coal_distances(robot, problem, trajectory, reach_of(problem)):
         excess = found.disagreement
         if proved is not None:
@@ -109,10 +109,10 @@ def check_coal(
         count += excess.size
         k = int(np.argmax(excess))
         if excess[k] > worst:
-            worst = float(excess[k])
+            worst, moment = float(excess[k]), float(found.waypoint[k])
             where = (
-                f"waypoint {found.sample[k]}, link {found.link[k] + 1}, "
-                f"{scene.names[found.obstacle[k]]}: Coal {found.distance[k]:.9g} m, "
+                f"link {found.link[k] + 1} and {scene.names[found.obstacle[k]]}: "
+                f"Coal {found.distance[k]:.9g} m, "
                 f"proved [{found.lower[k]:.9g}, {found.upper[k]:.9g}] m"
             )
     total = trajectory.n_samples * n_links * len(scene.obstacles)
@@ -126,6 +126,7 @@ def check_coal(
         limit=TOLERANCES.coal_agreement,
         unit="m",
         where=f"{where}; {count} of {total} pairs within reach measured{alone}",
+        moment=moment,
     )
     return (check,)
 
@@ -187,7 +188,7 @@ def _measured(
     bodies: list[tuple[CoalBody, ...]],
     pairs: IntArray,
 ) -> CoalDistances:
-    """Ask Coal and the kernels about (sample, link, obstacle) triples, shape (m, 3)."""
+    """Ask both about (waypoint, link, obstacle) triples, shape (m, 3)."""
     rows, row_of_pair = np.unique(pairs[:, 0], return_inverse=True)
     joints = trajectory.x0[rows], trajectory.alpha[rows], trajectory.theta[rows]
     poses = robot.link_poses(*joints)
@@ -228,8 +229,8 @@ def capsule_transforms(
 def _below_proof(found: CoalDistances, proved: FloatArray, n_links: int) -> FloatArray:
     """By how much Coal falls below what was proved over the intervals at a row; [m]."""
     column = found.obstacle * n_links + found.link
-    before = np.maximum(found.sample - 1, 0)
-    after = np.minimum(found.sample, len(proved) - 1)
+    before = np.maximum(found.waypoint - 1, 0)
+    after = np.minimum(found.waypoint, len(proved) - 1)
     bound = np.maximum(proved[before, column], proved[after, column])
     # Where bodies meet only the sign counts.
     return np.asarray(bound - np.maximum(found.distance, 0.0))

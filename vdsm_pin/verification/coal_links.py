@@ -30,14 +30,14 @@ class LinkDistances:
     """Measured distances between links, with the closed form beside them.
 
     Args:
-        sample: Row of the trajectory, from 0, shape (m,).
+        waypoint: Row of the trajectory, from 0, shape (m,).
         link: The link nearer to the base, from 0, shape (m,).
         other: The link farther out, from 0, shape (m,).
         distance: By Coal; -inf where its answer is unusable, shape (m,); [m].
         expected: In closed form, shape (m,); [m].
     """
 
-    sample: IntArray
+    waypoint: IntArray
     link: IntArray
     other: IntArray
     distance: FloatArray
@@ -76,16 +76,16 @@ def check_coal_links(
     if n_pairs == 0:
         return ()
     reach = problem.required_self_clearance + problem.manipulator.link_radius
-    count, worst, where = 0, -np.inf, ""
+    count, worst, where, moment = 0, -np.inf, "", float("nan")
     for found in link_distances(robot, trajectory, reach):
         excess = np.where(np.isnan(found.disagreement), np.inf, found.disagreement)
         count += excess.size
         k = int(np.argmax(excess))
         if excess[k] > worst:
-            worst = float(excess[k])
+            worst, moment = float(excess[k]), float(found.waypoint[k])
             where = (
-                f"waypoint {found.sample[k]}, link {found.link[k] + 1} and link "
-                f"{found.other[k] + 1}: Coal {found.distance[k]:.9g} m, "
+                f"link {found.link[k] + 1} and link {found.other[k] + 1}: "
+                f"Coal {found.distance[k]:.9g} m, "
                 f"closed form {found.expected[k]:.9g} m"
             )
     agreed = worst <= TOLERANCES.coal_agreement
@@ -98,6 +98,7 @@ def check_coal_links(
         unit="m",
         where=f"{where}; {count} of {n_pairs * trajectory.n_samples} pairs within "
         "reach measured",
+        moment=moment,
     )
     return (check,)
 
@@ -144,7 +145,7 @@ def link_distances(
 def _measured(
     robot: RobotModel, trajectory: Trajectory, pairs: IntArray, expected: FloatArray
 ) -> LinkDistances:
-    """Ask Coal about (sample, link, other link) triples, shape (m, 3)."""
+    """Ask Coal about (waypoint, link, other link) triples, shape (m, 3)."""
     rows, place = np.unique(pairs[:, 0], return_inverse=True)
     poses = robot.link_poses(
         trajectory.x0[rows], trajectory.alpha[rows], trajectory.theta[rows]

@@ -53,5 +53,6 @@ def check_fk(
         worst=worst,
         limit=TOLERANCES.joint_centre,
         unit="m",
-        where=f"waypoint {row}, joint centre O{joint + 1}",
+        where=f"joint centre O{joint + 1}",
+        moment=row,
     )

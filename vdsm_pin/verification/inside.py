@@ -130,6 +130,7 @@ def check_inside(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Chec
             worst=float(len(swallowed)),
             limit=0.0,
             unit="-",
-            where=f"waypoint 0, base inside {swallowed[0]}" if swallowed else "",
+            where=f"base inside {swallowed[0]}" if swallowed else "",
+            moment=0.0 if swallowed else float("nan"),
         ),
     )

@@ -76,7 +76,8 @@ def _angle_check(
         worst=worst,
         limit=limit,
         unit="rad",
-        where=f"waypoint {row}, {symbol}{joint}",
+        where=f"{symbol}{joint}",
+        moment=row,
     )
 
 
@@ -94,12 +95,12 @@ def _base_check(problem: PlanningProblem, trajectory: Trajectory) -> Check:
         worst=float(trajectory.x0[row]),
         limit=limit,
         unit="m",
-        where=f"waypoint {row}",
+        moment=row,
     )
 
 
 def check_limits(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Check, ...]:
-    """Box of theta and alpha, cone of psi, rail, and the change from row to row.
+    """Box of theta and alpha, cone of psi, rail, and the change between waypoints.
 
     Args:
         problem: Names the arm and its limits.
@@ -143,7 +144,7 @@ def check_limits(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Chec
     if trajectory.n_samples > 1:
         checks.append(
             _angle_check(
-                "change of a joint angle from row to row",
+                "change of a joint angle between waypoints",
                 "joint ",
                 step,
                 trajectory,

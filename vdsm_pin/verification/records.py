@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from math import nan
 from typing import TypeAlias
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
@@ -39,6 +40,8 @@ class Check:
         limit: What it was held against; NaN where there is none.
         unit: SI unit of both ("m", "rad"), "share" of a whole, or "-".
         where: The place of the worst case in words, joints and links from 1.
+        moment: When it happens, in waypoints: 12.25 is a quarter of the way from 12 to
+            13; NaN where it has no time.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Check:
     limit: float
     unit: str
     where: str = ""
+    moment: float = nan
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,7 @@ class ClosestApproach:
 
     Args:
         interval: Rows interval and interval + 1 bound it, counted from 0.
-        time: Where in the interval the upper bound was found, 0 to 1.
+        share: Where in the interval the upper bound was found, 0 to 1.
         pair: The pair.
         lower: Proved lower bound of the clearance over the interval; [m].
         upper: Clearance at that time, proved from above; negative inside; [m].
@@ -101,13 +105,18 @@ class ClosestApproach:
     """
 
     interval: int
-    time: float
+    share: float
     pair: Pair
     lower: float
     upper: float
     station: float
     link_point: FloatArray
     other_point: FloatArray
+
+    @property
+    def moment(self) -> float:
+        """When the upper bound was found, in waypoints."""
+        return self.interval + self.share
 
 
 @dataclass(frozen=True)

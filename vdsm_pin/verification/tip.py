@@ -175,12 +175,12 @@ def _row_check(
     problem: PlanningProblem, trajectory: Trajectory, tips: FloatArray
 ) -> Check:
     on, path = np.flatnonzero(trajectory.on_path), problem.path
-    worst, where, kept = float("nan"), "", False
+    worst, moment, kept = float("nan"), float("nan"), False
     if on.size:
         goal = path.at(_wrapped(path, trajectory.path_m[on]))
         gap = np.linalg.norm(tips[on] - goal, axis=1)
         at = int(np.argmax(gap))
-        worst, where = float(gap[at]), f"waypoint {on[at]}"
+        worst, moment = float(gap[at]), float(on[at])
         kept = worst <= TOLERANCES.tip_on_path
     verdict = Verdict.CERTIFIED if kept else Verdict.REFUTED
     return Check(
@@ -190,7 +190,7 @@ def _row_check(
         worst=worst,
         limit=TOLERANCES.tip_on_path,
         unit="m",
-        where=where,
+        moment=moment,
     )
 
 
@@ -205,7 +205,7 @@ def _start_checks(
         worst=gap,
         limit=TOLERANCES.tip_on_path,
         unit="m",
-        where="waypoint 0",
+        moment=0.0,
     )
     joints = problem.path.start_joints
     if joints is None:
@@ -223,7 +223,7 @@ def _start_checks(
             worst=worst,
             limit=TOLERANCES.start_joints,
             unit="-",
-            where="waypoint 0",
+            moment=0.0,
         ),
     )
 
@@ -254,10 +254,11 @@ def check_tip(problem: PlanningProblem, trajectory: Trajectory) -> TipReport:
         worst=deviation if drawn else float("nan"),
         limit=problem.path.spacing,
         unit="m",
-        where=f"interval {interval}" if drawn else "",
+        where="from here to the next waypoint" if drawn else "",
+        moment=interval if drawn else float("nan"),
     )
     covered = Check(
-        name="part of the desired path that is drawn",
+        name="coverage of the desired path",
         verdict=Verdict.CERTIFIED if enough else Verdict.REFUTED,
         count=1,
         worst=share,

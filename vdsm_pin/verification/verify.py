@@ -198,9 +198,7 @@ def _clearance_check(
     column = UP if verdict is Verdict.REFUTED else LOW
     pair = int(mine[np.argmin(proof.best[mine, column])])
     row = proof.best[pair]
-    at, when = int(row[AT_UPPER]), row[TIME]
-    where = f"interval {at} at {when:.4f}, link {proof.pairs[pair].link}"
-    where += f" and {proof.pairs[pair].label}"
+    where = f"link {proof.pairs[pair].link} and {proof.pairs[pair].label}"
     if verdict is Verdict.UNDECIDED:
         where += f"; {int(counts[2])} of {int(counts.sum())} undecided"
     return Check(
@@ -211,6 +209,7 @@ def _clearance_check(
         limit=needed,
         unit="m",
         where=where,
+        moment=float(row[AT_UPPER] + row[TIME]),
     )
 
 
@@ -251,7 +250,7 @@ def closest_approaches(
         rows.append(
             ClosestApproach(
                 interval=int(row[AT_UPPER]),
-                time=float(row[TIME]),
+                share=float(row[TIME]),
                 pair=pair,
                 lower=float(row[LOW]),
                 upper=float(row[UP]),

@@ -68,7 +68,7 @@ def _proved(problem: PlanningProblem, rows: PathRows, proof: TipProof) -> Infeas
         distance = np.hypot(rows.tips[:, 1], rows.tips[:, 2])
         worst = int(np.argmax(distance))
         return OutOfReach(
-            sample=worst,
+            waypoint=worst,
             distance=float(distance[worst]),
             reach=curled_reach(problem.manipulator),
             reason="every joint at its limit, Eq. 4",

@@ -85,7 +85,7 @@ def _check_start(
     if not bend <= problem.manipulator.max_link_angle + TOLERANCES.joint_limit:
         limit = float(np.rad2deg(problem.manipulator.max_link_angle))
         raise LimitExceeded(
-            sample=0, quantity="psi", value=float(np.rad2deg(bend)), limit=limit,
+            waypoint=0, quantity="psi", value=float(np.rad2deg(bend)), limit=limit,
             unit="deg",
         )  # fmt: skip
     if not room >= problem.required_clearance:

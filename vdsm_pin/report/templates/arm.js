@@ -206,7 +206,7 @@ class ArmView {
     });
     this.tip.position.copy(points[points.length - 1]);
     this.witness.visible = Boolean(this.shown);
-    const due = this.shown && Math.abs(time - this.shown.time) < 1.5;
+    const due = this.shown && Math.abs(time - this.shown.moment) < 1.5;
     for (const part of this.witness.children) part.material.opacity = due ? 1 : 0.35;
     this.tipNow = points[points.length - 1].toArray();
     this.viewer.set_dirty();

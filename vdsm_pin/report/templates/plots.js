@@ -151,10 +151,10 @@ class Plot {
   }
 
   // Where a check failed: a line through the plot with a flag on top.
-  mark({ time, verdict, name }) {
-    const x = this.x(time);
+  mark({ moment, verdict, name }) {
+    const x = this.x(moment);
     const group = element("g", {}, this.svg);
-    element("title", {}, group, `${name}: ${verdict} at ${time.toFixed(2)}`);
+    element("title", {}, group, `${name}: ${verdict} at waypoint ${moment.toFixed(2)}`);
     const ends = { x1: x, x2: x, y1: FRAME.top, y2: FRAME.height - FRAME.bottom };
     element("line", { ...ends, class: `mark ${verdict}` }, group);
     const flag = `M${x - 6} ${FRAME.top - 10}h12l-6 10z`;

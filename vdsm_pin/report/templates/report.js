@@ -26,17 +26,17 @@
       const approach = data.closest[Number(button.dataset.approach)];
       motion.play(false);
       if (view) view.showWitness(approach);
-      motion.go(approach.time);
+      motion.go(approach.moment);
       reveal(button);
     });
   // Jump to the worst case of a check; where two bodies meet, mark the points.
   for (const button of document.querySelectorAll("[data-go]"))
     button.addEventListener("click", () => {
-      const time = Number(button.dataset.go);
-      const approach = data.closest.find((one) => Math.abs(one.time - time) < 0.01);
+      const moment = Number(button.dataset.go);
+      const approach = data.closest.find((one) => Math.abs(one.moment - moment) < 0.01);
       motion.play(false);
       if (view && approach) view.showWitness(approach);
-      motion.go(time);
+      motion.go(moment);
       reveal(button);
     });
   for (const button of document.querySelectorAll("[data-look]"))
