@@ -7,39 +7,99 @@ from pathlib import Path
 import numpy as np
 import pytest
 from oracles.adversarial import (
+    LINK_MOTIONS,
     MOTIONS,
-    SHAPES,
-    as_data,
-    exact_bracket,
-    from_data,
+    Batch,
     make_batch,
-    sample,
+    make_link_batch,
 )
+from oracles.adversarial_bodies import SHAPES, pack
+from oracles.adversarial_truth import as_data, exact_bracket, from_data, sample
+
+from vdsm_pin.geometry.pieces import pack_pieces
 
 ROOT = Path(__file__).parents[2]
 SAMPLE = ROOT / "tests" / "oracles" / "adversarial_sample.json"
 sys.path.insert(0, str(ROOT / "analysis"))
 
-from soundness import CERTIFIED, REFUTED, UNDECIDED_LIMIT, run, verdicts  # noqa: E402
+from soundness import (  # noqa: E402
+    CERTIFIED,
+    REFUTED,
+    SHARES,
+    UNDECIDED_LIMIT,
+    report,
+    run,
+    verdicts,
+    whole,
+)
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
+def batch_of(motion: str, seed: int, size: int) -> Batch:
+    rng = np.random.default_rng(seed)
+    if motion in MOTIONS:
+        return make_batch(rng, motion, size, 1e-12)
+    while True:
+        batch = make_link_batch(rng, motion, size, 1e-12)
+        if batch.size:
+            return batch
+
+
+@pytest.mark.parametrize("motion", [*MOTIONS, *LINK_MOTIONS])
 def test_the_corpus_knows_its_truth(motion: str) -> None:
     """Plane and points, in balls, agree with the stated clearance to 1e-13 m."""
-    batch = make_batch(np.random.default_rng(3), motion, 4 * len(SHAPES), 1e-12)
-    for k in range(len(batch.link)):
+    batch = batch_of(motion, 3, 3 * len(SHAPES))
+    for k in range(batch.size):
         lower, upper = exact_bracket(batch, k)
-        assert float(lower) == pytest.approx(batch.excess[k], abs=1e-13)
         assert float(upper) == pytest.approx(batch.excess[k], abs=1e-13)
+        if motion != "pierce":
+            assert float(lower) == pytest.approx(batch.excess[k], abs=1e-13)
 
 
 def test_the_sample_is_the_generators() -> None:
     """Another numpy may draw other numbers; the sample then stands for itself."""
     stored = json.loads(SAMPLE.read_text())
-    assert len(stored) == 2 * len(MOTIONS) * len(SHAPES)
-    assert as_data(from_data(stored[7]), 0) == stored[7]
+    assert {data["motion"] for data in stored} == set(SHARES)
+    assert {data["shape"] for data in stored} == {*SHAPES, "links"}
+    for k in (0, 7, -1):
+        assert as_data(from_data(stored[k]), 0) == stored[k]
     if stored[0] == (again := sample())[0]:
         assert stored == again
+
+
+def test_queries_are_packed_as_the_products_scenes_are() -> None:
+    """Single pieces bit for bit; the triangles of meshes in another order."""
+    batch = batch_of("none", 4, 200)
+    mine = pack(batch.groups)
+    theirs = pack_pieces([batch.pieces(k) for k in range(batch.size)])
+    single = np.flatnonzero(np.diff(mine.first_piece) == 1)
+    np.testing.assert_array_equal(mine.first_piece, theirs.first_piece)
+    np.testing.assert_array_equal(mine.first_point, theirs.first_point)
+    np.testing.assert_array_equal(mine.root, theirs.root)
+    np.testing.assert_array_equal(mine.node_range, theirs.node_range)
+    np.testing.assert_array_equal(mine.node_right, theirs.node_right)
+    of_pieces = mine.first_piece[single]
+    for name in ("kind", "radius", "centre", "axis", "extent"):
+        found, wanted = getattr(mine, name), getattr(theirs, name)
+        np.testing.assert_array_equal(found[of_pieces], wanted[of_pieces])
+    for name in ("node_low", "node_high"):
+        np.testing.assert_array_equal(
+            getattr(mine, name)[mine.root], getattr(theirs, name)[mine.root]
+        )
+    for p in of_pieces:
+        part = slice(mine.first_point[p], mine.first_point[p + 1])
+        np.testing.assert_array_equal(mine.points[part], theirs.points[part])
+
+
+@pytest.mark.parametrize("motion", [*MOTIONS, *LINK_MOTIONS])
+def test_no_query_is_misjudged_within_a_whole_scene(motion: str) -> None:
+    """As the product is called, culling and meshes in their own order included."""
+    batch = batch_of(motion, 5, 60)
+    asked, found = whole(batch)
+    excess = batch.excess[asked]
+    assert not ((found == CERTIFIED) & (excess < 0.0)).any()
+    assert not ((found == REFUTED) & (excess > 0.0)).any()
+    decided = found[np.abs(excess) > 1e-6]
+    assert np.isin(decided, (CERTIFIED, REFUTED)).all()
 
 
 def test_no_query_of_the_sample_is_misjudged() -> None:
@@ -53,18 +113,31 @@ def test_no_query_of_the_sample_is_misjudged() -> None:
             assert verdict == (CERTIFIED if data["excess"] > 0.0 else REFUTED), data
 
 
-def no_errors(queries: int, seed: int) -> None:
-    tally = run(queries, seed, 2000)
-    assert tally["queries"] == queries
+def test_an_error_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A verifier that lies is found out, whichever way it lies."""
+    import soundness
+
+    for lie, name in ((CERTIFIED, "false certified"), (REFUTED, "false refuted")):
+        monkeypatch.setattr(
+            soundness, "verdicts", lambda batch, lie=lie: np.full(batch.size, lie)
+        )
+        assert run(300, 1, 50)[name] > 100
+
+
+def no_errors(queries: int, seed: int, processes: int = 1) -> None:
+    tally = run(queries, seed, 1000, processes)
+    assert tally["queries"] >= queries
+    assert tally["rechecked"] > queries / 1000
     assert tally["false certified"] == 0
     assert tally["false refuted"] == 0
     assert tally["undecided far"] < UNDECIDED_LIMIT * tally["far"]
+    assert f"{tally['queries']:,} queries" in report(tally, "-")
 
 
 def test_random_queries_are_judged_rightly() -> None:
-    no_errors(6_000, 11)
+    no_errors(15_000, 11)
 
 
 @pytest.mark.slow
 def test_ten_million_queries_are_judged_rightly() -> None:
-    no_errors(10_000_000, 12)
+    no_errors(10_000_000, 12, processes=2)
