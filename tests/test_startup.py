@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -14,13 +15,30 @@ try:
     main(sys.argv[1:])
 except SystemExit:
     pass
-sys.stderr.write(" ".join({name.split(".")[0] for name in sys.modules}))
+sys.stderr.write(" ".join(sys.modules))
 """
+
+
+def run(*words: str) -> subprocess.CompletedProcess[str]:
+    program = [sys.executable, "-c", PROGRAM, *words]
+    return subprocess.run(program, capture_output=True, text=True, check=True)
+
+
+def imported(ended: subprocess.CompletedProcess[str]) -> set[str]:
+    return set(ended.stderr.split())
 
 
 @pytest.mark.parametrize("command", [["--help"], ["plan", "--help"]])
 def test_help_imports_nothing_heavy(command: list[str]) -> None:
-    words = [sys.executable, "-c", PROGRAM, *command]
-    ended = subprocess.run(words, capture_output=True, text=True, check=True)
+    ended = run(*command)
     assert "Usage" in ended.stdout
-    assert not HEAVY & set(ended.stderr.split())
+    assert not HEAVY & imported(ended)
+
+
+def test_a_plan_is_made_without_numba_once_its_machine_code_is_there(
+    tmp_path: Path,
+) -> None:
+    command = ("plan", "paper/free", "--strategy", "paper", "--out", str(tmp_path))
+    run(*command)
+    assert "numba" not in imported(run(*command))
+    assert (tmp_path / "trajectory.csv").exists()

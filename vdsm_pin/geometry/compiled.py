@@ -1,28 +1,72 @@
-"""The one place that asks numba to compile, and keeps what it made.
+"""Functions that run as machine code.
 
-numba notices a change of the file a function stands in, but not of the files of the
-functions it calls, and would go on with stale machine code. So the code is kept in a
-folder named by the content of a module and of all that it imports. Modules with
+`@compiled` looks for the code of a function on disk and asks numba for it where there
+is none: numba is imported in the first run after a change, and never again.
+
+The code belongs to the content of a module and of all that it imports. Modules with
 compiled functions therefore import little.
 """
 
 import hashlib
+import inspect
 import re
 from collections.abc import Callable
-from functools import cache
+from contextlib import suppress
+from functools import cache, cached_property, update_wrapper
 from pathlib import Path
+from threading import RLock
 from typing import Any, Final, TypeVar, cast
 
-import numba
-from numba._dynfunc import make_function
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
-from numba.extending import intrinsic
+import numpy as np
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 IMPORT: Final = re.compile(rb"^from vdsm_pin\.([\w.]+) import", re.MULTILINE)
 PACKAGE: Final = Path(__file__).parents[1]
+
+_C, _FORTRAN, _ALIGNED, _WRITE = 0x1, 0x2, 0x100, 0x400
+"""Bits of an array's flags, as numpy numbers them."""
+
+_SCALARS: Final[dict[type, type]] = {
+    bool: bool,
+    int: int,
+    float: float,
+    np.bool_: bool,
+    np.int64: int,
+    np.float64: float,
+}
+"""What a scalar is to compiled code."""
+
+_one_at_a_time: Final = RLock()
+
+
+def _kind(value: Any) -> Any:
+    """What compiled code is made for: values of one kind share their code.
+
+    numba would take an array that is not aligned for one that is.
+
+    Raises:
+        TypeError: If compiled code takes no such value.
+    """
+    given = type(value)
+    if given is np.ndarray and value.flags.num & _ALIGNED:
+        flags = value.flags.num
+        return value.dtype, value.ndim, flags & _C or flags & _FORTRAN, flags & _WRITE
+    if given in _SCALARS:
+        return _SCALARS[given]
+    if isinstance(value, tuple):
+        return given, *map(_kind, value)
+    message = f"compiled code takes no {given.__name__} such as {value!r}"
+    raise TypeError(message)
+
+
+def _words(kind: Any) -> str:
+    """A kind as text, the same in every process."""
+    if isinstance(kind, tuple):
+        return f"({' '.join(map(_words, kind))})"
+    if isinstance(kind, type):
+        return f"{kind.__module__}.{kind.__qualname__}"
+    return kind.str if isinstance(kind, np.dtype) else str(kind)
 
 
 @cache
@@ -37,121 +81,80 @@ def _sources(path: Path) -> dict[Path, bytes]:
     return found
 
 
-@cache
-def _folder(path: Path) -> Path | None:
-    """Where a module's machine code is kept; None where numba shall choose."""
-    digest = hashlib.sha256(numba.__version__.encode())
-    for _, content in sorted(_sources(path).items()):
+def _file_name(function: Callable[..., Any], kind: Any) -> str:
+    """The file of a function's code for one kind of arguments."""
+    from vdsm_pin.geometry.machine_code import platform
+
+    digest = hashlib.sha256(platform())
+    for _, content in sorted(_sources(Path(function.__code__.co_filename)).items()):
         digest.update(content)
-    folder = PACKAGE / "__pycache__" / f"{path.stem}-{digest.hexdigest()[:16]}"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:  # a read-only installation
-        return None
-    return folder
+    digest.update(_words(kind).encode())
+    return f"{function.__module__}.{function.__qualname__}-{digest.hexdigest()[:32]}"
 
 
-class _PartLibrary(JITCodeLibrary):
-    """A function's code as other compiled functions use it: to link, not to run."""
+class _Compiled:
+    """A function as Python calls it."""
 
-    def finalize(self) -> None:
-        """Leave optimising and translating to whoever is called from Python."""
-        self._finalized = True
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+        self._entries: dict[Any, Callable[..., Any]] = {}
+        update_wrapper(self, function)
 
+    def __call__(self, *arguments: Any) -> Any:
+        kind = tuple(map(_kind, arguments))
+        entry = self._entries.get(kind)
+        if entry is None:
+            with _one_at_a_time:
+                entry = self._entries[kind] = self._entry(kind, arguments)
+        return entry(*arguments)
 
-class _WholeLibrary(JITCodeLibrary):
-    """The code of a function with that of all that it calls."""
+    def _entry(self, kind: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
+        """The machine code for a kind of arguments, made if it is not there."""
+        from vdsm_pin.geometry.machine_code import Unusable, load, read, write
 
-    def finalize(self) -> None:
-        """Link every part once, then optimise and translate.
+        inspect.signature(self._function).bind(*arguments)
+        name = _file_name(self._function, kind)
+        with suppress(Unusable):
+            return load(read(name), self._function)
+        from vdsm_pin.geometry.compiling import machine_code
 
-        Callers come before what they call: the linker leaves out what nobody asks for.
-        """
-        order: list[Any] = []
+        code = machine_code(self._function, arguments)
+        write(name, code)
+        return load(code, self._function)
 
-        def visit(libraries: list[Any]) -> None:
-            for library in libraries:
-                if library not in seen:
-                    seen.add(library)
-                    if isinstance(library, _PartLibrary):
-                        visit(library._linking_libraries)
-                    order.append(library)
+    @property
+    def _numba_type_(self) -> Any:
+        """What numba asks for where compiled code calls this function."""
+        from vdsm_pin.geometry.compiling import part
 
-        seen: set[Any] = set()
-        visit(self._linking_libraries)
-        self._linking_libraries = order[::-1]
-        super().finalize()  # type: ignore[no-untyped-call]
-
-
-def _not_executable(library: Any, description: Any, environment: Any) -> Any:
-    """What stands for a part's entry point; numba knows it by its identity."""
-    name = description.qualname
-    return make_function(description.lookup_module(), name, name, 0, environment, ())
-
-
-class _PartCompiler(Compiler):
-    """numba's own steps, with a part as their result."""
-
-    def __init__(self, *arguments: Any) -> None:
-        super().__init__(*arguments)  # type: ignore[no-untyped-call]
-        library: Any = _PartLibrary
-        self.state.library = library(self.state.targetctx.codegen(), "part")
-        self.state.targetctx.get_executable = _not_executable
+        return part(self._function)._numba_type_
 
 
-class _WholeCompiler(Compiler):
-    """numba's own steps, with parts brought together."""
-
-    def __init__(self, *arguments: Any) -> None:
-        super().__init__(*arguments)  # type: ignore[no-untyped-call]
-        library: Any = _WholeLibrary
-        self.state.library = library(self.state.targetctx.codegen(), "whole")
-        self.state.library.enable_object_caching()
-
-
-def compiled(function: F) -> F:
-    """Compile a function, keeping its type and a copy of the machine code on disk.
-
-    Left to itself numba optimises and translates each function with all that it calls,
-    even where only compiled code calls it: with functions ten deep everything is done
-    ten times over. Here that is done for what Python calls, once.
-
-    No fast-math: the bounds rest on every operation being rounded once, as written.
-    The GIL is released, divisions by zero give inf or nan as numpy's do.
-    """
-    config: Any = numba.config
-    njit: Any = numba.njit
-    before, folder = config.CACHE_DIR, _folder(Path(function.__code__.co_filename))
-    config.CACHE_DIR = str(folder) if folder else before
-    common = {"nogil": True, "fastmath": False, "error_model": "numpy"}
-    try:
-        whole = njit(cache=True, pipeline_class=_WholeCompiler, **common)(function)
-    finally:
-        config.CACHE_DIR = before
-    part = njit(
-        pipeline_class=_PartCompiler,
-        no_cpython_wrapper=True,
-        no_cfunc_wrapper=True,
-        **common,
-    )(function)
-    # What a call in compiled code asks for.
-    whole.get_call_template = part.get_call_template
-    whole.get_overload = part.get_overload
-    return cast(F, whole)
-
-
-def _apart(typing_context: Any) -> Any:
-    """Keep the function that calls this from being copied into its callers.
+class _Apart:
+    """Keeps the function that calls it from being copied into its callers.
 
     Without it every large function is optimised again inside every other one, and
     compiling takes minutes.
     """
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        builder.function.attributes.add("noinline")
-        return context.get_dummy_value()
+    def __call__(self) -> None:
+        """Nothing, where Python calls it."""
 
-    return numba.types.void(), generate
+    @cached_property
+    def _numba_type_(self) -> Any:
+        from vdsm_pin.geometry.compiling import apart
+
+        return apart()
 
 
-apart: Callable[[], None] = cast(Any, intrinsic)(_apart)
+def compiled(function: F) -> F:
+    """Run a function as machine code, keeping its type.
+
+    Arguments are positional: arrays, numbers, and tuples of them. For each new kind of
+    them (dtype, dimensions, memory order, whether writeable) there is code of its own,
+    so that no array is ever taken for another.
+    """
+    return cast(F, _Compiled(function))
+
+
+apart: Final = _Apart()

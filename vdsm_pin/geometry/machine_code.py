@@ -1,0 +1,214 @@
+"""Machine code on disk: one file for each function and kind of arguments.
+
+A file holds what numba made: an object file and the few names needed to call it. It is
+loaded by numba's C extensions and LLVM alone, without numba's Python: importing that
+and filling its registries takes more than a second, loading takes milliseconds.
+"""
+
+import ctypes
+import hashlib
+import importlib.machinery
+import os
+import pickle
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec, module_from_spec
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final
+
+import llvmlite
+import llvmlite.binding as llvm
+import numpy as np
+
+PACKAGE: Final = Path(__file__).parents[1]
+
+DIGEST: Final = hashlib.sha256
+
+IN_THE_WAY: Final = ("NUMBA_NUM_THREADS", "NUMBA_CACHE_DIR")
+"""Settings of numba that leave the code as it is."""
+
+_unpickled: Final[dict[int, Any]] = {}
+
+_engines: Final[list[Any]] = []
+"""Owners of the loaded code; it stays until the process ends."""
+
+
+@dataclass(frozen=True)
+class MachineCode:
+    """A function compiled for one kind of arguments.
+
+    Args:
+        content: The object file.
+        entry: Name of the function that Python calls.
+        environment: Name of the pointer through which `entry` finds `constants`.
+        constants: Python objects that `entry` needs, such as the type it returns.
+        needs: Names from outside.
+    """
+
+    content: bytes
+    entry: str
+    environment: str
+    constants: tuple[Any, ...]
+    needs: tuple[str, ...]
+
+
+class Unusable(Exception):
+    """There is no code in a file, or not all of it."""
+
+
+def folders() -> Iterator[Path]:
+    """Where code is looked for, and kept in the first that can be written."""
+    yield PACKAGE / "__pycache__" / "machine_code"
+    home = os.environ.get("XDG_CACHE_HOME")
+    yield (Path(home) if home else Path.home() / ".cache") / "vdsm_pin"
+
+
+@cache
+def platform() -> bytes:
+    """All that decides on machine code besides the source."""
+    here, version = Path(__file__), _extensions_folder() / "_version.py"
+    sources = (here, here.with_name("compiling.py"), version)
+    settings = sorted(
+        f"{name}={value}"
+        for name, value in os.environ.items()
+        if name.startswith("NUMBA_") and name not in IN_THE_WAY
+    )
+    words = (
+        importlib.machinery.EXTENSION_SUFFIXES[0],  # Python and its kind
+        np.__version__,
+        llvmlite.__version__,
+        llvm.get_process_triple(),
+        llvm.get_host_cpu_name(),
+        llvm.get_host_cpu_features().flatten(),
+        *settings,
+    )
+    return "\n".join(words).encode() + b"".join(map(Path.read_bytes, sources))
+
+
+def read(name: str) -> MachineCode:
+    """The code in a file of that name.
+
+    Raises:
+        Unusable: If there is none, or none that is whole.
+    """
+    for folder in folders():
+        try:
+            content = (folder / name).read_bytes()
+        except OSError:
+            continue
+        size = DIGEST().digest_size
+        if DIGEST(content[size:]).digest() == content[:size]:
+            code: MachineCode = pickle.loads(content[size:])
+            return code
+    raise Unusable(name)
+
+
+def write(name: str, code: MachineCode) -> None:
+    """Keep code for later processes, if there is a folder for it.
+
+    The file appears whole or not at all, whoever else writes it or ends this process.
+    """
+    content = pickle.dumps(code)
+    for folder in folders():
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            number, aside = tempfile.mkstemp(dir=folder, prefix=name)
+        except OSError:  # a read-only installation
+            continue
+        with os.fdopen(number, "wb") as file:
+            file.write(DIGEST(content).digest() + content)
+        Path(aside).replace(folder / name)
+        return
+
+
+def load(code: MachineCode, function: Callable[..., Any]) -> Callable[..., Any]:
+    """Machine code as something to call.
+
+    Args:
+        code: The code.
+        function: What it was made from.
+
+    Raises:
+        Unusable: If a name from outside is unknown; LLVM would end the process.
+    """
+    dynamic = _runtime()
+    # An engine for each: names from different files never meet.
+    machine = llvm.Target.from_default_triple().create_target_machine()
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+    unknown = [name for name in code.needs if llvm.address_of_symbol(name) is None]
+    if unknown:
+        raise Unusable(", ".join(unknown))
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code.content))
+    engine.finalize_object()
+    environment = dynamic.Environment(function.__globals__)
+    environment.consts.extend(code.constants)
+    pointer = engine.get_global_value_address(code.environment)
+    ctypes.c_void_p.from_address(pointer).value = id(environment)
+    _engines.append(engine)
+    entry: Callable[..., Any] = dynamic.make_function(
+        sys.modules[function.__module__],
+        function.__name__,
+        function.__doc__ or "",
+        engine.get_function_address(code.entry),
+        environment,
+        None,
+    )
+    return entry
+
+
+@cache
+def _runtime() -> Any:
+    """Make known to LLVM what compiled code calls; numba's maker of functions."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    helpers = _extension("numba._helperlib")
+    memory = _extension("numba.core.runtime._nrt_python")
+    memory.memsys_use_cpython_allocator()
+    for prefix, module in (("numba_", helpers), ("NRT_", memory)):
+        for name, address in module.c_helpers.items():
+            llvm.add_symbol(name if name.startswith("_") else prefix + name, address)
+    llvm.add_symbol("numba_unpickle", ctypes.cast(_UNPICKLE, ctypes.c_void_p).value)
+    return _extension("numba._dynfunc")
+
+
+def _unpickle(address: int, size: int, digest: int) -> Any:
+    """The type of a result or what is raised, from the pickle in the code.
+
+    As numba's own, which imports all of numba.
+    """
+    if address not in _unpickled:
+        _unpickled[address] = pickle.loads(ctypes.string_at(address, size))
+    return _unpickled[address]
+
+
+_UNPICKLE: Final = ctypes.PYFUNCTYPE(
+    ctypes.py_object, ctypes.c_void_p, ctypes.c_int, ctypes.c_void_p
+)(_unpickle)
+
+
+def _extension(name: str) -> ModuleType:
+    """A C extension of numba without the package around it.
+
+    A later import of numba finds the same module, since its state is one to a process.
+    """
+    if name in sys.modules:
+        return sys.modules[name]
+    folder = _extensions_folder().joinpath(*name.split(".")[1:-1])
+    spec = importlib.machinery.PathFinder.find_spec(name, [str(folder)])
+    if spec is None or spec.loader is None:
+        raise ImportError(name=name)
+    module = sys.modules[name] = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@cache
+def _extensions_folder() -> Path:
+    spec = find_spec("numba")
+    if spec is None or spec.origin is None:
+        raise ImportError(name="numba")
+    return Path(spec.origin).parent
