@@ -252,15 +252,36 @@ def _narrow(
     results.best[touched, 0] = np.maximum(results.best[touched, 0], least[touched])
 
 
+class HastyProof:
+    """Asks whether the proof goes through, for stretches of a motion and error boxes.
+
+    Args:
+        problem: Arm, scene, required clearances.
+        trajectory: The motion; one row counts as an interval without motion.
+    """
+
+    def __init__(self, problem: PlanningProblem, trajectory: Trajectory) -> None:
+        self._problem, self._pieces = problem, pack_scene(problem)
+        self._motion = Motion(trajectory.x0, trajectory.alpha, trajectory.theta)
+        self._results = _new_results(problem, len(all_pairs(problem)), 1, 0)
+        self.n_intervals = max(1, trajectory.n_samples - 1)
+
+    def holds(self, errors: ErrorBox, first: int, last: int) -> bool:
+        """Whether every interval from `first` to below `last` is proved.
+
+        Stops at the first that is not.
+        """
+        task = make_task(self._problem, errors, self._pieces)
+        arm, n_obstacles = self._problem.manipulator, len(self._problem.scene.obstacles)
+        # Pairs that remember nothing: the answer depends on the question alone.
+        desk = new_desk(arm.n_links, task.pairs.link.size, BUDGET)
+        args = task, self._motion, desk, self._results, first, last, n_obstacles, True
+        return bool(sweep(*args))
+
+
 def is_certified(
     problem: PlanningProblem, trajectory: Trajectory, errors: ErrorBox
 ) -> bool:
     """Whether the clearance proof goes through; stops at the first gap."""
-    task = make_task(problem, errors)
-    n_pairs = task.pairs.link.size
-    motion = Motion(trajectory.x0, trajectory.alpha, trajectory.theta)
-    n_intervals = max(1, trajectory.n_samples - 1)
-    results = _new_results(problem, n_pairs, n_intervals, 0)
-    desk = new_desk(problem.manipulator.n_links, n_pairs, BUDGET)
-    n_obstacles = len(problem.scene.obstacles)
-    return bool(sweep(task, motion, desk, results, 0, n_intervals, n_obstacles, True))
+    proof = HastyProof(problem, trajectory)
+    return proof.holds(errors, 0, proof.n_intervals)

@@ -80,6 +80,29 @@ def _error_growth(
 
 
 @compiled
+def crude_growth(lengths: FloatArray, error: float, first: int, joint: int) -> float:
+    """The same for any n and any shape: both axes of a joint are at right angles; [m].
+
+    What an interval's own motion adds, half the error times its drift, comes on top.
+    """
+    levers = reach = 0.0
+    for k in range(joint - 1, first - 1, -1):
+        reach += lengths[k]
+        levers += reach
+    return second_order(lengths, first, joint, error) + sqrt(2.0) * error * levers
+
+
+@compiled
+def _far(points: FloatArray, plane: FloatArray, k: int) -> float:
+    """How far end k of a link gets along the plane's normal, at both rows; [m]."""
+    start = end = 0.0
+    for c in range(3):
+        start += plane[c] * points[k, c]
+        end += plane[c] * points[2 + k, c]
+    return max(start, end)
+
+
+@compiled
 def _near_upper(points: FloatArray, plane: FloatArray, run: FloatArray) -> float:
     """Distance of the remembered witness from the link's axis at the first row."""
     span = along = 0.0
@@ -108,6 +131,7 @@ def coast(
     frame: int,
     plane: FloatArray,
     errors: FloatArray,
+    crude: FloatArray,
     lost: float,
     rise: float,
     threshold: float,
@@ -129,6 +153,8 @@ def coast(
         frame: Frame of its partner.
         plane: What the pair remembers, shape (PLANE,).
         errors: Joint error [rad] and base error [m], shape (2,).
+        crude: What joint errors add at most at the link's ends, shape (2,), tried
+            first; inf where narrow bounds are wanted; [m].
         lost: What every plane loses; [m].
         rise: What turns a core distance into an upper bound; [m].
         threshold: A lower bound below it does not serve; [m].
@@ -143,18 +169,22 @@ def coast(
         The first interval that the plane does not serve, or `count`.
     """
     apart()
-    nx, ny, nz, support = plane[0], plane[1], plane[2], plane[SUPPORT]
-    first, base = frame + 1, abs(plane[0]) * errors[1] if frame == BASE else 0.0
+    support, first = plane[SUPPORT], frame + 1
+    base = abs(plane[0]) * errors[1] if frame == BASE else 0.0
     _load(centres, frames, local, link, frame, points, 2)
     while local < count:
         points[:2] = points[2:4]
         _load(centres, frames, local + 1, link, frame, points, 2)
         reach = -1e300
         for k in range(2):
-            start = nx * points[k, 0] + ny * points[k, 1] + nz * points[k, 2]
-            end = nx * points[2 + k, 0] + ny * points[2 + k, 1] + nz * points[2 + k, 2]
-            far = max(start, end) + 0.125 * bends[local, first, link + k]
-            if errors[0] > 0.0:
+            far = _far(points, plane, k) + 0.125 * bends[local, first, link + k]
+            wander = 0.5 * errors[0] * drifts[local, first, link + k]
+            reach = max(reach, far + wander + crude[k])
+        lower = support - reach - base - lost
+        if errors[0] > 0.0 and not lower >= threshold:
+            reach = -1e300
+            for k in range(2):
+                far = _far(points, plane, k) + 0.125 * bends[local, first, link + k]
                 far += _error_growth(
                     centres,
                     frames,
@@ -167,8 +197,8 @@ def coast(
                     plane[:3],
                     points[4],
                 )
-            reach = max(reach, far)
-        lower = support - reach - base - lost
+                reach = max(reach, far)
+            lower = support - reach - base - lost
         upper = _near_upper(points, plane, runs[local]) + rise
         allowed = 2.0 * plane[WIDTH] + SLACK * upper
         if not (lower >= threshold and upper - lower <= allowed):

@@ -1,0 +1,110 @@
+"""Oracle: the proof over the whole motion; motions drawn from the error box."""
+
+import numpy as np
+import pytest
+
+from vdsm_pin.geometry.arm import place, second_order, sway
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.manipulator import built_in
+from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.scene import Scene, Sphere
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.clearance import is_certified
+from vdsm_pin.verification.coasting import crude_growth
+from vdsm_pin.verification.records import ErrorBox
+from vdsm_pin.verification.robust import LARGEST, STRETCH, largest_joint_error
+
+ARM = built_in("hrm8")
+CENTRE, BALL = np.array([2.0, 0.45, 0.1]), 0.2
+REQUIRED = 0.003
+
+
+def asked(radius: float) -> PlanningProblem:
+    point = np.array([3.126, 0.0, 0.0])
+    path, ball = DesiredPath(point, point[None]), Sphere("ball", CENTRE, radius)
+    return PlanningProblem("p", ARM, Scene((ball,)), path, REQUIRED, np.eye(4))
+
+
+def swaying(n_rows: int) -> Trajectory:
+    """Some periods of all joints, weakest somewhere in the middle."""
+    t = np.linspace(0.0, 9.0, n_rows)[:, None] + np.arange(8.0)
+    x0, off = 0.02 * np.sin(t[:, 0]), np.zeros(n_rows, bool)
+    return Trajectory(off, off, x0, 0.02 * np.sin(t), 0.02 * np.cos(1.3 * t))
+
+
+@pytest.mark.parametrize("n_rows", [1, 2, 40, 3 * STRETCH + 7])
+def test_what_is_found_is_proved_and_little_more_is_not(n_rows: int) -> None:
+    problem, rows = asked(BALL), swaying(n_rows)
+    found = largest_joint_error(problem, rows, ErrorBox())
+    assert 1e-3 < found < LARGEST
+    assert is_certified(problem, rows, ErrorBox(joint=found))
+    above = found + 2.0 * TOLERANCES.joint_error
+    assert not is_certified(problem, rows, ErrorBox(joint=above))
+    besides = ErrorBox(base=0.001, obstacle=0.002)
+    assert largest_joint_error(problem, rows, besides) < found
+
+
+def test_no_motion_of_the_box_comes_too_near() -> None:
+    problem, rows, rng = asked(BALL), swaying(300), np.random.default_rng(1)
+    error = largest_joint_error(problem, rows, ErrorBox())
+    for _ in range(200):
+        pushed = rng.choice([-error, error], (2, 8))
+        centres = joint_centres(ARM, rows.x0, *(
+            angles + push
+            for angles, push in zip((rows.alpha, rows.theta), pushed, strict=True)
+        ))  # fmt: skip
+        assert clearance(centres) >= REQUIRED
+
+
+def clearance(centres: FloatArray) -> float:
+    link = np.diff(centres, axis=1)
+    t = ((CENTRE - centres[:, :-1]) * link).sum(axis=2) / (link**2).sum(axis=2)
+    foot = centres[:, :-1] + np.clip(t, 0.0, 1.0)[..., None] * link
+    gap = np.linalg.norm(CENTRE - foot, axis=2).min()
+    return float(gap - BALL - ARM.link_radius)
+
+
+def test_a_motion_that_fails_at_one_place_survives_nothing() -> None:
+    rows = swaying(1000)
+    assert largest_joint_error(asked(BALL + 1.0), rows, ErrorBox()) == 0.0
+    x0 = rows.x0.copy()
+    x0[777] -= 1.2  # one waypoint of a link in the ball
+    alpha = rows.alpha.copy()
+    alpha[777, 0] += 0.3
+    spoilt = Trajectory(rows.on_path, rows.path_m, x0, alpha, rows.theta)
+    assert not is_certified(asked(BALL), spoilt, ErrorBox())
+    assert largest_joint_error(asked(BALL), spoilt, ErrorBox()) == 0.0
+
+
+def test_nothing_in_the_way_is_looked_at_up_to_a_limit() -> None:
+    point = np.array([3.126, 0.0, 0.0])
+    free = PlanningProblem(
+        "free", built_in("hrm8"), Scene(), DesiredPath(point, point[None]), 0.0,
+        np.eye(4),
+    )  # fmt: skip
+    found = largest_joint_error(free, swaying(20), ErrorBox())
+    assert 0.0 < found <= LARGEST
+    assert is_certified(free, swaying(20), ErrorBox(joint=found))
+
+
+def test_the_crude_growth_is_above_every_exact_one() -> None:
+    rng = np.random.default_rng(2)
+    lengths, n_links = np.array(ARM.link_lengths), ARM.n_links
+    centres, frames = np.zeros((n_links + 1, 3)), np.zeros((n_links, 3, 3))
+    nearest = np.inf
+    for _ in range(500):
+        size = rng.choice([0.0, 1e-7, 0.7])
+        angles = rng.uniform(-size, size, (2, n_links))
+        place(0.1, angles[0], angles[1], lengths, centres, frames)
+        first, joint = sorted(rng.integers(0, n_links + 1, 2))
+        n, error = rng.normal(size=3), rng.uniform(0.0, 0.1)
+        n /= np.linalg.norm(n)
+        exact = second_order(lengths, first, joint, error)
+        exact += error * sway(n, centres, frames, first, joint)
+        crude = crude_growth(lengths, error, first, joint)
+        assert crude >= exact
+        if joint > first:
+            nearest = min(nearest, crude / exact)
+    assert nearest < 1.2
