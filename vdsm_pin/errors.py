@@ -117,6 +117,23 @@ class PathBlocked(Infeasible):
         super().__init__(f"obstacle {obstacle!r} blocks the tip path: {reason}")
 
 
+class CutOff(Infeasible):
+    """Every way of the tip to a place is narrower than the body and its clearance.
+
+    Args:
+        station: Arc length of that place along the desired path; [m].
+        narrowest: Where the widest way tried is shut, in words; may be empty.
+    """
+
+    def __init__(self, *, station: float, narrowest: str = "") -> None:
+        self.station, self.narrowest = station, narrowest
+        message = (
+            f"proved: every way of the tip to {station:.4f} m along the path is "
+            "narrower than the body and its clearance"
+        )
+        super().__init__(f"{message}; {narrowest}" if narrowest else message)
+
+
 class NoPlanFound(Infeasible):
     """The search ended without a plan; this proves nothing about the problem."""
 

@@ -1,8 +1,9 @@
 """What can be proved about a problem: tips no arm reaches, angles no plan can spare.
 
 Every proof here rests on a necessary condition. A tip beyond the curled reach or within
-an obstacle's margin cannot be drawn. An arm without a changed link angle lies along the
-rail, and an arm with one lies along it up to that joint, but for a sway that is bounded
+an obstacle's margin cannot be drawn (`passage.py` finds those no way leads to). An arm
+without a changed link angle lies along the rail, and an arm with one lies along it up
+to that joint, but for a sway that is bounded
 (`sway.py`): N postures for each tip, and where none of them comes near being clear a
 second angle must change.
 """
@@ -35,19 +36,21 @@ class TipProof:
     Args:
         far: Beyond the reach of the curled arm, shape (n,).
         buried: Within the margin of an obstacle, shape (n,).
+        cut_off: No way leads there from the start, shape (n,).
     """
 
     far: BoolArray
     buried: BoolArray
+    cut_off: BoolArray
 
     @property
     def closed(self) -> BoolArray:
-        """Either of them, shape (n,)."""
-        return self.far | self.buried
+        """Any of them, shape (n,)."""
+        return self.far | self.buried | self.cut_off
 
 
 @compiled
-def _upper_bounds(pieces: PackedPieces, segments: FloatArray) -> FloatArray:
+def upper_bounds(pieces: PackedPieces, segments: FloatArray) -> FloatArray:
     """Proved upper bounds of the distance of segments to each obstacle.
 
     Args:
@@ -88,7 +91,7 @@ def upper_clearance(problem: PlanningProblem, segments: FloatArray) -> FloatArra
     if not obstacles:
         return np.full((len(segments), 0), np.inf)
     pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
-    upper = _upper_bounds(pieces, np.ascontiguousarray(segments))
+    upper = upper_bounds(pieces, np.ascontiguousarray(segments))
     return np.asarray(upper - problem.manipulator.link_radius)
 
 
@@ -109,7 +112,7 @@ def prove_tips(
     near = np.flatnonzero(buried)
     upper = upper_clearance(problem, points[near]).min(axis=1, initial=np.inf)
     buried[near] = upper < problem.required_clearance - TOLERANCES.bracket_gap
-    return TipProof(far, buried)
+    return TipProof(far, buried, np.zeros(len(tips), dtype=np.bool_))
 
 
 def least_changed(

@@ -4,12 +4,18 @@ import itertools
 
 import numpy as np
 
-from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfReach, PathBlocked
+from vdsm_pin.errors import CutOff, Infeasible, NoPlanFound, OutOfReach, PathBlocked
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.feasibility import curled_reach
-from vdsm_pin.planner.fewest.bounds import TipProof, culprit, least_changed
+from vdsm_pin.planner.fewest.bounds import (
+    TipProof,
+    culprit,
+    least_changed,
+    upper_clearance,
+)
 from vdsm_pin.planner.fewest.explore import Outcome
 from vdsm_pin.planner.fewest.motion import Intervals, link_angles_at
+from vdsm_pin.planner.fewest.passage import narrowest
 from vdsm_pin.planner.fewest.route import PathRows
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import Blocked, PlanningProblem
@@ -29,6 +35,7 @@ def refuse(problem: PlanningProblem, outcome: Outcome) -> None:
     Raises:
         OutOfReach: Proved: beyond the reach of the curled arm.
         PathBlocked: Proved: too much of the path lies within an obstacle's margin.
+        CutOff: Proved: no way leads to too much of the path.
         NoPlanFound: Not proved: the search did not get that far.
     """
     rows, proof = outcome.rows, outcome.proof
@@ -73,6 +80,8 @@ def _proved(problem: PlanningProblem, rows: PathRows, proof: TipProof) -> Infeas
             reach=curled_reach(problem.manipulator),
             reason="every joint at its limit, Eq. 4",
         )
+    if not proof.buried.any():
+        return _cut_off(problem, rows, proof)
     first = int(np.flatnonzero(proof.buried)[0])
     tip = rows.tips[first]
     _, name, room = culprit(problem, np.stack([tip, tip]))
@@ -84,6 +93,23 @@ def _proved(problem: PlanningProblem, rows: PathRows, proof: TipProof) -> Infeas
             f"{problem.required_clearance * 1e3:.3f} mm"
         ),
     )
+
+
+def _cut_off(problem: PlanningProblem, rows: PathRows, proof: TipProof) -> Infeasible:
+    first = int(np.flatnonzero(proof.cut_off)[0])
+    place = narrowest(problem, rows.tips[first])
+    words = ""
+    if place is not None:
+        room = upper_clearance(problem, np.stack([place, place])[None])[0]
+        scene, required = problem.scene.obstacles, problem.required_clearance
+        near = [o.name for o, r in zip(scene, room, strict=True) if r < required]
+        words = (
+            f"the widest way tried has at most {room.min() * 1e3:.3f} mm to "
+            f"{', '.join(map(repr, near))} at "
+            f"({', '.join(f'{value:.3f}' for value in place)}) m, required are "
+            f"{required * 1e3:.3f} mm"
+        )
+    return CutOff(station=float(rows.stations[first]), narrowest=words)
 
 
 def how_far(problem: PlanningProblem, outcome: Outcome) -> str:
@@ -188,7 +214,7 @@ def _undrawn(outcome: Outcome) -> list[str]:
             continue
         a, b = route.stations[stretch[0] - 1], route.stations[k]
         why = (
-            "proved: the tip there is out of reach or within an obstacle's margin"
+            "proved: out of reach, within an obstacle's margin, or no way leads there"
             if route.closed[k]
             else "no way was found, which proves nothing"
         )

@@ -5,7 +5,7 @@ Everything is counted, nothing is timed: the same problem gives the same plan.
 
 import logging
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -15,6 +15,7 @@ from vdsm_pin.planner.fewest.bounds import TipProof, prove_tips
 from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.graft import fill
 from vdsm_pin.planner.fewest.home import with_start
+from vdsm_pin.planner.fewest.passage import cut_off
 from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste, build_roadmap
 from vdsm_pin.planner.fewest.route import PathRows, path_rows, tip_route
 from vdsm_pin.planner.fewest.search import Found, search
@@ -109,7 +110,7 @@ def explore(
     yield best
     if proof.closed.all():
         return
-    for level in LEVELS:
+    for number, level in enumerate(LEVELS):
         judge = Judge(problem, clearance, margin, level.slack, level.finest, level.ease)
         found = _look(judge, level, rows, proof, taste)
         now = Outcome(judge, found, rows, proof)
@@ -119,6 +120,13 @@ def explore(
             yield best
         if not best.missing > 0.0:
             return
+        if number == 0:
+            # Seldom needed, so only now: is there any way for the tip at all?
+            proof = replace(proof, cut_off=cut_off(problem, rows.tips))
+            best = replace(best, proof=proof)
+            yield best
+            if proof.closed.all():
+                return
 
 
 def _look(

@@ -1,0 +1,87 @@
+"""Proofs that no way leads to a tip, from both sides of what passes."""
+
+import numpy as np
+import pytest
+from scenes_for_fewest import problem, random_problem
+
+from vdsm_pin.errors import CutOff
+from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.manipulator import built_in
+from vdsm_pin.planner.fewest.passage import cut_off
+from vdsm_pin.planner.fewest.route import path_rows
+from vdsm_pin.planner.fewest.strategy import plan_fewest
+from vdsm_pin.problem import Blocked
+from vdsm_pin.scene import Box, Sphere
+from vdsm_pin.verification.link_clearance import link_clearance
+
+KEEP = built_in("hrm8").link_radius + 0.0035
+"""What the tip keeps from every surface."""
+
+
+def plate(name: str, centre: FloatArray, R: FloatArray, size: list[float]) -> Box:
+    return Box(name, centre, R, np.array(size) / 2.0)
+
+
+def cage(window: float, R: FloatArray, centre: FloatArray) -> list[Box]:
+    """A room of 0.8 m whose one window is a square of twice `window`."""
+    room, thick = 0.8, 0.03
+    boxes = []
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            if axis == 0 and side < 0.0:
+                continue
+            size = [room + 2 * thick] * 3
+            size[axis] = thick
+            off = np.zeros(3)
+            off[axis] = side * (room + thick) / 2.0
+            boxes.append(plate(f"p{axis}{side:+.0f}", centre + R @ off, R, size))
+    wide = (room + 2 * thick - 2 * window) / 2.0
+    for c, a in ((1, 2), (2, 1)):
+        for side in (-1.0, 1.0):
+            size = [thick] * 3
+            size[c], size[a] = wide, room + 2 * thick
+            off = np.array([-(room + thick) / 2.0, 0.0, 0.0])
+            off[c] = side * (window + wide / 2.0)
+            boxes.append(plate(f"w{c}{side:+.0f}", centre + R @ off, R, size))
+    return boxes
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_window_lets_the_tip_in_from_the_bodys_width_on(seed: int) -> None:
+    rng = np.random.default_rng([91, seed])
+    R = rotation_from_rpy(rng.uniform(-0.7, 0.7, 3))
+    centre = np.array([2.6, *rng.uniform(-0.4, 0.4, 2)])
+    inside, outside = centre + R @ [0.1, 0.1, 0.0], centre + R @ [0.7, 0.0, 0.0]
+    start = tuple((centre - R @ np.array([0.8, 0.0, 0.0])).tolist())
+    tips = np.stack([inside, outside])
+    for window, answer in ((KEEP - 4e-4, True), (KEEP + 4e-4, False)):
+        task = problem(*cage(window, R, centre), start=start, points=tips, closed=False)
+        assert cut_off(task, tips).tolist() == [answer, False]
+
+
+def test_the_tip_of_a_plan_is_never_cut_off() -> None:
+    for name in ("obs1", "obs2", "obs3"):
+        task = read_problem(f"paper/{name}").problem
+        assert not cut_off(task, path_rows(task.path).tips).any()
+    for seed in range(3):
+        task = random_problem(seed, clutter=True)
+        tips = plan_fewest(task, link_clearance(task), 0.0).tip_path.points[::10]
+        assert not cut_off(task, tips).any()
+
+
+def test_a_tip_beyond_reach_or_in_an_obstacle_counts_as_cut_off() -> None:
+    ball = Sphere("ball", np.array([3.126, 1.0, 0.5]), 0.1)
+    tips = np.array([[3.126, 1.0, 0.55], [3.126, 0.5, 0.5], [3.126, 3.5, 0.0]])
+    assert cut_off(problem(ball), tips).tolist() == [True, False, True]
+
+
+def test_what_lies_behind_a_narrow_hole_is_refused_with_place_and_obstacles() -> None:
+    centre, R = np.array([2.9, 0.0, 0.0]), np.eye(3)
+    points = np.array([[2.9, 0.1, 0.1], [2.9, -0.1, 0.1]])
+    start = (2.2, 0.0, 0.0)
+
+    narrow = problem(*cage(KEEP - 0.002, R, centre), start=start, points=points,
+                     closed=False, blocked=Blocked.FAIL)  # fmt: skip
+    with pytest.raises(CutOff, match=r"way tried .* 'w\d.* at \(2\.\d+, 0\.0"):
+        plan_fewest(narrow, link_clearance(narrow), 0.0)

@@ -1,0 +1,149 @@
+"""Compiled loops over the cells of an octree: what a cell holds, what it leads to.
+
+A cell is the code of its lowest corner (bits of the three coordinates in turn, counted
+in cells of the finest level) and its level. Sorted codes are in depth-first order, so
+the eight children of a cell take its place without any sorting.
+"""
+
+import heapq
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.compiled import compiled
+
+DEPTH = 18
+"""Level of the finest cells; three coordinates of so many bits fit an integer."""
+SHUT = 0
+"""Proved: a tip anywhere in the cell is too close to an obstacle or out of reach."""
+DOUBTFUL = 1
+"""Neither of the two others."""
+OPEN = 2
+"""A tip anywhere in the cell is clear and within reach."""
+
+
+@compiled
+def encode(x: int, y: int, z: int) -> int:
+    """The code of a finest cell."""
+    code = 0
+    for bit in range(DEPTH):
+        code |= ((x >> bit) & 1) << (3 * bit)
+        code |= ((y >> bit) & 1) << (3 * bit + 1)
+        code |= ((z >> bit) & 1) << (3 * bit + 2)
+    return code
+
+
+@compiled
+def decode(code: int, axis: int) -> int:
+    """One coordinate of a code."""
+    value = 0
+    for bit in range(DEPTH):
+        value |= ((code >> (3 * bit + axis)) & 1) << bit
+    return value
+
+
+@compiled
+def places(codes: IntArray) -> IntArray:
+    """Lowest corners of cells, counted in finest cells, shape (n, 3)."""
+    result = np.zeros((codes.size, 3), np.int64)
+    for n in range(codes.size):
+        for axis in range(3):
+            result[n, axis] = decode(codes[n], axis)
+    return result
+
+
+@compiled
+def holders(codes: IntArray, points: IntArray) -> IntArray:
+    """Number of the cell that holds each finest cell, shape (n,)."""
+    result = np.zeros(len(points), np.int64)
+    for n in range(len(points)):
+        result[n] = _holder(codes, encode(points[n, 0], points[n, 1], points[n, 2]))
+    return result
+
+
+@compiled
+def _holder(codes: IntArray, code: int) -> int:
+    """Number of the cell that holds a finest cell."""
+    return int(np.searchsorted(codes, code, side="right")) - 1
+
+
+@compiled
+def adjoining(
+    codes: IntArray, levels: IntArray, passable: BoolArray
+) -> tuple[IntArray, IntArray]:
+    """Cells that share a part of a face with each cell, both of them passable.
+
+    A way that leaves a cell through an edge or a corner touches every cell about it:
+    none of them is shut, and faces join them.
+
+    Returns:
+        Compressed rows: where each cell's neighbours begin, shape (n + 1,), and the
+        neighbours.
+    """
+    count = codes.size
+    pairs = np.zeros((6 * count, 2), np.int64)
+    found = 0
+    most = 1 << DEPTH
+    at = np.zeros(3, np.int64)
+    for n in range(count):
+        if not passable[n]:
+            continue
+        size = 1 << (DEPTH - levels[n])
+        for axis in range(3):
+            for step in (-1, size):
+                for c in range(3):
+                    at[c] = decode(codes[n], c)
+                at[axis] += step
+                if not 0 <= at[axis] < most:
+                    continue
+                other = _holder(codes, encode(at[0], at[1], at[2]))
+                # A smaller neighbour finds this cell from its own side.
+                if levels[other] <= levels[n] and passable[other]:
+                    pairs[found, 0], pairs[found, 1] = n, other
+                    found += 1
+    first = np.zeros(count + 1, np.int64)
+    for e in range(found):
+        first[pairs[e, 0] + 1] += 1
+        first[pairs[e, 1] + 1] += 1
+    for n in range(count):
+        first[n + 1] += first[n]
+    place = first[:-1].copy()
+    neighbours = np.zeros(2 * found, np.int64)
+    for e in range(found):
+        a, b = pairs[e]
+        neighbours[place[a]], neighbours[place[b]] = b, a
+        place[a] += 1
+        place[b] += 1
+    return first, neighbours
+
+
+@compiled
+def doubt_to(
+    sources: IntArray, first: IntArray, neighbours: IntArray, doubt: FloatArray
+) -> FloatArray:
+    """Least sum of `doubt` on a way through cells from any source, both ends counted.
+
+    Args:
+        sources: Cell numbers, shape (s,).
+        first: Where each cell's neighbours begin, shape (n + 1,).
+        neighbours: Cell numbers.
+        doubt: What passing a cell costs, shape (n,).
+
+    Returns:
+        Shape (n,), inf where no way leads.
+    """
+    result = np.full(doubt.size, np.inf)
+    heap = [(0.0, 0)][:0]
+    for source in sources:
+        result[source] = doubt[source]
+        heapq.heappush(heap, (doubt[source], source))
+    while len(heap) > 0:
+        value, n = heapq.heappop(heap)
+        if value > result[n]:
+            continue
+        for e in range(first[n], first[n + 1]):
+            m = neighbours[e]
+            if value + doubt[m] < result[m]:
+                result[m] = value + doubt[m]
+                heapq.heappush(heap, (result[m], m))
+    return result

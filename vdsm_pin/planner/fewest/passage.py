@@ -1,0 +1,238 @@
+"""Which tips are cut off from the start: proved, as no way for the tip leads there.
+
+Whatever the arm does, its tip keeps the body's radius and the required clearance from
+every obstacle and stays within reach. Space is cut into cells; a cell is shut where no
+tip can be. A tip whose cell cannot be entered from the start's through cells that are
+not shut is cut off. Only cells on the most promising ways are halved, so a hole of the
+body's width is found or closed without looking closely at the rest.
+"""
+
+import itertools
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.pieces import pack_pieces
+from vdsm_pin.planner.feasibility import curled_reach
+from vdsm_pin.planner.fewest.bounds import upper_bounds
+from vdsm_pin.planner.fewest.cells import (
+    DEPTH,
+    DOUBTFUL,
+    OPEN,
+    SHUT,
+    adjoining,
+    doubt_to,
+    holders,
+    places,
+)
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
+
+MOST_CELLS: Final = 60_000
+"""Cells at which a search ends; it has taken a second or two by then."""
+FINE: Final = 0.01
+"""Size to which the narrowest place is told; [m]."""
+CLOSER: Final = 60
+"""Rounds of coming closer to it."""
+FIRST_LEVEL: Final = 4
+"""Level of the cells begun with."""
+LIGHT: Final = 0.02
+"""Doubt of a cell whose centre is clear over that of another; [-]."""
+LIKELY: Final = 0.5
+"""Cells at least so much as close as the closest on a way are halved first; [-]."""
+CORNERS: Final = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+DETOUR: Final = 1.001
+"""Ways with so much of the best one's doubt are looked at with it; [-]."""
+
+
+class _Cells:
+    """The octree over all places a tip can be."""
+
+    def __init__(self, problem: PlanningProblem) -> None:
+        arm = problem.manipulator
+        low, high = arm.base_range
+        solids = [obstacle.pieces for obstacle in problem.scene.obstacles]
+        self.pieces = [*(pack_pieces([solid]) for solid in solids), pack_pieces(solids)]
+        self.convex = np.array([len(solid) == 1 for solid in solids], dtype=np.bool_)
+        keep = arm.link_radius + problem.required_clearance
+        self.inside = TOLERANCES.bracket_gap - keep
+        self.reach = curled_reach(arm) + TOLERANCES.tip_on_path
+        self.x_low, self.x_high = low - arm.total_length, high + arm.total_length
+        self.side = max(self.x_high - self.x_low, 2.0 * self.reach)
+        self.corner = np.array([self.x_low, -self.side / 2.0, -self.side / 2.0])
+        count = 8**FIRST_LEVEL
+        self.codes = np.arange(count) << (3 * (DEPTH - FIRST_LEVEL))
+        self.levels = np.full(count, FIRST_LEVEL)
+        self.state, self.middle = self._states(self.codes, self.levels)
+
+    def _boxes(
+        self, codes: IntArray, levels: IntArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Centres, shape (n, 3), and half sides, shape (n,), of cells; [m]."""
+        half = self.side / 2.0 ** (levels + 1.0)
+        low = self.corner + self.side / 2.0**DEPTH * places(codes)
+        return np.asarray(low + half[:, None]), np.asarray(half)
+
+    def _excess(self, points: FloatArray, obstacle: int = -1) -> FloatArray:
+        """Distances less what a tip must keep, from above; 0 counts inside; [m].
+
+        Args:
+            points: Shape (n, 3); [m].
+            obstacle: Which one; all of them without it.
+
+        Returns:
+            Shape (n, n_obstacles), or (n, 1) of one obstacle.
+        """
+        pieces = self.pieces[obstacle]
+        upper = upper_bounds(pieces, np.stack([points, points], axis=1))
+        return np.asarray(np.maximum(upper, 0.0) + self.inside)
+
+    def _states(self, codes: IntArray, levels: IntArray) -> tuple[IntArray, FloatArray]:
+        """What is known of cells, and what their centres have to spare, shape (n,)."""
+        centre, half = self._boxes(codes, levels)
+        out, inside = self._extent(centre, half)
+        radius = np.sqrt(3.0) * half
+        excess = np.full((len(codes), len(self.convex)), np.inf)
+        excess[~out] = self._excess(centre[~out])
+        free = (excess >= radius[:, None]).all(axis=1)
+        shut = out | (excess + radius[:, None] < 0.0).any(axis=1)
+        shut |= self._in_one(centre, half, excess, ~shut)
+        state = np.where(shut, SHUT, np.where(inside & free, OPEN, DOUBTFUL))
+        middle = np.where(out, np.inf, excess.min(axis=1, initial=self.side))
+        return state, middle
+
+    def _extent(self, centre: FloatArray, half: FloatArray) -> tuple[BoolArray, ...]:
+        """Whether cells are beyond reach as a whole, and whether within as a whole."""
+        off = np.abs(centre[:, 1:])
+        least = np.hypot(*np.maximum(off - half[:, None], 0.0).T)
+        most = np.hypot(*(off + half[:, None]).T)
+        low, high = centre[:, 0] - half, centre[:, 0] + half
+        out = (least > self.reach) | (low > self.x_high) | (high < self.x_low)
+        inside = (most <= self.reach) & (low >= self.x_low) & (high <= self.x_high)
+        return np.asarray(out), np.asarray(inside)
+
+    def _in_one(
+        self, centre: FloatArray, half: FloatArray, excess: FloatArray, open_: BoolArray
+    ) -> BoolArray:
+        """Whether all corners of a cell are too close to one convex obstacle.
+
+        The distance to a convex solid is largest at a corner.
+        """
+        shut = np.zeros(len(half), dtype=np.bool_)
+        if not self.convex.any():
+            return shut
+        nearest = np.where(self.convex, excess, np.inf).argmin(axis=1)
+        value = excess[np.arange(len(half)), nearest]
+        # Outside a convex solid some corner is farther than the centre by half a side.
+        worth = open_ & ((value + half < 0.0) | (value <= self.inside))
+        for o in np.flatnonzero(self.convex):
+            near = np.flatnonzero(worth & (nearest == o))
+            corners = centre[near, None] + half[near, None, None] * CORNERS
+            at = self._excess(corners.reshape(-1, 3), int(o))
+            shut[near] = (at.reshape(-1, 8) < 0.0).all(axis=1)
+        return shut
+
+    def holders(self, points: FloatArray) -> IntArray:
+        """Cells that hold points, shape (n,); -1 outside of all."""
+        place = np.floor((points - self.corner) / self.side * 2.0**DEPTH)
+        inside = ((place >= 0.0) & (place < 2.0**DEPTH)).all(axis=1)
+        found = np.full(len(points), -1)
+        found[inside] = holders(self.codes, place[inside].astype(np.int64))
+        return found
+
+    def sizes(self) -> FloatArray:
+        """Side of every cell; [m]."""
+        return np.asarray(self.side / 2.0**self.levels)
+
+    def closest(self, chosen: IntArray) -> IntArray:
+        """Of some cells those that come near the closest to an obstacle."""
+        middle = self.middle[chosen]
+        least = float(middle.min())
+        return chosen[middle <= LIKELY * least] if least < 0.0 else chosen
+
+    def centre(self, number: int) -> FloatArray:
+        """Centre of a cell, shape (3,); [m]."""
+        one = slice(number, number + 1)
+        return np.asarray(self._boxes(self.codes[one], self.levels[one])[0][0])
+
+    def split(self, chosen: IntArray) -> None:
+        """Put the eight children of cells in their place."""
+        count = np.ones(self.codes.size, dtype=np.int64)
+        count[chosen] = 8
+        begin = np.cumsum(count) - count
+        kids = (begin[chosen, None] + np.arange(8)).ravel()
+        codes, levels, state, middle = (
+            np.repeat(values, count)
+            for values in (self.codes, self.levels, self.state, self.middle)
+        )
+        levels[kids] += 1
+        codes[kids] += np.tile(np.arange(8), len(chosen)) << (
+            3 * (DEPTH - levels[kids])
+        )
+        state[kids], middle[kids] = self._states(codes[kids], levels[kids])
+        self.codes, self.levels, self.state, self.middle = codes, levels, state, middle
+
+
+def cut_off(problem: PlanningProblem, tips: FloatArray) -> BoolArray:
+    """Which tips no way leads to from the start; proved, but not every such tip found.
+
+    Args:
+        problem: Arm, scene, start, required clearance.
+        tips: Shape (n, 3); [m].
+
+    Returns:
+        Shape (n,).
+    """
+    return _decided(problem, tips)[1]
+
+
+def _decided(problem: PlanningProblem, tips: FloatArray) -> tuple[_Cells, BoolArray]:
+    """Cells halved until every tip is reached or cut off, or there are too many."""
+    cells = _Cells(problem)
+    while True:
+        home, goals = cells.holders(problem.path.start[None]), cells.holders(tips)
+        # A cell whose centre is clear hardly ever ends a way.
+        light = np.where(cells.middle < 0.0, 1.0, LIGHT)
+        doubt = np.where(cells.state == DOUBTFUL, cells.sizes() * light, 0.0)
+        first, neighbours = adjoining(cells.codes, cells.levels, cells.state != SHUT)
+        there = doubt_to(home, first, neighbours, doubt)
+        need = np.where(goals >= 0, there[goals], 0.0)
+        closed = ~np.isfinite(need)
+        open_ = np.unique(goals[(need > 0.0) & ~closed])
+        if not open_.size or cells.codes.size > MOST_CELLS:
+            return cells, np.asarray(closed)
+        through = there + doubt_to(open_, first, neighbours, doubt) - doubt
+        good = (cells.state == DOUBTFUL) & (cells.levels < DEPTH)
+        good &= through <= DETOUR * float(there[open_].min())
+        if not good.any():
+            return cells, np.asarray(closed)
+        cells.split(cells.closest(np.flatnonzero(good)))
+
+
+def narrowest(problem: PlanningProblem, tip: FloatArray) -> FloatArray | None:
+    """Where the widest way tried to a tip that is cut off is shut, shape (3,); [m].
+
+    An answer to show, not a proof: ways are compared cell by cell. None where no
+    obstacle is too close to the place found.
+    """
+    cells, _ = _decided(problem, tip[None])
+    place = 0
+    for _ in range(CLOSER):
+        home, goal = cells.holders(problem.path.start[None]), cells.holders(tip[None])
+        within = np.isfinite(cells.middle)
+        lack = np.maximum(0.0, cells.middle / cells.inside)
+        # The fourth power makes the worst place on a way count for nearly all of it.
+        cost = np.where(within, cells.sizes() * (lack**4 + LIGHT**4), 0.0)
+        first, neighbours = adjoining(cells.codes, cells.levels, within)
+        through = doubt_to(home, first, neighbours, cost)
+        through += doubt_to(goal, first, neighbours, cost) - cost
+        on_way = np.flatnonzero(through <= DETOUR * through[goal[0]])
+        place = int(on_way[np.argmin(cells.middle[on_way])])
+        # Clear centres tell little of a cell that is larger than what it must keep.
+        large = (cells.sizes() > -cells.inside) & (cells.state == DOUBTFUL)
+        large |= (cells.sizes() > FINE) & (cells.middle < 0.0)
+        if not large[on_way].any():
+            break
+        cells.split(cells.closest(on_way[large[on_way]]))
+    return cells.centre(place) if cells.middle[place] < 0.0 else None
