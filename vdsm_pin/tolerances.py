@@ -61,6 +61,12 @@ class Tolerances:
     joint_error: float = _held(1e-5, "rad")
     """Width to which the largest certified joint error is bisected; [rad]."""
 
+    slope_step: float = _held(1e-5, "m or rad")
+    """Step of the differences that a counterexample is sought along; [m], [rad].
+
+    At a lever of a millimetre the distance changes by ten times the width of a bracket.
+    """
+
     least_bracket: float = _held(1e-6, "m")
     """Width to which the bracket of the least clearance is narrowed; [m]."""
 

@@ -75,3 +75,14 @@ class Trajectory:
         """
         angles = np.stack([self.alpha, self.theta], axis=2).reshape(self.n_samples, -1)
         return np.concatenate([self.x0[:, None], angles], axis=1)
+
+    def part(self, first: int, last: int) -> "Trajectory":
+        """The rows from `first` up to `last`, or to the end where there are fewer."""
+        rows = slice(first, last)
+        return Trajectory(
+            self.on_path[rows],
+            self.path_m[rows],
+            self.x0[rows],
+            self.alpha[rows],
+            self.theta[rows],
+        )

@@ -1,5 +1,7 @@
 """Oracle: the proof over the whole motion; motions drawn from the error box."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from vdsm_pin.problem import DesiredPath, PlanningProblem
 from vdsm_pin.scene import Scene, Sphere
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.clearance import is_certified
+from vdsm_pin.verification.clearance import HastyProof, is_certified
 from vdsm_pin.verification.coasting import crude_growth
 from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.robust import LARGEST, STRETCH, largest_joint_error
@@ -87,6 +89,21 @@ def test_nothing_in_the_way_is_looked_at_up_to_a_limit() -> None:
     found = largest_joint_error(free, swaying(20), ErrorBox())
     assert 0.0 < found <= LARGEST
     assert is_certified(free, swaying(20), ErrorBox(joint=found))
+
+
+def test_many_obstacles_are_culled_and_change_nothing() -> None:
+    """Far balls beside the near one: culled block by block, deep into the motion."""
+    problem, rows = asked(BALL), swaying(3 * STRETCH)
+    far = [
+        Sphere(f"far {k}", CENTRE + (9.0 + k) * np.eye(3)[2], BALL) for k in range(20)
+    ]
+    scene = Scene((*problem.scene.obstacles, *far))
+    crowded = replace(problem, scene=scene)
+    found = largest_joint_error(problem, rows, ErrorBox())
+    assert largest_joint_error(crowded, rows, ErrorBox()) == found
+    proof = HastyProof(crowded, rows)
+    profile = proof._results.profile
+    assert (proof.n_intervals - 1) // proof._results.stride < len(profile)
 
 
 def test_the_crude_growth_is_above_every_exact_one() -> None:

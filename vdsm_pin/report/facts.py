@@ -15,6 +15,7 @@ from vdsm_pin.report.files import (
     BatchRow,
     CheckRow,
     ClosestRow,
+    CounterexampleRow,
     ErrorBoxRow,
     Hashes,
     MinClearance,
@@ -31,6 +32,7 @@ from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import (
     Check,
     ClosestApproach,
+    Counterexample,
     Verdict,
     Verification,
 )
@@ -102,6 +104,26 @@ def closest_row(verification: Verification, approach: ClosestApproach) -> Closes
         station_m=finite(approach.station),
         link_point_m=in_file_frame(verification, approach.link_point),
         other_point_m=in_file_frame(verification, approach.other_point),
+    )
+
+
+def counterexample_row(
+    verification: Verification, found: Counterexample
+) -> CounterexampleRow:
+    """One counterexample as its row."""
+    return CounterexampleRow(
+        moment=found.moment,
+        link=found.pair.link,
+        obstacle=found.pair.obstacle or None,
+        other_link=found.pair.other_link or None,
+        x0_m=float(found.joints[0]),
+        x0_error_m=float(found.offsets[0]),
+        angles_rad=tuple(found.joints[1:].tolist()),
+        angle_errors_rad=tuple(found.offsets[1:].tolist()),
+        clearance_m=found.clearance,
+        required_m=found.required,
+        link_point_m=in_file_frame(verification, found.link_point),
+        other_point_m=in_file_frame(verification, found.other_point),
     )
 
 
@@ -213,6 +235,11 @@ def verification_file(
             obstacle_error_m=errors.obstacle,
         ),
         max_joint_error_rad=finite(verification.joint_error),
+        refuted_joint_error_rad=finite(verification.refuted_joint_error),
+        counterexamples=tuple(
+            counterexample_row(verification, found)
+            for found in verification.counterexamples
+        ),
         motion=motion_facts(verification.trajectory),
         hashes=hashes(record),
         versions=versions(),

@@ -89,6 +89,31 @@ class ErrorBoxRow(FileModel):
     obstacle_error_m: FiniteFloat = Field(description="displacement of every surface")
 
 
+class CounterexampleRow(FileModel):
+    """A motion within the error box that misses a required clearance."""
+
+    moment: FiniteFloat = Field(description=f"when it does; {_MOMENT}")
+    link: int = Field(description=_LINK)
+    obstacle: str | None = Field(description="its name; null in a pair of links")
+    other_link: int | None = Field(description="null unless a pair of links")
+    x0_m: FiniteFloat = Field(description="base position then, its error included")
+    x0_error_m: FiniteFloat = Field(description="of it, off the nominal one")
+    angles_rad: tuple[FiniteFloat, ...] = Field(
+        description="alpha1, theta1, alpha2, .. then, their errors included"
+    )
+    angle_errors_rad: tuple[FiniteFloat, ...] = Field(
+        description="of them, off the nominal ones, the same throughout the motion"
+    )
+    clearance_m: FiniteFloat = Field(
+        description="proved upper bound, the obstacle's displacement taken off"
+    )
+    required_m: FiniteFloat = Field(description="what it falls short of")
+    link_point_m: Point | None = Field(description=f"on the link; {_FRAME}")
+    other_point_m: Point | None = Field(
+        description=f"on the partner where it stands nominally; {_FRAME}"
+    )
+
+
 class ToleranceRow(FileModel):
     """One tolerance in force."""
 
@@ -147,6 +172,13 @@ class VerificationFile(FileModel):
     )
     error_box: ErrorBoxRow
     max_joint_error_rad: FiniteFloat | None = Field(description=_JOINT_ERROR)
+    refuted_joint_error_rad: FiniteFloat | None = Field(
+        description="smallest joint error found that loses the clearance; null: none"
+    )
+    counterexamples: tuple[CounterexampleRow, ...] = Field(
+        description="errors within the box that lose the clearance where it is refuted "
+        "for the box alone: one against obstacles, one between links, at most"
+    )
     motion: MotionFacts
     hashes: Hashes
     versions: dict[str, str] = Field(description=_VERSIONS)

@@ -60,6 +60,9 @@ def show_verification(
         _plain_checks(file.checks)
     if file.max_joint_error_rad is not None:
         error = measured(file.max_joint_error_rad, "rad")
+        if file.refuted_joint_error_rad is not None:
+            lost = measured(file.refuted_joint_error_rad, "rad")
+            error += f", lost at ±{lost}"
         more = ((term("max_joint_error_rad"), f"±{error}"), *more)
     _facts(*more, ("report", str(folder / "report.html")))
 

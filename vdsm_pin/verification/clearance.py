@@ -263,8 +263,10 @@ class HastyProof:
     def __init__(self, problem: PlanningProblem, trajectory: Trajectory) -> None:
         self._problem, self._pieces = problem, pack_scene(problem)
         self._motion = Motion(trajectory.x0, trajectory.alpha, trajectory.theta)
-        self._results = _new_results(problem, len(all_pairs(problem)), 1, 0)
         self.n_intervals = max(1, trajectory.n_samples - 1)
+        # Nobody asks for a profile: all intervals share its one bin.
+        results = _new_results(problem, len(all_pairs(problem)), 1, 0)
+        self._results = results._replace(stride=self.n_intervals)
 
     def holds(self, errors: ErrorBox, first: int, last: int) -> bool:
         """Whether every interval from `first` to below `last` is proved.

@@ -120,6 +120,39 @@ class ClosestApproach:
 
 
 @dataclass(frozen=True)
+class Counterexample:
+    """A motion within the error box that misses a required clearance.
+
+    Args:
+        interval: Rows interval and interval + 1 bound it, counted from 0.
+        share: Where in the interval it happens, 0 to 1.
+        pair: The pair that comes too near.
+        joints: x0, alpha1, theta1, .. at that instant, shape (1 + 2N,); [m], [rad].
+        offsets: What they differ by from the nominal ones: constant errors within the
+            box, shape (1 + 2N,); [m], [rad].
+        clearance: Proved upper bound with the obstacle's error taken off; [m].
+        required: What it falls short of; [m].
+        link_point: Witness on the link's surface, base frame, shape (3,); [m].
+        other_point: Witness on the partner's nominal surface, shape (3,); [m].
+    """
+
+    interval: int
+    share: float
+    pair: Pair
+    joints: FloatArray
+    offsets: FloatArray
+    clearance: float
+    required: float
+    link_point: FloatArray
+    other_point: FloatArray
+
+    @property
+    def moment(self) -> float:
+        """When it happens, in waypoints."""
+        return self.interval + self.share
+
+
+@dataclass(frozen=True)
 class ClearanceChunk:
     """Brackets of consecutive intervals; long motions arrive in many chunks.
 
@@ -185,6 +218,10 @@ class Verification:
         undrawn: Stretches not drawn, arc lengths from and to, shape (k, 2); [m].
         joint_error: Largest joint error still certified; 0 if none is; NaN if it was
             not asked for; [rad].
+        refuted_joint_error: A joint error at which the clearance is lost, with a
+            counterexample; NaN if none was looked for or found; [rad].
+        counterexamples: Motions within the error box that miss a required clearance:
+            one against obstacles, one between links, at most.
     """
 
     problem: PlanningProblem
@@ -198,6 +235,8 @@ class Verification:
     coverage: float
     undrawn: FloatArray
     joint_error: float
+    refuted_joint_error: float = nan
+    counterexamples: tuple[Counterexample, ...] = ()
 
     @property
     def verdict(self) -> Verdict:

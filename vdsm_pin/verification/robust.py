@@ -1,12 +1,14 @@
-"""The largest joint error that a motion's clearance survives, by bisection.
+"""The largest joint error that a motion's clearance survives, from both sides.
 
 A motion survives what its weakest stretch survives. So the bisection looks at stretches
 that do not survive what the ones before did, and the whole is asked about the result.
+In the stretch that survives no more, an error is sought that loses the clearance.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from math import nan
 from typing import Final
 
 import numpy as np
@@ -14,14 +16,23 @@ import numpy as np
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.clearance import HastyProof
+from vdsm_pin.verification.clearance import HastyProof, prove_clearance
+from vdsm_pin.verification.counterexample import Search, moments_of
 from vdsm_pin.verification.records import ErrorBox
+from vdsm_pin.verification.search import UNDECIDED
+from vdsm_pin.verification.sweep import LOW
 
 LARGEST: Final = float(np.deg2rad(45.0))
 """Errors beyond this are not looked at; [rad]."""
 
 STRETCH: Final = 256
 """Intervals asked about at once."""
+
+FACTORS: Final = (1.25, 2.0, 4.0)
+"""How far beyond what is proved counterexamples are sought."""
+
+SOUGHT: Final = 3
+"""Pairs for which they are sought."""
 
 
 def largest_joint_error(
@@ -74,3 +85,56 @@ def _largest(holds: Callable[[float], bool], most: float) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(middle) else (low, middle)
     return low
+
+
+def refuted_joint_error(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    errors: ErrorBox,
+    certified: float,
+) -> float:
+    """A joint error at which the clearance is lost, the smallest that is found.
+
+    Args:
+        problem: Arm, scene, required clearances.
+        trajectory: The motion.
+        errors: As for `largest_joint_error`.
+        certified: What that one found; [rad].
+
+    Returns:
+        The largest offset of a counterexample; NaN where none was found; [rad].
+    """
+    proof, above = HastyProof(problem, trajectory), certified + TOLERANCES.joint_error
+    firsts = range(0, proof.n_intervals, STRETCH)
+    lost = (
+        first
+        for first in firsts
+        if not _holds(
+            proof, errors, first, min(first + STRETCH, proof.n_intervals), above
+        )
+    )
+    first = next(lost, None)
+    if first is None:
+        return nan
+    weakest = trajectory.part(first, first + STRETCH + 1)
+    for factor in FACTORS:
+        found = _smallest(problem, weakest, replace(errors, joint=factor * above))
+        if found:
+            return min(found)
+    return nan
+
+
+def _smallest(
+    problem: PlanningProblem, trajectory: Trajectory, errors: ErrorBox
+) -> list[float]:
+    """Joint errors of counterexamples of the pairs that the box leaves undecided."""
+    proof = prove_clearance(problem, trajectory, errors)
+    among = np.flatnonzero(proof.counts[:, UNDECIDED] > 0)
+    nearest = among[np.argsort(proof.best[among, LOW], kind="stable")][:SOUGHT]
+    searches = [
+        Search(problem, trajectory, proof.pairs[k]).smallest(
+            errors, moments_of(proof.best[k])
+        )
+        for k in nearest
+    ]
+    return [float(np.abs(found.offsets[1:]).max()) for found in searches if found]

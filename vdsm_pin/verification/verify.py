@@ -1,17 +1,15 @@
 """The judgement of a trajectory: every check, one row each, in a fixed order."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput, VdsmError
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import RobotModel
-from vdsm_pin.scene import Mesh
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification import (
     cable_check,
@@ -21,6 +19,8 @@ from vdsm_pin.verification import (
     inside,
 )
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
+from vdsm_pin.verification.clearance_check import check_clearance
+from vdsm_pin.verification.counterexample import find_counterexamples
 from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.records import (
     Check,
@@ -31,7 +31,7 @@ from vdsm_pin.verification.records import (
     Verdict,
     Verification,
 )
-from vdsm_pin.verification.robust import largest_joint_error
+from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.sweep import (
     AT_UPPER,
     LOW,
@@ -80,12 +80,12 @@ def verify(
     wanted = [*sinks, kept.keep] if kept.fits else list(sinks)
     proof = prove_clearance(problem, trajectory, box, wanted)
     tip = check_tip(problem, trajectory)
-    clearance = _clearance_checks(problem, proof)
+    found = find_counterexamples(problem, trajectory, box, proof)
     checks = [
         *_guarded(fk.NAME, lambda: fk.check_fk(robot, problem, trajectory)),
         *check_limits(problem, trajectory),
         *tip.checks,
-        *clearance,
+        *check_clearance(problem, proof, found),
         *_guarded(inside.NAME, lambda: inside.check_inside(problem, trajectory)),
         *_guarded(
             coal_clearance.NAME,
@@ -99,9 +99,10 @@ def verify(
             cable_check.NAME, lambda: cable_check.check_cables(problem, trajectory)
         ),
     ]
-    largest = float("nan")
+    largest = refuted = float("nan")
     if joint_error:
         largest = largest_joint_error(problem, trajectory, box)
+        refuted = refuted_joint_error(problem, trajectory, box, largest)
     return Verification(
         problem=problem,
         trajectory=trajectory,
@@ -114,6 +115,8 @@ def verify(
         coverage=tip.coverage,
         undrawn=tip.undrawn,
         joint_error=largest,
+        refuted_joint_error=refuted,
+        counterexamples=found,
     )
 
 
@@ -161,56 +164,6 @@ def _guarded(
         nan = float("nan")
         return (Check(name, Verdict.UNDECIDED, 0, nan, nan, "-", f"not run: {error}"),)
     return rows if isinstance(rows, tuple) else (rows,)
-
-
-def _clearance_checks(
-    problem: PlanningProblem, proof: ClearanceProof
-) -> tuple[Check, ...]:
-    """One row for the obstacles, one for the links among themselves."""
-    of_obstacles = np.array([bool(pair.obstacle) for pair in proof.pairs], dtype=bool)
-    rows = []
-    for mine, name, needed in (
-        (of_obstacles, "clearance from obstacles", problem.required_clearance),
-        (~of_obstacles, "clearance between links", problem.required_self_clearance),
-    ):
-        if mine.any():
-            rows.append(_clearance_check(proof, np.flatnonzero(mine), name, needed))
-    surfaces = [
-        f"; {obstacle.name} is not closed: judged as a surface without an inside"
-        for obstacle in problem.scene.obstacles
-        if isinstance(obstacle, Mesh) and not obstacle.watertight
-    ]
-    if surfaces:
-        rows[0] = replace(rows[0], where=rows[0].where + "".join(surfaces))
-    return tuple(rows)
-
-
-def _clearance_check(
-    proof: ClearanceProof, mine: IntArray, name: str, needed: float
-) -> Check:
-    counts = proof.counts[mine].sum(axis=0)
-    verdict = Verdict.CERTIFIED
-    if counts[1]:
-        verdict = Verdict.REFUTED
-    elif counts[2]:
-        verdict = Verdict.UNDECIDED
-    # A refuted motion is as bad as its witness, another one as good as its proof.
-    column = UP if verdict is Verdict.REFUTED else LOW
-    pair = int(mine[np.argmin(proof.best[mine, column])])
-    row = proof.best[pair]
-    where = f"link {proof.pairs[pair].link} and {proof.pairs[pair].label}"
-    if verdict is Verdict.UNDECIDED:
-        where += f"; {int(counts[2])} of {int(counts.sum())} undecided"
-    return Check(
-        name=name,
-        verdict=verdict,
-        count=int(counts.sum()),
-        worst=float(row[column]),
-        limit=needed,
-        unit="m",
-        where=where,
-        moment=float(row[AT_UPPER] + row[TIME]),
-    )
 
 
 def _station(

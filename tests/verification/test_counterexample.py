@@ -1,0 +1,195 @@
+"""Refutation of error boxes: found where there is one, true wherever it is found."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
+from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.scene import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Obstacle,
+    Scene,
+    Sphere,
+)
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.clearance import is_certified, prove_clearance
+from vdsm_pin.verification.counterexample import find_counterexamples
+from vdsm_pin.verification.records import Counterexample, ErrorBox, Verdict
+from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
+from vdsm_pin.verification.verify import verify
+
+ARM = built_in("hrm8")
+LENGTH = float(ARM.total_length)
+
+
+def problem_with(
+    *obstacles: Obstacle, required: float = 0.002, between: float = 0.0
+) -> PlanningProblem:
+    tip = np.array([LENGTH, 0.0, 0.0])
+    scene, path = Scene(obstacles), DesiredPath(tip, tip[None])
+    return PlanningProblem("p", ARM, scene, path, required, np.eye(4), between)
+
+
+def motion(n_rows: int, seed: int = 0, size: float = 0.0) -> Trajectory:
+    rng = np.random.default_rng(seed)
+    x0, angles = np.linspace(0.0, 0.02, n_rows), rng.uniform(-size, size, (2, 8))
+    alpha, theta = (np.repeat(a[None], n_rows, axis=0) for a in angles)
+    return Trajectory(np.zeros(n_rows, bool), np.zeros(n_rows), x0, alpha, theta)
+
+
+def ceiling(gap: float) -> HalfSpace:
+    """Everything above the straight arm, at a distance from its surface."""
+    height = np.array([0.0, 0.0, ARM.link_radius + gap])
+    return HalfSpace("ceiling", height, np.array([0.0, 0.0, -1.0]))
+
+
+def checked(
+    problem: PlanningProblem, rows: Trajectory, box: ErrorBox
+) -> tuple[Counterexample, ...]:
+    """Counterexamples, each evaluated again from its numbers alone."""
+    proof = prove_clearance(problem, rows, box)
+    found = find_counterexamples(problem, rows, box, proof)
+    for one in found:
+        k, q = one.interval, rows.joints
+        nominal = q[k] + one.share * (q[min(k + 1, len(q) - 1)] - q[k])
+        off = np.abs(one.joints - nominal)
+        assert off[0] <= box.base
+        assert (off[1:] <= box.joint).all()
+        centres = joint_centres(
+            ARM, one.joints[:1], one.joints[None, 1::2], one.joints[None, 2::2]
+        )[0]
+        grown = box.obstacle if one.pair.obstacle else 0.0
+        gap = float(np.linalg.norm(one.link_point - one.other_point))
+        assert gap <= one.clearance + grown + 1e-9 or one.clearance < 0.0
+        assert one.clearance < one.required
+        a, b = centres[one.pair.link - 1], centres[one.pair.link]
+        t = np.clip((one.link_point - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
+        assert (
+            np.linalg.norm(one.link_point - a - t * (b - a)) <= ARM.link_radius + 1e-9
+        )
+    return found
+
+
+class Bracket(NamedTuple):
+    certified: float
+    refuted: float
+
+
+def bracketed(problem: PlanningProblem, rows: Trajectory) -> Bracket:
+    """The joint error that is survived, and one that is not."""
+    low = largest_joint_error(problem, rows, ErrorBox())
+    return Bracket(low, refuted_joint_error(problem, rows, ErrorBox(), low))
+
+
+def test_a_drooping_arm_is_refuted_at_the_error_that_lifts_its_tip() -> None:
+    """All theta off by -e lift the tip by sum L_l sin(l e): closed form."""
+    rows, wall = motion(3), ceiling(0.05)
+    lifts = np.arange(1, 9)
+
+    def lift(e: float) -> float:
+        return float((ARM.link_lengths * np.sin(lifts * e)).sum())
+
+    low, high = 0.0, 0.1
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if lift(middle) < 0.048 else (low, middle)
+    problem = problem_with(wall)
+    assert checked(problem, rows, ErrorBox(joint=low * 0.999)) == ()
+    (found,) = checked(problem, rows, ErrorBox(joint=low * 1.001))
+    assert found.pair.link == 8
+    np.testing.assert_allclose(found.offsets[2::2], -low * 1.001, rtol=1e-6)
+    errors = bracketed(problem, rows)
+    assert errors.certified <= low <= errors.refuted
+    assert errors.refuted == pytest.approx(low, rel=1e-3)
+    assert errors.certified == pytest.approx(low, rel=0.05)
+
+
+def test_base_and_obstacle_errors_are_used_to_the_full() -> None:
+    wall = HalfSpace("end", np.array([LENGTH + 0.1, 0, 0]), np.array([-1.0, 0, 0]))
+    rows = motion(2)  # ends 20 mm further on
+    gap = 0.1 - 0.02 - ARM.link_radius
+    problem = problem_with(wall, required=gap - 0.003)
+    assert is_certified(problem, rows, ErrorBox(base=0.0019, obstacle=0.001))
+    (found,) = checked(problem, rows, ErrorBox(base=0.0021, obstacle=0.001))
+    assert found.interval + found.share == pytest.approx(1.0)
+    assert found.offsets[0] == pytest.approx(0.0021)
+    assert found.clearance == pytest.approx(gap - 0.0031, abs=1e-8)
+
+
+SHAPES = [
+    Sphere("o", np.array([2.4, 0.3, 0.1]), 0.2),
+    Capsule("o", np.array([2.4, 0.3, 0.1]), np.array([0.0, 0.6, 0.8]), 0.2, 0.1),
+    Cylinder("o", np.array([2.0, 0.3, 0.2]), np.array([0.0, 1.0, 0.0]), 0.15, 0.2),
+    Box("o", np.array([2.0, 0.0, -0.3]), np.eye(3), np.array([0.2, 0.3, 0.15])),
+    Mesh(
+        "o",
+        np.array([[1.5, 0.2, -0.1], [2.5, 0.2, 0.0], [2.0, 0.2, 0.4], [2.0, 0.6, 0.2]]),
+        np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]]),
+        True,
+    ),
+]
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
+def test_the_bracket_of_the_joint_error_is_true_and_narrow(shape: Obstacle) -> None:
+    """What is called certified is proved, what is called refuted has a witness."""
+    problem, rows = problem_with(shape), motion(4, seed=3, size=0.01)
+    proof = prove_clearance(problem, rows, ErrorBox())
+    assert not proof.counts[:, 1:].any()
+    errors = bracketed(problem, rows)
+    assert is_certified(problem, rows, ErrorBox(joint=errors.certified))
+    assert errors.certified < errors.refuted < 1.4 * errors.certified
+    assert checked(problem, rows, ErrorBox(joint=errors.refuted * (1 + 1e-6)))
+    assert checked(problem, rows, ErrorBox(joint=errors.certified)) == ()
+
+
+def test_links_that_errors_bring_together_are_refuted() -> None:
+    n = 6
+    cables = CableLayout(0.03, 0.05, paper_hole_angles(n))
+    arm = Manipulator("u", np.full(n, 0.3), 0.04, 1.5, 1.5, (-5.0, 5.0), cables)
+    tip = np.array([1.8, 0.0, 0.0])
+    problem = PlanningProblem(
+        "u", arm, Scene(), DesiredPath(tip, tip[None]), 0.0, np.eye(4), 0.05
+    )
+    alpha = np.zeros((2, n))
+    alpha[:, [2, 3]] = 1.2  # a hook: link 5 looks back at link 2
+    rows = Trajectory(
+        np.zeros(2, bool), np.zeros(2), np.zeros(2), alpha, np.zeros((2, n))
+    )
+    proof = prove_clearance(problem, rows, ErrorBox())
+    assert not proof.counts[:, 1:].any()
+    errors = bracketed(problem, rows)
+    assert errors.certified > 0.0
+    box = ErrorBox(joint=1.01 * errors.refuted)
+    (found,) = find_counterexamples(
+        problem, rows, box, prove_clearance(problem, rows, box)
+    )
+    assert found.pair.other_link > found.pair.link
+    assert found.clearance < 0.05
+
+
+def test_the_row_says_refuted_and_the_nominal_motion_needs_no_counterexample() -> None:
+    problem, rows, robot = problem_with(ceiling(0.05)), motion(2), load_robot(ARM)
+    for box, verdict, count in (
+        (ErrorBox(joint=0.0001), Verdict.CERTIFIED, 0),
+        (ErrorBox(joint=0.01), Verdict.REFUTED, 1),
+    ):
+        found = verify(problem, rows, robot, errors=box)
+        row = next(c for c in found.checks if c.name == "clearance from obstacles")
+        assert row.verdict is verdict
+        assert len(found.counterexamples) == count
+    assert row.worst == found.counterexamples[0].clearance
+    assert "within the error box" in row.where
+    touching = replace(problem, required_clearance=0.06)
+    found = verify(touching, rows, robot, errors=ErrorBox(joint=0.01))
+    assert found.counterexamples == ()
+    assert found.verdict is Verdict.REFUTED

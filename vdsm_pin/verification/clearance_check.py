@@ -1,0 +1,86 @@
+"""What the clearance proof comes to: a row for the obstacles and one for the links."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import IntArray
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.scene import Mesh
+from vdsm_pin.verification.clearance import ClearanceProof
+from vdsm_pin.verification.records import Check, Counterexample, Verdict
+from vdsm_pin.verification.sweep import AT_UPPER, LOW, TIME, UP
+
+
+def check_clearance(
+    problem: PlanningProblem,
+    proof: ClearanceProof,
+    counterexamples: tuple[Counterexample, ...],
+) -> tuple[Check, ...]:
+    """One row for the obstacles, one for the links among themselves.
+
+    Args:
+        problem: Required clearances.
+        proof: Of every motion within the error box.
+        counterexamples: Motions within it that refute what the proof left undecided.
+    """
+    of_obstacles = np.array([bool(pair.obstacle) for pair in proof.pairs], dtype=bool)
+    rows = []
+    for mine, name, needed in (
+        (of_obstacles, "clearance from obstacles", problem.required_clearance),
+        (~of_obstacles, "clearance between links", problem.required_self_clearance),
+    ):
+        if mine.any():
+            row = _row(proof, np.flatnonzero(mine), name, needed)
+            against = [
+                found
+                for found in counterexamples
+                if bool(found.pair.obstacle) == bool(of_obstacles[mine][0])
+            ]
+            rows.append(_refuted(row, against[0]) if against else row)
+    surfaces = [
+        f"; {obstacle.name} is not closed: judged as a surface without an inside"
+        for obstacle in problem.scene.obstacles
+        if isinstance(obstacle, Mesh) and not obstacle.watertight
+    ]
+    if surfaces:
+        rows[0] = replace(rows[0], where=rows[0].where + "".join(surfaces))
+    return tuple(rows)
+
+
+def _row(proof: ClearanceProof, mine: IntArray, name: str, needed: float) -> Check:
+    counts = proof.counts[mine].sum(axis=0)
+    verdict = Verdict.CERTIFIED
+    if counts[1]:
+        verdict = Verdict.REFUTED
+    elif counts[2]:
+        verdict = Verdict.UNDECIDED
+    # A refuted motion is as bad as its witness, another one as good as its proof.
+    column = UP if verdict is Verdict.REFUTED else LOW
+    pair = int(mine[np.argmin(proof.best[mine, column])])
+    row = proof.best[pair]
+    where = f"link {proof.pairs[pair].link} and {proof.pairs[pair].label}"
+    if verdict is Verdict.UNDECIDED:
+        where += f"; {int(counts[2])} of {int(counts.sum())} undecided"
+    return Check(
+        name=name,
+        verdict=verdict,
+        count=int(counts.sum()),
+        worst=float(row[column]),
+        limit=needed,
+        unit="m",
+        where=where,
+        moment=float(row[AT_UPPER] + row[TIME]),
+    )
+
+
+def _refuted(row: Check, found: Counterexample) -> Check:
+    """The row of an undecided proof that a counterexample decides."""
+    pair = f"link {found.pair.link} and {found.pair.label}"
+    return replace(
+        row,
+        verdict=Verdict.REFUTED,
+        worst=found.clearance,
+        where=f"{pair}, with errors within the error box",
+        moment=found.moment,
+    )

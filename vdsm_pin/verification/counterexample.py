@@ -1,0 +1,257 @@
+"""A motion within the error box that misses its required clearance.
+
+Where the proof for an error box does not go through, the box may ask too much or the
+proof too little. A configuration within the box that comes too near settles it. The
+search only proposes: it walks from corner to corner of the box along the slopes of the
+distance. What it finds is judged like any motion of one row, so that nothing is refuted
+without two witness points.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.pieces import pack_pieces
+from vdsm_pin.geometry.row_bounds import link_gaps, row_brackets
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.scene import Scene
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
+from vdsm_pin.verification.records import (
+    ClearanceChunk,
+    Counterexample,
+    ErrorBox,
+    Pair,
+)
+from vdsm_pin.verification.search import REFUTED, UNDECIDED
+from vdsm_pin.verification.sweep import AT_LOWER, AT_UPPER, LOW, TIME
+
+PAIRS: Final = 8
+"""Pairs looked at, those of the least lower bounds first."""
+
+SHARES: Final = np.linspace(0.0, 1.0, 9)
+"""Where in the interval of the least lower bound the search starts."""
+
+STEPS: Final = 8
+"""Most walks from corner to corner; two or three are usual."""
+
+HALVINGS: Final = 16
+"""How often the step in time is halved around the nearest moment found."""
+
+PARTS: Final = 129
+"""Shares of the offsets tried at once for the smallest that suffices."""
+
+INSIDE: Final = 1.0 - 1e-9
+"""Offsets stay so little inside the box that adding them to angles cannot leave it."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """An instant of a motion: an interval and the share of it that has passed."""
+
+    interval: int
+    share: float
+
+
+class Search:
+    """Looks for counterexamples of one pair.
+
+    Args:
+        problem: Arm, scene, required clearances.
+        trajectory: The motion.
+        pair: The pair.
+    """
+
+    def __init__(
+        self, problem: PlanningProblem, trajectory: Trajectory, pair: Pair
+    ) -> None:
+        mine = [o for o in problem.scene.obstacles if o.name == pair.obstacle]
+        self.problem = replace(problem, scene=Scene(tuple(mine)))
+        self.pair, self.rows = pair, trajectory
+        self.required = problem.required_self_clearance
+        if pair.obstacle:
+            self.pieces = pack_pieces([mine[0].pieces])
+            self.required = problem.required_clearance
+
+    def find(
+        self, errors: ErrorBox, moments: tuple[Moment, ...]
+    ) -> Counterexample | None:
+        """A configuration within the box that misses the required clearance.
+
+        Args:
+            errors: The box.
+            moments: Where to start.
+
+        Returns:
+            One whose witness points prove it; None where none was found.
+        """
+        return self._judged(errors, *self._nearest(errors, moments))
+
+    def smallest(
+        self, errors: ErrorBox, moments: tuple[Moment, ...]
+    ) -> Counterexample | None:
+        """The same with joint offsets as small as the required clearance allows."""
+        moment, offset = self._nearest(errors, moments)
+        nominal, joints = self._joints(moment), np.arange(offset.size) > 0
+        low, high, limit = 0.0, 1.0, self.required + self._grown(errors)
+        for _ in range(2):
+            parts = np.linspace(low, high, PARTS)
+            tried = np.where(joints, parts[:, None] * offset, offset)
+            near = np.flatnonzero(self._gaps(nominal + tried) < limit)
+            if not near.size:
+                return None
+            low, high = parts[max(near[0] - 1, 0)], parts[near[0]]
+        return self._judged(errors, moment, np.where(joints, high * offset, offset))
+
+    def _grown(self, errors: ErrorBox) -> float:
+        """By how much the surface of the partner may come nearer; [m]."""
+        return errors.obstacle if self.pair.obstacle else 0.0
+
+    def _nearest(
+        self, errors: ErrorBox, moments: tuple[Moment, ...]
+    ) -> tuple[Moment, FloatArray]:
+        """The nearest configuration found within the box: moment and offsets."""
+        n = 2 * self.rows.n_links
+        scale = np.append(errors.base, np.full(n, errors.joint)) * INSIDE
+        corners = self._first_corners()
+        at = [(moment, corner) for moment in moments for corner in corners]
+        q = np.array([self._joints(moment) for moment, _ in at])
+        moved = self._walk(q, np.array([corner for _, corner in at]) * scale, scale)
+        best = int(np.argmin(self._gaps(q + moved)))
+        moment, offset = self._settle(at[best][0], moved[best])
+        return moment, self._walk(self._joints(moment)[None], offset[None], scale)[0]
+
+    def _joints(self, moment: Moment) -> FloatArray:
+        """Nominal joint values, shape (1 + 2N,)."""
+        k = moment.interval
+        rows = self.rows.joints[k : k + 2]
+        return np.asarray(rows[0] + moment.share * (rows[-1] - rows[0]))
+
+    def _first_corners(self) -> FloatArray:
+        """Corners to start from: none, and every alpha or theta to one side."""
+        corners = np.zeros((5, 1 + 2 * self.rows.n_links))
+        corners[1, 1::2], corners[2, 1::2] = 1.0, -1.0
+        corners[3, 2::2], corners[4, 2::2] = 1.0, -1.0
+        return corners
+
+    def _gaps(self, q: FloatArray) -> FloatArray:
+        """Clearance of the pair in many configurations (m, 1 + 2N), shape (m,); [m]."""
+        arm, pair = self.problem.manipulator, self.pair
+        centres = joint_centres(arm, q[:, 0], q[:, 1::2], q[:, 2::2])
+        if not pair.obstacle:
+            gaps = link_gaps(centres, arm.link_radius)
+            return np.asarray(gaps[:, pair.link - 1, pair.other_link - 1])
+        ends = np.ascontiguousarray(centres[:, pair.link - 1 : pair.link + 1])
+        only = np.zeros(len(q), np.int64)
+        found = row_brackets(self.pieces, ends, only, TOLERANCES.bracket_gap)
+        return np.asarray(found[:, 1] - arm.link_radius)
+
+    def _walk(
+        self, q: FloatArray, offsets: FloatArray, scale: FloatArray
+    ) -> FloatArray:
+        """Offsets (m, 1 + 2N) at which the slopes lead nowhere else within the box."""
+        least, width = self._gaps(q + offsets), TOLERANCES.slope_step
+        for _ in range(STEPS):
+            around = (q + offsets)[:, None] + width * np.vstack(
+                [np.eye(q.shape[1]), -np.eye(q.shape[1])]
+            )
+            gaps = self._gaps(around.reshape(-1, q.shape[1])).reshape(len(q), 2, -1)
+            slopes = gaps[:, 0] - gaps[:, 1]
+            flat = np.abs(slopes) <= 2.0 * TOLERANCES.bracket_gap
+            tried = np.where(flat, offsets, -np.sign(slopes) * scale)
+            found = self._gaps(q + tried)
+            nearer = found < least
+            if not nearer.any():
+                break
+            least = np.where(nearer, found, least)
+            offsets = np.where(nearer[:, None], tried, offsets)
+        return offsets
+
+    def _settle(self, moment: Moment, offset: FloatArray) -> tuple[Moment, FloatArray]:
+        """The nearest moment around one, the offsets kept."""
+        step = 0.5 * float(SHARES[1])
+        for _ in range(HALVINGS):
+            shares = moment.share + np.array([0.0, -step, step])
+            tried = [Moment(moment.interval, float(s)) for s in shares.clip(0.0, 1.0)]
+            gaps = self._gaps(np.array([self._joints(m) for m in tried]) + offset)
+            moment, step = tried[int(np.argmin(gaps))], 0.5 * step
+        return moment, offset
+
+    def _judged(
+        self, errors: ErrorBox, moment: Moment, offset: FloatArray
+    ) -> Counterexample | None:
+        """What the clearance proof says of one configuration."""
+        q, links = self._joints(moment) + offset, (self.pair.link, self.pair.other_link)
+        problem = replace(
+            self.problem,
+            required_clearance=self.problem.required_clearance + errors.obstacle,
+        )
+        row = Trajectory(
+            np.zeros(1, bool), np.zeros(1), q[:1], q[None, 1::2], q[None, 2::2]
+        )
+        chunks: list[ClearanceChunk] = []
+        proof = prove_clearance(problem, row, ErrorBox(), [chunks.append])
+        column = [(p.link, p.other_link) for p in proof.pairs].index(links)
+        if chunks[0].verdict[0, column] != REFUTED:
+            return None
+        return Counterexample(
+            interval=moment.interval,
+            share=moment.share,
+            pair=self.pair,
+            joints=frozen(q),
+            offsets=frozen(offset),
+            clearance=float(chunks[0].upper[0, column]) - self._grown(errors),
+            required=self.required,
+            link_point=frozen(chunks[0].link_point[0, column]),
+            other_point=frozen(chunks[0].other_point[0, column]),
+        )
+
+
+def moments_of(row: FloatArray) -> tuple[Moment, ...]:
+    """Where a pair comes nearest: along the interval of its least lower bound.
+
+    Args:
+        row: The pair's row of `ClearanceProof.best`.
+    """
+    spread = tuple(Moment(int(row[AT_LOWER]), float(share)) for share in SHARES)
+    return (Moment(int(row[AT_UPPER]), float(row[TIME])), *spread)
+
+
+def find_counterexamples(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    errors: ErrorBox,
+    proof: ClearanceProof,
+) -> tuple[Counterexample, ...]:
+    """Motions within the error box that miss what the proof left undecided.
+
+    Args:
+        problem: Arm, scene, required clearances.
+        trajectory: The nominal motion.
+        errors: The box.
+        proof: The proof for it.
+
+    Returns:
+        One against obstacles and one between links, at most; none where the nominal
+        motion itself is refuted.
+    """
+    if errors == ErrorBox():
+        return ()
+    groups = [bool(pair.obstacle) for pair in proof.pairs]
+    found = []
+    for group in (True, False):
+        mine = np.array(groups, dtype=bool) == group
+        if proof.counts[mine, REFUTED].any():
+            continue
+        among = np.flatnonzero(mine & (proof.counts[:, UNDECIDED] > 0))
+        for k in among[np.argsort(proof.best[among, LOW], kind="stable")][:PAIRS]:
+            search = Search(problem, trajectory, proof.pairs[k])
+            one = search.find(errors, moments_of(proof.best[k]))
+            if one:
+                found.append(one)
+                break
+    return tuple(found)
