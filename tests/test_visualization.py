@@ -1,10 +1,15 @@
 """Oracle: what a plain HTTP client gets, and the port afterwards."""
 
+import os
+import re
+import signal
 import socket
+import subprocess
+import sys
 import threading
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from urllib.error import HTTPError
 
@@ -12,8 +17,19 @@ import made_up
 import pytest
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.io.problem_file import built_in_text
 from vdsm_pin.io.trajectory_file import write_trajectory
 from vdsm_pin.visualization import ViewServer, page, write_page
+
+TETRAHEDRON = """v 0 0 900
+v 0 90 900
+v 90 0 900
+v 0 0 990
+f 1 2 3
+f 1 3 4
+f 1 4 2
+f 3 2 4
+"""
 
 
 @contextmanager
@@ -53,7 +69,7 @@ def test_a_changed_file_is_noticed_and_a_broken_one_explained(tmp_path: Path) ->
     with serving(path) as server:
         first = get(server.url)
         state = server.state()
-        assert f"changed?seen={state}" in first
+        assert f'data-seen="{state}"' in first
         write_trajectory(path, made_up.trajectory(6))
         assert get(f"{server.url}changed?seen={state}") == "yes"
         assert get(server.url) != first
@@ -65,7 +81,7 @@ def test_a_changed_file_is_noticed_and_a_broken_one_explained(tmp_path: Path) ->
 
 def test_without_watching_no_page_asks(tmp_path: Path) -> None:
     with serving(None, watch=False) as server:
-        assert "changed?seen" not in get(server.url)
+        assert "data-seen" not in get(server.url)
 
 
 def test_a_page_is_one_file(tmp_path: Path) -> None:
@@ -74,4 +90,53 @@ def test_a_page_is_one_file(tmp_path: Path) -> None:
     with pytest.raises(InvalidFile, match="expected a file"):
         write_page(tmp_path, "paper/obs1", None)
     with pytest.raises(InvalidFile):
-        page("paper/obs1", tmp_path / "absent.csv")
+        page(made_up.problem(), tmp_path / "absent.csv")
+
+
+def test_the_meshes_of_a_problem_are_watched_too(tmp_path: Path) -> None:
+    source = tmp_path / "p.yaml"
+    part = "obstacles: [{name: part, shape: mesh, file: part.obj, check_size: false}]"
+    source.write_text(built_in_text("paper/free").replace("obstacles: []", part))
+    (tmp_path / "part.obj").write_text(TETRAHEDRON)
+    with ViewServer(str(source), None, 0, True) as server:
+        before = server.current_page()
+        assert server.current_page() is before, "nothing changed, nothing is done"
+        (tmp_path / "part.obj").write_text(TETRAHEDRON.replace("900", "950"))
+        assert server.current_page() != before
+
+
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """A process started in the background ignores Ctrl-C, and so do its children."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
+def test_an_interrupt_ends_it_cleanly_with_a_page_still_open() -> None:
+    command = [sys.executable, "-m", "vdsm_pin", "view", "paper/free", "--port", "0"]
+    with subprocess.Popen(
+        [*command, "--watch"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={key: value for key, value in os.environ.items() if key != "DISPLAY"},
+    ) as process:
+        assert process.stdout is not None
+        url = process.stdout.readline().split()[0]
+        seen = re.search('data-seen="(\\w+)"', get(url))
+        assert seen is not None
+        waiting = threading.Thread(
+            target=quietly, args=(f"{url}changed?seen={seen[1]}",)
+        )
+        waiting.start()
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60.0)
+        waiting.join()
+    assert (process.returncode, out, err) == (0, "closed\n", "")
+
+
+def quietly(url: str) -> None:
+    with suppress(OSError):
+        get(url)

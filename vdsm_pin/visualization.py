@@ -10,6 +10,7 @@ from collections.abc import Callable
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Lock
 from typing import Final
 from urllib.parse import parse_qs, urlsplit
 
@@ -41,16 +42,15 @@ def at_start(problem: PlanningProblem) -> Trajectory:
     )
 
 
-def page(problem: str, trajectory: Path | None, live: str = "") -> str:
-    """The page of a problem, by its name or path.
+def page(problem: PlanningProblem, trajectory: Path | None, live: str = "") -> str:
+    """The page of a problem and its motion.
 
     Raises:
-        InvalidInput: If a file is bad.
+        InvalidInput: If the trajectory is bad.
     """
-    task = read_problem(problem).problem
     if trajectory is None:
-        return view_page(task, at_start(task), live)
-    return view_page(task, read_trajectory(trajectory, task.manipulator), live)
+        return view_page(problem, at_start(problem), live)
+    return view_page(problem, read_trajectory(trajectory, problem.manipulator), live)
 
 
 def write_page(path: Path, problem: str, trajectory: Path | None) -> None:
@@ -60,7 +60,7 @@ def write_page(path: Path, problem: str, trajectory: Path | None) -> None:
         InvalidInput: If a file is bad or the page cannot be written.
     """
     check_output_file(path)
-    write_text(path, page(problem, trajectory))
+    write_text(path, page(read_problem(problem).problem, trajectory))
 
 
 class ViewServer(ThreadingHTTPServer):
@@ -82,11 +82,10 @@ class ViewServer(ThreadingHTTPServer):
         self, problem: str, trajectory: Path | None, port: int, watch: bool
     ) -> None:
         self._problem, self._trajectory = problem, trajectory
-        files = [read_problem(problem).path, trajectory]
-        self._files = [path for path in files if path is not None]
         self.watch, self.ended = watch, False
-        self._seen, self._page = "", ""
-        page(problem, trajectory)  # bad files are refused before a page is promised
+        self._files: tuple[Path, ...] = ()
+        self._seen, self._page, self._lock = "", "", Lock()
+        self._read()  # bad files are refused before a page is promised
         try:
             super().__init__((HOST, port), _Handler)
         except OSError as error:
@@ -109,17 +108,25 @@ class ViewServer(ThreadingHTTPServer):
                 facts.append((0, 0))
         return hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
 
+    def _read(self) -> PlanningProblem:
+        """Read the problem; from now on its files are watched."""
+        source = read_problem(self._problem)
+        motion = () if self._trajectory is None else (self._trajectory,)
+        self._files = (source.path, *source.meshes, *motion)
+        return source.problem
+
     def current_page(self) -> str:
         """The page of the files as they are now, or what is wrong with them."""
-        state = self.state()
-        if state != self._seen:
-            live = state if self.watch else ""
-            try:
-                self._page = page(self._problem, self._trajectory, live)
-            except VdsmError as error:
-                self._page = message_page(str(error), live)
-            self._seen = state
-        return self._page
+        with self._lock:  # two tabs may ask at once
+            state = self.state()
+            if state != self._seen:
+                live = state if self.watch else ""
+                try:
+                    self._page = page(self._read(), self._trajectory, live)
+                except VdsmError as error:
+                    self._page = message_page(str(error), live)
+                self._seen = state
+            return self._page
 
     def changed_since(self, seen: str) -> bool:
         """Wait for a change of the files, but not for ever."""

@@ -101,8 +101,9 @@ def test_the_view_loads_nothing_and_only_a_live_one_asks() -> None:
     task, rows = made_up.problem(), made_up.trajectory(5)
     still, live = view_page(task, rows), view_page(task, rows, "abc")
     assert Page(still).loads == ["data:,"]
-    assert "fetch(" not in still.split("// Ask the server")[-1][-600:]
-    assert 'fetch("changed?seen=abc")' in live
+    assert "fetch(`changed?seen=" not in still
+    assert "fetch(`changed?seen=" in live
+    assert 'data-seen="abc"' in live
     assert "<b>" not in message_page("bad <b>", "").split("<body>")[1]
 
 

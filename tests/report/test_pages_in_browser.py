@@ -4,9 +4,6 @@ Oracles: the pixels of a screenshot, the page's own state, Python's forward kine
 Screenshots stay in test-output/.
 """
 
-import os
-import shutil
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +11,7 @@ from typing import Any
 import made_up
 import numpy as np
 import pytest
+from watched_pages import NEEDS_CHROMIUM, Watched, pixels
 
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.report.facts import batch_row, verification_file
@@ -21,53 +19,7 @@ from vdsm_pin.report.html import write_index, write_report
 from vdsm_pin.report.picture import picture
 from vdsm_pin.verification.records import Check, Verdict
 
-CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium")
-SHOTS = Path(__file__).parents[2] / "test-output"
-SOFTWARE_GL = [
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]
-pytestmark = [
-    pytest.mark.display,
-    pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine"),
-]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    sync_api = pytest.importorskip("playwright.sync_api")
-    with sync_api.sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(
-            executable_path=CHROMIUM, args=SOFTWARE_GL
-        )
-        yield chromium
-        chromium.close()
-
-
-class Watched:
-    """A page whose requests and errors are written down."""
-
-    def __init__(self, browser: Any, path: Path, **options: Any) -> None:
-        self.page = browser.new_page(**options)
-        self.requests: list[str] = []
-        self.errors: list[str] = []
-        self.page.on("request", lambda request: self.requests.append(request.url))
-        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
-        self.page.goto(path.as_uri())
-
-    def shot(self, name: str) -> None:
-        SHOTS.mkdir(exist_ok=True)
-        self.page.screenshot(path=SHOTS / f"{name}.png")
-
-
-def pixels(page: Any) -> np.ndarray:
-    """The 3D pane as it is drawn, shape (n_pixels, 3)."""
-    matplotlib_image = pytest.importorskip("matplotlib.image")
-    shot = SHOTS / "pane.png"
-    page.locator("#view").screenshot(path=shot)
-    return np.asarray(matplotlib_image.imread(shot))[..., :3].reshape(-1, 3)
+pytestmark = NEEDS_CHROMIUM
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +27,7 @@ def report(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Watched:
     path = tmp_path_factory.mktemp("report") / "report.html"
     judged = made_up.verification()
     write_report(path, judged, verification_file(judged, made_up.RECORD))
-    watched = Watched(browser, path, viewport={"width": 700, "height": 600})
+    watched = Watched(browser, path.as_uri(), viewport={"width": 700, "height": 600})
     watched.page.wait_for_function("window.vdsm && window.vdsm.view")
     return watched
 
@@ -92,7 +44,6 @@ def test_nothing_is_requested_and_nothing_fails(report: Watched) -> None:
 
 
 def test_the_arm_is_seen_in_its_colours(report: Watched) -> None:
-    SHOTS.mkdir(exist_ok=True)
     seen = pixels(report.page)
     assert len(np.unique((seen * 255).astype(int), axis=0)) > 500
     blue = (seen[:, 2] > seen[:, 0] + 0.3) & (seen[:, 2] > 0.5)
@@ -178,7 +129,7 @@ def test_dark_and_narrow_pages_work_and_show_what_failed(
     path = tmp_path / "report.html"
     write_report(path, judged, verification_file(judged, made_up.RECORD))
     size = {"width": 420, "height": 800}
-    watched = Watched(browser, path, viewport=size, color_scheme="dark")
+    watched = Watched(browser, path.as_uri(), viewport=size, color_scheme="dark")
     watched.page.wait_for_function("window.vdsm && window.vdsm.view")
     watched.shot("report-dark-narrow")
     width = watched.page.evaluate("document.documentElement.scrollWidth")
@@ -217,7 +168,7 @@ def test_an_index_of_a_thousand_problems_sorts_at_once(
         (tmp_path / f"p{i:04}" / "picture.svg").write_text(picture(judged))
     (tmp_path / "timing.js").write_text('window.vdsmTiming = {"p0003": 1.5};')
     write_index(tmp_path / "index.html", rows)
-    watched = Watched(browser, tmp_path / "index.html")
+    watched = Watched(browser, (tmp_path / "index.html").as_uri())
     page = watched.page
     assert "1.50 s" in page.locator("tr[data-folder=p0003]").text_content()
     took = page.evaluate(

@@ -7,6 +7,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from vdsm_pin.errors import InvalidFile, UnknownName
+from vdsm_pin.io.obstacle_schema import MeshModel
 from vdsm_pin.io.problem_builder import build_problem
 from vdsm_pin.io.problem_errors import first_error
 from vdsm_pin.io.problem_schema import ProblemModel
@@ -30,11 +31,13 @@ class ProblemFile:
         path: The file.
         sha256: Of the file's bytes followed by those of its meshes, in the order of
             the obstacles.
+        meshes: The mesh files it names, in the same order.
     """
 
     problem: PlanningProblem
     path: Path
     sha256: str
+    meshes: tuple[Path, ...] = ()
 
 
 def read_problem(name_or_path: str | Path) -> ProblemFile:
@@ -58,7 +61,13 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
         raise first_error(error, document) from None
     stem = "".join(c if c.isascii() and c.isalnum() else "_" for c in path.stem[:100])
     built = build_problem(model, document, name=stem, folder=path.parent)
-    return ProblemFile(built.problem, path, sha256_of([content, *built.mesh_contents]))
+    named = (one for one in model.obstacles if isinstance(one, MeshModel))
+    return ProblemFile(
+        built.problem,
+        path,
+        sha256_of([content, *built.mesh_contents]),
+        tuple(path.parent / mesh.file for mesh in named),
+    )
 
 
 def find_problem(name_or_path: str | Path) -> Path:

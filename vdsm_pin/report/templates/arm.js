@@ -187,8 +187,18 @@ class ArmView {
     const reach = world.getSize(new Vector3()).length();
     const wide = Math.max(1, 1.45 / Math.max(this.camera.aspect, 0.5));
     const away = new Vector3(...directions[name]).transformDirection(this.root.matrixWorld);
-    this.camera.position.copy(middle).addScaledVector(away, 1.08 * reach * wide);
-    this.viewer.controls.target.copy(middle);
+    const place = middle.clone().addScaledVector(away, 1.08 * reach * wide);
+    this.lookFrom([place.toArray(), middle.toArray()]);
+  }
+
+  // Where the camera is and what it looks at, to look from there again.
+  eye() {
+    return [this.camera.position.toArray(), this.viewer.controls.target.toArray()];
+  }
+
+  lookFrom([place, target]) {
+    this.camera.position.fromArray(place);
+    this.viewer.controls.target.fromArray(target);
     this.viewer.controls.update();
     this.viewer.set_dirty();
   }

@@ -1,0 +1,18 @@
+"""One Chromium for all tests of pages."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from watched_pages import CHROMIUM, SOFTWARE_GL
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    sync_api = pytest.importorskip("playwright.sync_api")
+    with sync_api.sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(
+            executable_path=CHROMIUM, args=SOFTWARE_GL
+        )
+        yield chromium
+        chromium.close()
