@@ -100,6 +100,7 @@ ONE_VALUE: list[tuple[tuple[Any, ...], Any, str]] = [
     (("obstacles", 0, "axis"), [0, 0, 0], "which has no direction"),
     (("obstacles", 0, "axis"), [1, 0], "axis (line 8): is [1, 0], expected at least 3"),
     (("obstacles", 0, "name"), "Link 5", "name (line 6): is 'Link 5', which is how li"),
+    (("obstacles", 0, "name"), "x" * 101, "xxx..., expected at most 100 characters"),
     (("obstacles", 0, "colour"), 1, "is not a known key; known: name, axis, center"),
     (
         ("obstacles",),

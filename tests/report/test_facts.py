@@ -24,5 +24,5 @@ def test_a_check_without_evidence_is_not_said_to_have_a_value() -> None:
     nan = math.nan
     empty = Check("tip on the path", Verdict.UNDECIDED, 0, nan, 1e-6, "m")
     judged = replace(made_up.verification(), checks=(empty,))
-    assert "tip on the path: there is nothing to judge it by" in reason(judged)
+    assert 'there is no evidence for "tip on the path"' in reason(judged)
     assert "not available" not in reason(judged)

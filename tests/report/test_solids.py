@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_up import X, Y, every_shape
 
-from vdsm_pin.report.solids import Surface, surface
+from vdsm_pin.report.solids import Surface, detail, surface
 from vdsm_pin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Sphere
 
 
@@ -34,6 +34,14 @@ def test_surfaces_enclose_their_solid(
     solid: Obstacle, expected: float, tolerance: float
 ) -> None:
     assert volume(surface(solid, 1.0)) == pytest.approx(expected, rel=tolerance)
+
+
+@pytest.mark.parametrize("count", [1, 20, 100, 500])
+def test_many_obstacles_share_what_a_page_can_hold(count: int) -> None:
+    fine = detail(count)
+    ball = surface(Sphere("s", CENTRE, 0.5), 1.0, fine)
+    assert count * len(ball.triangles) <= 60_000
+    assert volume(ball) == pytest.approx(4.0 / 3.0 * np.pi * 0.125, rel=0.2)
 
 
 def test_a_prism_keeps_its_notch() -> None:

@@ -145,6 +145,10 @@ def _expected(details: ErrorDetails, at: Location) -> str:
             return f"at least {_entries(context['min_length'])}"
         case "too_long":
             return f"at most {_entries(context['max_length'])}"
+        case "string_too_long":
+            return f"at most {context['max_length']} characters"
+        case "string_too_short":
+            return f"at least {context['min_length']} characters"
         case "string_pattern_mismatch":
             return _NAMES[context["pattern"]]
     return words.get(kind) or details["msg"][:1].lower() + details["msg"][1:]

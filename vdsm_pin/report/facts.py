@@ -178,17 +178,18 @@ def reason(verification: Verification) -> str:
     first = bad[0]
     found = f"{check_title(first.name)} is {quantity(first.worst, first.unit)}"
     if math.isnan(first.worst):
-        found = f"{check_title(first.name)}: there is nothing to judge it by"
+        found = f'there is no evidence for "{check_title(first.name)}"'
     elif not math.isnan(first.limit):
         found += f" against a limit of {quantity(first.limit, first.unit)}"
     at = place(finite(first.moment), first.where)
     if at:
         found += f" ({at})"
-    others = f", and {len(bad) - 1} more" if len(bad) > 1 else ""
+    share = f"{len(bad)} of {len(verification.checks)} checks"
+    first_of = "the first: " if len(bad) > 1 else ""
     if verification.verdict is Verdict.REFUTED:
-        count = len(verification.checks)
-        return f"The motion breaks {len(bad)} of its {count} checks: {found}{others}."
-    return f"The proof is not complete: {found}{others}. This counts as not passed."
+        return f"The motion breaks {share}: {first_of}{found}."
+    undecided = f"The proof is not complete, {share} undecided: {first_of}{found}."
+    return f"{undecided} This counts as not passed."
 
 
 def _certified_sentence(verification: Verification) -> str:

@@ -11,7 +11,7 @@ from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.charts import charts, packed
 from vdsm_pin.report.facts import failing
 from vdsm_pin.report.palette import link_colours
-from vdsm_pin.report.solids import surface
+from vdsm_pin.report.solids import detail, surface
 from vdsm_pin.report.thinning import Thinned, thinned
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import ClosestApproach, Verification
@@ -20,16 +20,17 @@ from vdsm_pin.verification.records import ClosestApproach, Verification
 def scene_data(problem: PlanningProblem) -> dict[str, Any]:
     """The arm, the obstacles and the desired path; base frame, [m]."""
     arm = problem.manipulator
-    extent = arm.total_length
+    extent, fine = arm.total_length, detail(len(problem.scene.obstacles))
     solids = []
     for obstacle in problem.scene.obstacles:
-        skin = surface(obstacle, extent)
+        skin = surface(obstacle, extent, fine)
         solids.append(
             {
                 "name": obstacle.name,
                 "vertices": packed(skin.vertices),
                 "triangles": packed(skin.triangles, "<u4"),
                 "round": skin.round,
+                "creased": skin.creased,
             }
         )
     return {

@@ -18,12 +18,40 @@ from vdsm_pin.scene import (
     Sphere,
 )
 
-_AROUND: Final = 48  # corners of a drawn circle
-_UP: Final = 12  # rings of a drawn half ball
-_MOST_TRIANGLES: Final = 20_000  # of a drawn mesh; keeps a page below a megabyte
+_PAGE_TRIANGLES: Final = 60_000  # of all obstacles of a page: about two megabytes
+_MOST_TRIANGLES: Final = 20_000  # of one drawn mesh
+_LEAST_TRIANGLES: Final = 200  # below, a mesh is no longer recognised
+_ROUNDNESS: Final = ((48, 12), (32, 8), (24, 6), (16, 4), (12, 3))
 _BOX_FACES: Final = (
     (0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3),
 )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Detail:
+    """How finely a solid is drawn.
+
+    Args:
+        around: Corners of a circle.
+        up: Rings of half a ball.
+        triangles: The most a mesh may have.
+    """
+
+    around: int
+    up: int
+    triangles: int
+
+
+def detail(n_obstacles: int) -> Detail:
+    """The detail that many obstacles can have together."""
+    share = _PAGE_TRIANGLES // max(n_obstacles, 1)
+    fitting = (one for one in _ROUNDNESS if 2 * one[0] * (2 * one[1] - 1) <= share)
+    around, up = next(fitting, _ROUNDNESS[-1])
+    return Detail(around, up, min(max(share, _LEAST_TRIANGLES), _MOST_TRIANGLES))
+
+
+FINE: Final = detail(1)
+"""For an obstacle by itself."""
 
 
 @dataclass(frozen=True)
@@ -34,29 +62,32 @@ class Surface:
         vertices: Shape (n, 3), base frame; [m].
         triangles: Vertex indices, counter-clockwise from outside, shape (m, 3).
         round: Whether shared corners are to be shaded smoothly.
+        creased: Whether it has edges to be drawn.
     """
 
     vertices: FloatArray
     triangles: IntArray
     round: bool = False
+    creased: bool = True
 
 
-def surface(obstacle: Obstacle, extent: float) -> Surface:
+def surface(obstacle: Obstacle, extent: float, fine: Detail = FINE) -> Surface:
     """The surface of an obstacle.
 
     Args:
         obstacle: Any shape.
         extent: Half the width of the square drawn for a half-space; [m].
+        fine: How finely round solids and meshes are drawn.
     """
     match obstacle:
         case Sphere():
-            return _capsule(obstacle.centre, np.eye(3)[2], 0.0, obstacle.radius)
+            frame, half_length = np.eye(3), 0.0
+            return _capsule(obstacle, frame, half_length, fine)
         case Capsule():
-            return _capsule(
-                obstacle.centre, obstacle.axis, obstacle.half_length, obstacle.radius
-            )
+            frame = frame_along(obstacle.axis)
+            return _capsule(obstacle, frame, obstacle.half_length, fine)
         case Cylinder():
-            return _cylinder(obstacle)
+            return _cylinder(obstacle, fine.around)
         case Box():
             corners = BOX_CORNERS * obstacle.half_size @ obstacle.rotation.T
             return _polygons(obstacle.centre + corners, _BOX_FACES)
@@ -65,7 +96,7 @@ def surface(obstacle: Obstacle, extent: float) -> Surface:
         case HalfSpace():
             return _plane(obstacle, extent)
         case Mesh():
-            return _coarse(obstacle)
+            return _coarse(obstacle, fine.triangles)
 
 
 def frame_along(axis: FloatArray) -> FloatArray:
@@ -76,42 +107,43 @@ def frame_along(axis: FloatArray) -> FloatArray:
     return np.column_stack([first, np.cross(axis, first), axis])
 
 
-def _rings(radii: FloatArray, heights: FloatArray) -> FloatArray:
-    """Circles about z, shape (rings * _AROUND, 3); [m]."""
-    turn = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
+def _rings(radii: FloatArray, heights: FloatArray, around: int) -> FloatArray:
+    """Circles about z, shape (rings * around, 3); [m]."""
+    turn = 2.0 * np.pi * np.arange(around) / around
     x, y = np.outer(radii, np.cos(turn)), np.outer(radii, np.sin(turn))
     z = np.broadcast_to(heights[:, None], x.shape)
     return np.stack([x, y, z], axis=2).reshape(-1, 3)
 
 
-def _between(n_rings: int) -> IntArray:
+def _between(n_rings: int, around: int) -> IntArray:
     """Triangles between consecutive rings."""
-    ring, k = np.meshgrid(np.arange(n_rings - 1), np.arange(_AROUND), indexing="ij")
-    a, b = ring * _AROUND + k, ring * _AROUND + (k + 1) % _AROUND
-    c, d = a + _AROUND, b + _AROUND
+    ring, k = np.meshgrid(np.arange(n_rings - 1), np.arange(around), indexing="ij")
+    a, b = ring * around + k, ring * around + (k + 1) % around
+    c, d = a + around, b + around
     lower, upper = np.stack([a, b, d], axis=2), np.stack([a, d, c], axis=2)
     return np.concatenate([lower.reshape(-1, 3), upper.reshape(-1, 3)])
 
 
 def _capsule(
-    centre: FloatArray, axis: FloatArray, half_length: float, radius: float
+    solid: Sphere | Capsule, frame: FloatArray, half_length: float, fine: Detail
 ) -> Surface:
-    rise = np.linspace(0.0, np.pi / 2.0, _UP)
-    up = half_length + radius * np.sin(rise)
+    rise = np.linspace(0.0, np.pi / 2.0, fine.up)
+    up = half_length + solid.radius * np.sin(rise)
     heights = np.concatenate([-up[::-1], up])
-    radii = radius * np.concatenate([np.cos(rise)[::-1], np.cos(rise)])
-    points = _rings(radii, heights) @ frame_along(axis).T
-    return Surface(centre + points, _between(2 * _UP), round=True)
+    radii = solid.radius * np.concatenate([np.cos(rise)[::-1], np.cos(rise)])
+    points = _rings(radii, heights, fine.around) @ frame.T
+    triangles = _between(2 * fine.up, fine.around)
+    return Surface(solid.centre + points, triangles, round=True, creased=False)
 
 
-def _cylinder(solid: Cylinder) -> Surface:
+def _cylinder(solid: Cylinder, around: int) -> Surface:
     # Rim corners appear twice, so that shading breaks at the edge.
     heights = solid.half_length * np.array([-1.0, -1.0, 1.0, 1.0])
-    tube = _rings(np.full(2, solid.radius), heights[[0, 2]])
-    caps = [_rings(np.array([0.0, solid.radius]), heights[:2]),
-            _rings(np.array([solid.radius, 0.0]), heights[2:])]  # fmt: skip
+    tube = _rings(np.full(2, solid.radius), heights[[0, 2]], around)
+    caps = [_rings(np.array([0.0, solid.radius]), heights[:2], around),
+            _rings(np.array([solid.radius, 0.0]), heights[2:], around)]  # fmt: skip
     points = np.vstack([tube, *caps]) @ frame_along(solid.axis).T
-    strip, count = _between(2), 2 * _AROUND
+    strip, count = _between(2, around), 2 * around
     triangles = np.concatenate([strip, strip + count, strip + 2 * count])
     return Surface(solid.centre + points, triangles, round=True)
 
@@ -157,13 +189,13 @@ def _plane(solid: HalfSpace, extent: float) -> Surface:
     return _polygons(middle + signs @ across.T, ((0, 1, 2, 3),))
 
 
-def _coarse(solid: Mesh) -> Surface:
+def _coarse(solid: Mesh, most: int) -> Surface:
     """The mesh, its corners merged on a grid until few enough triangles are left."""
     vertices, triangles = solid.vertices, solid.triangles
     low = vertices.min(axis=0)
     size = float(np.max(vertices.max(axis=0) - low))
     cells = 512
-    while len(triangles) > _MOST_TRIANGLES and cells > 1:
+    while len(triangles) > most and cells > 1:
         grid = np.round((vertices - low) / size * cells).astype(np.int64)
         _, first, place = np.unique(
             grid, axis=0, return_index=True, return_inverse=True

@@ -1,6 +1,8 @@
 // The scene in 3D, drawn by Meshcat's viewer and the three.js that it carries.
 "use strict";
 
+const CREASE = 32; // degrees between two faces from which on their edge is drawn
+
 class ArmView {
   constructor(pane, scene, motion) {
     this.pane = pane;
@@ -88,13 +90,13 @@ class ArmView {
       const corners = unpack(solid.vertices, Float32Array);
       shape.setAttribute("position", new BufferAttribute(corners, 3));
       shape.setIndex(new BufferAttribute(unpack(solid.triangles, Uint32Array), 1));
-      const edges = new EdgesGeometry(shape, 25);
+      const edges = solid.creased ? new EdgesGeometry(shape, CREASE) : null;
       if (!solid.round) shape = shape.toNonIndexed();
       shape.computeVertexNormals();
       const glass = { transparent: true, opacity: 0.42, side: DoubleSide, depthWrite: false };
       const body = new Mesh(shape, this.material(0x8a94a6, glass));
       const ink = new LineBasicMaterial({ color: 0x5d6878 });
-      body.add(new LineSegments(edges, ink));
+      if (edges) body.add(new LineSegments(edges, ink));
       this.root.add(body);
       return body;
     });

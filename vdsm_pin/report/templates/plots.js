@@ -3,6 +3,7 @@
 "use strict";
 
 const SVG = "http://www.w3.org/2000/svg";
+const MOST_CHIPS = 60; // more names than that help nobody
 const FRAME = { width: 640, height: 232, left: 58, right: 14, top: 12, bottom: 34 };
 
 function element(name, attributes, parent, text) {
@@ -111,7 +112,8 @@ class Plot {
     this.axes();
     for (const { value, label: text } of this.limits) this.limit(value, text);
     this.lines = this.series.map((one) => this.line(one));
-    for (const mark of this.marks) this.mark(mark);
+    // The one that decided comes first; drawn last, it is not covered.
+    for (const mark of [...this.marks].reverse()) this.mark(mark);
     this.rule = element("line", { y1: top, y2: height - bottom, class: "cursor" }, this.svg);
     this.tip = element("g", { class: "hover", visibility: "hidden" }, this.svg);
     element("rect", { rx: 4, height: 20, y: -10 }, this.tip);
@@ -193,7 +195,9 @@ class Plot {
 
   legend(figure) {
     const list = figure.querySelector("[data-legend]");
-    if (this.series.length > 48) {
+    list.classList.toggle("wide", this.series.some(({ name }) => name.length > 4));
+    list.classList.toggle("long", this.series.length > 24);
+    if (this.series.length > MOST_CHIPS) {
       list.textContent = `${this.series.length} curves; the nearest is named under the pointer`;
       this.chips = [];
       return;
