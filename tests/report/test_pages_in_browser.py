@@ -4,6 +4,7 @@ Oracles: the pixels of a screenshot, the page's own state, Python's forward kine
 Screenshots stay in test-output/.
 """
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.report.facts import batch_row, verification_file
 from vdsm_pin.report.html import write_index, write_report
 from vdsm_pin.report.picture import picture
+from vdsm_pin.report.words import OUTCOMES
 from vdsm_pin.verification.records import Check, Verdict
 
 pytestmark = NEEDS_CHROMIUM
@@ -27,9 +29,57 @@ def report(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Watched:
     path = tmp_path_factory.mktemp("report") / "report.html"
     judged = made_up.verification()
     write_report(path, judged, verification_file(judged, made_up.RECORD))
-    watched = Watched(browser, path.as_uri(), viewport={"width": 700, "height": 600})
+    watched = Watched(browser, path.as_uri(), viewport={"width": 800, "height": 600})
     watched.page.wait_for_function("window.vdsm && window.vdsm.view")
     return watched
+
+
+REACHABLE = """() =>
+  [...document.querySelectorAll("button, a, input")]
+    .filter((node) => node.getClientRects().length > 0).length"""
+FOCUS = """() => {
+  const node = document.activeElement;
+  if (!node || node === document.body) return null;
+  const place = [...document.querySelectorAll("*")].indexOf(node);
+  const { outlineStyle, outlineWidth } = getComputedStyle(node);
+  const ring = outlineStyle !== "none" && parseFloat(outlineWidth) >= 2;
+  return { place, ring, what: node.outerHTML.slice(0, 80) };
+}"""
+CONTRASTS = """() => {
+  function parts(colour) {
+    const [r, g, b, a = 1] = colour.match(/[\\d.]+/g).map(Number);
+    return [r, g, b, a];
+  }
+  function over([r, g, b, a], [R, G, B]) {
+    return [r * a + R * (1 - a), g * a + G * (1 - a), b * a + B * (1 - a)];
+  }
+  function ground(node) {
+    if (!node) return [255, 255, 255];
+    const own = parts(getComputedStyle(node).backgroundColor);
+    return own[3] === 1 ? own : over(own, ground(node.parentElement));
+  }
+  function light(colour) {
+    const [r, g, b] = colour.slice(0, 3).map((v) => {
+      const c = v / 255;
+      return c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
+    });
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  }
+  const found = [];
+  const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walk.nextNode()) {
+    const node = walk.currentNode.parentElement;
+    const text = walk.currentNode.textContent.trim();
+    if (!text || node.closest("script, style, .hover") || !node.getClientRects().length)
+      continue;
+    const style = getComputedStyle(node);
+    const behind = ground(node.closest("svg") ? node.closest("figure") : node);
+    const ink = over(parts(node.closest("svg") ? style.fill : style.color), behind);
+    const [low, high] = [light(ink), light(behind)].sort((a, b) => a - b);
+    found.push({ text, ratio: (high + 0.05) / (low + 0.05) });
+  }
+  return found;
+}"""
 
 
 def time_of(watched: Watched) -> float:
@@ -107,6 +157,54 @@ def test_keys_play_and_step(report: Watched) -> None:
     page.wait_for_function("vdsm.motion.time > 6.5")
     page.keyboard.press(" ")
     assert page.evaluate("vdsm.motion.playing") is False
+
+
+def test_the_keyboard_reaches_everything_and_shows_where_it_is(report: Watched) -> None:
+    page = report.page
+    page.evaluate("document.activeElement.blur(); window.scrollTo(0, 0)")
+    reached = set()
+    for _ in range(400):
+        page.keyboard.press("Tab")
+        one = page.evaluate(FOCUS)
+        if one is None or one["place"] in reached:
+            break
+        assert one["ring"], f"no ring around {one['what']}"
+        reached.add(one["place"])
+    assert len(reached) >= page.evaluate(REACHABLE)
+    page.locator("[data-slider]").focus()
+    page.evaluate("vdsm.motion.go(20.25)")
+    page.keyboard.press("ArrowRight")
+    assert time_of(report) == 21.0
+    page.locator("[data-look=top]").focus()
+    before = page.evaluate("vdsm.view.eye()")
+    page.keyboard.press(" ")
+    assert page.evaluate("vdsm.view.eye()") != before
+    assert page.evaluate("vdsm.motion.playing") is False
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_every_text_keeps_its_contrast(
+    browser: Any, tmp_path: Path, scheme: str
+) -> None:
+    judged = made_up.verification(Verdict.REFUTED, n=40, joint_error=math.nan)
+    late = Check("late", Verdict.UNDECIDED, 1, 2.0, 1.0, "m", moment=30.0)
+    judged = replace(judged, checks=(*judged.checks, late))
+    file = verification_file(judged, made_up.RECORD)
+    write_report(tmp_path / "report.html", judged, file)
+    rows = [
+        batch_row("x", "paper", file).model_copy(update={"outcome": word})
+        for word in OUTCOMES
+    ]
+    write_index(tmp_path / "index.html", rows, with_files=set())
+    for name in ("report", "index"):
+        address = (tmp_path / f"{name}.html").as_uri()
+        watched = Watched(browser, address, color_scheme=scheme)
+        watched.page.wait_for_function(f"'{name}' === 'index' || window.vdsm")
+        measured = watched.page.evaluate(CONTRASTS)
+        assert len(measured) > 50
+        assert not [one for one in measured if one["ratio"] < 4.5]
+        watched.shot(f"{name}-{scheme}")
+        watched.page.close()
 
 
 def test_hovering_names_a_value(report: Watched) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import link_angles
 from vdsm_pin.report.facts import cables, changed_angles, min_clearance, straight_arm
-from vdsm_pin.report.palette import link_colours, oklch
+from vdsm_pin.report.palette import link_colours, obstacle_colours
 from vdsm_pin.report.thinning import Thinned
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.records import Verification
@@ -95,8 +95,6 @@ def _clearance_charts(
         "scale": "asinh",
         "limits": [_limit(f"required {required:g} mm", required)],
     }
-    count = len(scene.names)
-    hues = [oklch(0.62, 0.13, 30.0 + 360.0 * i / count) for i in range(count)]
     links = [f"link {i + 1}" for i in range(profile.link_lower.shape[1])]
     note = "Solid: proved lower bound. Dashed: proved upper bound."
     # What is proved for the whole motion holds in every interval of it.
@@ -124,7 +122,7 @@ def _clearance_charts(
             "note": f"Of the nearest link. {note}",
             "series": _brackets(
                 list(scene.names),
-                tuple(hues),
+                obstacle_colours(len(scene.names)),
                 shown.least(obstacle_lower, profile.first_interval),
                 shown.least(profile.obstacle_upper, profile.first_interval),
             ),

@@ -198,10 +198,12 @@ def _certified_sentence(verification: Verification) -> str:
     if smallest is None:
         return f"All {count} checks passed over the whole motion; no obstacle is there."
     required = quantity(verification.problem.required_clearance, "m")
+    box = asdict(verification.errors)
+    errors = ", with any error of the error box," if any(box.values()) else ""
     return (
-        f"All {count} checks passed; at every instant of the motion the arm keeps at "
-        f"least {quantity(smallest.lower_m, 'm')} from every obstacle; {required} are "
-        "required."
+        f"All {count} checks passed; at every instant of the motion{errors} the arm "
+        f"keeps at least {quantity(smallest.lower_m, 'm')} from every obstacle; "
+        f"{required} are required."
     )
 
 

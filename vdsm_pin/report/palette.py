@@ -1,10 +1,14 @@
-"""One colour per link, the same in plots and in 3D, legible on white and on black."""
+"""Colours of links, the same in plots and in 3D, and of obstacles.
+
+Each is legible on white and on the dark page.
+"""
 
 import math
 from typing import Final
 
 _CHROMA: Final = 0.135
 _LIGHTNESS: Final = (0.55, 0.64)  # alternating, so that neighbours differ without hue
+_OBSTACLES: Final = (0.62, 0.57)
 _FIRST_HUE, _LAST_HUE = 262.0, -20.0  # blue at the base, over green, to magenta
 
 
@@ -14,6 +18,12 @@ def link_colours(count: int) -> tuple[str, ...]:
     return tuple(
         oklch(_LIGHTNESS[i % 2], _CHROMA, _FIRST_HUE + step * i) for i in range(count)
     )
+
+
+def obstacle_colours(count: int) -> tuple[str, ...]:
+    """Colours for the plots, in the order of the obstacles, as #rrggbb."""
+    hues = (30.0 + 360.0 * i / max(count, 1) for i in range(count))
+    return tuple(oklch(_OBSTACLES[i % 2], _CHROMA, hue) for i, hue in enumerate(hues))
 
 
 def oklch(lightness: float, chroma: float, hue_deg: float) -> str:

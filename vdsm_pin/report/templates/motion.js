@@ -116,8 +116,9 @@ function bindControls(motion, root) {
   });
   button.addEventListener("click", () => motion.play(!motion.playing));
   document.addEventListener("keydown", (event) => {
-    if (event.target.closest("input, button, a, summary, select")) return;
-    if (event.key === " ") motion.play(!motion.playing);
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    const pressed = event.target.closest("button, a, [type=checkbox]"); // space is theirs
+    if (event.key === " " && !pressed) motion.play(!motion.playing);
     else if (event.key === "ArrowRight") motion.go(Math.floor(motion.time) + 1);
     else if (event.key === "ArrowLeft") motion.go(Math.ceil(motion.time) - 1);
     else return;

@@ -4,7 +4,9 @@
 
 const SVG = "http://www.w3.org/2000/svg";
 const MOST_CHIPS = 60; // more names than that help nobody
-const FRAME = { width: 640, height: 232, left: 58, right: 14, top: 12, bottom: 34 };
+const TICK_GAP = 13;
+const NARROW = window.innerWidth <= 700; // a plot is as wide as its figures stay legible
+const FRAME = { width: NARROW ? 420 : 640, height: 232, left: 58, right: 14, top: 12, bottom: 34 };
 
 function element(name, attributes, parent, text) {
   const node = document.createElementNS(SVG, name);
@@ -127,12 +129,15 @@ class Plot {
     const values = this.chart.scale === "asinh"
       ? decades(this.lowest, this.highest)
       : ticks(this.lowest, this.highest, 5).filter((v) => !this.chart.whole || v % 1 === 0);
-    for (const value of values) {
+    const drawn = []; // heights of the ticks; on a curved scale they may crowd near zero
+    for (const value of values.sort((a, b) => Math.abs(a) - Math.abs(b))) {
       const y = this.y(value);
+      if (drawn.some((other) => Math.abs(other - y) < TICK_GAP)) continue;
+      drawn.push(y);
       element("line", { x1: left, x2: width - right, y1: y, y2: y, class: "grid" }, this.svg);
       element("text", { x: left - 6, y: y + 4, class: "tick end" }, this.svg, shortNumber(value));
     }
-    for (const time of ticks(0, this.motion.end || 1, 8).filter((t) => t % 1 === 0)) {
+    for (const time of ticks(0, this.motion.end || 1, NARROW ? 4 : 8).filter((t) => t % 1 === 0)) {
       const x = this.x(time);
       element("line", { x1: x, x2: x, y1: height - bottom, y2: height - bottom + 4, class: "axis" }, this.svg);
       element("text", { x, y: height - bottom + 16, class: "tick middle" }, this.svg, time);
