@@ -22,6 +22,8 @@ Draft: TypeAlias = dict[str, Any]
 `start`, `hard` (the straight arm is in the way), `answer`."""
 
 TIP: Final = 3.126
+CLEARANCE: Final = 0.0035
+"""What every problem requires; [m]."""
 
 
 def curve(rng: Rng, x: float = TIP) -> Draft:
@@ -63,7 +65,7 @@ def _polygon(rng: Rng, radius: float, centre: np.ndarray) -> list[list[float]]:
     return (centre + ring).tolist()
 
 
-def prismatic_x(rng: Rng, folder: Path) -> Draft:
+def prismatic_x(rng: Rng, folder: Path, radius: float) -> Draft:
     """One to six prisms along X."""
     obstacles: Obstacles = []
     for _ in range(int(rng.integers(1, 7))):
@@ -77,7 +79,7 @@ def prismatic_x(rng: Rng, folder: Path) -> Draft:
     return {"obstacles": obstacles, **curve(rng), "hard": True}
 
 
-def crossing(rng: Rng, folder: Path) -> Draft:
+def crossing(rng: Rng, folder: Path, radius: float) -> Draft:
     """One to four long cylinders across the arm at any angle."""
     obstacles: Obstacles = []
     for _ in range(int(rng.integers(1, 5))):
@@ -93,7 +95,7 @@ def _direction(rng: Rng) -> list[float]:
     return (axis / np.linalg.norm(axis)).tolist()
 
 
-def clutter(rng: Rng, folder: Path) -> Draft:
+def clutter(rng: Rng, folder: Path, radius: float) -> Draft:
     """Two to eight boxes and spheres."""
     obstacles: Obstacles = []
     for _ in range(int(rng.integers(2, 9))):
@@ -135,7 +137,7 @@ def wall_with_hole(
     return obstacles
 
 
-def wall(rng: Rng, folder: Path) -> Draft:
+def wall(rng: Rng, folder: Path, radius: float) -> Draft:
     """A wall with a round or square hole that the arm reaches through."""
     x, hole = rng.uniform(1.2, 2.0), rng.uniform(0.15, 0.35)
     obstacles = wall_with_hole(x, rng.uniform(0.02, 0.3), hole, rng.random() < 0.5)
@@ -149,7 +151,7 @@ def _ring(rng: Rng, radius: float, x: float = TIP, centre: Any = (0.0, 0.0)) -> 
     return np.column_stack([np.full(32, x), ring])
 
 
-def pipe(rng: Rng, folder: Path) -> Draft:
+def pipe(rng: Rng, folder: Path, radius: float) -> Draft:
     """A pipe about the rail, eight-sided, that turns aside at a bend."""
     bore, bend = rng.uniform(0.2, 0.3), rng.uniform(0.1, 0.3)
     around = rng.uniform(0.0, 2.0 * np.pi)
@@ -189,7 +191,7 @@ def _rpy_deg(rotation: np.ndarray) -> list[float]:
     return np.rad2deg([roll, pitch, yaw]).tolist()
 
 
-def shelf(rng: Rng, folder: Path) -> Draft:
+def shelf(rng: Rng, folder: Path, radius: float) -> Draft:
     """Boards above one another; the tip draws in the bays between them."""
     pitch, boards = rng.uniform(0.4, 0.6), int(rng.integers(3, 6))
     depth = rng.uniform(0.4, 0.9)
@@ -210,7 +212,7 @@ def shelf(rng: Rng, folder: Path) -> Draft:
             "start": [TIP - depth - 0.2, 0.0, 0.0]}  # fmt: skip
 
 
-def mesh(rng: Rng, folder: Path) -> Draft:
+def mesh(rng: Rng, folder: Path, radius: float) -> Draft:
     """One or two watertight meshes: rings and lumpy balls."""
     obstacles: Obstacles = []
     for i in range(int(rng.integers(1, 3))):
@@ -228,37 +230,37 @@ def mesh(rng: Rng, folder: Path) -> Draft:
     return {"obstacles": obstacles, **curve(rng), "hard": True}
 
 
-def narrow(rng: Rng, folder: Path) -> Draft:
+def narrow(rng: Rng, folder: Path, radius: float) -> Draft:
     """A hole wider than the body and its clearance by 4 to 15 mm on each side."""
     x = rng.uniform(0.9, 1.5)
-    hole = 0.0615 + 0.0035 + rng.uniform(0.004, 0.015)
+    hole = radius + CLEARANCE + rng.uniform(0.004, 0.015)
     obstacles = wall_with_hole(x, 0.02, hole, rng.random() < 0.5)
     points = _ring(rng, rng.uniform(0.1, 0.35) * (TIP - x))
     return {"obstacles": obstacles, "points": points, "closed": True}
 
 
-def infeasible(rng: Rng, folder: Path) -> Draft:
+def infeasible(rng: Rng, folder: Path, radius: float) -> Draft:
     """No arm can do it: out of reach, into a solid, behind a wall, hole too small."""
     kind = ("reach", "solid", "wall", "hole")[int(rng.integers(4))]
     draft: Draft = {"points": _ring(rng, 0.5), "closed": True, "answer": kind}
     if kind == "reach":
         far = rng.uniform(3.0, 3.6)
         draft["points"] = _ring(rng, 0.3, TIP, (far / np.sqrt(2), far / np.sqrt(2)))
-        draft["obstacles"] = clutter(rng, folder)["obstacles"]
+        draft["obstacles"] = clutter(rng, folder, radius)["obstacles"]
     elif kind == "solid":
         at = draft["points"][int(rng.integers(32))]
         draft["obstacles"] = [{"shape": "sphere", "center": at.tolist(),
                                "radius": rng.uniform(0.05, 0.2)}]  # fmt: skip
     else:
         x = rng.uniform(1.5, 2.5)
-        hole = 0.02 if kind == "wall" else 0.0615 + rng.uniform(-0.02, 0.003)
+        hole = 0.02 if kind == "wall" else radius + rng.uniform(-0.02, 0.003)
         # 8 m wide: its edge is beyond every reach, and the rail ends before it helps.
         draft["obstacles"] = wall_with_hole(x, 0.1, hole, False, 4.0)
         draft["start"] = [x - 0.4, 0.0, 0.0]
     return draft
 
 
-FAMILIES: Final[Mapping[str, Callable[[Rng, Path], Draft]]] = {
+FAMILIES: Final[Mapping[str, Callable[[Rng, Path, float], Draft]]] = {
     "prismatic_x": prismatic_x,
     "crossing": crossing,
     "clutter": clutter,
@@ -269,4 +271,4 @@ FAMILIES: Final[Mapping[str, Callable[[Rng, Path], Draft]]] = {
     "narrow": narrow,
     "infeasible": infeasible,
 }
-"""Every family by name."""
+"""Every family by name; the last argument is the radius of the arm's body [m]."""

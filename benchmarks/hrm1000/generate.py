@@ -11,18 +11,21 @@ from typing import Any, Final
 import numpy as np
 import yaml
 
-from benchmarks.hrm1000.families import FAMILIES, TIP, Draft
+from benchmarks.hrm1000.families import CLEARANCE, FAMILIES, TIP, Draft
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.manipulator import built_in
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.verification.link_clearance import link_clearance
 
-VERSION: Final = 1
+VERSION: Final = 2
 """Raised whenever a generated file changes."""
 
 ROOM: Final = 0.0115
 """Clearance of tip and start that a feasible family promises; [m]."""
 
 LENGTH: Final = 3.126
+EQUAL_RADIUS: Final = 0.05
+"""Body of the arms of equal links; [m]."""
 ARMS: Final[tuple[Any, ...]] = ("hrm8", "hrm8", 4, 12, 20)
 """Problem n is for arm n modulo 5: the paper's, or equal links of the same length."""
 
@@ -33,7 +36,7 @@ def _arm(kind: str | int) -> Any:
     return {
         "name": f"equal{kind}",
         "link_lengths": [LENGTH / kind] * kind,
-        "link_radius": 0.05,
+        "link_radius": EQUAL_RADIUS,
         "max_link_angle_deg": 42.5,
         "max_joint_angle_deg": 42.5,
         "base_range": [-5.0, 5.0],
@@ -71,7 +74,7 @@ def _file(name: str, arm: Any, draft: Draft) -> dict[str, Any]:
         "manipulator": _arm(arm),
         "obstacles": obstacles,
         "tip_path": path,
-        "required_clearance": 0.0035,
+        "required_clearance": CLEARANCE,
     }
     return {key: _plain(value) for key, value in file.items()}
 
@@ -114,14 +117,16 @@ def generate(folder: Path, family: str, number: int) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     seed = [VERSION, zlib.crc32(family.encode()), number]
     rng = np.random.default_rng(seed)
+    arm = ARMS[number % len(ARMS)]
+    radius = built_in(arm).link_radius if isinstance(arm, str) else EQUAL_RADIUS
     for _ in range(10_000):
         for old in folder.glob(f"{family}-{number:04d}*.stl"):
             old.unlink()
-        draft = FAMILIES[family](rng, folder)
+        draft = FAMILIES[family](rng, folder, radius)
         answer = f"-{draft['answer']}" if "answer" in draft else ""
         name = f"{family}-{number:04d}{answer}"
         path = folder / f"{name}.yaml"
-        data = _file(name, ARMS[number % len(ARMS)], draft)
+        data = _file(name, arm, draft)
         path.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
         if _keeps_its_promise(read_problem(path).problem, draft):
             return path
