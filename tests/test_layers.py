@@ -12,6 +12,7 @@ LAYERS = {
     "errors": 0,
     "tolerances": 0,
     "units": 0,
+    "kept": 0,
     "geometry": 1,
     "manipulator": 2,
     "kinematics": 3,

@@ -3,10 +3,14 @@
 import math
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
+import jinja2
 import made_up
 import pytest
 
+from vdsm_pin import kept
+from vdsm_pin.report import html
 from vdsm_pin.report.facts import batch_row, verification_file
 from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.html import message_page, view_page, write_index, write_report
@@ -121,3 +125,28 @@ def test_the_index_links_every_finished_problem(tmp_path: Path) -> None:
         "data:,", "a-b/picture.svg", "a-b/report.html", "timing.js",
     }  # fmt: skip
     assert "<c>" in page.text
+
+
+def test_templates_are_compiled_once_and_again_where_what_was_kept_is_damaged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept_in = tmp_path / "kept"
+    monkeypatch.setattr(kept, "folders", lambda: iter([kept_in]))
+    compiled: list[str | None] = []
+    compile_it = jinja2.Environment.compile
+
+    def note(self: jinja2.Environment, source: Any, name: Any, path: Any) -> Any:
+        compiled.append(name)
+        return compile_it(self, source, name, path)
+
+    monkeypatch.setattr(jinja2.Environment, "compile", note)
+    pages = []
+    for damage in (False, False, True):
+        if damage:
+            for file in kept_in.iterdir():
+                file.write_bytes(file.read_bytes()[:-1] + b"?")
+        html._environment.cache_clear()
+        pages.append(message_page("text", "state"))
+    html._environment.cache_clear()
+    assert compiled[: len(compiled) // 2] == compiled[len(compiled) // 2 :] != []
+    assert pages[0] == pages[1] == pages[2]

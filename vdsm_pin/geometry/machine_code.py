@@ -1,18 +1,16 @@
-"""Machine code on disk: one file for each function and kind of arguments.
+"""Machine code that was kept: one file for each function and kind of arguments.
 
-A file holds what numba made: an object file and the few names needed to call it. It is
+It holds what numba made: an object file and the few names needed to call it. It is
 loaded by numba's C extensions and LLVM alone, without numba's Python: importing that
 and filling its registries takes more than a second, loading takes milliseconds.
 """
 
 import ctypes
-import hashlib
 import importlib.machinery
 import os
 import pickle
 import sys
-import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec, module_from_spec
@@ -24,9 +22,7 @@ import llvmlite
 import llvmlite.binding as llvm
 import numpy as np
 
-PACKAGE: Final = Path(__file__).parents[1]
-
-DIGEST: Final = hashlib.sha256
+from vdsm_pin import kept
 
 IN_THE_WAY: Final = ("NUMBA_NUM_THREADS", "NUMBA_CACHE_DIR")
 """Settings of numba that leave the code as it is."""
@@ -57,14 +53,7 @@ class MachineCode:
 
 
 class Unusable(Exception):
-    """There is no code in a file, or not all of it."""
-
-
-def folders() -> Iterator[Path]:
-    """Where code is looked for, and kept in the first that can be written."""
-    yield PACKAGE / "__pycache__" / "machine_code"
-    home = os.environ.get("XDG_CACHE_HOME")
-    yield (Path(home) if home else Path.home() / ".cache") / "vdsm_pin"
+    """There is no code of that name, or it needs what is not there."""
 
 
 @cache
@@ -90,39 +79,21 @@ def platform() -> bytes:
 
 
 def read(name: str) -> MachineCode:
-    """The code in a file of that name.
+    """The code kept under a name.
 
     Raises:
-        Unusable: If there is none, or none that is whole.
+        Unusable: If there is none.
     """
-    for folder in folders():
-        try:
-            content = (folder / name).read_bytes()
-        except OSError:
-            continue
-        size = DIGEST().digest_size
-        if DIGEST(content[size:]).digest() == content[:size]:
-            code: MachineCode = pickle.loads(content[size:])
-            return code
-    raise Unusable(name)
+    content = kept.read(name)
+    if content is None:
+        raise Unusable(name)
+    code: MachineCode = pickle.loads(content)
+    return code
 
 
 def write(name: str, code: MachineCode) -> None:
-    """Keep code for later processes, if there is a folder for it.
-
-    The file appears whole or not at all, whoever else writes it or ends this process.
-    """
-    content = pickle.dumps(code)
-    for folder in folders():
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            number, aside = tempfile.mkstemp(dir=folder, prefix=name)
-        except OSError:  # a read-only installation
-            continue
-        with os.fdopen(number, "wb") as file:
-            file.write(DIGEST(content).digest() + content)
-        Path(aside).replace(folder / name)
-        return
+    """Keep code for later processes."""
+    kept.keep(name, pickle.dumps(code))
 
 
 def load(code: MachineCode, function: Callable[..., Any]) -> Callable[..., Any]:

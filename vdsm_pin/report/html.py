@@ -1,15 +1,17 @@
 """HTML pages: report.html, the 3D view, index.html; each is one file, no request."""
 
+import hashlib
 from collections.abc import Container, Sequence
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
-import jinja2
+import jinja2.compiler
+from jinja2.bccache import Bucket
 from markupsafe import Markup
 
-from vdsm_pin import __version__
+from vdsm_pin import __version__, kept
 from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.facts import failing, nearest_to_obstacle
@@ -34,10 +36,33 @@ from vdsm_pin.verification.records import Verification
 _TEMPLATES: Final = Path(__file__).parent / "templates"
 
 
+class _Templates(jinja2.BytecodeCache):
+    """Keeps templates as Python's byte code; jinja2 sees by itself when one changed.
+
+    It does not see that its own rules or the options below did.
+    """
+
+    def load_bytecode(self, bucket: Bucket) -> None:
+        """Fill a bucket from what was kept."""
+        content = kept.read(self._name(bucket))
+        if content is not None:
+            bucket.bytecode_from_string(content)
+
+    def dump_bytecode(self, bucket: Bucket) -> None:
+        """Keep what a bucket holds."""
+        kept.keep(self._name(bucket), bucket.bytecode_to_string())
+
+    def _name(self, bucket: Bucket) -> str:
+        rules = (Path(jinja2.compiler.__file__), Path(__file__))
+        digest = hashlib.sha256(b"".join(path.read_bytes() for path in rules))
+        return f"template-{bucket.key}-{digest.hexdigest()[:32]}"
+
+
 @cache
 def _environment() -> jinja2.Environment:
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_TEMPLATES),
+        bytecode_cache=_Templates(),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
