@@ -38,7 +38,10 @@ def test_clearance_rows_are_complete_and_in_order(tmp_path: Path) -> None:
     assert [float(row["moment"]) for row in rows[:: len(pairs)]] == [0, 1, 2, 3.5, 4.5]
     first = made_up.chunk(0, 3, len(pairs))
     lower = [float(row["lower_m"]) for row in rows[: 3 * len(pairs)]]
-    np.testing.assert_allclose(lower, first.lower.ravel(), rtol=1e-8)
+    upper = [float(row["upper_m"]) for row in rows[: 3 * len(pairs)]]
+    np.testing.assert_allclose(lower, first.lower.ravel(), rtol=0, atol=1e-9)
+    assert (np.array(lower) <= first.lower.ravel()).all()
+    assert (np.array(upper) >= first.upper.ravel()).all()
     assert {row["verdict"] for row in rows} == {"certified", "refuted", "undecided"}
 
 

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from vdsm_pin.cables import cable_lengths
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import link_angles
 from vdsm_pin.report.facts import cables, changed_angles, min_clearance, straight_arm
@@ -146,7 +147,9 @@ def _brackets(
 
 
 def _changed_chart(verification: Verification, shown: Thinned) -> dict[str, Any]:
-    count = changed_angles(verification.trajectory).sum(axis=1)[shown.rows]
+    rows = verification.trajectory
+    psi = link_angles(rows.alpha[shown.rows], rows.theta[shown.rows])
+    count = changed_angles(psi)
     return {
         "id": "changed",
         "title": "Changed link angles",
@@ -182,7 +185,8 @@ def _joint_charts(verification: Verification, shown: Thinned) -> list[dict[str, 
 
 def _cable_chart(verification: Verification, shown: Thinned) -> dict[str, Any]:
     straight = cables(verification.problem, straight_arm(verification.problem))
-    lengths = cables(verification.problem, verification.trajectory)[shown.rows]
+    arm, rows = verification.problem.manipulator, verification.trajectory
+    lengths = cable_lengths(arm, rows.alpha[shown.rows], rows.theta[shown.rows])
     change = (lengths - straight) * MM_PER_M
     colours = link_colours(change.shape[1])
     return {

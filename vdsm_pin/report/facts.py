@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.cables import cable_lengths
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem import PlanningProblem
@@ -37,6 +37,7 @@ from vdsm_pin.verification.records import (
     Verification,
 )
 
+_CHUNK: Final = 65_536  # rows treated at once, so that memory stays bounded
 _PASSED: Final = Verdict.CERTIFIED
 
 
@@ -45,21 +46,29 @@ def finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def changed_angles(trajectory: Trajectory) -> BoolArray:
-    """Which link angles differ from zero by more than 0.05 deg, (n_samples, N)."""
-    psi = link_angles(trajectory.alpha, trajectory.theta)
-    return np.asarray(psi > TOLERANCES.changed_angle)
+def changed_angles(psi: FloatArray) -> IntArray:
+    """How many link angles differ from zero by more than 0.05 deg, (n_samples,).
+
+    Args:
+        psi: Link angles, shape (n_samples, N); [rad].
+    """
+    return np.asarray((psi > TOLERANCES.changed_angle).sum(axis=1))
 
 
 def motion_facts(trajectory: Trajectory) -> MotionFacts:
     """Extremes over the rows of a trajectory."""
-    psi = link_angles(trajectory.alpha, trajectory.theta)
-    changed = changed_angles(trajectory).sum(axis=1)
+    largest = np.zeros(trajectory.n_links)
+    changed = np.zeros(trajectory.n_samples, dtype=np.int64)
+    for first in range(0, trajectory.n_samples, _CHUNK):
+        part = slice(first, first + _CHUNK)
+        psi = link_angles(trajectory.alpha[part], trajectory.theta[part])
+        largest = np.maximum(largest, psi.max(axis=0))
+        changed[part] = changed_angles(psi)
     on_path = changed[trajectory.on_path]
     return MotionFacts(
         waypoints=trajectory.n_samples,
         on_path_waypoints=int(trajectory.on_path.sum()),
-        max_link_angle_rad=tuple(float(value) for value in psi.max(axis=0)),
+        max_link_angle_rad=tuple(float(value) for value in largest),
         x0_min_m=float(trajectory.x0.min()),
         x0_max_m=float(trajectory.x0.max()),
         changed_angle_threshold_rad=TOLERANCES.changed_angle,
