@@ -148,7 +148,7 @@ def notes_of(
     centres: FloatArray,
 ) -> tuple[str, ...]:
     """Notes of a plan: what is not drawn, how sparse it is, what is proved."""
-    notes = [*_undrawn(outcome)]
+    notes = [*_undrawn(outcome), *_order(outcome)]
     on_path = trajectory.on_path
     if not on_path.any():
         return tuple(notes)
@@ -199,6 +199,18 @@ def _farthest_back(
         ends = min(tips[max(a - 1, 0), 0], tips[min(b, len(tips) - 1), 0])
         worst = max(worst, float(ends - tips[a:b, 0].min()))
     return worst
+
+
+def _order(outcome: Outcome) -> list[str]:
+    """In which order and directions the pieces are drawn, where it is not as given."""
+    assert outcome.found is not None
+    stations = outcome.found.roadmap.route.stations
+    runs = [leg for leg in outcome.found.sequence.legs if leg.drawn]
+    ends = [(stations[run.layers[0]], stations[run.layers[-1]]) for run in runs]
+    if all(np.diff(np.array(ends).ravel()) >= 0.0):
+        return []
+    pieces = ", then ".join(f"from {a:.4f} m to {b:.4f} m" for a, b in ends)
+    return [f"drawn in another order than given, as the problem allows: {pieces}"]
 
 
 def _undrawn(outcome: Outcome) -> list[str]:

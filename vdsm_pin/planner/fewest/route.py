@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem import DesiredPath, Order, PlanningProblem
 
 
 @dataclass(frozen=True)
@@ -138,11 +138,18 @@ def tip_route(
     drawn = rows.tips[chosen]
     approach = _chain(path.start, drawn[0], coarse)
     tips = np.vstack([approach, drawn])
-    n, k = len(tips), len(approach)
+    k, last = len(approach), len(approach) + len(drawn) - 1
+    ring = path.closed and last - k > 1
+    either = path.order is Order.FREE and not path.closed
+    if either:
+        # The other end may be the one to begin with.
+        tips = np.vstack([tips, _chain(path.start, drawn[-1], coarse)[:0:-1]])
+    n = len(tips)
     pairs = [(i, i + 1) for i in range(n - 1)]
-    ring = path.closed and n - k > 2
     if ring:
-        pairs.append((k, n - 1))
+        pairs.append((k, last))
+    elif either:
+        pairs.append((n - 1, 0))
     if back > 0.0:
         chain = tips
         tips, more = _behind(chain, ring, k, coarse, back)
@@ -155,7 +162,7 @@ def tip_route(
     for i, (a, b) in enumerate(itertools.pairwise(chosen)):
         shut[i + 1] = closed[a : b + 1].any()
     links = np.array(pairs).reshape(-1, 2)
-    return _linked(tips, np.arange(k, n), rows.stations[chosen], shut, links)
+    return _linked(tips, np.arange(k, last + 1), rows.stations[chosen], shut, links)
 
 
 MOST_BESIDE = 16

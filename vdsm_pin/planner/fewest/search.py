@@ -7,8 +7,10 @@ import numpy as np
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.motion import Knots, knots_of
+from vdsm_pin.planner.fewest.order import reordered
 from vdsm_pin.planner.fewest.roadmap import Roadmap
 from vdsm_pin.planner.fewest.sequence import Planner, Sequence
+from vdsm_pin.problem import Order
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,8 @@ def search(judge: Judge, roadmap: Roadmap, home: int, rounds: int) -> Found | No
         sequence = planner.sequence()
         if not any(leg.drawn for leg in sequence.legs):
             return None
+        if judge.problem.path.order is Order.FREE:
+            sequence = reordered(planner, sequence)
         knots = knots_of(judge.problem.manipulator, roadmap, sequence)
         fresh = _fresh(knots.edges, known)
         good = judge.clear(knots.pick(fresh)) if fresh.size else np.ones(0, bool)

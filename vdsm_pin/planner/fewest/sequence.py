@@ -167,9 +167,9 @@ class Planner:
             if k < 0:
                 break
             node = int(home_from[k])
-        return self._joined(runs[::-1], tuple(sorted(skipped)), total)
+        return self.joined(runs[::-1], tuple(sorted(skipped)), total)
 
-    def _joined(
+    def joined(
         self, runs: list[Leg], skipped: tuple[int, ...], cost: float
     ) -> Sequence:
         """Drawn legs with the shortest ways between them."""

@@ -36,7 +36,7 @@ def _runs(knots: Knots) -> list[tuple[int, int]]:
 def _share(knots: Knots, a: int, b: int) -> FloatArray:
     """Where the inner knots of a..b come to lie between its ends, 0 to 1."""
     if knots.drawn[a]:
-        length = knots.stations[a : b + 1] - knots.stations[a]
+        length = np.abs(knots.stations[a : b + 1] - knots.stations[a])
     else:
         way = np.linalg.norm(np.diff(knots.tips[a : b + 1], axis=0), axis=1)
         turn = np.diff(knots.offsets[a : b + 1], axis=0)
