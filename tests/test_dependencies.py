@@ -1,0 +1,79 @@
+"""Oracle: the imports themselves, read from the source, against pyproject.toml."""
+
+import ast
+import re
+import sys
+import tomllib
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+FOLDERS = ("vdsm_pin", "tests", "analysis", "benchmarks")
+COMES_WITH = {"pinocchio": "pin", "pydantic-core": "pydantic", "markupsafe": "jinja2"}
+"""What a declared library brings under another name."""
+
+
+def plain(name: str) -> str:
+    """A distribution's name as registries compare it."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def declared(*extras: str) -> set[str]:
+    """What pyproject.toml asks for, with extras."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    wanted = list(project["dependencies"])
+    for extra in extras:
+        wanted += project["optional-dependencies"][extra]
+    return {plain(re.split(r"[<>=\[; ]", line)[0]) for line in wanted}
+
+
+def imported(folder: str) -> set[str]:
+    """Top names a folder imports, also by importorskip."""
+    names = set()
+    for path in (ROOT / folder).rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
+                names.add(node.module)
+            elif isinstance(node, ast.Call) and node.args:
+                called, first = ast.unparse(node.func), node.args[0]
+                if called.endswith("importorskip") and isinstance(first, ast.Constant):
+                    names.add(str(first.value))
+    return {name.split(".")[0] for name in names}
+
+
+def ours() -> set[str]:
+    """Modules and packages that this repository holds."""
+    paths = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")]
+    return {path.stem for path in paths} | {path.parent.name for path in paths}
+
+
+@pytest.mark.parametrize(
+    ("folder", "extras"),
+    [
+        ("vdsm_pin", ("cluster", "parquet")),
+        ("tests", ("dev",)),
+        ("analysis", ("dev",)),
+        ("benchmarks", ("dev",)),
+    ],
+)
+def test_every_library_imported_is_declared(
+    folder: str, extras: tuple[str, ...]
+) -> None:
+    providers = packages_distributions()
+    known = declared(*extras)
+    foreign = imported(folder) - set(sys.stdlib_module_names) - ours()
+    assert "numpy" in foreign
+    for name in sorted(foreign):
+        made_by = {plain(one) for one in providers.get(name, [name])}
+        made_by |= {COMES_WITH[one] for one in made_by if one in COMES_WITH}
+        assert made_by & known, f"{folder} imports {name}, of {sorted(made_by)}"
+
+
+def test_the_scan_sees_what_is_not_declared() -> None:
+    assert "lxml" in imported("tests")
+    assert "lxml" not in declared()
+    assert "playwright" in imported("tests")
