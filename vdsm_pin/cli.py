@@ -138,7 +138,7 @@ def batch(
     problems: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[PROBLEM]...",
+            metavar="PROBLEM",
             help="Built-in names, problem files or folders of them; the built-in "
             "problems if there is none.",
         ),
@@ -262,6 +262,7 @@ def urdf(
     check_output_file(out)
     with atomic_path(out) as path:
         path.write_text(text, encoding="utf-8")
+    typer.echo(f"wrote {out}")
 
 
 @app.command(
@@ -271,9 +272,15 @@ def urdf(
     ),
 )
 def check_certificate(
-    certificate: Annotated[Path, typer.Argument(metavar="FILE")],
+    certificate: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="What vdsm verify --certificate wrote."),
+    ],
     problem: Problem,
-    trajectory: Annotated[Path, typer.Argument(metavar="TRAJECTORY")],
+    trajectory: Annotated[
+        Path,
+        typer.Argument(metavar="TRAJECTORY", help="The trajectory.csv it is about."),
+    ],
 ) -> None:
     """Recheck a certificate.
 
@@ -288,8 +295,10 @@ def check_certificate(
 
 @app.command(epilog=_examples("vdsm diff out/monday out/tuesday"))
 def diff(
-    old: Annotated[Path, typer.Argument(metavar="OLD")],
-    new: Annotated[Path, typer.Argument(metavar="NEW")],
+    old: Annotated[
+        Path, typer.Argument(metavar="OLD", help="A folder of vdsm batch or verify.")
+    ],
+    new: Annotated[Path, typer.Argument(metavar="NEW", help="Another one.")],
 ) -> None:
     """Compare two result folders.
 

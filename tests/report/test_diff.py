@@ -75,5 +75,5 @@ def test_other_folders_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidFile, match="neither"):
         compare_folders(tmp_path, tmp_path)
     (tmp_path / "summary.csv").write_text("outcome\nsplendid\n")
-    with pytest.raises(InvalidFile, match="cannot be read"):
+    with pytest.raises(InvalidFile, match="folder: Field required; was it written"):
         compare_folders(tmp_path, tmp_path)

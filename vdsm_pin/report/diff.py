@@ -124,8 +124,12 @@ def _rows(folder: Path) -> dict[str, BatchRow]:
         if single.is_file():
             file = VerificationFile.model_validate_json(single.read_bytes())
             return {file.problem: batch_row(file.problem, "", file)}
-    except (OSError, ValidationError, ValueError) as error:
-        first = str(error).splitlines()[0]
-        raise InvalidFile(file=folder, problem=f"cannot be read: {first}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"]) or "content"
+        problem = f"{key}: {first['msg']}; was it written by this version of vdsm?"
+        raise InvalidFile(file=folder, problem=problem) from error
+    except (OSError, ValueError) as error:
+        raise InvalidFile(file=folder, problem=f"cannot be read: {error}") from error
     what = "holds neither summary.csv nor verification.json"
     raise InvalidFile(file=folder, problem=what)

@@ -194,10 +194,10 @@ def reason(verification: Verification) -> str:
     if at:
         found += f" ({at})"
     share = f"{len(bad)} of {len(verification.checks)} checks"
-    first_of = "the first: " if len(bad) > 1 else ""
+    first_of = ", the first: " if len(bad) > 1 else ": "
     if verification.verdict is Verdict.REFUTED:
-        return f"The motion breaks {share}: {first_of}{found}."
-    undecided = f"The proof is not complete, {share} undecided: {first_of}{found}."
+        return f"The motion breaks {share}{first_of}{found}."
+    undecided = f"The proof is not complete, {share} undecided{first_of}{found}."
     return f"{undecided} This counts as not passed."
 
 
