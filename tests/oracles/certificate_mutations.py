@@ -1,7 +1,7 @@
 """Seeded damage to a certificate, of each kind a careless or dishonest writer may do.
 
 `raw` changes the file's bytes. `forged` also makes the last line fit again, so that
-only the mathematics can object.
+only the mathematics can object. `other_files` changes what the certificate is about.
 """
 
 import copy
@@ -53,6 +53,15 @@ def change_number(lines: list[Any], rng: Rng) -> str:
     old = holder[key]
     holder[key] = nudged(old, rng)
     return f"number {key}: {old!r} -> {holder[key]!r}"
+
+
+def changes(old: Any, new: Any) -> list[tuple[Any, ...]] | None:
+    """Places of the numbers that differ; None where the structure does."""
+    places = numbers_in(old)
+    if places != numbers_in(new):
+        return None
+    found = [place(old, p)[0][p[-1]] != place(new, p)[0][p[-1]] for p in places]
+    return [p for p, differs in zip(places, found, strict=True) if differs]
 
 
 def a_list(lines: list[Any], rng: Rng) -> tuple[list[Any], str]:
@@ -187,3 +196,28 @@ def raw(content: bytes, rng: Rng) -> tuple[bytes, str]:
     at = int(rng.integers(len(content)))
     flipped = content[at] ^ (1 << int(rng.integers(8)))
     return content[:at] + bytes([flipped]) + content[at + 1 :], f"byte {at}"
+
+
+def other_files(data: Any, rows: Any, rng: Rng) -> tuple[Any, Any, str]:
+    """Problem data and joint values: less clearance, more of it asked, another row."""
+    data, rows = copy.deepcopy(data), rows.copy()
+    at = int(rng.integers(len(data["obstacles"])))
+    obstacle, much = data["obstacles"][at], 1.0 + 10.0 ** rng.uniform(-6, 0)
+    match int(rng.integers(5)):
+        case 0:
+            data["manipulator"]["link_radius"] *= much
+            return data, rows, "wider links"
+        case 1:
+            data["required_clearance"] *= much
+            return data, rows, "more clearance required"
+        case 2:
+            rows[rng.integers(len(rows)), 0] += rng.choice([-1, 1]) * (much - 1.0)
+            return data, rows, "a row with another base position"
+        case 3:
+            rows[rng.integers(len(rows)), 1] += rng.choice([-0.1, 0.1]) * (much - 1.0)
+            return data, rows, "a row with another first angle"
+    if "radius" in obstacle:
+        obstacle["radius"] *= much
+        return data, rows, "a wider obstacle"
+    obstacle["name"] += "2"
+    return data, rows, "an obstacle of another name"

@@ -170,7 +170,6 @@ class OracleWriter:
         """[n, lower] for a range of pieces."""
         if isinstance(pieces[0], HalfSpacePiece):
             n = -np.array(pieces[0].normal)
-            support = -pieces[0].offset
         else:
             ends = np.vstack([self.pose(k, t)[1][link : link + 2] for t in (a, b)])
 
@@ -181,11 +180,20 @@ class OracleWriter:
             v = nearest(difference, least(pieces[0], np.ones(3))[1] - ends[0])
             size = np.linalg.norm(v)
             n = v / size if size > 1e-12 else np.array([1.0, 0.0, 0.0])
+        return n, self.proved_of_pieces(k, a, b, link, pieces, n) - PAD
+
+    def proved_of_pieces(
+        self, k: int, a: float, b: float, link: int, pieces: Any, n: Any
+    ) -> float:
+        """What a plane with unit normal n proves of a range of pieces."""
+        if isinstance(pieces[0], HalfSpacePiece):
+            support = -pieces[0].offset
+        else:
             support = min(least(piece, n)[0] for piece in pieces)
         _, base, surface = self.errors
         tops = [self.top(k, a, b, j, 0, n, -1) for j in (link, link + 1)]
-        lower = support - surface - base * abs(n[0]) - max(tops) - self.arm.link_radius
-        return n, lower - PAD
+        lost = surface + base * abs(n[0]) + self.arm.link_radius
+        return float(support - lost - max(tops))
 
     def plane_to_link(self, k: int, a: float, b: float, link: int, other: int) -> Any:
         frames, centres = self.pose(k, (a + b) / 2)
@@ -197,11 +205,15 @@ class OracleWriter:
 
         v = nearest(difference, local[0] - fixed[0])
         n = v / np.linalg.norm(v)
+        return n, self.proved_of_link(k, a, b, link, other, n) - PAD
+
+    def proved_of_link(
+        self, k: int, a: float, b: float, link: int, other: int, n: Any
+    ) -> float:
+        """What a plane with unit normal n, from link to link, proves of a pair."""
         tops = [self.top(k, a, b, j, link + 1, -n, link) for j in (other, other + 1)]
-        lower = (
-            -max(tops) - max(0.0, self.lengths[link] * n[0]) - 2 * self.arm.link_radius
-        )
-        return n, lower - PAD
+        own = max(0.0, self.lengths[link] * n[0]) + 2 * self.arm.link_radius
+        return float(-max(tops) - own)
 
     # ---- slices ----------------------------------------------------------------------
 

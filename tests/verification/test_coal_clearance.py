@@ -32,6 +32,7 @@ from vdsm_pin.verification.coal_clearance import (
     reach_of,
 )
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.verify import verify
 
 HRM8 = built_in("hrm8")
 ROBOT = load_robot(HRM8)
@@ -173,6 +174,28 @@ def test_a_wrong_distance_is_noticed_on_both_sides(
     (check,) = check_coal(ROBOT, ball_near_link_4(0.01), STRAIGHT)
     expected = Verdict.CERTIFIED if excess < 1.0 else Verdict.UNDECIDED
     assert check.verdict is expected
+
+
+def test_a_lie_leaves_the_whole_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One of Coal's distances 0.1 mm off: the row says which, nothing is certified."""
+    problem, drawn = ball_near_link_4(0.01), replace(STRAIGHT, on_path=np.ones(2))
+    honest = coal_clearance.measure
+
+    def lying(*arguments: object) -> Measured:
+        found = honest(*arguments)
+        off = 1e-4 if 0.0 < found.distance < 0.011 else 0.0
+        return Measured(found.distance + off, found.near, found.far)
+
+    for tell, verdict in ((honest, Verdict.CERTIFIED), (lying, Verdict.UNDECIDED)):
+        monkeypatch.setattr(coal_clearance, "measure", tell)
+        found = verify(problem, drawn, ROBOT)
+        row = next(c for c in found.checks if c.name == coal_clearance.NAME)
+        assert row.verdict is verdict
+        others = {c.verdict for c in found.checks if c is not row}
+        assert others == {Verdict.CERTIFIED}
+        assert found.verdict is verdict
+    assert row.worst == pytest.approx(1e-4, abs=1e-8)
+    assert "link 4, ball: Coal 0.0101" in row.where
 
 
 @pytest.mark.parametrize("answer", [-np.inf, np.nan, -1.7976931348623157e308])
