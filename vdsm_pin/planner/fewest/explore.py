@@ -14,15 +14,21 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.fewest.bounds import TipProof, prove_tips
 from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.graft import fill
-from vdsm_pin.planner.fewest.home import with_start
+from vdsm_pin.planner.fewest.home import largest_start_angle, with_start
 from vdsm_pin.planner.fewest.passage import cut_off
-from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste, build_roadmap
+from vdsm_pin.planner.fewest.roadmap import (
+    Roadmap,
+    Taste,
+    build_roadmap,
+    link_limit,
+)
 from vdsm_pin.planner.fewest.route import PathRows, path_rows, tip_route
 from vdsm_pin.planner.fewest.search import Found, search
 from vdsm_pin.planner.fewest.sequence import Planner
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
 
 LOGGER = logging.getLogger(__name__)
 
@@ -110,8 +116,12 @@ def explore(
     yield best
     if proof.closed.all():
         return
+    # The way out of a start that is bent more than is liked must be allowed.
+    bent = largest_start_angle(problem) / link_limit(problem)
+    least_ease = min(1.0, bent + TOLERANCES.joint_limit)
     for number, level in enumerate(LEVELS):
-        judge = Judge(problem, clearance, margin, level.slack, level.finest, level.ease)
+        ease = max(level.ease, least_ease)
+        judge = Judge(problem, clearance, margin, level.slack, level.finest, ease)
         found = _look(judge, level, rows, proof, taste)
         now = Outcome(judge, found, rows, proof)
         LOGGER.debug("%s: %.4f m missing", level, now.missing)

@@ -4,7 +4,7 @@ import numpy as np
 
 from vdsm_pin.errors import LimitExceeded, NoPlanFound, PathBlocked
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.kinematics import joint_centres, link_angles
 from vdsm_pin.planner.fewest.bounds import culprit
 from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
@@ -49,8 +49,8 @@ def with_start(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, i
         return roadmap, int(roadmap.index[0])
     offsets = start_offsets(judge.problem)[None]
     tip = roadmap.route.tips[:1]
-    room, _, bend = judge.look(tip, offsets)
-    _check_start(judge, tip, offsets, float(room[0]), float(bend[0]))
+    _check_start(judge, tip, offsets)
+    room, _, _ = judge.look(tip, offsets)
     shapes = roadmap.shapes
     nodes = np.arange(roadmap.tip_nodes[0], roadmap.tip_nodes[1])
     shape = roadmap.node[nodes] % shapes.size
@@ -78,22 +78,38 @@ def with_start(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, i
     return more, int(more.index[shapes.size])
 
 
-def _check_start(
-    judge: Judge, tip: FloatArray, offsets: FloatArray, room: float, bend: float
-) -> None:
+def largest_start_angle(problem: PlanningProblem) -> float:
+    """Largest link angle at the start; [rad]."""
+    arm, path = problem.manipulator, problem.path
+    if path.start_joints is None:
+        away = np.hypot(path.start[1], path.start[2])
+        return float(np.arcsin(min(1.0, away / arm.total_length)))
+    alpha, theta = path.start_joints[None, 1::2], path.start_joints[None, 2::2]
+    return float(link_angles(alpha, theta).max())
+
+
+def _check_start(judge: Judge, tip: FloatArray, offsets: FloatArray) -> None:
     problem = judge.problem
+    still = Intervals(tip, tip, offsets, offsets)
+    place, share = np.zeros(1, dtype=np.int64), np.zeros(1)
+    centres = still.centres(problem.manipulator, place, share)
+    if not judge.clearance(centres).min() >= problem.required_clearance:
+        link, obstacle, gap = culprit(problem, centres[0])
+        reason = (
+            f"the arm at its start has {gap * 1e3:.3f} mm from link {link} to it, "
+            f"required are {problem.required_clearance * 1e3:.3f} mm"
+        )
+        raise PathBlocked(obstacle=obstacle, reason=reason)
+    bend = float(judge.bends(tip, offsets).max())
     if not bend <= problem.manipulator.max_link_angle + TOLERANCES.joint_limit:
         limit = float(np.rad2deg(problem.manipulator.max_link_angle))
         raise LimitExceeded(
             waypoint=0, quantity="psi", value=float(np.rad2deg(bend)), limit=limit,
             unit="deg",
         )  # fmt: skip
-    if not room >= problem.required_clearance:
-        still = Intervals(tip, tip, offsets, offsets)
-        centres = still.centres(problem.manipulator, np.zeros(1, int), np.zeros(1))[0]
-        link, obstacle, gap = culprit(problem, centres)
-        reason = (
-            f"the arm at its start has {gap * 1e3:.3f} mm from link {link} to it, "
-            f"required are {problem.required_clearance * 1e3:.3f} mm"
+    if not bend <= judge.limit + TOLERANCES.joint_limit:
+        message = (
+            f"the arm starts with a link angle of {np.rad2deg(bend):.4g} deg, and this "
+            f"strategy bends joints by at most {np.rad2deg(judge.limit):.4g} deg"
         )
-        raise PathBlocked(obstacle=obstacle, reason=reason)
+        raise NoPlanFound(message)

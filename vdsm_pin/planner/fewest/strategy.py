@@ -14,6 +14,12 @@ from vdsm_pin.planner.fewest.motion import Knots, Rows, dense_rows
 from vdsm_pin.planner.fewest.nearby import nearby
 from vdsm_pin.planner.fewest.roadmap import Taste
 from vdsm_pin.planner.fewest.smooth import lifted, smooth, straightened
+from vdsm_pin.planner.fewest.unbend import (
+    from_there,
+    leans_ahead,
+    unbend,
+    with_unbending,
+)
 from vdsm_pin.planner.records import LinkClearance, Plan, TipPath
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
@@ -62,6 +68,12 @@ def _plan(
     name: str,
     taste: Taste,
 ) -> Plan:
+    if not leans_ahead(problem):
+        rows = unbend(problem, clearance, margin)
+        there = from_there(problem, rows[-1])
+        return with_unbending(
+            problem, rows, _plan(there, clearance, margin, name, taste)
+        )
     quick = nearby(problem, clearance)
     best: Outcome | None = None
     try:

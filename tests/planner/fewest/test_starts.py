@@ -1,0 +1,142 @@
+"""Starts in any direction, arms of 2 to 40 links, bases anywhere."""
+
+import itertools
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from scenes_for_fewest import problem
+
+from vdsm_pin.errors import NoPlanFound
+from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.io.problem_file import built_in_text, read_problem
+from vdsm_pin.kinematics import joint_centres, link_angles
+from vdsm_pin.manipulator import CableLayout, Manipulator, paper_hole_angles
+from vdsm_pin.planner.fewest.strategy import plan_fewest
+from vdsm_pin.planner.fewest.unbend import leans_ahead, unbend
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.scene import Obstacle, Sphere
+from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.verify import verify
+
+LENGTH = 3.126
+POINTS = np.array([[3.126, 0.3, -0.2], [3.126, 0.8, -0.2], [3.126, 0.8, 0.6]])
+
+
+def equal_links(count: int) -> Manipulator:
+    limit = float(np.deg2rad(42.5))
+    cables = CableLayout(0.01, 0.005, paper_hole_angles(count))
+    lengths = np.full(count, LENGTH / count)
+    radius = min(0.05, 0.3 * LENGTH / count)
+    return Manipulator("equal", lengths, radius, limit, limit, (-5.0, 5.0), cables)
+
+
+def starting(
+    arm: Manipulator, alpha: FloatArray, theta: FloatArray, *obstacles: Obstacle
+) -> PlanningProblem:
+    centres = joint_centres(arm, np.array([0.2]), alpha[None], theta[None])[0]
+    joints = np.concatenate([[0.2], np.stack([alpha, theta], axis=1).ravel()])
+    task = problem(*obstacles, points=POINTS)
+    path = replace(task.path, start=centres[-1], start_joints=joints)
+    return replace(task, manipulator=arm, path=path)
+
+
+def judged(task: PlanningProblem) -> Verification:
+    plan = plan_fewest(task, link_clearance(task), 0.0)
+    start = plan.trajectory.joints[0]
+    np.testing.assert_allclose(start, task.path.start_joints, atol=1e-9)
+    return verify(task, plan.trajectory, load_robot(task.manipulator))
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 13, 40])
+def test_an_arm_of_any_number_of_links_starts_in_any_direction(count: int) -> None:
+    rng = np.random.default_rng(count)
+    arm, size = equal_links(count), min(0.5, 1.5 / np.sqrt(count))
+    ball = Sphere("ball", np.array([1.9, -0.9, 0.6]), 0.2)
+    for _ in range(2):
+        alpha, theta = rng.uniform(-size, size, (2, count))
+        task = starting(arm, alpha, theta, ball)
+        result = judged(task)
+        assert result.verdict is Verdict.CERTIFIED
+        assert result.coverage == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_start_bent_nearly_to_the_limit_is_not_taken_for_a_blocked_one() -> None:
+    arm = equal_links(8)
+    alpha = np.zeros(8)
+    alpha[3] = 0.999 * arm.max_link_angle
+    result = judged(starting(arm, alpha, np.zeros(8)))
+    assert result.verdict is Verdict.CERTIFIED
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_arm_curled_backwards_unbends_and_draws(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    arm, turn = equal_links(8), rng.uniform(0.0, 2.0 * np.pi)
+    alpha, theta = np.full(8, 0.5 * np.cos(turn)), np.full(8, 0.5 * np.sin(turn))
+    task = starting(arm, alpha, theta)
+    centres = joint_centres(arm, np.array([0.2]), alpha[None], theta[None])[0]
+    assert (np.diff(centres[:, 0]) < 0.0).any()
+    assert not leans_ahead(task)
+    result = judged(task)
+    assert result.verdict is Verdict.CERTIFIED
+    assert result.coverage == pytest.approx(1.0, abs=1e-9)
+
+
+def test_unbending_keeps_limits_and_clearance_and_gives_up_where_it_cannot() -> None:
+    arm = equal_links(8)
+    alpha = np.full(8, 0.5)
+    ahead = Sphere("ball", np.array([2.3, 0.8, 0.0]), 0.25)
+    task = starting(arm, alpha, np.zeros(8), ahead)
+    clearance = link_clearance(task)
+    rows = unbend(task, clearance, 0.0)
+    fine = np.concatenate([
+        a + np.linspace(0.0, 1.0, 9)[:, None] * (b - a)
+        for a, b in itertools.pairwise(rows)
+    ])  # fmt: skip
+    centres = joint_centres(arm, fine[:, 0], fine[:, 1::2], fine[:, 2::2])
+    assert clearance(centres).min() >= task.required_clearance
+    psi = link_angles(fine[:, 1::2], fine[:, 2::2])
+    assert psi.max() <= arm.max_link_angle
+    assert leans_ahead(replace(task, path=replace(task.path, start_joints=rows[-1])))
+
+    def never(centres: FloatArray) -> FloatArray:
+        room = np.full(centres[:, 1:, 0].shape, -1.0)
+        room[(centres == joint_centres(arm, rows[:1, 0], rows[:1, 1::2],
+              rows[:1, 2::2])).all(axis=(1, 2))] = 1.0  # fmt: skip
+        return room
+
+    with pytest.raises(NoPlanFound, match="backwards"):
+        unbend(task, never, 0.0)
+
+
+def test_a_problem_moved_as_a_whole_has_the_same_plan(tmp_path: Path) -> None:
+    text = built_in_text("paper/obs3")
+    data = yaml.safe_load(text)
+    rpy, shift = np.array([20.0, -35.0, 110.0]), np.array([500.0, -300.0, 1200.0])
+    R = rotation_from_rpy(np.deg2rad(rpy))
+    moved = dict(data, base={"position": shift.tolist(), "rpy_deg": rpy.tolist()})
+    moved["tip_path"] = dict(data["tip_path"])
+    for key in ("start", "points"):
+        values = np.array(data["tip_path"][key], dtype=float)
+        moved["tip_path"][key] = (values @ R.T + shift).tolist()
+    here = read_problem("paper/obs3").problem
+    given = dict(data["obstacles"][0])
+    given["center"] = (R @ np.array(given["center"], float) + shift).tolist()
+    given["axis"] = R[:, 2].tolist()
+    moved["obstacles"] = [given]
+    path = tmp_path / "moved.yaml"
+    path.write_text(yaml.safe_dump(moved), encoding="utf-8")
+    there = read_problem(path).problem
+    plans = [plan_fewest(task, link_clearance(task), 0.0) for task in (here, there)]
+    one, other = (plan.trajectory for plan in plans)
+    # Rounding may put one row more into a turn.
+    assert abs(one.n_samples - other.n_samples) <= 3
+    np.testing.assert_allclose(one.joints[-1], other.joints[-1], atol=1e-6)
+    result = verify(there, other, load_robot(there.manipulator))
+    assert result.verdict is Verdict.CERTIFIED
+    assert result.coverage == pytest.approx(1.0, abs=1e-9)

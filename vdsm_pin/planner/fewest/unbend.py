@@ -1,0 +1,176 @@
+"""Starts that the chart does not hold: the arm unbends until all links lean ahead.
+
+The chart (`motion.py`) knows an arm by its projection across the rail, so a link that
+leans backwards, or stands nearly square to the rail, is beyond it. From there the arm
+moves along straight lines in joint space towards smaller angles, the base making room.
+"""
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.cables import cable_lengths
+from vdsm_pin.errors import NoPlanFound
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.kinematics import joint_centres, link_angles
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.planner.records import LinkClearance, Plan, TipPath
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+
+AHEAD: Final = 0.15
+"""A link leans ahead if it advances along the rail by so much of its length; [-]."""
+PARTS: Final = (0.75, 0.5, 0.25, 0.0)
+"""Parts of the angles that may be left; [-]."""
+SHIFTS: Final = (1.0, 0.5, 0.0, 1.5)
+"""Parts of the tip's advance that the base takes back; [-]."""
+TRIES: Final = 200
+"""Ways over a configuration drawn by chance."""
+SEED: Final = 0
+FEWEST: Final = 16
+"""Intervals a straight line is begun to be looked at with."""
+MOST: Final = 2048
+"""Intervals at which a line that is not known to be clear is given up."""
+
+
+def _centres(arm: Manipulator, joints: FloatArray) -> FloatArray:
+    return joint_centres(arm, joints[:, 0], joints[:, 1::2], joints[:, 2::2])
+
+
+def leans_ahead(problem: PlanningProblem) -> bool:
+    """Whether the chart holds the arm at its start."""
+    joints = problem.path.start_joints
+    return joints is None or _ahead(problem.manipulator, joints)
+
+
+def _ahead(arm: Manipulator, joints: FloatArray) -> bool:
+    advance = np.diff(_centres(arm, joints[None])[0, :, 0])
+    return bool((advance >= AHEAD * arm.link_lengths).all())
+
+
+def _targets(arm: Manipulator, start: FloatArray) -> Iterator[FloatArray]:
+    """Joint values to move to, the nearest first."""
+    tip_x = float(_centres(arm, start[None])[0, -1, 0])
+    for part, shift in itertools.product(PARTS, SHIFTS):
+        joints = part * start
+        joints[0] = start[0]
+        advance = float(_centres(arm, joints[None])[0, -1, 0]) - tip_x
+        joints[0] = min(max(start[0] - shift * advance, arm.base_range[0]),
+                        arm.base_range[1])  # fmt: skip
+        if _ahead(arm, joints):
+            yield joints
+
+
+def _line(
+    arm: Manipulator,
+    clearance: LinkClearance,
+    begin: FloatArray,
+    end: FloatArray,
+    need: float,
+) -> FloatArray | None:
+    """Rows from begin to end if every place in between is clear, shape (r, 1 + 2N)."""
+    turn = np.abs(end - begin)
+    # No point is farther from a joint than the arm is long from there.
+    lever = np.repeat(arm.total_length - arm.stations[:-1], 2)
+    way = float(turn[0] + turn[1:] @ lever)
+    count = FEWEST
+    while count * TOLERANCES.planned_step < turn[1:].max():
+        count *= 2
+    while count <= MOST:
+        share = np.arange(count + 1)[:, None] / count
+        rows = begin + share * (end - begin)
+        room = clearance(_centres(arm, rows)).min(axis=1)
+        if not (room >= need).all():
+            return None
+        if (room[:-1] + room[1:] - way / count >= 2.0 * need).all():
+            return np.asarray(rows)
+        count *= 2
+    return None
+
+
+def _within(arm: Manipulator, joints: FloatArray) -> bool:
+    angles = np.abs(joints[1:])
+    psi = link_angles(joints[None, 1::2], joints[None, 2::2])
+    low, high = arm.base_range
+    return bool(
+        (angles <= arm.max_joint_angle).all()
+        and (psi <= arm.max_link_angle).all()
+        and low <= joints[0] <= high
+    )
+
+
+def unbend(
+    problem: PlanningProblem, clearance: LinkClearance, margin: float
+) -> FloatArray:
+    """Rows of joint values from the start to an arm that leans ahead, (r, 1 + 2N).
+
+    Raises:
+        NoPlanFound: If neither a straight line in joint space nor two were clear.
+    """
+    arm, start = problem.manipulator, problem.path.start_joints
+    assert start is not None
+    at_start = float(clearance(_centres(arm, start[None])).min())
+    # The start may be closer than the margin asks for; the way out only gets better.
+    need = min(problem.required_clearance + margin, at_start - TOLERANCES.joint_centre)
+    need = max(need, problem.required_clearance)
+    targets = list(_targets(arm, start))
+    for target in targets:
+        rows = _line(arm, clearance, start, target, need)
+        if rows is not None:
+            return rows
+    rng = np.random.default_rng(SEED)
+    for _ in range(TRIES):
+        target = targets[int(rng.integers(len(targets)))]
+        middle = start + rng.random() * (target - start)
+        middle = middle + rng.normal(0.0, 0.3, middle.shape)
+        if not _within(arm, middle):
+            continue
+        first = _line(arm, clearance, start, middle, need)
+        rest = None if first is None else _line(arm, clearance, middle, target, need)
+        if first is not None and rest is not None:
+            return np.concatenate([first, rest[1:]])
+    message = (
+        "a link leans backwards at the start, and no clear way to unbend was found"
+    )
+    raise NoPlanFound(message)
+
+
+def from_there(problem: PlanningProblem, joints: FloatArray) -> PlanningProblem:
+    """The same problem from other joint values, shape (1 + 2N,)."""
+    tip = _centres(problem.manipulator, joints[None])[0, -1]
+    return replace(problem, path=replace(problem.path, start=tip, start_joints=joints))
+
+
+def with_unbending(problem: PlanningProblem, rows: FloatArray, plan: Plan) -> Plan:
+    """A plan that begins with more rows; the last one is the plan's first."""
+    first, arm = rows[:-1], problem.manipulator
+    centres, told, count = _centres(arm, first), plan.trajectory, len(first)
+    alpha, theta = first[:, 1::2], first[:, 2::2]
+    on_path = np.concatenate([np.zeros(count, dtype=np.bool_), told.on_path])
+    path_m = np.concatenate([np.full(count, told.path_m[0]), told.path_m])
+    every = np.concatenate([centres, plan.centres])
+    trajectory = Trajectory(
+        on_path,
+        path_m,
+        np.concatenate([first[:, 0], told.x0]),
+        np.concatenate([alpha, told.alpha]),
+        np.concatenate([theta, told.theta]),
+    )
+    note = (
+        f"a link leans backwards at the start: the arm unbends first, in {count} rows"
+    )
+    return replace(
+        plan,
+        problem=problem,
+        tip_path=TipPath(every[:, -1], on_path, path_m),
+        centres=every,
+        trajectory=trajectory,
+        cable_lengths=np.concatenate(
+            [cable_lengths(arm, alpha, theta), plan.cable_lengths]
+        ),
+        notes=(*plan.notes, note),
+    )
