@@ -1,4 +1,4 @@
-"""Fig. 12: paths of all key points in obs2."""
+"""Fig. 12: paths of all key points in obs2, in both readings of its prism."""
 
 from matplotlib.figure import Figure
 from paper_figures.four_views import four_views
@@ -9,10 +9,11 @@ NAME = "fig12"
 
 
 def draw(runs: Runs) -> dict[str, Figure]:
-    """One figure per strategy."""
+    """One figure per reading and strategy."""
     return {
-        f"{NAME}-{run.strategy}": four_views(run, single_joints=True)
-        for run in runs.both("obs2")
+        f"{NAME}{reading}-{run.strategy}": four_views(run, single_joints=True)
+        for reading in ("", "-small")
+        for run in runs.both(f"obs2{reading}")
     }
 
 

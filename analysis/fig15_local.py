@@ -16,32 +16,30 @@ from vdsm_pin.tolerances import TOLERANCES
 
 NAME = "fig15"
 MARGIN = 12  # waypoints shown before and after
-LONGEST = 260  # waypoints of one panel
-WIDTH, HEIGHT = 1.58, 1.55  # of one panel; [inch]
+WIDTH, HEIGHT = 3.12, 1.30  # of one panel; [inch]
+PLACES = (("obs1", -1, "about A₅"), ("obs2", 0, "from B₁"),
+          ("obs2", -1, "the way back"), ("obs3", 0, "about the column"))  # fmt: skip
+"""Scene, stretch and name of the places the paper enlarges, in its order."""
 
 
 def draw(runs: Runs) -> dict[str, Figure]:
-    """Four places in columns, the strategies in rows."""
+    """The four places in rows, the strategies in columns."""
     first = {scene: runs.both(scene) for scene in ("obs1", "obs2", "obs3")}
-    places = (("obs1", -1, "about A₅"), ("obs2", 0, "first bend"),
-              ("obs2", -1, "last bend"), ("obs3", 0, "column"))  # fmt: skip
-    pitch = HEIGHT + 0.60
-    figure = style.sheet(2.0 * pitch + 0.28)
-    for r in range(2):
-        for k, (scene, stretch, what) in enumerate(places):
+    pitch = HEIGHT + 0.52
+    figure = style.sheet(len(PLACES) * pitch + 0.50)
+    for k, (scene, stretch, what) in enumerate(PLACES):
+        for r in range(2):
             run = first[scene][r]
-            left = 0.40 + k * (WIDTH + 0.12)
-            axes = style.place(figure, left, 0.36 + (1 - r) * pitch, WIDTH, HEIGHT)
+            left, low = 0.45 + r * (WIDTH + 0.30), 0.38 + (len(PLACES) - 1 - k) * pitch
+            axes = style.place(figure, left, low, WIDTH, HEIGHT)
             draw_link_angles(axes, run, window(run, stretch))
             shade_detours(axes, run)
             draw_moments(axes, run)
-            letter = "abcdefgh"[4 * r + k]
-            axes.set_title(f"({letter}) {scene}, {what}", pad=11.0)
-            if k == 0:
-                axes.set_ylabel(f"ψ [°], strategy ‘{run.strategy}’")
-            else:
-                axes.tick_params(labelleft=False)
-            if r == 1:
+            title = f"({'abcd'[k]}) {scene}, {what}, ‘{run.strategy}’"
+            axes.set_title(title, pad=11.0)
+            if r == 0:
+                axes.set_ylabel("ψ [°]")
+            if k == len(PLACES) - 1:
                 axes.set_xlabel("waypoint")
     lines, names = angle_legend(first["obs1"][0])
     figure.legend(
@@ -62,8 +60,6 @@ def window(run: Run, stretch: int) -> slice:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], bent.astype(int), [0]])))
     stretches = list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
     begin, end = stretches[stretch] if stretches else (0, run.trajectory.n_samples)
-    if end - begin > LONGEST:
-        begin, end = (begin, begin + LONGEST) if stretch == 0 else (end - LONGEST, end)
     return slice(max(begin - MARGIN, 0), min(end + MARGIN, run.trajectory.n_samples))
 
 

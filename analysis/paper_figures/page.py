@@ -23,7 +23,8 @@ def page(numbers: dict[str, Any]) -> str:
     facts = numbers["facts"]
     arm = built_in("hrm8")
     names = [f"fig{k:02d}" for k in (4, 5, 6, 7, 8, 9, 14, 15, 16, 17, 18)]
-    names += [f"fig{k}-{s}" for k in (11, 12, 13) for s in ("paper", "fewest")]
+    pairs = ("fig11", "fig12", "fig12-small", "fig13")
+    names += [f"{name}-{s}" for name in pairs for s in ("paper", "fewest")]
     return TEMPLATE.read_text(encoding="utf-8").format(
         f=facts,
         comparison=_comparison(numbers["table"]),

@@ -42,7 +42,12 @@ PANELS = {
     "fig08_step5": {"fig08": 6},
     "fig09_moving_on": {"fig09": 6},
     "fig11_paths_obs1": {"fig11-paper": 11, "fig11-fewest": 11},
-    "fig12_paths_obs2": {"fig12-paper": 11, "fig12-fewest": 11},
+    "fig12_paths_obs2": {
+        "fig12-paper": 11,
+        "fig12-fewest": 11,
+        "fig12-small-paper": 11,
+        "fig12-small-fewest": 11,
+    },
     "fig13_paths_obs3": {"fig13-paper": 4, "fig13-fewest": 4},
     "fig14_link_angles": {"fig14": 10},
     "fig15_local": {"fig15": 8},
