@@ -142,6 +142,13 @@ class Tolerances:
     cut time finely where the clearance just suffices.
     """
 
+    search_gain: float = _held(1e-12, "m")
+    """Cost by which one way must be cheaper than another to replace it; [m].
+
+    Sums of some thousand costs of order 1 m leave 1e-13; without it rounding would keep
+    a search that sweeps until nothing gets cheaper from ending.
+    """
+
     result_change: float = _held(1e-6, "m, rad or -")
     """Difference of two results below which `vdsm diff` calls them equal; SI."""
 

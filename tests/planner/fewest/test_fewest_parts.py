@@ -2,19 +2,23 @@ import itertools
 
 import numpy as np
 import pytest
+import shapely
 from scenes_for_fewest import problem
 
+from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.kinematics import joint_angles, link_angles
 from vdsm_pin.manipulator import built_in
 from vdsm_pin.planner.fewest.bounds import prove_tips
 from vdsm_pin.planner.fewest.clear import Judge
+from vdsm_pin.planner.fewest.cores import blocked_by, cores_of
 from vdsm_pin.planner.fewest.growth import vary
 from vdsm_pin.planner.fewest.kernels import pose_shapes
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.nearby import FAR, nearby
-from vdsm_pin.planner.fewest.route import path_rows
+from vdsm_pin.planner.fewest.roadmap import Taste, build_roadmap
+from vdsm_pin.planner.fewest.route import path_rows, tip_route
 from vdsm_pin.planner.fewest.shapes import Shapes, one_knee_shapes
-from vdsm_pin.scene import Box, Capsule, Cylinder, HalfSpace, Sphere
+from vdsm_pin.scene import Box, Capsule, Cylinder, HalfSpace, Obstacle, Prism, Sphere
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance
 
@@ -26,9 +30,11 @@ PILLAR = Cylinder(
 
 def posed(tips: np.ndarray) -> tuple[Shapes, np.ndarray, np.ndarray, np.ndarray]:
     shapes = one_knee_shapes(ARM, ARM.max_link_angle, 0.08, 8)
+    whole = np.ones(len(tips), dtype=np.bool_)
     node, ends, bends = pose_shapes(
-        tips, shapes.knees, shapes.slopes, ARM.stations, ARM.max_link_angle, -5.0, 5.0
-    )
+        tips, whole, shapes.knees, shapes.slopes, ARM.stations, ARM.max_link_angle,
+        -5.0, 5.0,
+    )  # fmt: skip
     return shapes, node, ends, bends
 
 
@@ -83,7 +89,106 @@ def test_bounds_from_boxes_never_exceed_the_clearance_and_are_exact_when_near() 
     assert (bound[apart] <= truth[apart] + 1e-8).all()
     assert (bound[~apart] <= 0.0).all()
     assert 0.1 < near.mean() < 0.9
-    np.testing.assert_allclose(bound[near & apart], truth[near & apart], atol=1e-8)
+    enough = near & (truth >= task.required_clearance)
+    np.testing.assert_allclose(bound[enough], truth[enough], atol=1e-8)
+    # Most of what is blocked is known without a distance.
+    assert np.isneginf(bound[~apart]).mean() > 0.5
+
+
+def outside(obstacle: Obstacle, points: np.ndarray) -> float:
+    """How far the farthest point is out of a solid, in some measure; [m]."""
+    if isinstance(obstacle, Box):
+        local = (points - obstacle.centre) @ obstacle.rotation
+        return float((np.abs(local) - obstacle.half_size).max())
+    if isinstance(obstacle, Prism):
+        local = (points - obstacle.origin) @ obstacle.rotation
+        section = shapely.Polygon(obstacle.polygon).convex_hull
+        low, high = obstacle.span
+        aside = shapely.distance(section, shapely.points(local[:, :2])).max()
+        return max(
+            float(aside), float(np.maximum(low - local, local - high)[:, 2].max())
+        )
+    local = points - obstacle.centre
+    if isinstance(obstacle, Sphere):
+        return float(np.linalg.norm(local, axis=1).max() - obstacle.radius)
+    along = local @ obstacle.axis
+    if isinstance(obstacle, Cylinder):
+        aside = np.linalg.norm(local - along[:, None] * obstacle.axis, axis=1)
+        ends = np.abs(along) - obstacle.half_length
+        return float(max((aside - obstacle.radius).max(), ends.max()))
+    half = obstacle.half_length
+    along = np.maximum(-half, np.minimum(half, along))
+    gap = np.linalg.norm(local - along[:, None] * obstacle.axis, axis=1)
+    return float(gap.max() - obstacle.radius)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_cores_lie_inside_their_obstacles(seed: int) -> None:
+    """A core's capsule, shrunk by rounding, holds points of the solid alone."""
+    rng = np.random.default_rng(seed)
+    rotation = rotation_from_rpy(rng.uniform(-3, 3, 3))
+    axis = rng.normal(size=3)
+    axis /= np.linalg.norm(axis)
+    angles = np.sort(rng.uniform(0, 2 * np.pi, 7))
+    section = rng.uniform(0.1, 0.5) * np.column_stack([np.cos(angles), np.sin(angles)])
+    obstacles = (
+        Box("box", rng.normal(size=3), rotation, rng.uniform(0.01, 0.5, 3)),
+        Prism("prism", rng.normal(size=3), rotation, section, (-0.3, 0.8)),
+        Cylinder("long", rng.normal(size=3), axis, 1.0, 0.2),
+        Cylinder("flat", rng.normal(size=3), axis, 0.1, 0.4),
+        Capsule("capsule", rng.normal(size=3), axis, 0.7, 0.1),
+        Sphere("ball", rng.normal(size=3), 0.3),
+    )
+    for obstacle in obstacles:
+        (core,) = cores_of((obstacle,))
+        assert core[6] > 0.0
+        away = rng.normal(size=(300, 3))
+        away *= core[6] * (1.0 - 1e-9) / np.linalg.norm(away, axis=1)[:, None]
+        share = rng.uniform(0, 1, (300, 1))
+        points = core[:3] + share * (core[3:6] - core[:3]) + away
+        assert outside(obstacle, points) <= 1e-9, obstacle.name
+
+
+def test_a_segment_is_blocked_by_a_core_on_the_right_side_of_the_limit() -> None:
+    rng = np.random.default_rng(5)
+    cores = np.column_stack([rng.normal(size=(50, 6)), rng.uniform(0, 0.2, 50)])
+    ends = rng.normal(size=(50, 2, 3))
+    for core, end in zip(cores, ends, strict=True):
+        capsule = Capsule("c", (core[:3] + core[3:6]) / 2.0, *_axis(core), core[6])
+        gap = link_clearance(problem(capsule))(end[None])[0, 0] + ARM.link_radius
+        if gap > 1e-6:
+            assert blocked_by(core[None], end[None], gap + 1e-7)[0]
+            assert not blocked_by(core[None], end[None], gap - 1e-7)[0]
+
+
+def _axis(core: np.ndarray) -> tuple[np.ndarray, float]:
+    side = core[3:6] - core[:3]
+    length = float(np.linalg.norm(side))
+    return side / length, length / 2.0
+
+
+def test_bent_arms_are_tried_only_near_where_the_straight_one_does_not_do() -> None:
+    task = problem(PILLAR)
+    clearance = link_clearance(task)
+    rows = path_rows(task.path)
+    shut = np.zeros(len(rows.tips), dtype=np.bool_)
+    route = tip_route(task, rows, shut, 0.08, 0.0)
+    shapes = one_knee_shapes(ARM, ARM.max_link_angle, 0.08, 8)
+    every, some = (
+        build_roadmap(task, clearance, 0.0035, route, shapes, Taste(), 0.74, around)
+        for around in (None, 3)
+    )
+    assert set(some.node.tolist()) < set(every.node.tolist())
+    straight = every.index[np.arange(len(route.tips)) * shapes.size]
+    poor = np.flatnonzero((straight < 0) | (every.cost[straight] > 2.0))
+    bent = np.flatnonzero(np.diff(some.tip_nodes) > 1)
+    assert set(poor.tolist()) <= set(bent.tolist())
+    assert all(np.abs(poor - tip).min() <= 3 for tip in bent)
+    # At those tips nothing is left out, and the straight arm nowhere.
+    for tip in bent:
+        assert np.diff(every.tip_nodes)[tip] == np.diff(some.tip_nodes)[tip]
+    again = some.index[np.arange(len(route.tips)) * shapes.size]
+    np.testing.assert_array_equal(again >= 0, straight >= 0)
 
 
 def test_a_motion_through_a_thin_plate_is_refused_though_both_ends_are_clear() -> None:

@@ -140,8 +140,9 @@ def least_changed(
     reserve = float(np.nanmax(slack.body, initial=0.0))
     low, high = arm.base_range
     knees = np.repeat(np.arange(n_links)[:, None], 2, axis=1)
+    everywhere, straight = np.ones(len(tips), dtype=np.bool_), np.zeros((n_links, 4))
     node, ends, bends = pose_shapes(
-        np.ascontiguousarray(tips), knees, np.zeros((n_links, 4)), arm.stations,
+        np.ascontiguousarray(tips), everywhere, knees, straight, arm.stations,
         float(slack.bend.max()), low - reserve, high + reserve,
     )  # fmt: skip
     possible = bends.max(axis=1, initial=0.0) <= slack.bend[node % n_links]

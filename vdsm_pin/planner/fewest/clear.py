@@ -5,12 +5,19 @@ more than half the way between them needs no further look. The rest is halved. T
 planner's check; the proof over continuous time is the verifier's.
 """
 
+from dataclasses import dataclass, fields
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.motion import Intervals, link_angles_at
+from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.planner.fewest.poses import (
+    bends_of,
+    farthest_moved,
+    least_of,
+    pieces_of,
+)
 from vdsm_pin.planner.fewest.roadmap import link_limit
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
@@ -33,6 +40,7 @@ class Judge:
         finest: Way of the body below which an interval between two clear
             configurations counts as clear; [m].
         ease: Part of the largest link angle that may be used; [-].
+        rough: For single configurations, where less exactness will do; None: the same.
     """
 
     def __init__(
@@ -43,8 +51,10 @@ class Judge:
         slack: float,
         finest: float,
         ease: float = 1.0,
+        rough: LinkClearance | None = None,
     ) -> None:
         self.problem, self.clearance = problem, clearance
+        self.rough = clearance if rough is None else rough
         self.required = problem.required_clearance + margin + slack
         self.slack, self.finest = slack, finest
         self.limit = ease * link_limit(problem)
@@ -63,52 +73,42 @@ class Judge:
             changed link angles, (n,); largest link angle, (n,) [rad].
         """
         still = Intervals(tips, tips, offsets, offsets)
-        number = np.arange(len(tips))
-        centres, room = self._states(
-            still, number, np.zeros(len(tips)), np.full(len(tips), np.inf)
-        )
-        angles = link_angles_at(centres)
+        knees = still.knees(self.problem.manipulator)
+        number, share = np.arange(len(tips)), np.zeros(len(tips))
+        most = np.full(len(tips), self.limit)
+        centres, room = self._states(still, knees, number, share, most, self.rough)
+        angles = bends_of(centres)
         changed = (angles > TOLERANCES.changed_angle).sum(axis=1)
         return room, changed, angles.max(axis=1)
 
     def bends(self, tips: FloatArray, offsets: FloatArray) -> FloatArray:
         """Link angles of configurations, shape (n, N); [rad]."""
         still = Intervals(tips, tips, offsets, offsets)
-        number = np.arange(len(tips))
-        manipulator = self.problem.manipulator
-        centres = still.centres(manipulator, number, np.zeros(len(tips)))
-        return link_angles_at(centres)
+        number, share = np.arange(len(tips)), np.zeros(len(tips))
+        return bends_of(still.centres(self.problem.manipulator, number, share))
 
     def _states(
         self,
         intervals: Intervals,
+        knees: BoolArray,
         interval: IntArray,
         share: FloatArray,
-        bend: FloatArray,
+        most: FloatArray,
+        clearance: LinkClearance,
     ) -> tuple[FloatArray, FloatArray]:
-        """Joint centres and clearance, -inf where a limit is broken."""
+        """Joint centres and clearance, -inf where a limit is broken.
+
+        Links in line between two knees are measured as one.
+        """
         manipulator = self.problem.manipulator
         centres = intervals.centres(manipulator, interval, share)
-        peak = link_angles_at(centres).max(axis=1)
+        peak = bends_of(centres).max(axis=1)
         base = centres[:, 0, 0]
         low, high = manipulator.base_range
-        fine = (peak <= np.minimum(self.limit, bend)) & (base >= low) & (base <= high)
-        room = np.full(len(fine), -np.inf)
-        kept = np.flatnonzero(fine)
-        knees = intervals.knees(manipulator)
-        room[kept] = self._room(centres[kept], knees[interval[kept]])
-        return centres, room
-
-    def _room(self, centres: FloatArray, knees: BoolArray) -> FloatArray:
-        """Least clearance; links in line between two knees are measured as one."""
-        room = np.full(len(centres), np.inf)
-        counts = knees.sum(axis=1)
-        for count in np.unique(counts):
-            rows = np.flatnonzero(counts == count)
-            joints = np.nonzero(knees[rows])[1].reshape(len(rows), count)
-            pieces = centres[rows[:, None], joints]
-            room[rows] = self.clearance(np.ascontiguousarray(pieces)).min(axis=1)
-        return room
+        fine = (peak <= most) & (base >= low) & (base <= high)
+        pieces, first = pieces_of(centres, knees, interval, fine)
+        room = clearance(pieces)[:, 0] if len(pieces) else np.zeros(0)
+        return centres, least_of(room, first, -np.inf)
 
     def clear(
         self,
@@ -116,46 +116,89 @@ class Judge:
         required: FloatArray | None = None,
         bend: FloatArray | None = None,
     ) -> BoolArray:
-        """Which intervals are clear, shape (n,).
+        """Which intervals are clear, shape (n,); see `measured`."""
+        return self.measured(intervals, required, bend)[0]
+
+    def measured(
+        self,
+        intervals: Intervals,
+        required: FloatArray | None = None,
+        bend: FloatArray | None = None,
+    ) -> tuple[BoolArray, FloatArray]:
+        """Which intervals are clear, and the clearance where they begin.
 
         Args:
             intervals: Straight lines in the chart.
             required: Clearance to keep in each interval; [m].
             bend: Largest link angle in each interval; [rad].
+
+        Returns:
+            Shape (n,) each; the clearance is -inf where a limit is broken; [m].
         """
-        count = len(intervals.tips)
+        count, tol = len(intervals.tips), TOLERANCES.on_boundary
+        ask = self.clearance
         need = np.full(count, self.required) if required is None else required
-        most = np.full(count, np.inf) if bend is None else bend
-        number = np.arange(count)
-        low, high = np.zeros(count), np.ones(count)
-        good = np.ones(count, dtype=np.bool_)
-        tol = TOLERANCES.on_boundary
-        c0, r0 = self._states(intervals, number, low, most + tol)
-        c1, r1 = np.roll(c0, -1, axis=0), np.roll(r0, -1)
+        most = np.full(count, self.limit)
+        if bend is not None:
+            most = np.minimum(most, bend + tol)
+        knees = intervals.knees(self.problem.manipulator)
+        number, low, high = np.arange(count), np.zeros(count), np.ones(count)
+        c0, begin = self._states(intervals, knees, number, low, most, ask)
+        c1, r1 = np.roll(c0, -1, axis=0), np.roll(begin, -1)
         ends = np.flatnonzero(~intervals.continued())
-        c1[ends], r1[ends] = self._states(intervals, ends, high[ends], most[ends] + tol)
-        good &= (r0 >= need - tol) & (r1 >= need - tol)
-        number, low, high = number[good], low[good], high[good]
-        c0, c1, r0, r1 = c0[good], c1[good], r0[good], r1[good]
+        c1[ends], r1[ends] = self._states(
+            intervals, knees, ends, high[ends], most[ends], ask
+        )
+        good = (begin >= need - tol) & (r1 >= need - tol)
+        halves = _Halves(number, low, high, c0, c1, begin, r1)
         for _ in range(HALVINGS):
-            way = np.linalg.norm(c1 - c0, axis=2).max(axis=1)
-            need_here = need[number]
-            least = (r0 + r1 - way) / 2.0
-            open_ = (least < need_here) & (way > self.finest)
-            # A long interval may hide a bend or a curve: look at its middle anyway.
-            open_ |= way > LONG_WAY
-            open_ &= good[number]
-            if not open_.any():
-                return good
-            number, low, high = number[open_], low[open_], high[open_]
-            c0, c1, r0, r1 = c0[open_], c1[open_], r0[open_], r1[open_]
-            middle = (low + high) / 2.0
-            cm, rm = self._states(intervals, number, middle, most[number] + tol)
-            bad = ~(rm >= need[number] - tol)
-            good[number[bad]] = False
-            number = np.concatenate([number, number])
-            low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
-            c0, c1 = np.concatenate([c0, cm]), np.concatenate([cm, c1])
-            r0, r1 = np.concatenate([r0, rm]), np.concatenate([rm, r1])
-        good[number] = False  # not settled after all halvings: not known to be clear
-        return good
+            halves = halves.take(good[halves.interval])
+            halves = halves.take(halves.open(need, self.finest))
+            if not len(halves.interval):
+                return good, begin
+            where, middle = halves.interval, (halves.low + halves.high) / 2.0
+            cm, rm = self._states(intervals, knees, where, middle, most[where], ask)
+            good[where[~(rm >= need[where] - tol)]] = False
+            halves = halves.cut(middle, cm, rm)
+        # What is not settled after all halvings is not known to be clear.
+        good[halves.interval] = False
+        return good, begin
+
+
+@dataclass(frozen=True)
+class _Halves:
+    """Parts of intervals with both ends looked at: where, joint centres, clearance."""
+
+    interval: IntArray
+    low: FloatArray
+    high: FloatArray
+    centres: FloatArray
+    next_centres: FloatArray
+    room: FloatArray
+    next_room: FloatArray
+
+    def open(self, need: FloatArray, finest: float) -> BoolArray:
+        """Which parts may not be clear between their ends."""
+        way = farthest_moved(self.centres, self.next_centres)
+        least = (self.room + self.next_room - way) / 2.0
+        doubtful = (least < need[self.interval]) & (way > finest)
+        # A long part may hide a bend or a curve: look at its middle anyway.
+        return np.asarray(doubtful | (way > LONG_WAY))
+
+    def take(self, kept: BoolArray) -> "_Halves":
+        """Some of the parts."""
+        return _Halves(*(getattr(self, one.name)[kept] for one in fields(self)))
+
+    def cut(
+        self, middle: FloatArray, centres: FloatArray, room: FloatArray
+    ) -> "_Halves":
+        """Every part in two."""
+        return _Halves(
+            np.concatenate([self.interval, self.interval]),
+            np.concatenate([self.low, middle]),
+            np.concatenate([middle, self.high]),
+            np.concatenate([self.centres, centres]),
+            np.concatenate([centres, self.next_centres]),
+            np.concatenate([self.room, room]),
+            np.concatenate([room, self.next_room]),
+        )

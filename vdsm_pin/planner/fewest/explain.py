@@ -14,8 +14,9 @@ from vdsm_pin.planner.fewest.bounds import (
     upper_clearance,
 )
 from vdsm_pin.planner.fewest.explore import Outcome
-from vdsm_pin.planner.fewest.motion import Intervals, link_angles_at
+from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.passage import narrowest
+from vdsm_pin.planner.fewest.poses import bends_of
 from vdsm_pin.planner.fewest.route import PathRows
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import Blocked, PlanningProblem
@@ -152,7 +153,7 @@ def notes_of(
     on_path = trajectory.on_path
     if not on_path.any():
         return tuple(notes)
-    angles = link_angles_at(centres[on_path])
+    angles = bends_of(centres[on_path])
     changed = (angles > TOLERANCES.changed_angle).sum(axis=1)
     tips = centres[on_path, -1]
     least = least_changed(problem, clearance, tips)

@@ -15,6 +15,7 @@ from vdsm_pin.planner.fewest.bounds import TipProof, prove_tips
 from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.graft import fill
 from vdsm_pin.planner.fewest.home import largest_start_angle, with_start
+from vdsm_pin.planner.fewest.nearby import Nearby
 from vdsm_pin.planner.fewest.passage import cut_off
 from vdsm_pin.planner.fewest.roadmap import (
     Roadmap,
@@ -26,7 +27,6 @@ from vdsm_pin.planner.fewest.route import PathRows, path_rows, tip_route
 from vdsm_pin.planner.fewest.search import Found, search
 from vdsm_pin.planner.fewest.sequence import Planner
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes
-from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -47,6 +47,8 @@ class Level:
         slack: Clearance kept for what happens between two rows; [m].
         finest: Way of the body between two looks at the clearance; [m].
         ease: Part of the largest link angle that may be used; [-].
+        around: Bent arms are tried up to this many tips from where the straight arm
+            does not do; None for everywhere.
     """
 
     step: float
@@ -58,14 +60,15 @@ class Level:
     slack: float = 3e-4
     finest: float = 2e-3
     ease: float = 1.0
+    around: int | None = None
 
 
 SEED: Final = 0
 """Seed of the growth of shapes; the same problem gives the same plan."""
 
 LEVELS: Final = (
-    Level(0.06, 0.026, 8, 20, 0.0, 1, ease=0.79),
-    Level(0.08, 0.026, 8, 40, 0.0, 2),
+    Level(0.08, 0.026, 8, 20, 0.0, 1, ease=0.79, around=4),
+    Level(0.08, 0.026, 8, 40, 0.0, 2, around=4),
     Level(0.08, 0.026, 8, 40, 1.0, 2),
     Level(0.05, 0.016, 10, 60, 1.0, 3),
     Level(0.05, 0.013, 10, 60, 1.0, 3, 3e-5, 5e-4),
@@ -95,7 +98,7 @@ class Outcome:
 
 
 def explore(
-    problem: PlanningProblem, clearance: LinkClearance, margin: float, taste: Taste
+    problem: PlanningProblem, clearance: Nearby, margin: float, taste: Taste
 ) -> Iterator[Outcome]:
     """Search level by level until all that can be drawn is drawn.
 
@@ -121,7 +124,11 @@ def explore(
     least_ease = min(1.0, bent + TOLERANCES.joint_limit)
     for number, level in enumerate(LEVELS):
         ease = max(level.ease, least_ease)
-        judge = Judge(problem, clearance, margin, level.slack, level.finest, ease)
+        worth = problem.required_clearance + margin + level.slack + taste.room
+        judge = Judge(
+            problem, clearance, margin, level.slack, level.finest, ease,
+            clearance.up_to(worth),
+        )  # fmt: skip
         found = _look(judge, level, rows, proof, taste)
         now = Outcome(judge, found, rows, proof)
         LOGGER.debug("%s: %.4f m missing", level, now.missing)
@@ -150,8 +157,9 @@ def _look(
     shapes = one_knee_shapes(arm, judge.limit, level.step, level.joints)
     route = tip_route(problem, rows, proof.closed, coarse, back)
     roadmap = build_roadmap(
-        problem, judge.clearance, judge.required, route, shapes, taste, judge.limit
-    )
+        problem, judge.rough, judge.required, route, shapes, taste, judge.limit,
+        level.around,
+    )  # fmt: skip
     roadmap, home = with_start(judge, roadmap, taste)
     rng = np.random.default_rng(SEED)
     found = search(judge, roadmap, home, level.rounds)

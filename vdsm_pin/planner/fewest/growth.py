@@ -15,7 +15,7 @@ from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 
-FAMILY = 16
+FAMILY = 8
 """Children tried for each parent."""
 POPULATION = 150
 """Configurations that live on at a layer."""

@@ -1,19 +1,89 @@
 """Compiled loops of the search: poses of shapes, the stage programme."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.tolerances import TOLERANCES
 
 NEAR = 0.26
 """Knee angles up to this are one move away from the straight arm, 15 deg; [rad]."""
-EPS = 1e-12
-"""A cost must fall by more than this to count as lower, so that sweeps end."""
+GAIN = TOLERANCES.search_gain
+
+
+class Graph(NamedTuple):
+    """The roadmap as the compiled loops read it.
+
+    Args:
+        n_shapes: Number of shapes n.
+        n_lattice: Number of shapes that exist at many tips; the others come after.
+        place: Node of each (tip, shape) or -1, shape (k * n,).
+        node: tip * n + shape of each node, ascending, shape (v,).
+        tip_nodes: Where each tip's nodes begin, shape (k + 1,).
+        first: Neighbour rows of the shapes.
+        neighbours: See `Shapes`.
+        change: See `Shapes`.
+        lean: Sum of the knees' angles, joint 1 left out, shape (v,); [rad].
+    """
+
+    n_shapes: int
+    n_lattice: int
+    place: IntArray
+    node: IntArray
+    tip_nodes: IntArray
+    first: IntArray
+    neighbours: IntArray
+    change: FloatArray
+    lean: FloatArray
+
+
+class Barred(NamedTuple):
+    """Edges found to be blocked.
+
+    Args:
+        flagged: Nodes with a blocked edge, shape (v,).
+        keys: Sorted keys min * v + max of the edges.
+    """
+
+    flagged: BoolArray
+    keys: IntArray
+
+
+class Weights(NamedTuple):
+    """What the stage programme adds up.
+
+    Args:
+        turn: Cost of a radian of turning.
+        still: Cost of a step at rest.
+        visit: Cost of a visit home.
+        way: Cost of a metre of way.
+        skip: Cost of a metre not drawn.
+    """
+
+    turn: float
+    still: float
+    visit: float
+    way: float
+    skip: float
+
+
+class Labels(NamedTuple):
+    """Cost of every node and the node before, shape (v,) each."""
+
+    cost: FloatArray
+    parent: IntArray
+
+
+FROM_HOME = -2
+"""Stands for the node before where that is home."""
 
 
 @compiled
 def pose_shapes(
     tips: FloatArray,
+    whole: BoolArray,
     knees: IntArray,
     slopes: FloatArray,
     stations: FloatArray,
@@ -25,6 +95,7 @@ def pose_shapes(
 
     Args:
         tips: Shape (k, 3); [m].
+        whole: Tips where all shapes are wanted; elsewhere it is shape 0, shape (k,).
         knees: Shape (n, 2), joints counted from 0.
         slopes: Shape (n, 4); [-].
         stations: Arc length of each joint centre, shape (N + 1,); [m].
@@ -36,49 +107,67 @@ def pose_shapes(
         node numbers tip * n + shape, ascending, shape (v,); the ends of the three
         straight pieces, shape (v, 4, 3) [m]; psi at the three bends, (v, 3) [rad].
     """
-    n_tips, n_shapes, total = tips.shape[0], knees.shape[0], stations[-1]
-    node = np.zeros(n_tips * n_shapes, dtype=np.int64)
-    ends = np.zeros((n_tips * n_shapes, 4, 3))
-    bends = np.zeros((n_tips * n_shapes, 3))
+    n_shapes = knees.shape[0]
+    room = tips.shape[0] + whole.sum() * (n_shapes - 1)
+    node = np.zeros(room, dtype=np.int64)
+    ends, bends = np.zeros((room, 4, 3)), np.zeros((room, 3))
     count = 0
-    for k in range(n_tips):
-        tip_x, tip_y, tip_z = tips[k]
-        for c in range(n_shapes):
-            s1, s2 = stations[knees[c, 0]], stations[knees[c, 1]]
-            y1, z1 = s1 * slopes[c, 0], s1 * slopes[c, 1]
-            y2 = y1 + (s2 - s1) * slopes[c, 2]
-            z2 = z1 + (s2 - s1) * slopes[c, 3]
-            v3y, v3z = (tip_y - y2) / (total - s2), (tip_z - z2) / (total - s2)
-            across = v3y * v3y + v3z * v3z
-            if across >= 1.0:
-                continue
-            v3x = np.sqrt(1.0 - across)
-            v1y, v1z, v2y, v2z = slopes[c]
-            if knees[c, 0] == 0:
-                v1y, v1z = v3y, v3z
-            if knees[c, 1] == knees[c, 0]:
-                v2y, v2z = v1y, v1z
-            v1x = np.sqrt(1.0 - v1y * v1y - v1z * v1z)
-            v2x = np.sqrt(1.0 - v2y * v2y - v2z * v2z)
-            x2 = tip_x - (total - s2) * v3x
-            x1 = x2 - (s2 - s1) * v2x
-            x0 = x1 - s1 * v1x
-            bend1 = np.arctan2(np.hypot(v1y, v1z), v1x)
-            bend2 = _angle(v1x, v1y, v1z, v2x, v2y, v2z)
-            bend3 = _angle(v2x, v2y, v2z, v3x, v3y, v3z)
-            if not (bend1 <= limit and bend2 <= limit and bend3 <= limit):
-                continue
-            if not base_low <= x0 <= base_high:
-                continue
-            node[count] = k * n_shapes + c
-            bends[count, 0], bends[count, 1], bends[count, 2] = bend1, bend2, bend3
-            ends[count, 0, 0] = x0
-            ends[count, 1, 0], ends[count, 1, 1], ends[count, 1, 2] = x1, y1, z1
-            ends[count, 2, 0], ends[count, 2, 1], ends[count, 2, 2] = x2, y2, z2
-            ends[count, 3, 0], ends[count, 3, 1] = tip_x, tip_y
-            ends[count, 3, 2] = tip_z
-            count += 1
+    for k in range(tips.shape[0]):
+        for c in range(n_shapes if whole[k] else 1):
+            fits = _pose(
+                tips[k], knees[c], slopes[c], stations, limit, ends[count], bends[count]
+            )
+            if fits and base_low <= ends[count, 0, 0] <= base_high:
+                node[count] = k * n_shapes + c
+                count += 1
     return node[:count], ends[:count], bends[:count]
+
+
+@compiled
+def _pose(
+    tip: FloatArray,
+    knees: IntArray,
+    slopes: FloatArray,
+    stations: FloatArray,
+    limit: float,
+    ends: FloatArray,
+    bends: FloatArray,
+) -> bool:
+    """One shape at one tip, back from the tip; False where it breaks the limit."""
+    total = stations[-1]
+    s1, s2 = stations[knees[0]], stations[knees[1]]
+    y1, z1 = s1 * slopes[0], s1 * slopes[1]
+    y2, z2 = y1 + (s2 - s1) * slopes[2], z1 + (s2 - s1) * slopes[3]
+    v3y, v3z = (tip[1] - y2) / (total - s2), (tip[2] - z2) / (total - s2)
+    across = v3y * v3y + v3z * v3z
+    if across >= 1.0:
+        return False
+    v3x = np.sqrt(1.0 - across)
+    v1y, v1z, v2y, v2z = slopes
+    if knees[0] == 0:
+        v1y, v1z = v3y, v3z
+    if knees[1] == knees[0]:
+        v2y, v2z = v1y, v1z
+    v1x = np.sqrt(1.0 - v1y * v1y - v1z * v1z)
+    v2x = np.sqrt(1.0 - v2y * v2y - v2z * v2z)
+    # Most poses break the limit; cosines tell so without an arctan.
+    least = np.cos(limit) - GAIN
+    if v1x < least or v1x * v2x + v1y * v2y + v1z * v2z < least:
+        return False
+    if v2x * v3x + v2y * v3y + v2z * v3z < least:
+        return False
+    bends[0] = np.arctan2(np.sqrt(v1y * v1y + v1z * v1z), v1x)
+    bends[1] = _angle(v1x, v1y, v1z, v2x, v2y, v2z)
+    bends[2] = _angle(v2x, v2y, v2z, v3x, v3y, v3z)
+    if not (bends[0] <= limit and bends[1] <= limit and bends[2] <= limit):
+        return False
+    x2 = tip[0] - (total - s2) * v3x
+    x1 = x2 - (s2 - s1) * v2x
+    ends[0, 0], ends[0, 1], ends[0, 2] = x1 - s1 * v1x, 0.0, 0.0
+    ends[1, 0], ends[1, 1], ends[1, 2] = x1, y1, z1
+    ends[2, 0], ends[2, 1], ends[2, 2] = x2, y2, z2
+    ends[3, 0], ends[3, 1], ends[3, 2] = tip
+    return True
 
 
 @compiled
@@ -89,163 +178,141 @@ def _angle(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> 
 
 
 @compiled
-def is_blocked(u: int, v: int, flagged: BoolArray, blocked: IntArray) -> bool:
-    """Whether the edge of two nodes is among the sorted keys of blocked ones."""
-    if not (flagged[u] and flagged[v]):
+def is_blocked(u: int, v: int, barred: Barred) -> bool:
+    """Whether the edge of two nodes is among the blocked ones."""
+    if not (barred.flagged[u] and barred.flagged[v]):
         return False
-    key = min(u, v) * flagged.size + max(u, v)
-    place = np.searchsorted(blocked, key)
-    return bool(place < blocked.size and blocked[place] == key)
+    key = min(u, v) * barred.flagged.size + max(u, v)
+    place = np.searchsorted(barred.keys, key)
+    return bool(place < barred.keys.size and barred.keys[place] == key)
+
+
+@compiled
+def _offer(u: int, v: int, value: float, labels: Labels, barred: Barred) -> bool:
+    """Reach v from u where that is cheaper and not blocked."""
+    if not value < labels.cost[v] - GAIN or is_blocked(u, v, barred):
+        return False
+    labels.cost[v], labels.parent[v] = value, u
+    return True
 
 
 @compiled
 def _settle(
-    nodes: IntArray,
-    tip: int,
-    n_shapes: int,
-    index: IntArray,
-    shape_of: IntArray,
-    first: IntArray,
-    neighbours: IntArray,
-    change: FloatArray,
-    lean: FloatArray,
-    turn_cost: float,
-    still_cost: float,
-    flagged: BoolArray,
-    blocked: IntArray,
-    cost: FloatArray,
-    parent: IntArray,
+    graph: Graph, tip: int, weights: Weights, labels: Labels, barred: Barred
 ) -> None:
     """Moves of the arm while the tip rests, until nothing gets cheaper."""
-    better = True
-    sweep = 0
-    straight = index[tip * n_shapes]
+    low, high = graph.tip_nodes[tip], graph.tip_nodes[tip + 1]
+    cost, corner = labels.cost, tip * graph.n_shapes
+    straight = graph.place[corner]
+    better, sweep = True, 0
     while better:
         better = False
-        for place in range(nodes.size):
-            v = nodes[place] if sweep % 2 == 0 else nodes[nodes.size - 1 - place]
-            c = shape_of[v]
-            for e in range(first[c], first[c + 1]):
-                u = index[tip * n_shapes + neighbours[e]]
-                if u < 0:
-                    continue
-                value = cost[u] + turn_cost * change[e] + still_cost
-                if value < cost[v] - EPS and not is_blocked(u, v, flagged, blocked):
-                    cost[v], parent[v], better = value, u, True
-            if straight >= 0 and v != straight and lean[v] <= NEAR:
+        for place in range(high - low):
+            v = low + place if sweep % 2 == 0 else high - 1 - place
+            c = graph.node[v] - corner
+            for e in range(graph.first[c], graph.first[c + 1]):
+                u = graph.place[corner + graph.neighbours[e]]
+                if u >= 0:
+                    value = cost[u] + weights.turn * graph.change[e] + weights.still
+                    better |= _offer(u, v, value, labels, barred)
+            if straight >= 0 and v != straight and graph.lean[v] <= NEAR:
                 a, b = (straight, v) if cost[straight] < cost[v] else (v, straight)
-                value = cost[a] + turn_cost * lean[v] + still_cost
-                if value < cost[b] - EPS and not is_blocked(a, b, flagged, blocked):
-                    cost[b], parent[b], better = value, a, True
+                value = cost[a] + weights.turn * graph.lean[v] + weights.still
+                better |= _offer(a, b, value, labels, barred)
         sweep += 1
 
 
 @compiled
+def _draw(
+    graph: Graph,
+    before: int,
+    tip: int,
+    drawn: FloatArray,
+    weights: Weights,
+    labels: Labels,
+    barred: Barred,
+) -> None:
+    """Moves from one layer's tip to the next one's.
+
+    Args:
+        graph: The roadmap.
+        before: The tip before.
+        tip: This tip.
+        drawn: Cost of drawing the stretch with each node, shape (v,).
+        weights: What moves cost.
+        labels: Costs so far.
+        barred: Blocked edges.
+    """
+    cost, corner = labels.cost, before * graph.n_shapes
+    straight = graph.place[corner]
+    for v in range(graph.tip_nodes[tip], graph.tip_nodes[tip + 1]):
+        c = graph.node[v] - tip * graph.n_shapes
+        u = graph.place[corner + c]
+        if u >= 0:
+            _offer(u, v, cost[u] + drawn[v], labels, barred)
+        for e in range(graph.first[c], graph.first[c + 1]):
+            u = graph.place[corner + graph.neighbours[e]]
+            if u >= 0:
+                value = cost[u] + drawn[v] + weights.turn * graph.change[e]
+                _offer(u, v, value, labels, barred)
+        if c > 0:
+            if straight >= 0 and graph.lean[v] <= NEAR:
+                value = cost[straight] + drawn[v] + weights.turn * graph.lean[v]
+                _offer(straight, v, value, labels, barred)
+            continue
+        for u in range(graph.tip_nodes[before], graph.tip_nodes[before + 1]):
+            if graph.lean[u] <= NEAR:
+                value = cost[u] + drawn[v] + weights.turn * graph.lean[u]
+                _offer(u, v, value, labels, barred)
+
+
+@compiled
 def stage_programme(
+    graph: Graph,
     layers: IntArray,
-    layer_first: IntArray,
     gap: FloatArray,
-    n_shapes: int,
-    index: IntArray,
-    shape_of: IntArray,
-    first: IntArray,
-    neighbours: IntArray,
-    change: FloatArray,
-    lean: FloatArray,
     node_cost: FloatArray,
     home: FloatArray,
-    start: int,
-    weights: FloatArray,
-    flagged: BoolArray,
-    blocked: IntArray,
-) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:
+    weights: Weights,
+    barred: Barred,
+) -> tuple[Labels, FloatArray, IntArray]:
     """Cheapest way to draw all layers in order, with visits home in between.
 
     Args:
+        graph: The roadmap.
         layers: Tip numbers in drawing order, shape (l,).
-        layer_first: Where each tip's nodes begin, shape (k + 1,).
         gap: Path length from the layer before to this one, shape (l,); [m].
-        n_shapes: Number of shapes n.
-        index: Node of each (tip, shape) or -1, shape (k * n,).
-        shape_of: Shape of each node, shape (v,).
-        first: Neighbour rows of the shapes.
-        neighbours: See `Shapes`.
-        change: See `Shapes`.
-        lean: Sum of the knees' angles, joint 1 left out, shape (v,); [rad].
         node_cost: What a metre drawn with this node costs, shape (v,).
-        home: Length of the way from the start to each node, inf if none, (v,).
-        start: Node of the first layer to start from without a way, or -1.
-        weights: Cost of a rad of turning, of a step at rest, of a visit home, of a
-            metre of way, of a metre not drawn.
-        flagged: Nodes with a blocked edge, shape (v,).
-        blocked: Sorted keys of blocked edges.
+        home: Length of the way from the start to each node, inf if none, (v,); [m].
+        weights: What moves cost.
+        barred: Blocked edges.
 
     Returns:
-        cost and parent of every node (-2: from home); cost of being at home after
-        each layer and the node left from (-1: was at home already), shape (l,).
+        cost and parent of every node; cost of being at home after each layer and the
+        node left from (-1: was at home already), shape (l,).
     """
-    turn_cost, still_cost, visit_cost, way_cost, skip_cost = weights
-    cost = np.full(shape_of.size, np.inf)
-    parent = np.full(shape_of.size, -1)
-    home_cost = np.full(layers.size, np.inf)
-    home_from = np.full(layers.size, -1)
-    at_home = np.inf
-    if start < 0:
-        at_home = -visit_cost
+    count = graph.node.size
+    labels = Labels(np.full(count, np.inf), np.full(count, -1))
+    home_cost, home_from = np.full(layers.size, np.inf), np.full(layers.size, -1)
+    # The first way to the path costs nothing but its length.
+    at_home = -weights.visit
     for k in range(layers.size):
         tip = layers[k]
-        nodes = np.arange(layer_first[tip], layer_first[tip + 1])
-        if k == 0:
-            if start >= 0:
-                cost[start] = 0.0
-        else:
-            before = layers[k - 1]
-            for v in nodes:
-                c = shape_of[v]
-                drawn = node_cost[v] * gap[k]
-                u = index[before * n_shapes + c]
-                if u >= 0 and not is_blocked(u, v, flagged, blocked):
-                    cost[v], parent[v] = cost[u] + drawn, u
-                for e in range(first[c], first[c + 1]):
-                    u = index[before * n_shapes + neighbours[e]]
-                    if u < 0:
-                        continue
-                    value = cost[u] + drawn + turn_cost * change[e]
-                    if value < cost[v] and not is_blocked(u, v, flagged, blocked):
-                        cost[v], parent[v] = value, u
-                if c > 0 and lean[v] <= NEAR:
-                    u = index[before * n_shapes]
-                    if u >= 0:
-                        value = cost[u] + drawn + turn_cost * lean[v]
-                        if value < cost[v] and not is_blocked(u, v, flagged, blocked):
-                            cost[v], parent[v] = value, u
-                if c == 0:
-                    for u in range(layer_first[before], layer_first[before + 1]):
-                        value = cost[u] + drawn + turn_cost * lean[u]
-                        if (
-                            lean[u] <= NEAR
-                            and value < cost[v]
-                            and not is_blocked(u, v, flagged, blocked)
-                        ):
-                            cost[v], parent[v] = value, u
-            at_home += skip_cost * gap[k]
-        _settle(
-            nodes, tip, n_shapes, index, shape_of, first, neighbours, change, lean,
-            turn_cost, still_cost, flagged, blocked, cost, parent,
-        )  # fmt: skip
-        for v in nodes:
-            value = cost[v] + way_cost * home[v]
+        if k > 0:
+            drawn = node_cost * gap[k]
+            _draw(graph, layers[k - 1], tip, drawn, weights, labels, barred)
+            at_home += weights.skip * gap[k]
+        _settle(graph, tip, weights, labels, barred)
+        entered = False
+        for v in range(graph.tip_nodes[tip], graph.tip_nodes[tip + 1]):
+            value = labels.cost[v] + weights.way * home[v]
             if value < at_home:
                 at_home, home_from[k] = value, v
         home_cost[k] = at_home
-        entered = False
-        for v in nodes:
-            value = at_home + visit_cost + way_cost * home[v]
-            if value < cost[v]:
-                cost[v], parent[v], entered = value, -2, True
+        for v in range(graph.tip_nodes[tip], graph.tip_nodes[tip + 1]):
+            value = at_home + weights.visit + weights.way * home[v]
+            if value < labels.cost[v]:
+                labels.cost[v], labels.parent[v], entered = value, FROM_HOME, True
         if entered:
-            _settle(
-                nodes, tip, n_shapes, index, shape_of, first, neighbours, change, lean,
-                turn_cost, still_cost, flagged, blocked, cost, parent,
-            )  # fmt: skip
-    return cost, parent, home_cost, home_from
+            _settle(graph, tip, weights, labels, barred)
+    return labels, home_cost, home_from

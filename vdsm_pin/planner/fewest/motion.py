@@ -8,7 +8,7 @@ there; where one knee turns into another, both are bent on the way and no third 
 """
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Final
 
 import numpy as np
@@ -17,9 +17,9 @@ from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.kinematics import joint_angles, joint_centres
 from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.planner.fewest.poses import centres_between, knees_between
 from vdsm_pin.planner.fewest.roadmap import Roadmap
 from vdsm_pin.planner.fewest.sequence import Sequence
-from vdsm_pin.planner.lift import rises_squared
 from vdsm_pin.tolerances import TOLERANCES
 
 ROUNDS: Final = 12
@@ -85,20 +85,22 @@ class Intervals:
     offsets: FloatArray
     next_offsets: FloatArray
 
+    def __post_init__(self) -> None:
+        """Lay the arrays out in one way, so that kernels are compiled for one."""
+        for field in fields(self):
+            value = np.require(getattr(self, field.name), float, ["C", "W"])
+            object.__setattr__(self, field.name, value)
+
     def knees(self, manipulator: Manipulator) -> BoolArray:
         """Joints where the arm may bend somewhere in each interval, and both ends.
 
         Returns:
             Shape (n, N + 1).
         """
-        lengths = manipulator.link_lengths[:, None]
-        bent = np.ones((len(self.tips), len(lengths) + 1), dtype=np.bool_)
-        bent[:, 1:-1] = False
-        for offsets in (self.offsets, self.next_offsets):
-            slopes = np.diff(offsets, axis=1) / lengths
-            turn = np.abs(np.diff(slopes, axis=1)).max(axis=2, initial=0.0)
-            bent[:, 1:-1] |= turn > TOLERANCES.straight_slope
-        return bent
+        return knees_between(
+            self.offsets, self.next_offsets, manipulator.link_lengths,
+            TOLERANCES.straight_slope,
+        )  # fmt: skip
 
     def continued(self) -> BoolArray:
         """Whether each interval ends where the next begins, shape (n,)."""
@@ -120,19 +122,10 @@ class Intervals:
         Returns:
             Shape (r, N + 1, 3), NaN where a link is too short; [m].
         """
-        t = share[:, None]
-        tips = (1.0 - t) * self.tips[interval] + t * self.next_tips[interval]
-        t = t[..., None]
-        offsets = (1.0 - t) * self.offsets[interval] + t * self.next_offsets[interval]
-        planar = tips[:, None, 1:] * manipulator.ratios[:, None] + offsets
-        squares = rises_squared(manipulator, planar)
-        rises = np.sqrt(np.where(squares > 0.0, squares, np.nan))
-        centres = np.zeros((*planar.shape[:2], 3))
-        centres[..., 1:] = planar
-        centres[:, -1, 0] = tips[:, 0]
-        back = np.cumsum(rises[:, ::-1], axis=1)[:, ::-1]
-        centres[:, :-1, 0] = tips[:, :1] - back
-        return centres
+        return centres_between(
+            self.tips, self.next_tips, self.offsets, self.next_offsets,
+            interval, share, manipulator.ratios, manipulator.link_lengths,
+        )  # fmt: skip
 
 
 def knots_of(manipulator: Manipulator, roadmap: Roadmap, sequence: Sequence) -> Knots:
@@ -192,17 +185,6 @@ def spread(counts: IntArray) -> tuple[IntArray, FloatArray]:
         np.append(interval, len(counts) - 1),
         np.append(share, 1.0),
     )
-
-
-def link_angles_at(centres: FloatArray) -> FloatArray:
-    """Psi of every joint, shape (r, N); NaN where a link is short; [rad]."""
-    axes = np.diff(centres, axis=1)
-    axes = axes / np.linalg.norm(axes, axis=2, keepdims=True)
-    rail = np.zeros_like(axes[:, :1])
-    rail[..., 0] = 1.0
-    axes = np.concatenate([rail, axes], axis=1)
-    chord = np.linalg.norm(np.diff(axes, axis=1), axis=2)
-    return np.asarray(2.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)))
 
 
 def dense_rows(

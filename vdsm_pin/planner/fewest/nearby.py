@@ -1,63 +1,153 @@
 """A clearance function that leaves alone what is obviously far away.
 
 Most links are far from most obstacles. Axis-parallel boxes round the obstacles and
-round a few stretches of each link give a lower bound of the clearance at once; the
-function passed in is asked only where that bound is small.
+round a few stretches of each link give a lower bound of the clearance at once, and
+capsules inside the obstacles tell of links that are too near. The function passed in is
+asked only where neither does.
 """
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import compiled
-from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece
+from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Piece
+from vdsm_pin.geometry.pieces import coherent_order
+from vdsm_pin.planner.fewest.cores import blocked_by, cores_of
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.scene import Obstacle
+from vdsm_pin.tolerances import TOLERANCES
 
-FAR = 0.12
+FAR = 0.08
 """A bound of the clearance above this is as good as the clearance itself; [m]."""
 STRETCHES = 6
 """Stretches into which a link is cut for its boxes."""
 SLICES = 8
 """Boxes along a long hull or cylinder that lies askew."""
+MOST_BOXES = 32
+"""Boxes round an obstacle of many pieces."""
 
 
-def _cut(low_end: FloatArray, high_end: FloatArray, grow: FloatArray) -> FloatArray:
-    """Boxes round equal stretches of a swept line, shape (n, 2, 3)."""
-    marks = np.linspace(0.0, 1.0, SLICES + 1)[:, None]
-    points = low_end + marks * (high_end - low_end)
+@dataclass(frozen=True)
+class Nearby:
+    """Lower bounds of the clearance, exact where it is small but enough.
+
+    Args:
+        clearance: The clearance function.
+        boxes: Low and high corners of boxes that cover the obstacles, (b, 2, 3); [m].
+        planes: Outward normals and offsets of the half-spaces, shape (p, 4).
+        cores: Capsules inside the obstacles, shape (c, 7); [m].
+        radius: Radius of the links; [m].
+        floor: Clearance below which -inf will do; [m].
+        far: A bound from boxes above this is left as it is; [m].
+    """
+
+    clearance: LinkClearance
+    boxes: FloatArray
+    planes: FloatArray
+    cores: FloatArray
+    radius: float
+    floor: float
+    far: float = FAR
+
+    def __call__(self, centres: FloatArray) -> FloatArray:
+        """Joint centres (n, m + 1, 3) to lower bounds (n, m); [m]."""
+        ends = np.stack([centres[:, :-1], centres[:, 1:]], axis=2).reshape(-1, 2, 3)
+        enough = self.far + self.radius
+        room = _box_bounds(ends, self.boxes, self.planes, STRETCHES, enough)
+        room -= self.radius
+        near = np.flatnonzero(room < self.far)
+        if near.size:
+            blocked = blocked_by(self.cores, ends[near], self.floor + self.radius)
+            room[near[blocked]] = -np.inf
+            near = near[~blocked]
+            room[near] = self.clearance(ends[near])[:, 0]
+        return room.reshape(len(centres), -1)
+
+    def up_to(self, far: float) -> "Nearby":
+        """The same, exact only below another bound; [m]."""
+        return replace(self, far=far)
+
+
+def nearby(problem: PlanningProblem, clearance: LinkClearance) -> Nearby:
+    """The clearance function of a problem with its boxes."""
+    covers = [_cover(obstacle) for obstacle in problem.scene.obstacles]
+    flat = [
+        [*piece.normal, piece.offset]
+        for obstacle in problem.scene.obstacles
+        for piece in obstacle.pieces
+        if isinstance(piece, HalfSpacePiece)
+    ]
+    return Nearby(
+        clearance,
+        np.concatenate([np.zeros((0, 2, 3)), *covers]),
+        np.array(flat).reshape(-1, 4),
+        cores_of(problem.scene.obstacles),
+        problem.manipulator.link_radius,
+        problem.required_clearance - TOLERANCES.planned_clearance,
+    )
+
+
+def _cover(obstacle: Obstacle) -> FloatArray:
+    """Boxes that cover an obstacle but for its half-spaces, shape (n, 2, 3); [m]."""
+    boxes = np.concatenate([_boxes(piece) for piece in obstacle.pieces])
+    if len(boxes) <= MOST_BOXES:
+        return boxes
+    order = coherent_order(boxes.mean(axis=1))
+    groups = [boxes[part] for part in np.array_split(order, MOST_BOXES)]
+    pairs = [[part[:, 0].min(axis=0), part[:, 1].max(axis=0)] for part in groups]
+    return np.array(pairs)
+
+
+def _boxes(piece: Piece) -> FloatArray:
+    """Boxes that cover a piece, none for a half-space, shape (n, 2, 3); [m]."""
+    if isinstance(piece, FlatCylinder):
+        half = piece.half_length * piece.axis
+        # A disc of unit normal a reaches r sqrt(1 - a_c^2) along axis c.
+        grow = piece.radius * np.sqrt(np.maximum(0.0, 1.0 - piece.axis**2))
+        return _cut(piece.centre - half, piece.centre + half, grow)
+    if isinstance(piece, HalfSpacePiece):
+        return np.zeros((0, 2, 3))
+    if len(piece.points) == 2:
+        return _cut(piece.points[0], piece.points[1], np.full(3, piece.radius))
+    low = piece.points.min(axis=0) - piece.radius
+    high = piece.points.max(axis=0) + piece.radius
+    return np.stack([low, high])[None]
+
+
+def _cut(start: FloatArray, end: FloatArray, grow: FloatArray) -> FloatArray:
+    """Boxes round a swept line, in slices where it lies askew, shape (n, 2, 3)."""
+    askew = (np.abs(end - start) > TOLERANCES.bracket_gap).sum() > 1
+    marks = np.linspace(0.0, 1.0, 1 + (SLICES if askew else 1))[:, None]
+    points = start + marks * (end - start)
     low = np.minimum(points[:-1], points[1:]) - grow
     high = np.maximum(points[:-1], points[1:]) + grow
     return np.stack([low, high], axis=1)
 
 
-def _boxes(obstacle: Obstacle) -> list[FloatArray]:
-    """Boxes that cover an obstacle, each of shape (n, 2, 3)."""
-    pieces = obstacle.pieces
-    if len(pieces) > 16:
-        points = np.vstack([piece.points for piece in pieces])  # type: ignore[union-attr]
-        return [np.stack([points.min(axis=0), points.max(axis=0)])[None]]
-    boxes = []
-    for piece in pieces:
-        if isinstance(piece, FlatCylinder):
-            half = piece.half_length * piece.axis
-            # A disc of unit normal a reaches r sqrt(1 - a_c^2) along axis c.
-            grow = piece.radius * np.sqrt(np.maximum(0.0, 1.0 - piece.axis**2))
-            boxes.append(_cut(piece.centre - half, piece.centre + half, grow))
-        elif not isinstance(piece, HalfSpacePiece):
-            if len(piece.points) == 2:
-                grow = np.full(3, piece.radius)
-                boxes.append(_cut(piece.points[0], piece.points[1], grow))
-            else:
-                low = piece.points.min(axis=0) - piece.radius
-                high = piece.points.max(axis=0) + piece.radius
-                boxes.append(np.stack([low, high])[None])
-    return boxes
+@compiled
+def _box_gap(
+    a: FloatArray, b: FloatArray, t0: float, t1: float, box: FloatArray
+) -> float:
+    """Squared distance of a box from the box round a stretch of a segment; [m^2]."""
+    gap = 0.0
+    for c in range(3):
+        one, two = a[c] + t0 * (b[c] - a[c]), a[c] + t1 * (b[c] - a[c])
+        out = max(box[0, c] - max(one, two), min(one, two) - box[1, c])
+        if out > 0.0:
+            gap += out * out
+    return gap
 
 
 @compiled
 def _box_bounds(
-    ends: FloatArray, boxes: FloatArray, planes: FloatArray, stretches: int
+    ends: FloatArray,
+    boxes: FloatArray,
+    planes: FloatArray,
+    stretches: int,
+    enough: float,
 ) -> FloatArray:
     """Lower bounds of the distance from segments to boxes and half-spaces.
 
@@ -66,9 +156,11 @@ def _box_bounds(
         boxes: Low and high corners, shape (b, 2, 3); [m].
         planes: Outward normals and offsets, shape (p, 4).
         stretches: Number of stretches of each segment.
+        enough: A distance from which on the box of the whole segment will do; [m].
     """
     result = np.full(ends.shape[0], np.inf)
     for n in range(ends.shape[0]):
+        a, z = ends[n]
         best = np.inf
         for p in range(planes.shape[0]):
             for e in range(2):
@@ -78,47 +170,14 @@ def _box_bounds(
                 best = min(best, height)
         square = np.inf
         for b in range(boxes.shape[0]):
-            for s in range(stretches):
-                t0, t1 = s / stretches, (s + 1) / stretches
-                gap = 0.0
-                for c in range(3):
-                    a = ends[n, 0, c] + t0 * (ends[n, 1, c] - ends[n, 0, c])
-                    z = ends[n, 0, c] + t1 * (ends[n, 1, c] - ends[n, 0, c])
-                    out = max(boxes[b, 0, c] - max(a, z), min(a, z) - boxes[b, 1, c])
-                    if out > 0.0:
-                        gap += out * out
-                square = min(square, gap)
+            gap = _box_gap(a, z, 0.0, 1.0, boxes[b])
+            if gap >= square:
+                continue
+            if gap < enough * enough:
+                gap = np.inf
+                for s in range(stretches):
+                    t0, t1 = s / stretches, (s + 1) / stretches
+                    gap = min(gap, _box_gap(a, z, t0, t1, boxes[b]))
+            square = min(square, gap)
         result[n] = min(best, np.sqrt(square))
     return result
-
-
-def nearby(problem: PlanningProblem, clearance: LinkClearance) -> LinkClearance:
-    """The same lower bounds, exact where they are below `FAR`.
-
-    Args:
-        problem: Arm and scene.
-        clearance: The clearance function.
-
-    Returns:
-        Joint centres (n, m + 1, 3) to lower bounds (n, m); [m].
-    """
-    covers = [box for o in problem.scene.obstacles for box in _boxes(o)]
-    boxes = np.concatenate(covers) if covers else np.zeros((0, 2, 3))
-    flat = [
-        [*piece.normal, piece.offset]
-        for obstacle in problem.scene.obstacles
-        for piece in obstacle.pieces
-        if isinstance(piece, HalfSpacePiece)
-    ]
-    planes = np.array(flat).reshape(-1, 4)
-    radius = problem.manipulator.link_radius
-
-    def bounds(centres: FloatArray) -> FloatArray:
-        ends = np.stack([centres[:, :-1], centres[:, 1:]], axis=2).reshape(-1, 2, 3)
-        room = _box_bounds(ends, boxes, planes, STRETCHES) - radius
-        near = np.flatnonzero(room < FAR)
-        if near.size:
-            room[near] = clearance(np.ascontiguousarray(ends[near]))[:, 0]
-        return room.reshape(len(centres), -1)
-
-    return bounds

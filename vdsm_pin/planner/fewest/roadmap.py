@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.kernels import pose_shapes
+from vdsm_pin.planner.fewest.kernels import Barred, Graph, pose_shapes
 from vdsm_pin.planner.fewest.route import TipRoute
 from vdsm_pin.planner.fewest.shapes import Shapes
 from vdsm_pin.planner.records import LinkClearance
@@ -60,6 +60,14 @@ class Roadmap:
     strain: FloatArray
     clearance: FloatArray
 
+    def graph(self) -> Graph:
+        """What the compiled loops read."""
+        shapes = self.shapes
+        return Graph(
+            shapes.size, shapes.n_lattice, self.index, self.node, self.tip_nodes,
+            shapes.first, shapes.neighbours, shapes.change, self.lean,
+        )  # fmt: skip
+
     def tip(self, node: int) -> int:
         """Tip number of a node."""
         return int(self.node[node] // self.shapes.size)
@@ -83,31 +91,69 @@ def build_roadmap(
     shapes: Shapes,
     taste: Taste,
     limit: float,
+    around: int | None = None,
 ) -> Roadmap:
-    """Every shape at every tip that keeps limits and clearance."""
+    """Every shape at every tip that keeps limits and clearance.
+
+    Args:
+        problem: Arm and limits.
+        clearance: The clearance function.
+        required: Clearance to keep; [m].
+        route: The tips.
+        shapes: The shapes.
+        taste: What the strategy prefers.
+        limit: Largest link angle; [rad].
+        around: Only the straight arm is tried at tips farther than this many tips from
+            where the straight arm does not do; None: every shape at every tip.
+    """
     arm = problem.manipulator
-    node, ends, bends = pose_shapes(
-        route.tips,
-        shapes.knees,
-        shapes.slopes,
-        arm.stations,
-        limit,
-        *arm.base_range,
-    )
-    single = bool((shapes.knees[:, 0] == shapes.knees[:, 1]).all())
-    pieces = ends[:, [0, 1, 3]] if single else ends
-    room = clearance(np.ascontiguousarray(pieces)).min(axis=1)
-    keep = room >= required
-    return _assemble(
-        route,
-        shapes,
-        node[keep],
-        bends[keep],
-        room[keep],
-        required,
-        taste,
-        limit,
-    )
+
+    def tried(whole: BoolArray) -> Roadmap:
+        node, ends, bends = pose_shapes(
+            route.tips, whole, shapes.knees, shapes.slopes, arm.stations, limit,
+            *arm.base_range,
+        )  # fmt: skip
+        single = bool((shapes.knees[:, 0] == shapes.knees[:, 1]).all())
+        room = _least(clearance, ends[:, [0, 1, 3]] if single else ends, required)
+        keep = room >= required
+        return _assemble(
+            route, shapes, node[keep], bends[keep], room[keep], required, taste, limit
+        )
+
+    count = len(route.tips)
+    if around is None:
+        return tried(np.ones(count, dtype=np.bool_))
+    straight = tried(np.zeros(count, dtype=np.bool_))
+    poor = np.ones(count, dtype=np.bool_)
+    poor[straight.node[straight.cost <= 2.0 * taste.angle] // shapes.size] = False
+    return tried(_spread(route, poor, around)) if poor.any() else straight
+
+
+def _least(clearance: LinkClearance, ends: FloatArray, required: float) -> FloatArray:
+    """Least clearance of the pieces, from the tip back to the first that lacks it.
+
+    Args:
+        clearance: The clearance function.
+        ends: Ends of the pieces, shape (v, p + 1, 3); [m].
+        required: Clearance below which a piece lacks it; [m].
+    """
+    room = np.full(len(ends), np.inf)
+    rows = np.arange(len(ends))
+    for piece in range(ends.shape[1] - 2, -1, -1):
+        values = clearance(ends[rows, piece : piece + 2])[:, 0]
+        room[rows] = np.minimum(room[rows], values)
+        rows = rows[values >= required]
+    return room
+
+
+def _spread(route: TipRoute, picked: BoolArray, times: int) -> BoolArray:
+    """Some tips and those at most so many links away from them, shape (k,)."""
+    own = np.repeat(np.arange(len(route.tips)), np.diff(route.first))
+    for _ in range(times):
+        wider = picked.copy()
+        wider[route.links[picked[own]]] = True
+        picked = wider
+    return picked
 
 
 def _assemble(
@@ -194,25 +240,14 @@ def extended(
     )
 
 
-@dataclass
-class Blocked:
-    """Edges found to be blocked, in the form the kernels read.
+def nothing_barred(n_nodes: int) -> Barred:
+    """No edge is blocked."""
+    return Barred(np.zeros(n_nodes, dtype=np.bool_), np.zeros(0, dtype=np.int64))
 
-    Args:
-        flagged: Nodes with a blocked edge, shape (v,).
-        keys: Sorted keys min * v + max of the edges.
-    """
 
-    flagged: BoolArray
-    keys: IntArray
-
-    @staticmethod
-    def none(n_nodes: int) -> "Blocked":
-        """No edge is blocked."""
-        return Blocked(np.zeros(n_nodes, dtype=np.bool_), np.zeros(0, dtype=np.int64))
-
-    def add(self, edges: IntArray) -> None:
-        """Block edges (u, v), shape (n, 2)."""
-        self.flagged[edges.ravel()] = True
-        keys = edges.min(axis=1) * self.flagged.size + edges.max(axis=1)
-        self.keys = np.union1d(self.keys, keys)
+def with_barred(barred: Barred, edges: IntArray) -> Barred:
+    """Further edges (u, v) blocked, shape (n, 2)."""
+    flagged = barred.flagged.copy()
+    flagged[edges.ravel()] = True
+    keys = edges.min(axis=1) * flagged.size + edges.max(axis=1)
+    return Barred(flagged, np.union1d(barred.keys, keys))

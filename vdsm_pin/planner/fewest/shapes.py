@@ -124,31 +124,31 @@ def one_knee_shapes(
         most: Largest number of knee joints.
     """
     joints, disc = knee_joints(manipulator, most), slope_disc(limit, step)
-    n_disc = len(disc)
-    knees = np.repeat(joints, n_disc)
+    first = 1 + len(disc) * np.arange(len(joints))
+    slides = [np.stack([first[:-1], first[1:]]), np.stack([first[1:], first[:-1]])]
+    sliding = np.concatenate(slides, axis=1)[..., None] + np.arange(len(disc))
+    turning = _beside(disc)
+    gaps = step * np.hypot(*(disc[turning[0]] - disc[turning[1]]).T)
+    turns = turning[:, None] + first[None, :, None]
+    here, there = np.concatenate([turns.reshape(2, -1), sliding.reshape(2, -1)], axis=1)
+    change = np.full(len(here), 2.0 * step)
+    change[: turns[0].size] = np.tile(gaps, len(joints))
+    links = np.column_stack([here, there, change])
     slopes = np.tile(disc * step, (len(joints), 1))
-    number = {(int(a), int(b)): i for i, (a, b) in enumerate(disc)}
+    return _shapes(np.repeat(joints, len(disc)), slopes, links, step)
+
+
+def _beside(points: IntArray) -> IntArray:
+    """Pairs of lattice points that are among each other's eight, shape (2, m)."""
+    reach = int(np.abs(points).max(initial=0)) + 1
+    number = np.full((2 * reach + 1, 2 * reach + 1), -1)
+    column, row = points.T + reach
+    number[column, row] = np.arange(len(points))
     around = [(a, b) for a in (-1, 0, 1) for b in (-1, 0, 1) if (a, b) != (0, 0)]
-    rows: list[tuple[int, int, float]] = []
-    for i, (a, b) in enumerate(disc):
-        for da, db in around:
-            other = number.get((int(a + da), int(b + db)))
-            if other is not None:
-                rows.append((i, other, step * float(np.hypot(da, db))))
-    base = np.array(rows)
-    links = []
-    for m in range(len(joints)):
-        links.append(base + np.array([1 + m * n_disc, 1 + m * n_disc, 0.0]))
-        for other in (m - 1, m + 1):
-            if 0 <= other < len(joints):
-                own = np.arange(n_disc)
-                cost = np.full(n_disc, 2.0 * step)
-                links.append(
-                    np.column_stack(
-                        [1 + m * n_disc + own, 1 + other * n_disc + own, cost]
-                    )
-                )
-    return _shapes(knees, slopes, np.vstack(links), step)
+    others = np.stack([number[column + a, row + b] for a, b in around])
+    own = np.broadcast_to(np.arange(len(points)), others.shape)
+    there = others >= 0
+    return np.stack([own[there], others[there]])
 
 
 def _compressed(links: FloatArray, count: int) -> tuple[IntArray, IntArray, FloatArray]:

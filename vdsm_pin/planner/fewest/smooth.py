@@ -8,6 +8,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.motion import Knots
+from vdsm_pin.planner.fewest.poses import farthest_apart, on_line
 from vdsm_pin.planner.fewest.roadmap import Taste
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -20,10 +21,13 @@ class _State:
     bend: FloatArray
     room: FloatArray
 
-
-def _state(judge: Judge, knots: Knots) -> _State:
-    room, changed, bend = judge.look(knots.tips, knots.offsets)
-    return _State(changed, bend, room)
+    def taken(self, other: "_State", rows: BoolArray) -> "_State":
+        """The other's values in some rows."""
+        return _State(
+            np.where(rows, other.changed, self.changed),
+            np.where(rows, other.bend, self.bend),
+            np.where(rows, other.room, self.room),
+        )
 
 
 def _runs(knots: Knots) -> list[tuple[int, int]]:
@@ -33,31 +37,12 @@ def _runs(knots: Knots) -> list[tuple[int, int]]:
     return list(itertools.pairwise(marks))
 
 
-def _share(knots: Knots, a: int, b: int) -> FloatArray:
-    """Where the inner knots of a..b come to lie between its ends, 0 to 1."""
-    if knots.drawn[a]:
-        length = np.abs(knots.stations[a : b + 1] - knots.stations[a])
-    else:
-        way = np.linalg.norm(np.diff(knots.tips[a : b + 1], axis=0), axis=1)
-        turn = np.diff(knots.offsets[a : b + 1], axis=0)
-        way = way + np.abs(turn).max(axis=(1, 2))
-        length = np.concatenate([[0.0], np.cumsum(way)])
-    if not length[-1] > 0.0:
-        return np.linspace(0.0, 1.0, b - a + 1)
-    return np.asarray(length / length[-1])
-
-
 def _flattened(knots: Knots, spans: list[tuple[int, int]]) -> Knots:
     """Knots with every span's inner knots on the line between its ends."""
-    tips, offsets = knots.tips.copy(), knots.offsets.copy()
-    edges = knots.edges.copy()
+    tips, offsets, edges = knots.tips.copy(), knots.offsets.copy(), knots.edges.copy()
     for a, b in spans:
-        t = _share(knots, a, b)
-        offsets[a : b + 1] = (1 - t)[:, None, None] * offsets[a] + t[
-            :, None, None
-        ] * offsets[b]
-        if not knots.drawn[a]:
-            tips[a : b + 1] = (1 - t)[:, None] * tips[a] + t[:, None] * tips[b]
+        drawn = bool(knots.drawn[a])
+        on_line(knots.tips, knots.offsets, knots.stations, drawn, a, b, tips, offsets)
         edges[a:b] = -1
     return replace(knots, tips=tips, offsets=offsets, edges=edges)
 
@@ -87,7 +72,8 @@ def smooth(judge: Judge, knots: Knots, taste: Taste) -> Knots:
     """
     longest = max(b - a for a, b in _runs(knots))
     stride = 1 << max(1, int(np.ceil(np.log2(max(longest, 2)))))
-    state = _state(judge, knots)
+    room, changed, bend = judge.look(knots.tips, knots.offsets)
+    state = _State(changed, bend, room)
     while stride >= 2:
         for phase in (0, stride // 2):
             spans = _spans(knots, stride, phase)
@@ -105,16 +91,18 @@ def _round(
     spans: list[tuple[int, int]],
 ) -> tuple[Knots, _State]:
     trial = _flattened(knots, spans)
-    change = np.abs(trial.offsets - knots.offsets).max(axis=(1, 2))
-    change = np.maximum(change, np.abs(trial.tips - knots.tips).max(axis=1))
+    change = farthest_apart(knots.tips, knots.offsets, trial.tips, trial.offsets)
     moved = change > TOLERANCES.joint_centre
     spans = [(a, b) for a, b in spans if moved[a : b + 1].any()]
     if not spans:
         return knots, state
-    new = _state(judge, trial)
-    need, bend = _guards(judge, knots, state, taste, spans)
     picked = np.concatenate([np.arange(a, b) for a, b in spans])
-    good = judge.clear(trial.pick(picked), need, bend)
+    new = _State(state.changed.copy(), state.bend.copy(), state.room.copy())
+    bends = judge.bends(trial.tips[picked], trial.offsets[picked])
+    new.changed[picked] = (bends > TOLERANCES.changed_angle).sum(axis=1)
+    new.bend[picked] = bends.max(axis=1)
+    need, bend = _guards(judge, knots, state, taste, spans)
+    good, new.room[picked] = judge.measured(trial.pick(picked), need, bend)
     kept = []
     place = 0
     taken = np.zeros(len(knots.tips), dtype=np.bool_)
@@ -126,12 +114,7 @@ def _round(
             kept.append(span)
             taken[a + 1 : b] = True
         place += b - a
-    state = _State(
-        np.where(taken, new.changed, state.changed),
-        np.where(taken, new.bend, state.bend),
-        np.where(taken, new.room, state.room),
-    )
-    return _flattened(knots, kept), state
+    return _flattened(knots, kept), state.taken(new, taken)
 
 
 def _guards(
@@ -154,15 +137,19 @@ def _guards(
 
 def straightened(knots: Knots) -> Knots:
     """Ways without the knots that lie on the line between their neighbours."""
-    kept: BoolArray = np.ones(len(knots.tips), dtype=np.bool_)
+    kept = np.ones(len(knots.tips), dtype=np.bool_)
+    tips, offsets = knots.tips.copy(), knots.offsets.copy()
+    a = 0
     for k in range(1, len(knots.tips) - 1):
-        if knots.drawn[k - 1] or knots.drawn[k]:
-            continue
-        a = int(np.flatnonzero(kept[:k])[-1])
-        span = _flattened(knots, [(a, k + 1)])
-        gap = np.abs(span.offsets - knots.offsets)[a : k + 2].max()
-        gap = max(gap, np.abs(span.tips - knots.tips)[a : k + 2].max())
-        kept[k] = gap > TOLERANCES.joint_centre
+        if not (knots.drawn[k - 1] or knots.drawn[k]):
+            now = knots.tips, knots.offsets, knots.stations
+            on_line(*now, False, a, k + 1, tips, offsets)
+            span = slice(a + 1, k + 1)
+            gap = farthest_apart(
+                knots.tips[span], knots.offsets[span], tips[span], offsets[span]
+            )
+            kept[k] = gap.max() > TOLERANCES.joint_centre
+        a = k if kept[k] else a
     return knots.take(np.flatnonzero(kept))
 
 

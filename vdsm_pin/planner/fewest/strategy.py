@@ -11,7 +11,7 @@ from vdsm_pin.kinematics import joint_angles
 from vdsm_pin.planner.fewest.explain import how_far, notes_of, refuse
 from vdsm_pin.planner.fewest.explore import Outcome, explore
 from vdsm_pin.planner.fewest.motion import Knots, Rows, dense_rows
-from vdsm_pin.planner.fewest.nearby import nearby
+from vdsm_pin.planner.fewest.nearby import Nearby, nearby
 from vdsm_pin.planner.fewest.roadmap import Taste
 from vdsm_pin.planner.fewest.smooth import lifted, smooth, straightened
 from vdsm_pin.planner.fewest.unbend import (
@@ -89,7 +89,7 @@ def _plan(
 
 def _written(
     problem: PlanningProblem,
-    clearance: LinkClearance,
+    clearance: Nearby,
     name: str,
     taste: Taste,
     outcome: Outcome,
@@ -102,6 +102,8 @@ def _written(
     turn = TOLERANCES.planned_step
     rows = dense_rows(arm, knots, problem.path.spacing, turn, judge.slack)
     alpha, theta = joint_angles(arm, rows.centres)
+    # Proofs of what is needed ask no more than whether there is the clearance required.
+    enough = clearance.up_to(problem.required_clearance)
     stations, on_path = _stations(knots, rows)
     trajectory = Trajectory(on_path, stations, rows.centres[:, 0, 0], alpha, theta)
     return Plan(
@@ -111,7 +113,7 @@ def _written(
         rows.centres,
         trajectory,
         cable_lengths(arm, alpha, theta),
-        notes_of(problem, clearance, outcome, trajectory, rows.centres),
+        notes_of(problem, enough, outcome, trajectory, rows.centres),
     )
 
 

@@ -1,34 +1,108 @@
 """Compiled shortest ways over the graph of configurations (Dijkstra)."""
 
 import heapq
+from typing import NamedTuple
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import compiled
-from vdsm_pin.planner.fewest.kernels import NEAR, is_blocked
+from vdsm_pin.planner.fewest.kernels import NEAR, Barred, Graph, Labels, is_blocked
+
+
+class TipLinks(NamedTuple):
+    """Neighbouring tips.
+
+    Args:
+        first: Where each tip's neighbours begin, shape (k + 1,).
+        links: Neighbouring tips, shape (m,).
+        gaps: Distances to them, shape (m,); [m].
+    """
+
+    first: IntArray
+    links: IntArray
+    gaps: FloatArray
+
+
+@compiled
+def _push(
+    heap: list[tuple[float, int]],
+    u: int,
+    v: int,
+    value: float,
+    labels: Labels,
+    barred: Barred,
+) -> None:
+    """Reach v from u where that is shorter; what is done is not longer than u."""
+    if value < labels.cost[v] and not is_blocked(u, v, barred):
+        labels.cost[v], labels.parent[v] = value, u
+        heapq.heappush(heap, (value, v))
+
+
+@compiled
+def _move_tip(
+    heap: list[tuple[float, int]],
+    graph: Graph,
+    tips: TipLinks,
+    u: int,
+    shape: int,
+    reached: float,
+    strain: FloatArray,
+    labels: Labels,
+    barred: Barred,
+) -> None:
+    """Moves of node u's tip to the tips beside it, ending in a given shape."""
+    tip = graph.node[u] // graph.n_shapes
+    for e in range(tips.first[tip], tips.first[tip + 1]):
+        v = graph.place[tips.links[e] * graph.n_shapes + shape]
+        if v >= 0:
+            value = reached + tips.gaps[e] + strain[v]
+            _push(heap, u, v, value, labels, barred)
+
+
+@compiled
+def _move_arm(
+    heap: list[tuple[float, int]],
+    graph: Graph,
+    tips: TipLinks,
+    u: int,
+    strain: FloatArray,
+    arm: float,
+    labels: Labels,
+    barred: Barred,
+) -> None:
+    """Changes of node u's shape, between lattice shapes with the tip at rest."""
+    tip, c = graph.node[u] // graph.n_shapes, graph.node[u] % graph.n_shapes
+    reached = labels.cost[u]
+    for e in range(graph.first[c], graph.first[c + 1]):
+        other, turned = graph.neighbours[e], reached + arm * graph.change[e]
+        v = graph.place[tip * graph.n_shapes + other]
+        if v >= 0:
+            _push(heap, u, v, turned + strain[v], labels, barred)
+        # Grown shapes live at one tip only: the tip moves as the shape changes.
+        if c >= graph.n_lattice or other >= graph.n_lattice:
+            _move_tip(heap, graph, tips, u, other, turned, strain, labels, barred)
+    low, high = graph.tip_nodes[tip], graph.tip_nodes[tip + 1]
+    if c > 0:
+        high = low
+        straight = graph.place[tip * graph.n_shapes]
+        if straight >= 0 and graph.lean[u] <= NEAR:
+            low, high = straight, straight + 1
+    for v in range(low, high):
+        if graph.lean[v] <= NEAR:
+            value = reached + arm * (graph.lean[v] + graph.lean[u]) + strain[v]
+            _push(heap, u, v, value, labels, barred)
 
 
 @compiled
 def shortest_ways(
     source: int,
     target: int,
-    n_shapes: int,
-    n_lattice: int,
-    index: IntArray,
-    node: IntArray,
-    tip_first: IntArray,
-    tip_links: IntArray,
-    tip_gap: FloatArray,
-    first: IntArray,
-    neighbours: IntArray,
-    change: FloatArray,
-    lean: FloatArray,
+    graph: Graph,
+    tips: TipLinks,
     strain: FloatArray,
-    tip_nodes: IntArray,
     arm: float,
-    flagged: BoolArray,
-    blocked: IntArray,
+    barred: Barred,
 ) -> tuple[FloatArray, IntArray]:
     """Shortest ways over the whole graph from one node (Dijkstra).
 
@@ -38,30 +112,19 @@ def shortest_ways(
     Args:
         source: Node to start from.
         target: Node at which to stop, or -1 for all.
-        n_shapes: Number of shapes n.
-        n_lattice: Number of shapes that exist at every tip; the others come after.
-        index: Node of each (tip, shape) or -1, shape (k * n,).
-        node: Number tip * n + shape of each node, shape (v,).
-        tip_first: Neighbour rows of the tips, shape (k + 1,).
-        tip_links: Neighbouring tips.
-        tip_gap: Distances to them; [m].
-        first: Neighbour rows of the shapes.
-        neighbours: See `Shapes`.
-        change: See `Shapes`.
-        lean: Sum of the knees' angles, joint 1 left out, shape (v,); [rad].
+        graph: The roadmap.
+        tips: Which tips are beside each other.
         strain: Length added for entering a node, shape (v,); [m].
-        tip_nodes: Where each tip's nodes begin, shape (k + 1,).
         arm: Length that turns a change into a distance; [m].
-        flagged: Nodes with a blocked edge, shape (v,).
-        blocked: Sorted keys of blocked edges.
+        barred: Blocked edges.
 
     Returns:
         Length of the way to each node (inf: none) [m], and the node before.
     """
-    length = np.full(node.size, np.inf)
-    before = np.full(node.size, -1)
-    done = np.zeros(node.size, dtype=np.bool_)
-    length[source] = 0.0
+    count = graph.node.size
+    labels = Labels(np.full(count, np.inf), np.full(count, -1))
+    done = np.zeros(count, dtype=np.bool_)
+    labels.cost[source] = 0.0
     heap = [(0.0, source)]
     while len(heap) > 0:
         reached, u = heapq.heappop(heap)
@@ -70,44 +133,7 @@ def shortest_ways(
         done[u] = True
         if u == target:
             break
-        tip, c = node[u] // n_shapes, node[u] % n_shapes
-        for e in range(tip_first[tip], tip_first[tip + 1]):
-            v = index[tip_links[e] * n_shapes + c]
-            if v < 0 or done[v]:
-                continue
-            value = reached + tip_gap[e] + strain[v]
-            if value < length[v] and not is_blocked(u, v, flagged, blocked):
-                length[v], before[v] = value, u
-                heapq.heappush(heap, (value, v))
-        for e in range(first[c], first[c + 1]):
-            v = index[tip * n_shapes + neighbours[e]]
-            if v >= 0 and not done[v]:
-                value = reached + arm * change[e] + strain[v]
-                if value < length[v] and not is_blocked(u, v, flagged, blocked):
-                    length[v], before[v] = value, u
-                    heapq.heappush(heap, (value, v))
-            # Grown shapes live at one tip only: the tip moves as the shape changes.
-            if c < n_lattice and neighbours[e] < n_lattice:
-                continue
-            for g in range(tip_first[tip], tip_first[tip + 1]):
-                v = index[tip_links[g] * n_shapes + neighbours[e]]
-                if v < 0 or done[v]:
-                    continue
-                value = reached + arm * change[e] + tip_gap[g] + strain[v]
-                if value < length[v] and not is_blocked(u, v, flagged, blocked):
-                    length[v], before[v] = value, u
-                    heapq.heappush(heap, (value, v))
-        low, high = tip_nodes[tip], tip_nodes[tip + 1]
-        if c > 0:
-            high = low
-            v = index[tip * n_shapes]
-            if v >= 0 and lean[u] <= NEAR:
-                low, high = v, v + 1
-        for v in range(low, high):
-            value = reached + arm * (lean[v] + lean[u]) + strain[v]
-            if done[v] or value >= length[v] or lean[v] > NEAR:
-                continue
-            if not is_blocked(u, v, flagged, blocked):
-                length[v], before[v] = value, u
-                heapq.heappush(heap, (value, v))
-    return length, before
+        shape = graph.node[u] % graph.n_shapes
+        _move_tip(heap, graph, tips, u, shape, reached, strain, labels, barred)
+        _move_arm(heap, graph, tips, u, strain, arm, labels, barred)
+    return labels.cost, labels.parent

@@ -1,0 +1,230 @@
+"""Compiled: configurations along straight lines in the chart (Eq. 7)."""
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.compiled import compiled
+
+
+@compiled
+def centres_between(
+    tips: FloatArray,
+    next_tips: FloatArray,
+    offsets: FloatArray,
+    next_offsets: FloatArray,
+    interval: IntArray,
+    share: FloatArray,
+    ratios: FloatArray,
+    lengths: FloatArray,
+) -> FloatArray:
+    """Joint centres at places of intervals (Eq. 7).
+
+    Args:
+        tips: Where the intervals begin, shape (n, 3); [m].
+        next_tips: Where they end; [m].
+        offsets: D_1..D_{N+1} where they begin, shape (n, N + 1, 2); [m].
+        next_offsets: D_1..D_{N+1} where they end; [m].
+        interval: Interval of each place, shape (r,).
+        share: Where in its interval, 0 to 1, shape (r,).
+        ratios: k_i of each joint centre, shape (N + 1,); [-].
+        lengths: Of the links, shape (N,); [m].
+
+    Returns:
+        Shape (r, N + 1, 3), NaN from the base to a link that is too short; [m].
+    """
+    n_links = lengths.size
+    centres = np.zeros((interval.size, n_links + 1, 3))
+    for r in range(interval.size):
+        a, t = interval[r], share[r]
+        s = 1.0 - t
+        tip_y = s * tips[a, 1] + t * next_tips[a, 1]
+        tip_z = s * tips[a, 2] + t * next_tips[a, 2]
+        x = s * tips[a, 0] + t * next_tips[a, 0]
+        for i in range(n_links, -1, -1):
+            dy = s * offsets[a, i, 0] + t * next_offsets[a, i, 0]
+            dz = s * offsets[a, i, 1] + t * next_offsets[a, i, 1]
+            y, z = tip_y * ratios[i] + dy, tip_z * ratios[i] + dz
+            if i < n_links:
+                gap_y, gap_z = centres[r, i + 1, 1] - y, centres[r, i + 1, 2] - z
+                square = lengths[i] * lengths[i] - gap_y * gap_y - gap_z * gap_z
+                x -= np.sqrt(square) if square > 0.0 else np.nan
+            centres[r, i, 0], centres[r, i, 1], centres[r, i, 2] = x, y, z
+    return centres
+
+
+@compiled
+def bends_of(centres: FloatArray) -> FloatArray:
+    """Psi of every joint, shape (r, N), NaN where a link is too short; [rad].
+
+    Args:
+        centres: Joint centres, shape (r, N + 1, 3); [m].
+    """
+    n_links = centres.shape[1] - 1
+    angles = np.zeros((centres.shape[0], n_links))
+    for r in range(centres.shape[0]):
+        before = (1.0, 0.0, 0.0)
+        for i in range(n_links):
+            x = centres[r, i + 1, 0] - centres[r, i, 0]
+            y = centres[r, i + 1, 1] - centres[r, i, 1]
+            z = centres[r, i + 1, 2] - centres[r, i, 2]
+            size = np.sqrt(x * x + y * y + z * z)
+            axis = (x / size, y / size, z / size)
+            dx, dy, dz = axis[0] - before[0], axis[1] - before[1], axis[2] - before[2]
+            # The chord of the unit circle keeps full precision at small angles.
+            chord = np.sqrt(dx * dx + dy * dy + dz * dz)
+            angles[r, i] = 2.0 * np.arcsin(min(chord / 2.0, 1.0))
+            before = axis
+    return angles
+
+
+@compiled
+def knees_between(
+    offsets: FloatArray, next_offsets: FloatArray, lengths: FloatArray, straight: float
+) -> BoolArray:
+    """Joints where the arm may bend somewhere in each interval, and both ends.
+
+    Args:
+        offsets: D_1..D_{N+1} where they begin, shape (n, N + 1, 2); [m].
+        next_offsets: D_1..D_{N+1} where they end; [m].
+        lengths: Of the links, shape (N,); [m].
+        straight: Change of slope that counts as none; [-].
+
+    Returns:
+        Shape (n, N + 1).
+    """
+    n_links = lengths.size
+    bent = np.ones((offsets.shape[0], n_links + 1), dtype=np.bool_)
+    for r in range(offsets.shape[0]):
+        for i in range(1, n_links):
+            turn = 0.0
+            for rows in (offsets[r], next_offsets[r]):
+                for c in range(2):
+                    after = (rows[i + 1, c] - rows[i, c]) / lengths[i]
+                    before = (rows[i, c] - rows[i - 1, c]) / lengths[i - 1]
+                    turn = max(turn, abs(after - before))
+            bent[r, i] = turn > straight
+    return bent
+
+
+@compiled
+def pieces_of(
+    centres: FloatArray, knees: BoolArray, interval: IntArray, wanted: BoolArray
+) -> tuple[FloatArray, IntArray]:
+    """Straight pieces of configurations: links in line between knees are one.
+
+    Args:
+        centres: Joint centres, shape (r, N + 1, 3); [m].
+        knees: Of each interval, shape (n, N + 1).
+        interval: Interval of each configuration, shape (r,).
+        wanted: Which configurations are wanted, shape (r,).
+
+    Returns:
+        Ends of the pieces, shape (p, 2, 3) [m], and where each configuration's pieces
+        begin, shape (r + 1,).
+    """
+    n_rows, n_links = centres.shape[0], centres.shape[1] - 1
+    first = np.zeros(n_rows + 1, dtype=np.int64)
+    for r in range(n_rows):
+        count = 0
+        if wanted[r]:
+            for i in range(1, n_links + 1):
+                count += knees[interval[r], i]
+        first[r + 1] = first[r] + count
+    pieces = np.zeros((first[n_rows], 2, 3))
+    for r in range(n_rows):
+        begin, place = 0, first[r]
+        for i in range(1, n_links + 1):
+            if wanted[r] and knees[interval[r], i]:
+                pieces[place, 0], pieces[place, 1] = centres[r, begin], centres[r, i]
+                begin, place = i, place + 1
+    return pieces, first
+
+
+@compiled
+def least_of(values: FloatArray, first: IntArray, none: float) -> FloatArray:
+    """The least value of each group, `none` where a group is empty, shape (r,)."""
+    least = np.full(first.size - 1, none)
+    for r in range(first.size - 1):
+        if first[r + 1] > first[r]:
+            least[r] = values[first[r] : first[r + 1]].min()
+    return least
+
+
+@compiled
+def farthest_moved(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Longest way of a joint centre between configurations, shape (r,); [m].
+
+    Args:
+        one: Joint centres, shape (r, N + 1, 3); [m].
+        other: The same; [m].
+    """
+    longest = np.zeros(one.shape[0])
+    for r in range(one.shape[0]):
+        square = 0.0
+        for i in range(one.shape[1]):
+            x = one[r, i, 0] - other[r, i, 0]
+            y = one[r, i, 1] - other[r, i, 1]
+            z = one[r, i, 2] - other[r, i, 2]
+            square = max(square, x * x + y * y + z * z)
+        longest[r] = np.sqrt(square)
+    return longest
+
+
+@compiled
+def on_line(
+    tips: FloatArray,
+    offsets: FloatArray,
+    stations: FloatArray,
+    drawn: bool,
+    a: int,
+    b: int,
+    line_tips: FloatArray,
+    line_offsets: FloatArray,
+) -> None:
+    """Knots between two knots, moved onto the straight line between them.
+
+    Where the tip draws, each keeps its station and its tip; elsewhere they are spread
+    as far apart as they are now.
+
+    Args:
+        tips: Shape (n, 3); [m].
+        offsets: Shape (n, N + 1, 2); [m].
+        stations: Arc length along the desired path, shape (n,); [m].
+        drawn: Whether the tip draws here.
+        a: The first knot.
+        b: The last one.
+        line_tips: Result in rows a + 1 to b - 1, shape (n, 3); [m].
+        line_offsets: Result likewise, shape (n, N + 1, 2); [m].
+    """
+    share = np.zeros(b - a + 1)
+    for k in range(a, b):
+        if drawn:
+            way = abs(stations[k + 1] - stations[k])
+        else:
+            turn = np.abs(offsets[k + 1] - offsets[k]).max()
+            way = np.sqrt(((tips[k + 1] - tips[k]) ** 2).sum()) + turn
+        share[k + 1 - a] = share[k - a] + way
+    if share[-1] > 0.0:
+        share /= share[-1]
+    else:
+        share[:] = np.arange(b - a + 1) / (b - a)
+    for k in range(a + 1, b):
+        t = share[k - a]
+        line_offsets[k] = (1.0 - t) * offsets[a] + t * offsets[b]
+        if not drawn:
+            line_tips[k] = (1.0 - t) * tips[a] + t * tips[b]
+
+
+@compiled
+def farthest_apart(
+    tips: FloatArray,
+    offsets: FloatArray,
+    other_tips: FloatArray,
+    other_offsets: FloatArray,
+) -> FloatArray:
+    """Largest difference of a coordinate, knot by knot, shape (n,); [m]."""
+    result = np.zeros(len(tips))
+    for k in range(len(tips)):
+        gap = np.abs(tips[k] - other_tips[k]).max()
+        result[k] = max(gap, np.abs(offsets[k] - other_offsets[k]).max())
+    return result
