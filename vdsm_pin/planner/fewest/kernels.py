@@ -188,82 +188,73 @@ def is_blocked(u: int, v: int, barred: Barred) -> bool:
 
 
 @compiled
-def _offer(u: int, v: int, value: float, labels: Labels, barred: Barred) -> bool:
-    """Reach v from u where that is cheaper and not blocked."""
-    if not value < labels.cost[v] - GAIN or is_blocked(u, v, barred):
-        return False
-    labels.cost[v], labels.parent[v] = value, u
-    return True
-
-
-@compiled
 def _settle(
     graph: Graph, tip: int, weights: Weights, labels: Labels, barred: Barred
 ) -> None:
     """Moves of the arm while the tip rests, until nothing gets cheaper."""
     low, high = graph.tip_nodes[tip], graph.tip_nodes[tip + 1]
-    cost, corner = labels.cost, tip * graph.n_shapes
+    cost, parent, corner = labels.cost, labels.parent, tip * graph.n_shapes
     straight = graph.place[corner]
     better, sweep = True, 0
     while better:
         better = False
-        for place in range(high - low):
-            v = low + place if sweep % 2 == 0 else high - 1 - place
+        for step in range(high - low):
+            v = low + step if sweep % 2 == 0 else high - 1 - step
             c = graph.node[v] - corner
             for e in range(graph.first[c], graph.first[c + 1]):
                 u = graph.place[corner + graph.neighbours[e]]
-                if u >= 0:
-                    value = cost[u] + weights.turn * graph.change[e] + weights.still
-                    better |= _offer(u, v, value, labels, barred)
+                if u < 0:
+                    continue
+                value = cost[u] + weights.turn * graph.change[e] + weights.still
+                if value < cost[v] - GAIN and not is_blocked(u, v, barred):
+                    cost[v], parent[v], better = value, u, True
             if straight >= 0 and v != straight and graph.lean[v] <= NEAR:
                 a, b = (straight, v) if cost[straight] < cost[v] else (v, straight)
                 value = cost[a] + weights.turn * graph.lean[v] + weights.still
-                better |= _offer(a, b, value, labels, barred)
+                if value < cost[b] - GAIN and not is_blocked(a, b, barred):
+                    cost[b], parent[b], better = value, a, True
         sweep += 1
 
 
 @compiled
 def _draw(
-    graph: Graph,
-    before: int,
-    tip: int,
-    drawn: FloatArray,
-    weights: Weights,
-    labels: Labels,
-    barred: Barred,
+    graph: Graph, before: int, tip: int, turn: float, labels: Labels, barred: Barred
 ) -> None:
-    """Moves from one layer's tip to the next one's.
+    """Moves from one layer's tip to the next one's, what is drawn not yet counted.
 
     Args:
         graph: The roadmap.
         before: The tip before.
         tip: This tip.
-        drawn: Cost of drawing the stretch with each node, shape (v,).
-        weights: What moves cost.
+        turn: Cost of a radian of turning.
         labels: Costs so far.
         barred: Blocked edges.
     """
-    cost, corner = labels.cost, before * graph.n_shapes
+    cost, parent, corner = labels.cost, labels.parent, before * graph.n_shapes
     straight = graph.place[corner]
     for v in range(graph.tip_nodes[tip], graph.tip_nodes[tip + 1]):
         c = graph.node[v] - tip * graph.n_shapes
         u = graph.place[corner + c]
-        if u >= 0:
-            _offer(u, v, cost[u] + drawn[v], labels, barred)
+        if u >= 0 and cost[u] < cost[v] and not is_blocked(u, v, barred):
+            cost[v], parent[v] = cost[u], u
         for e in range(graph.first[c], graph.first[c + 1]):
             u = graph.place[corner + graph.neighbours[e]]
-            if u >= 0:
-                value = cost[u] + drawn[v] + weights.turn * graph.change[e]
-                _offer(u, v, value, labels, barred)
+            if u < 0:
+                continue
+            value = cost[u] + turn * graph.change[e]
+            if value < cost[v] and not is_blocked(u, v, barred):
+                cost[v], parent[v] = value, u
+        low, high = graph.tip_nodes[before], graph.tip_nodes[before + 1]
         if c > 0:
-            if straight >= 0 and graph.lean[v] <= NEAR:
-                value = cost[straight] + drawn[v] + weights.turn * graph.lean[v]
-                _offer(straight, v, value, labels, barred)
-            continue
-        for u in range(graph.tip_nodes[before], graph.tip_nodes[before + 1]):
-            if graph.lean[u] <= NEAR:
-                value = cost[u] + drawn[v] + weights.turn * graph.lean[u]
-                _offer(u, v, value, labels, barred)
+            # Shapes near the straight arm and it are one move from each other.
+            near = straight >= 0 and graph.lean[v] <= NEAR
+            low, high = straight, straight + 1 if near else straight
+        for u in range(low, high):
+            value = cost[u] + turn * (graph.lean[v] + graph.lean[u])
+            if graph.lean[u] > NEAR or not value < cost[v]:
+                continue
+            if not is_blocked(u, v, barred):
+                cost[v], parent[v] = value, u
 
 
 @compiled
@@ -299,8 +290,9 @@ def stage_programme(
     for k in range(layers.size):
         tip = layers[k]
         if k > 0:
-            drawn = node_cost * gap[k]
-            _draw(graph, layers[k - 1], tip, drawn, weights, labels, barred)
+            _draw(graph, layers[k - 1], tip, weights.turn, labels, barred)
+            for v in range(graph.tip_nodes[tip], graph.tip_nodes[tip + 1]):
+                labels.cost[v] += node_cost[v] * gap[k]
             at_home += weights.skip * gap[k]
         _settle(graph, tip, weights, labels, barred)
         entered = False

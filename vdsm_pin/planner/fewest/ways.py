@@ -25,43 +25,7 @@ class TipLinks(NamedTuple):
 
 
 @compiled
-def _push(
-    heap: list[tuple[float, int]],
-    u: int,
-    v: int,
-    value: float,
-    labels: Labels,
-    barred: Barred,
-) -> None:
-    """Reach v from u where that is shorter; what is done is not longer than u."""
-    if value < labels.cost[v] and not is_blocked(u, v, barred):
-        labels.cost[v], labels.parent[v] = value, u
-        heapq.heappush(heap, (value, v))
-
-
-@compiled
-def _move_tip(
-    heap: list[tuple[float, int]],
-    graph: Graph,
-    tips: TipLinks,
-    u: int,
-    shape: int,
-    reached: float,
-    strain: FloatArray,
-    labels: Labels,
-    barred: Barred,
-) -> None:
-    """Moves of node u's tip to the tips beside it, ending in a given shape."""
-    tip = graph.node[u] // graph.n_shapes
-    for e in range(tips.first[tip], tips.first[tip + 1]):
-        v = graph.place[tips.links[e] * graph.n_shapes + shape]
-        if v >= 0:
-            value = reached + tips.gaps[e] + strain[v]
-            _push(heap, u, v, value, labels, barred)
-
-
-@compiled
-def _move_arm(
+def _expand(
     heap: list[tuple[float, int]],
     graph: Graph,
     tips: TipLinks,
@@ -71,27 +35,40 @@ def _move_arm(
     labels: Labels,
     barred: Barred,
 ) -> None:
-    """Changes of node u's shape, between lattice shapes with the tip at rest."""
+    """Every move from node u; arguments as in `shortest_ways`."""
+    cost, parent = labels.cost, labels.parent
     tip, c = graph.node[u] // graph.n_shapes, graph.node[u] % graph.n_shapes
-    reached = labels.cost[u]
-    for e in range(graph.first[c], graph.first[c + 1]):
-        other, turned = graph.neighbours[e], reached + arm * graph.change[e]
-        v = graph.place[tip * graph.n_shapes + other]
-        if v >= 0:
-            _push(heap, u, v, turned + strain[v], labels, barred)
+    corner, begin = tip * graph.n_shapes, graph.first[c]
+    for e in range(begin - 1, graph.first[c + 1]):  # the first one keeps the shape
+        other, turned = c, cost[u]
+        if e >= begin:
+            other, turned = graph.neighbours[e], turned + arm * graph.change[e]
+            v = graph.place[corner + other]
+            value = turned + strain[v]
+            if v >= 0 and value < cost[v] and not is_blocked(u, v, barred):
+                cost[v], parent[v] = value, u
+                heapq.heappush(heap, (value, v))
         # Grown shapes live at one tip only: the tip moves as the shape changes.
-        if c >= graph.n_lattice or other >= graph.n_lattice:
-            _move_tip(heap, graph, tips, u, other, turned, strain, labels, barred)
+        if other != c and c < graph.n_lattice and other < graph.n_lattice:
+            continue
+        for g in range(tips.first[tip], tips.first[tip + 1]):
+            v = graph.place[tips.links[g] * graph.n_shapes + other]
+            value = turned + tips.gaps[g] + strain[v]
+            if v >= 0 and value < cost[v] and not is_blocked(u, v, barred):
+                cost[v], parent[v] = value, u
+                heapq.heappush(heap, (value, v))
     low, high = graph.tip_nodes[tip], graph.tip_nodes[tip + 1]
     if c > 0:
-        high = low
-        straight = graph.place[tip * graph.n_shapes]
-        if straight >= 0 and graph.lean[u] <= NEAR:
-            low, high = straight, straight + 1
+        low, high = graph.place[corner], graph.place[corner] + 1
+    if c > 0 and (low < 0 or graph.lean[u] > NEAR):
+        return
     for v in range(low, high):
-        if graph.lean[v] <= NEAR:
-            value = reached + arm * (graph.lean[v] + graph.lean[u]) + strain[v]
-            _push(heap, u, v, value, labels, barred)
+        value = cost[u] + arm * (graph.lean[v] + graph.lean[u]) + strain[v]
+        if graph.lean[v] > NEAR or not value < cost[v]:
+            continue
+        if not is_blocked(u, v, barred):
+            cost[v], parent[v] = value, u
+            heapq.heappush(heap, (value, v))
 
 
 @compiled
@@ -127,13 +104,11 @@ def shortest_ways(
     labels.cost[source] = 0.0
     heap = [(0.0, source)]
     while len(heap) > 0:
-        reached, u = heapq.heappop(heap)
+        u = heapq.heappop(heap)[1]
         if done[u]:
             continue
         done[u] = True
         if u == target:
             break
-        shape = graph.node[u] % graph.n_shapes
-        _move_tip(heap, graph, tips, u, shape, reached, strain, labels, barred)
-        _move_arm(heap, graph, tips, u, strain, arm, labels, barred)
+        _expand(heap, graph, tips, u, strain, arm, labels, barred)
     return labels.cost, labels.parent
