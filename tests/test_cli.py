@@ -16,6 +16,7 @@ import pytest
 from problem_files import NEAR, OUT_OF_REACH, write_problem
 
 from vdsm_pin.cli import app, main
+from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.planner.strategies import STRATEGIES, strategy
 from vdsm_pin.report.files import schema
 
@@ -173,6 +174,24 @@ def test_an_infeasible_problem_leaves_nothing(vdsm: Shell, tmp_path: Path) -> No
     assert ran.status == 1
     assert "reach" in one_message(ran)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_search_in_vain_tells_how_far_it_came_and_how_long_it_took(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def in_vain(*_: object) -> None:
+        message = "drew 0.100 m of 0.400 m"
+        raise NoPlanFound(message)
+
+    monkeypatch.setattr("vdsm_pin.workflow.plan_to_folder", in_vain)
+    file = write_problem(tmp_path / "near.yaml", NEAR)
+    with pytest.raises(SystemExit) as ended:
+        main(["plan", str(file), "--out", str(tmp_path / "out")])
+    assert ended.value.code == 1
+    said = capsys.readouterr().err
+    assert re.search(
+        r"no plan found: drew 0\.100 m of .*; searched for \d+\.\d s", said
+    )
 
 
 def test_a_time_limit_ends_planning(vdsm: Shell, planned: Path, tmp_path: Path) -> None:

@@ -5,13 +5,14 @@ Modules are imported inside the commands, so that `vdsm --help` answers at once.
 
 import shlex
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Final, Literal, NoReturn
 
 import typer
 
-from vdsm_pin.errors import InvalidInput, VdsmError
+from vdsm_pin.errors import InvalidInput, NoPlanFound, OutOfTime, VdsmError
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY, STRATEGIES
 
 PASSED: Final = 0
@@ -62,9 +63,15 @@ def plan(
     from vdsm_pin.report.terminal import show_plan
     from vdsm_pin.workflow import plan_to_folder, within
 
-    source = read_problem(problem)
-    with within(time_limit):
-        file = plan_to_folder(source, strategy, out, context.obj)
+    source, begin = read_problem(problem), time.monotonic()
+    try:
+        with within(time_limit):
+            file = plan_to_folder(source, strategy, out, context.obj)
+    except NoPlanFound as error:
+        if not isinstance(error, OutOfTime):  # which tells its time itself
+            spent = time.monotonic() - begin
+            error.args = (f"no plan found: {error}; searched for {spent:.1f} s",)
+        raise
     show_plan(file, out)
 
 
