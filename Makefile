@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-slow lint check urdf figures report bench dist clean
+.PHONY: demo test test-slow lint check urdf figures report soundness bench dist clean
 
 demo: $(VENV)/.installed
 	$(BIN)/vdsm batch --out out/demo
@@ -31,6 +31,9 @@ figures: $(VENV)/.installed
 report: figures
 	$(BIN)/python analysis/paper_table.py --out reports/paper
 	$(BIN)/python analysis/obs2_orientations.py --out reports/paper
+
+soundness: $(VENV)/.installed
+	$(BIN)/python analysis/soundness.py --queries 10000000 --save reports/soundness.md
 
 bench: $(VENV)/.installed
 	$(BIN)/python -m benchmarks.report --save reports/performance

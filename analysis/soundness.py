@@ -267,21 +267,27 @@ def _blocks(queries: int, seed: int) -> Iterator[tuple[np.random.SeedSequence, i
         yield child, min(BLOCK, queries - k * BLOCK)
 
 
-def run(queries: int, seed: int, size: int, processes: int = 1) -> Counter[str]:
-    """Judge that many queries; one seed gives one set of queries."""
+def counted(
+    queries: int, seed: int, size: int, processes: int
+) -> Iterator[Counter[str]]:
+    """The tally after each block; one seed gives one set of queries."""
     tally: Counter[str] = Counter()
     seeds, numbers = zip(*_blocks(queries, seed), strict=True)
     arguments = seeds, numbers, [size] * len(seeds)
     if processes == 1:
         for part in map(run_block, *arguments):
             tally.update(part)
-        return tally
-    start = time.perf_counter()
+            yield tally
+        return
     with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
         for part in pool.map(run_block, *arguments):
             tally.update(part)
-            done, seconds = tally["queries"], time.perf_counter() - start
-            print(f"  {done} queries, {seconds:.0f} s", flush=True)
+            yield tally
+
+
+def run(queries: int, seed: int, size: int, processes: int = 1) -> Counter[str]:
+    """Judge that many queries."""
+    *_, tally = counted(queries, seed, size, processes)
     return tally
 
 
@@ -358,12 +364,15 @@ def main() -> int:
     parser.add_argument("--save", type=Path, help="write the page here as well")
     arguments = parser.parse_args()
     wanted = arguments.queries, arguments.seed
-    tally = run(*wanted, arguments.batch, arguments.processes)
     command = "python analysis/soundness.py --queries {} --seed {}".format(*wanted)
-    page = report(tally, command)
+    start, page = time.perf_counter(), ""
+    for tally in counted(*wanted, arguments.batch, arguments.processes):
+        page = report(tally, command)
+        seconds = time.perf_counter() - start
+        print(f"  {tally['queries']:,} queries, {seconds:.0f} s", flush=True)
+        if arguments.save:  # whoever stops it keeps what was counted
+            arguments.save.write_text(page)
     print(page)
-    if arguments.save:
-        arguments.save.write_text(page)
     wrong = tally["false certified"] + tally["false refuted"]
     return int(wrong > 0 or tally["undecided far"] >= UNDECIDED_LIMIT * tally["far"])
 
