@@ -94,7 +94,9 @@ def machine_code(
     """
     njit: Any = numba.njit
     typeof: Any = numba.typeof
-    whole = njit(pipeline_class=_WholeCompiler, **OPTIONS)(function)
+    whole = njit(pipeline_class=_WholeCompiler, no_cfunc_wrapper=True, **OPTIONS)(
+        function
+    )
     signature = tuple(typeof(argument) for argument in arguments)
     whole.compile(signature)
     result = whole.overloads[signature]
@@ -115,12 +117,22 @@ def machine_code(
 def part(function: Callable[..., Any]) -> Any:
     """A function for other functions being compiled, in numba's form."""
     njit: Any = numba.njit
-    return njit(
+    made = njit(
         pipeline_class=_PartCompiler,
         no_cpython_wrapper=True,
         no_cfunc_wrapper=True,
         **OPTIONS,
     )(function)
+    choose = made.get_call_template
+
+    def choose_by_type(arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
+        plain: Any = types.unliteral
+        types_of_named = {name: plain(one) for name, one in named.items()}
+        return choose(tuple(map(plain, arguments)), types_of_named)
+
+    # Left to itself numba compiles a function again for every constant it is given.
+    made.get_call_template = choose_by_type
+    return made
 
 
 def apart() -> Any:
