@@ -136,9 +136,9 @@ def brackets(problem: PlanningProblem, rows: Trajectory) -> ClearanceChunk:
     return chunk
 
 
-def shown(lower: FloatArray) -> FloatArray:
+def shown(bounds: FloatArray) -> FloatArray:
     """Bounds where axes meet obstacles mean that they do, not how deep."""
-    return np.maximum(lower, -RADIUS)
+    return np.maximum(bounds, -RADIUS)
 
 
 def by_coal(obstacle: Obstacle, q: FloatArray) -> FloatArray:
@@ -228,7 +228,7 @@ def test_growing_an_obstacle_never_raises_a_lower_bound(shape: str, seed: int) -
     for step in (0.0, 0.2):
         rows = motion_of(rng, 2, step)
         one, two = (brackets(problem_of(o), rows) for o in (small, large))
-        limit = (one.upper if step else shown(one.lower))[:, :N_LINKS]
+        limit = shown(one.upper if step else one.lower)[:, :N_LINKS]
         # Inside a mesh its surface is what is measured: growing moves it away.
         asked = np.full(limit.shape, True) if shape != "mesh" else limit > RADIUS
         assert (shown(two.lower)[:, :N_LINKS] <= limit + PADDING)[asked].all()
