@@ -30,5 +30,9 @@ class FileModel(BaseModel):
     """Base: unknown keys refused, no silent conversion, every number finite."""
 
     model_config = ConfigDict(
-        extra="forbid", strict=True, frozen=True, allow_inf_nan=False
+        extra="forbid",
+        strict=True,
+        frozen=True,
+        allow_inf_nan=False,
+        defer_build=True,  # only the whole file's model is ever used
     )

@@ -32,7 +32,7 @@ _COMMAND: Final = "exact command line"
 class FileModel(BaseModel):
     """Common rules: no unknown keys, nothing changes after it is built."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     def text(self) -> str:
         """The file's text; an undefined number is null, never a pass."""
