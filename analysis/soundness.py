@@ -45,12 +45,16 @@ from vdsm_pin.problem import DesiredPath, PlanningProblem
 from vdsm_pin.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.blocks import sweep
-from vdsm_pin.verification.clearance import BUDGET, prove_clearance
+from vdsm_pin.verification.clearance import (
+    BUDGET,
+    SLACK,
+    new_results,
+    prove_clearance,
+)
+from vdsm_pin.verification.proof.blocks import new_desk, sweep
+from vdsm_pin.verification.proof.culling import new_culling
+from vdsm_pin.verification.proof.terms import Motion, Pairs, Rules, Task
 from vdsm_pin.verification.records import ClearanceChunk, ErrorBox
-from vdsm_pin.verification.search import Motion, Task
-from vdsm_pin.verification.slices import Pairs, Rules
-from vdsm_pin.verification.sweep import BEST, Results, new_desk
 
 FAR: Final = 1e-6
 """From here on a query must be decided; [m]."""
@@ -102,24 +106,6 @@ def _pack(batch: Batch) -> PackedPieces:
     )
 
 
-def _results(n_pairs: int, columns: int) -> Results:
-    best = np.full((n_pairs, BEST), np.inf)
-    best[:, [1, 3, 4]] = 0.0
-    return Results(
-        best=best,
-        counts=np.zeros((n_pairs, 3), np.int64),
-        profile=np.full((1, 2, columns), np.inf),
-        stride=1,
-        limit=np.full(2, np.inf),
-        gap=TOLERANCES.least_bracket,
-        candidates=np.zeros((n_pairs, 5)),
-        tally=np.zeros(2, np.int64),
-        overflow=np.full(2, np.inf),
-        numbers=np.zeros((1, n_pairs, 9)),
-        verdicts=np.zeros((1, n_pairs), np.int64),
-    )
-
-
 def verdicts(batch: Batch) -> Any:
     """The verifier's verdict on each query; 0, 1 or 2, shape (n,)."""
     arm, pieces, n = batch.arm, _pack(batch), batch.size
@@ -134,6 +120,8 @@ def verdicts(batch: Batch) -> Any:
         obstacle_error=0.0,
         pad=TOLERANCES.arithmetic * max(1.0, extent / TOLERANCES.scene_extent),
         goal=TOLERANCES.bracket_gap,
+        gap=TOLERANCES.least_bracket,
+        slack=SLACK,
     )
     own = batch.frame == BASE
     obstacle = np.where(own, np.arange(n), batch.frame).astype(np.int64)
@@ -145,12 +133,13 @@ def verdicts(batch: Batch) -> Any:
     )
     rows = np.ascontiguousarray(batch.rows)
     x0, alpha, theta = rows[:, 0].copy(), rows[:, 1::2].copy(), rows[:, 2::2].copy()
-    results = _results(n, arm.n_links + n)
+    results = new_results(n, arm.n_links + n, 1)
     desk = new_desk(arm.n_links, n, BUDGET)
     # No obstacle is named as such, so that none is culled.
+    culling = new_culling(pieces, arm.n_links, 0, n)
     task, motion = Task(pieces, pairs, rules), Motion(x0, alpha, theta)
-    sweep(task, motion, desk, results, 0, 1, 0, False)
-    return results.verdicts[0]
+    sweep(task, motion, desk, results, culling, 0, 1, False)
+    return results.counts.argmax(axis=1)
 
 
 # ---- the same, as the product is called ----------------------------------------------

@@ -19,7 +19,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from benchmarks.certify import beside, sway
+from benchmarks.certify import NEAR, beside, problem_of, sway
 from benchmarks.common import compare, save, surroundings, timed
 from benchmarks.peers.least_squares import follow
 from vdsm_pin.cables import angles_from_cables, cable_lengths
@@ -27,9 +27,7 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.kinematics import joint_angles, joint_centres
 from vdsm_pin.planner.strategies import strategy
-from vdsm_pin.problem import DesiredPath, PlanningProblem
 from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Scene
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import ErrorBox
@@ -75,11 +73,7 @@ def growing(results: Results) -> None:
         arm = base.manipulator
         centres = joint_centres(arm, *joints(motion))
         lengths = cable_lengths(arm, motion.alpha, motion.theta)
-        point = np.array([3.126, 0.0, 0.0])
-        near = PlanningProblem(
-            "bench", arm, Scene((beside(motion, 3.5e-3),)),
-            DesiredPath(point, point[None]), 3.5e-3, np.eye(4),
-        )  # fmt: skip
+        near = problem_of(arm, [beside(motion, NEAR)], NEAR)
         there = timed(lambda: cable_lengths(arm, *joint_angles(arm, centres)))  # noqa: B023
         back = timed(
             lambda: joint_centres(arm, motion.x0, *angles_from_cables(arm, lengths)),  # noqa: B023

@@ -12,7 +12,13 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
-from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
+from vdsm_pin.geometry.convex import (
+    FlatCylinder,
+    HalfSpacePiece,
+    Hull,
+    Piece,
+    Triangles,
+)
 
 BOX_CORNERS: Final = frozen(
     [[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]
@@ -277,9 +283,9 @@ class Mesh:
             raise InvalidInput(message)
 
     @cached_property
-    def pieces(self) -> tuple[Piece, ...]:
+    def pieces(self) -> Triangles:
         """One hull per triangle."""
-        return tuple(Hull(frozen(corners)) for corners in self.vertices[self.triangles])
+        return Triangles(self.vertices[self.triangles])
 
 
 Obstacle: TypeAlias = Sphere | Capsule | Cylinder | Box | Prism | HalfSpace | Mesh

@@ -19,7 +19,8 @@ from vdsm_pin.geometry.kernels import (
     bracket,
 )
 from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
-from vdsm_pin.geometry.pieces import PackedPieces, coherent_order, pack_pieces
+from vdsm_pin.geometry.ordering import coherent_order
+from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 
 GOAL = 1e-9
 

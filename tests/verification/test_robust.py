@@ -14,7 +14,7 @@ from vdsm_pin.scene import Scene, Sphere
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import HastyProof, is_certified
-from vdsm_pin.verification.coasting import crude_growth
+from vdsm_pin.verification.proof.coasting import crude_growth
 from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.robust import LARGEST, STRETCH, largest_joint_error
 
@@ -102,8 +102,8 @@ def test_many_obstacles_are_culled_and_change_nothing() -> None:
     found = largest_joint_error(problem, rows, ErrorBox())
     assert largest_joint_error(crowded, rows, ErrorBox()) == found
     proof = HastyProof(crowded, rows)
-    profile = proof._results.profile
-    assert (proof.n_intervals - 1) // proof._results.stride < len(profile)
+    results = proof._proving.results
+    assert (proof.n_intervals - 1) // results.stride < results.profile.shape[2]
 
 
 def test_the_crude_growth_is_above_every_exact_one() -> None:

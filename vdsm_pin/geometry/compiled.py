@@ -20,6 +20,7 @@ from typing import Any, Final, TypeVar, cast
 import numpy as np
 
 F = TypeVar("F", bound=Callable[..., Any])
+T = TypeVar("T")
 
 IMPORT: Final = re.compile(rb"^from vdsm_pin\.([\w.]+) import", re.MULTILINE)
 PACKAGE: Final = Path(__file__).parents[1]
@@ -147,6 +148,27 @@ class _Apart:
         return apart()
 
 
+class _Borrowed:
+    """The same value, its arrays without reference counts.
+
+    Compiled code counts the references of every array that it hands on, twice a call,
+    with atomic operations: for a tuple of fifty arrays that costs more than the
+    arithmetic of a short function. Whoever calls from Python holds the arrays until the
+    call returns, so that nothing inside needs to count them. Only for arguments that
+    came from Python, and never to be returned.
+    """
+
+    def __call__(self, value: T) -> T:
+        """The value itself, where Python calls it."""
+        return value
+
+    @cached_property
+    def _numba_type_(self) -> Any:
+        from vdsm_pin.geometry.compiling import borrowed
+
+        return borrowed()
+
+
 def compiled(function: F) -> F:
     """Run a function as machine code, keeping its type.
 
@@ -158,3 +180,4 @@ def compiled(function: F) -> F:
 
 
 apart: Final = _Apart()
+borrowed: Final = _Borrowed()

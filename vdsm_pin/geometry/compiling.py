@@ -9,11 +9,11 @@ over. Here that is done for what Python calls, once.
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numba
 from numba._dynfunc import make_function
-from numba.core import types
+from numba.core import cgutils, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.typing.templates import make_intrinsic_template
@@ -148,4 +148,38 @@ def apart() -> Any:
     template: Any = make_intrinsic_template
     return types.Function(
         template(define, define, "apart", prefer_literal=False, kwargs={})
+    )
+
+
+def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    """An array, or a tuple of whatever holds arrays, that owns nothing."""
+    helpers: Any = cgutils
+    if isinstance(kind, types.Array):
+        array = context.make_array(kind)(context, builder, value=value)
+        array.meminfo = helpers.get_null_value(array.meminfo.type)
+        array.parent = helpers.get_null_value(array.parent.type)
+        return array._getvalue()
+    if isinstance(kind, types.BaseTuple):
+        kinds: list[Any] = list(cast(Any, kind))
+        items: list[Any] = helpers.unpack_tuple(builder, value)
+        stripped = [
+            _without_owner(context, builder, kinds[k], items[k])
+            for k in range(len(items))
+        ]
+        return context.make_tuple(builder, kind, stripped)
+    return value
+
+
+def borrowed() -> Any:
+    """The numba type of the function that takes the owners off its argument."""
+
+    def define(typing_context: Any, value: Any) -> Any:
+        return value(value), generate
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _without_owner(context, builder, signature.args[0], arguments[0])
+
+    template: Any = make_intrinsic_template
+    return types.Function(
+        template(define, define, "borrowed", prefer_literal=False, kwargs={})
     )

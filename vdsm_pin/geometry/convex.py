@@ -4,10 +4,11 @@ The hull of a few points grown by a radius, a flat-ended cylinder, and a half-sp
 sphere, capsule, box, convex prism and triangle are hulls.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TypeAlias, overload
 
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, frozen
 
 
 @dataclass(frozen=True)
@@ -54,3 +55,31 @@ class HalfSpacePiece:
 
 
 Piece: TypeAlias = Hull | FlatCylinder | HalfSpacePiece
+
+
+class Triangles(Sequence[Hull]):
+    """Many triangles; each is made a hull only when it is asked for.
+
+    Args:
+        corners: Shape (n, 3, 3); [m].
+    """
+
+    def __init__(self, corners: FloatArray) -> None:
+        """Keep the corners, read-only."""
+        self.corners = frozen(corners)
+
+    def __len__(self) -> int:
+        """Number of triangles."""
+        return len(self.corners)
+
+    @overload
+    def __getitem__(self, index: int) -> Hull: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> "Triangles": ...
+
+    def __getitem__(self, index: int | slice) -> "Hull | Triangles":
+        """One triangle, or some."""
+        if isinstance(index, slice):
+            return Triangles(self.corners[index])
+        return Hull(self.corners[index])

@@ -14,11 +14,16 @@ from vdsm_pin.geometry.kernels import (
     NORMAL,
     UPPER,
     bracket,
+    piece_support,
+    rounding_radius,
 )
-from vdsm_pin.geometry.pieces import PackedPieces
+from vdsm_pin.geometry.pieces import HALF_SPACE, PackedPieces
 
 STACK: Final = 64
 """Depth of the hierarchy's waiting list: pieces are halved, so 2^60 are enough."""
+
+TURNS: Final = 3
+"""How often `facing` goes from a segment to a box and back."""
 
 
 @compiled
@@ -120,8 +125,53 @@ def obstacle_bracket(
 
 
 @compiled
+def node_support(
+    pieces: PackedPieces, node: int, n: FloatArray, stack: IntArray, point: FloatArray
+) -> float:
+    """Least n.x over all pieces of a node, n of unit length; [m].
+
+    Args:
+        pieces: The scene.
+        node: The node. A half-space has one direction, the negative of its normal,
+            which n is taken to be.
+        n: Shape (3,); [-].
+        stack: Working space, shape (STACK,).
+        point: Working space, shape (3,).
+    """
+    apart()
+    least = np.inf
+    stack[0] = node
+    waiting = 1
+    while waiting > 0:
+        waiting -= 1
+        node = stack[waiting]
+        p = pieces.node_range[node, 0]
+        if pieces.node_range[node, 1] - p == 1:
+            if pieces.kind[p] == HALF_SPACE:
+                return float(-pieces.extent[p])
+            core = piece_support(pieces, p, n[0], n[1], n[2], point)
+            least = min(least, core - rounding_radius(pieces, p))
+            continue
+        left, right = node + 1, pieces.node_right[node]
+        at_left = box_support(pieces, left, n[0], n[1], n[2])
+        at_right = box_support(pieces, right, n[0], n[1], n[2])
+        if at_left > at_right:
+            left, right, at_left, at_right = right, left, at_right, at_left
+        if at_right < least:
+            stack[waiting] = right
+            waiting += 1
+        if at_left < least:
+            stack[waiting] = left
+            waiting += 1
+    return least
+
+
+@compiled
 def facing(pieces: PackedPieces, node: int, points: FloatArray, n: FloatArray) -> bool:
-    """A guess of n towards a node's box: from the nearest point of the first segment.
+    """A guess of n towards a node's box, from the first segment.
+
+    The point of the box nearest to a point of the segment, the point of the segment
+    nearest to that one, and so on: a few turns come near the two nearest points.
 
     Args:
         pieces: The scene.
@@ -130,7 +180,7 @@ def facing(pieces: PackedPieces, node: int, points: FloatArray, n: FloatArray) -
         n: Result, unit vector, shape (3,).
 
     Returns:
-        Whether there is such a direction.
+        Whether there is such a direction; there is none where they seem to meet.
     """
     apart()
     low, high = pieces.node_low[node], pieces.node_high[node]
@@ -139,12 +189,17 @@ def facing(pieces: PackedPieces, node: int, points: FloatArray, n: FloatArray) -
         d = points[1, c] - points[0, c]
         span += d * d
         along += d * (0.5 * (low[c] + high[c]) - points[0, c])
-    t = min(1.0, max(0.0, along / span)) if span > 0.0 else 0.0
     squared = 0.0
-    for c in range(3):
-        at = points[0, c] + t * (points[1, c] - points[0, c])
-        n[c] = 0.5 * (low[c] + high[c]) - at
-        squared += n[c] * n[c]
+    for _ in range(TURNS):
+        t = min(1.0, max(0.0, along / span)) if span > 0.0 else 0.0
+        squared = along = 0.0
+        for c in range(3):
+            d = points[1, c] - points[0, c]
+            at = points[0, c] + t * d
+            inside = min(max(at, low[c]), high[c])
+            n[c] = inside - at
+            squared += n[c] * n[c]
+            along += d * (inside - points[0, c])
     length = sqrt(squared)
     if not 0.0 < length < np.inf:
         return False

@@ -6,12 +6,20 @@ order of the pieces is coherent, so `coherent_order` sorts a mesh's triangles on
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
+from vdsm_pin.geometry.convex import (
+    FlatCylinder,
+    HalfSpacePiece,
+    Hull,
+    Piece,
+    Triangles,
+)
+from vdsm_pin.geometry.ordering import coherent_order
 
 HULL: Final = 0
 CYLINDER: Final = 1
@@ -58,77 +66,137 @@ class PackedPieces(NamedTuple):
     node_high: FloatArray
 
 
-def coherent_order(points: FloatArray) -> IntArray:
-    """An order in which every halved range is compact: a k-d tree's leaves.
-
-    Args:
-        points: Shape (n, 3); [m].
-
-    Returns:
-        Permutation of 0..n-1, shape (n,); ties keep the given order.
-    """
-    order = np.arange(len(points))
-    ranges = [(0, len(points))]
-    while ranges:
-        first, last = ranges.pop()
-        if last - first <= 2:
-            continue
-        part = points[order[first:last]]
-        axis = int(np.argmax(np.ptp(part, axis=0)))
-        order[first:last] = order[first:last][np.argsort(part[:, axis], kind="stable")]
-        middle = (first + last) // 2
-        ranges += [(first, middle), (middle, last)]
-    return order
+def _order(group: Sequence[Piece]) -> IntArray:
+    """The order in which an obstacle's pieces are packed."""
+    if isinstance(group, Triangles):
+        centres = group.corners.mean(axis=1)
+    elif len(group) <= SHORT or not all(isinstance(piece, Hull) for piece in group):
+        return np.arange(len(group))
+    else:
+        hulls = [piece for piece in group if isinstance(piece, Hull)]
+        centres = np.array([hull.points.mean(axis=0) for hull in hulls])
+    return coherent_order(centres) if len(group) > SHORT else np.arange(len(group))
 
 
-def _boxes(pieces: Sequence[Piece]) -> FloatArray:
-    """Lower and upper corners of the pieces' boxes, shape (n, 2, 3); [m]."""
-    boxes = np.zeros((len(pieces), 2, 3))
-    for box, piece in zip(boxes, pieces, strict=True):
+@dataclass
+class _Table:
+    """Pieces as columns, while they are collected."""
+
+    kind: list[int] = field(default_factory=list)
+    radius: list[float] = field(default_factory=list)
+    n_points: list[int] = field(default_factory=list)
+    points: list[FloatArray] = field(default_factory=lambda: [np.zeros((0, 3))])
+    centres: list[FloatArray] = field(default_factory=lambda: [np.zeros((0, 3))])
+    flat: dict[int, FlatCylinder | HalfSpacePiece] = field(default_factory=dict)
+
+    def add_triangles(self, corners: FloatArray) -> None:
+        """Append triangles, corners of shape (n, 3, 3)."""
+        n = len(corners)
+        self.kind += [HULL] * n
+        self.radius += [0.0] * n
+        self.n_points += [3] * n
+        self.points.append(corners.reshape(-1, 3))
+        self.centres.append(corners.mean(axis=1))
+
+    def add(self, piece: Piece) -> None:
+        """Append a piece."""
         if isinstance(piece, Hull):
-            box[0] = piece.points.min(axis=0) - piece.radius
-            box[1] = piece.points.max(axis=0) + piece.radius
-        elif isinstance(piece, FlatCylinder):
+            self.kind.append(HULL)
+            self.radius.append(piece.radius)
+            self.n_points.append(len(piece.points))
+            self.points.append(piece.points)
+            self.centres.append(piece.points.mean(axis=0)[None])
+            return
+        self.flat[len(self.kind)] = piece
+        self.n_points.append(0)
+        if isinstance(piece, FlatCylinder):
+            self.kind.append(CYLINDER)
+            self.radius.append(piece.radius)
+            self.centres.append(piece.centre[None])
+        else:
+            self.kind.append(HALF_SPACE)
+            self.radius.append(0.0)
+            self.centres.append((piece.offset * piece.normal)[None])
+
+
+def _collect(obstacles: Sequence[Sequence[Piece]], orders: list[IntArray]) -> _Table:
+    table = _Table()
+    for group, order in zip(obstacles, orders, strict=True):
+        if isinstance(group, Triangles):
+            table.add_triangles(group.corners[order])
+        else:
+            for k in order:
+                table.add(group[k])
+    return table
+
+
+def _boxes(
+    table: _Table, points: FloatArray, first_point: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper corners of the pieces' boxes, shape (n, 3) each; [m]."""
+    n = len(table.kind)
+    low, high = np.full((n, 3), -np.inf), np.full((n, 3), np.inf)
+    hulls = np.flatnonzero(np.array(table.kind, dtype=np.int64) == HULL)
+    if hulls.size:
+        # The other kinds have no points: hulls follow each other without a gap.
+        start = first_point[hulls]
+        radius = np.array(table.radius)[hulls, None]
+        low[hulls] = np.minimum.reduceat(points, start) - radius
+        high[hulls] = np.maximum.reduceat(points, start) + radius
+    for k, piece in table.flat.items():
+        if isinstance(piece, FlatCylinder):
             # Not sqrt(1 - axis^2): it loses half the digits along the axis.
             across = np.hypot(np.roll(piece.axis, 1), np.roll(piece.axis, 2))
             half = piece.half_length * np.abs(piece.axis) + piece.radius * across
             # A box must hold the solid: half an ulp lost to the square root is given.
             half = half * (1.0 + 4.0 * np.finfo(float).eps)
-            box[0], box[1] = piece.centre - half, piece.centre + half
-        else:
-            box[0], box[1] = -np.inf, np.inf
-    return boxes
+            low[k], high[k] = piece.centre - half, piece.centre + half
+    return low, high
 
 
-def _hierarchy(
-    boxes: FloatArray, offset: int, start: int
-) -> tuple[list[tuple[int, int]], list[int], list[FloatArray]]:
-    """Nodes over one obstacle in depth-first order: ranges, right children, boxes."""
-    ranges: list[tuple[int, int]] = []
-    rights: list[int] = []
-    hulls: list[FloatArray] = []
-    waiting = [(0, len(boxes), -1)]
-    while waiting:
-        first, last, parent = waiting.pop()
-        node = start + len(ranges)
-        if parent >= 0:
-            rights[parent] = node
-        ranges.append((first + offset, last + offset))
-        rights.append(-1)
-        part = boxes[first:last]
-        hulls.append(np.stack([part[:, 0].min(axis=0), part[:, 1].max(axis=0)]))
-        if last - first > 1:
-            middle = (first + last) // 2
-            waiting += [(middle, last, len(ranges) - 1), (first, middle, -1)]
-    return ranges, rights, hulls
+def _levels(n: int) -> list[tuple[IntArray, IntArray, IntArray]]:
+    """Nodes over n pieces, level by level: their numbers, first and last pieces.
+
+    Numbers go depth first: the left child follows its parent, the right one comes
+    after the 2 k - 1 nodes over the k pieces of the left one.
+    """
+    node, first, last = np.zeros(1, np.int64), np.zeros(1, np.int64), np.full(1, n)
+    levels = []
+    while node.size:
+        levels.append((node, first, last))
+        inner = last - first > 1
+        node, first, last = node[inner], first[inner], last[inner]
+        middle = (first + last) // 2
+        node = np.concatenate([node + 1, node + 2 * (middle - first)])
+        first, last = np.concatenate([first, middle]), np.concatenate([middle, last])
+    return levels
 
 
-def _order(group: Sequence[Piece]) -> IntArray:
-    """The order in which an obstacle's pieces are packed."""
-    if len(group) <= SHORT or not all(isinstance(piece, Hull) for piece in group):
-        return np.arange(len(group))
-    hulls = [piece for piece in group if isinstance(piece, Hull)]
-    return coherent_order(np.array([hull.points.mean(axis=0) for hull in hulls]))
+def _fill_tree(
+    nodes: tuple[IntArray, IntArray, FloatArray, FloatArray],
+    root: int,
+    offset: int,
+    boxes: tuple[FloatArray, FloatArray],
+) -> None:
+    """Write the nodes over one obstacle: ranges, right children, boxes.
+
+    Args:
+        nodes: Arrays of all nodes, to be written from `root` on.
+        root: Number of the root.
+        offset: Number of the obstacle's first piece.
+        boxes: Of its pieces, shape (n, 3) each; [m].
+    """
+    ranges, rights, low, high = nodes
+    for node, first, last in reversed(_levels(len(boxes[0]))):
+        at, inner = root + node, last - first > 1
+        ranges[at, 0], ranges[at, 1] = offset + first, offset + last
+        leaf = ~inner
+        low[at[leaf]], high[at[leaf]] = boxes[0][first[leaf]], boxes[1][first[leaf]]
+        at, middle = at[inner], ((first + last) // 2)[inner]
+        left, right = at + 1, at + 2 * (middle - first[inner])
+        rights[at] = right
+        low[at] = np.minimum(low[left], low[right])
+        high[at] = np.maximum(high[left], high[right])
 
 
 def pack_pieces(obstacles: Sequence[Sequence[Piece]]) -> PackedPieces:
@@ -141,53 +209,47 @@ def pack_pieces(obstacles: Sequence[Sequence[Piece]]) -> PackedPieces:
         Flat arrays; empty ones for no obstacle.
     """
     orders = [_order(group) for group in obstacles]
-    obstacles = [
-        [group[k] for k in order]
-        for group, order in zip(obstacles, orders, strict=True)
-    ]
-    pieces = [piece for group in obstacles for piece in group]
-    n = len(pieces)
-    kind, radius, extent = np.zeros(n, np.int64), np.zeros(n), np.zeros(n)
-    centre, axis = np.zeros((n, 3)), np.zeros((n, 3))
-    counts, points = np.zeros(n + 1, np.int64), [np.zeros((0, 3))]
-    for k, piece in enumerate(pieces):
-        if isinstance(piece, Hull):
-            kind[k], radius[k] = HULL, piece.radius
-            centre[k] = piece.points.mean(axis=0)
-            counts[k + 1] = len(piece.points)
-            points.append(piece.points)
-        elif isinstance(piece, FlatCylinder):
-            kind[k], radius[k], extent[k] = CYLINDER, piece.radius, piece.half_length
-            centre[k], axis[k] = piece.centre, piece.axis
-        elif isinstance(piece, HalfSpacePiece):
-            kind[k], extent[k], axis[k] = HALF_SPACE, piece.offset, piece.normal
-            centre[k] = piece.offset * piece.normal
-    sizes = [0, *(len(group) for group in obstacles)]
-    first_piece = np.cumsum(sizes)
-    ranges: list[tuple[int, int]] = []
-    rights: list[int] = []
-    hulls: list[FloatArray] = [np.zeros((0, 2, 3))]
-    roots = []
-    for group, offset in zip(obstacles, first_piece[:-1], strict=True):
-        roots.append(len(ranges))
-        tree = _hierarchy(_boxes(group), int(offset), len(ranges))
-        ranges += tree[0]
-        rights += tree[1]
-        hulls.append(np.array(tree[2]))
-    nodes = np.concatenate(hulls)
+    table = _collect(obstacles, orders)
+    n = len(table.kind)
+    axis, extent = np.zeros((n, 3)), np.zeros(n)
+    points = np.ascontiguousarray(np.concatenate(table.points))
+    first_point = np.cumsum([0, *table.n_points])
+    low, high = _boxes(table, points, first_point)
+    for k, piece in table.flat.items():
+        if isinstance(piece, FlatCylinder):
+            extent[k], axis[k] = piece.half_length, piece.axis
+        else:
+            extent[k], axis[k] = piece.offset, piece.normal
+    sizes = np.array([len(group) for group in obstacles], dtype=np.int64)
+    first_piece = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
+    # A tree over n pieces has 2 n - 1 nodes.
+    root = 2 * first_piece[:-1] - np.arange(len(sizes))
+    n_nodes = int(2 * first_piece[-1] - len(sizes))
+    nodes = (
+        np.zeros((n_nodes, 2), np.int64),
+        np.full(n_nodes, -1, np.int64),
+        np.zeros((n_nodes, 3)),
+        np.zeros((n_nodes, 3)),
+    )
+    single, only = root[sizes == 1], first_piece[:-1][sizes == 1]
+    nodes[0][single, 0], nodes[0][single, 1] = only, only + 1
+    nodes[2][single], nodes[3][single] = low[only], high[only]
+    for k in np.flatnonzero(sizes > 1).tolist():
+        first, last = first_piece[k], first_piece[k + 1]
+        _fill_tree(nodes, root[k], first, (low[first:last], high[first:last]))
     return PackedPieces(
         order=np.concatenate([np.zeros(0, np.int64), *orders]),
-        kind=kind,
-        first_point=np.cumsum(counts),
-        points=np.ascontiguousarray(np.concatenate(points)),
-        radius=radius,
-        centre=centre,
+        kind=np.array(table.kind, dtype=np.int64),
+        first_point=first_point.astype(np.int64),
+        points=points,
+        radius=np.array(table.radius, dtype=np.float64),
+        centre=np.concatenate(table.centres),
         axis=axis,
         extent=extent,
-        first_piece=first_piece.astype(np.int64),
-        root=np.array(roots, dtype=np.int64),
-        node_range=np.array(ranges, dtype=np.int64).reshape(-1, 2),
-        node_right=np.array(rights, dtype=np.int64),
-        node_low=np.ascontiguousarray(nodes[:, 0]),
-        node_high=np.ascontiguousarray(nodes[:, 1]),
+        first_piece=first_piece,
+        root=root,
+        node_range=nodes[0],
+        node_right=nodes[1],
+        node_low=nodes[2],
+        node_high=nodes[3],
     )

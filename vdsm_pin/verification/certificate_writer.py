@@ -23,7 +23,8 @@ from vdsm_pin.scene import Prism
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.clearance import BUDGET, all_pairs, make_task
 from vdsm_pin.verification.limits import extremes
-from vdsm_pin.verification.recording import (
+from vdsm_pin.verification.proof.blocks import new_desk
+from vdsm_pin.verification.proof.recording import (
     CLAIM,
     FIRST,
     LAST,
@@ -31,10 +32,8 @@ from vdsm_pin.verification.recording import (
     RECORD,
     record,
 )
+from vdsm_pin.verification.proof.terms import BASE, Motion, Task
 from vdsm_pin.verification.records import Verdict, Verification
-from vdsm_pin.verification.search import Motion, Task
-from vdsm_pin.verification.slices import BASE
-from vdsm_pin.verification.sweep import new_desk
 
 CHUNK: Final = 512
 """Intervals recorded at once."""

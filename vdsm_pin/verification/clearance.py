@@ -13,11 +13,42 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
+from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.blocks import sweep
 from vdsm_pin.verification.link_clearance import arithmetic_pad
+from vdsm_pin.verification.proof.blocks import Desk, forget, new_desk, sweep
+from vdsm_pin.verification.proof.culling import Culling, new_culling
+from vdsm_pin.verification.proof.heaps import KEY, PAIR, SLICE
+from vdsm_pin.verification.proof.narrowing import narrow
+from vdsm_pin.verification.proof.results import (
+    AT_LOWER,
+    AT_UPPER,
+    BEST,
+    HELD,
+    LOW,
+    OTHER,
+    SLICES,
+    TALLY,
+    TIME,
+    UP,
+    Candidates,
+    Dense,
+    Results,
+)
+from vdsm_pin.verification.proof.rows import BLOCK
+from vdsm_pin.verification.proof.search import Witnesses
+from vdsm_pin.verification.proof.terms import (
+    BASE,
+    LINKS,
+    OBSTACLES,
+    Motion,
+    Pairs,
+    Rules,
+    Task,
+)
+from vdsm_pin.verification.proof.witnesses import place_best
 from vdsm_pin.verification.records import (
     ClearanceChunk,
     ClearanceProfile,
@@ -25,25 +56,15 @@ from vdsm_pin.verification.records import (
     ErrorBox,
     Pair,
 )
-from vdsm_pin.verification.search import Motion, Task
-from vdsm_pin.verification.slices import BASE, Pairs, Rules
-from vdsm_pin.verification.sweep import (
-    AT_LOWER,
-    AT_UPPER,
-    BEST,
-    BLOCK,
-    TIME,
-    Desk,
-    Results,
-    narrow,
-    new_desk,
-)
 
 BUDGET: Final = 20_000
 """Most slices of one interval and pair."""
 
 CANDIDATES: Final = 65_536
-"""Most intervals kept for narrowing the least bracket."""
+"""Most blocks, and then intervals, kept for narrowing the least bracket."""
+
+SLACK: Final = 0.02
+"""How wide a bracket may be, as a part of the clearance."""
 
 CHUNK_VALUES: Final = 1_000_000
 """Most (interval, pair) values held at once for the sinks."""
@@ -66,19 +87,22 @@ def all_pairs(problem: PlanningProblem) -> tuple[Pair, ...]:
 
 def _packed_pairs(problem: PlanningProblem) -> Pairs:
     """The same for the kernels: the axis of link i is obstacle n_obstacles + i."""
-    n_obstacles = len(problem.scene.obstacles)
-    index = {name: k for k, name in enumerate(problem.scene.names)}
-    rows = []
-    for pair in all_pairs(problem):
-        if pair.obstacle:
-            needed = problem.required_clearance
-            rows.append((pair.link - 1, index[pair.obstacle], BASE, needed))
-        else:
-            i, needed = pair.link - 1, problem.required_self_clearance
-            rows.append((pair.other_link - 1, n_obstacles + i, i, needed))
-    table = np.array(rows, dtype=float).reshape(-1, 4)
-    link, obstacle, frame = np.ascontiguousarray(table[:, :3].T.astype(np.int64))
-    return Pairs(link, obstacle, frame, np.ascontiguousarray(table[:, 3]))
+    n_links, n_obstacles = problem.manipulator.n_links, len(problem.scene.obstacles)
+    first, second = np.triu_indices(n_links, k=2)
+    n_outer = n_links * n_obstacles
+    return Pairs(
+        link=np.concatenate([np.tile(np.arange(n_links), n_obstacles), second]),
+        obstacle=np.concatenate(
+            [np.repeat(np.arange(n_obstacles), n_links), n_obstacles + first]
+        ),
+        frame=np.concatenate([np.full(n_outer, BASE), first]),
+        required=np.concatenate(
+            [
+                np.full(n_outer, problem.required_clearance),
+                np.full(len(first), problem.required_self_clearance),
+            ]
+        ),
+    )
 
 
 def pack_scene(problem: PlanningProblem) -> PackedPieces:
@@ -96,17 +120,19 @@ def make_task(
     problem: PlanningProblem, errors: ErrorBox, pieces: PackedPieces | None = None
 ) -> Task:
     """What the kernels need to know of a problem."""
-    arm = problem.manipulator
+    arm, packed = problem.manipulator, pieces or pack_scene(problem)
     rules = Rules(
         lengths=np.array(arm.link_lengths),
         radius=float(arm.link_radius),
         joint_error=float(errors.joint),
         base_error=float(errors.base),
         obstacle_error=float(errors.obstacle),
-        pad=float(arithmetic_pad(problem)),
+        pad=arithmetic_pad(problem, packed),
         goal=TOLERANCES.bracket_gap,
+        gap=TOLERANCES.least_bracket,
+        slack=SLACK,
     )
-    return Task(pieces or pack_scene(problem), _packed_pairs(problem), rules)
+    return Task(packed, _packed_pairs(problem), rules)
 
 
 @dataclass(frozen=True)
@@ -116,7 +142,7 @@ class ClearanceProof:
     Args:
         pairs: Every pair.
         counts: Intervals by verdict, shape (n_pairs, 3).
-        best: Least bounds of each pair, in the layout of `sweep`, (n_pairs, BEST).
+        best: Least bounds of each pair, in the layout of `results`, (n_pairs, BEST).
         profile: Brackets along the motion.
         slices: Slices tried beyond one per interval and pair.
     """
@@ -128,57 +154,123 @@ class ClearanceProof:
     slices: int
 
 
-def _new_results(
-    problem: PlanningProblem, n_pairs: int, n_intervals: int, dense: int
+def new_results(
+    n_pairs: int, columns: int, n_intervals: int, values: int = PROFILE_VALUES
 ) -> Results:
-    columns = problem.manipulator.n_links + len(problem.scene.obstacles)
-    stride = -(-n_intervals * columns * 2 // PROFILE_VALUES)
+    """Where a sweep writes, with nothing found yet and no dense rows.
+
+    Args:
+        n_pairs: Number of pairs.
+        columns: Links and obstacles.
+        n_intervals: Of the motion.
+        values: Most values of its profile.
+    """
+    stride = -(-n_intervals * columns * 2 // values)
     n_bins = -(-n_intervals // stride)
     best = np.full((n_pairs, BEST), np.inf)
     best[:, [AT_LOWER, AT_UPPER, TIME]] = 0.0
-    wanted = (dense, n_pairs) if dense else (0, 0)
     return Results(
         best=best,
         counts=np.zeros((n_pairs, 3), np.int64),
-        profile=np.full((n_bins, 2, columns), np.inf),
+        profile=np.full((2, columns, n_bins), np.inf),
         stride=stride,
         limit=np.full(2, np.inf),
-        gap=TOLERANCES.least_bracket,
-        candidates=np.zeros((CANDIDATES, 5)),
-        tally=np.zeros(2, np.int64),
+        candidates=_room(CANDIDATES),
         overflow=np.full(2, np.inf),
-        numbers=np.zeros((*wanted, 9)),
-        verdicts=np.zeros(wanted, np.int64),
+        tally=np.zeros(TALLY, np.int64),
+        dense=_dense_rows(0, n_pairs),
     )
 
 
-def _chunk(results: Results, task: Task, first: int, count: int) -> ClearanceChunk:
-    numbers = results.numbers[:count].copy()
+def _room(size: int) -> Candidates:
+    numbers = (np.zeros(size, np.int64) for _ in range(3))
+    return Candidates(np.zeros(size), *numbers)
+
+
+def _dense_rows(size: int, n_pairs: int) -> Dense:
+    shape = (size, n_pairs)
+    return Dense(
+        lower=np.zeros(shape),
+        upper=np.zeros(shape),
+        time=np.zeros(shape),
+        verdict=np.zeros(shape, np.int64),
+        own=np.zeros((*shape, 3)),
+        other=np.zeros((*shape, 3)),
+    )
+
+
+@dataclass(frozen=True)
+class _Proving:
+    """One problem and motion, and the working space of their proof."""
+
+    task: Task
+    motion: Motion
+    desk: Desk
+    results: Results
+    culling: Culling
+    n_intervals: int
+
+    def sweep(self, results: Results, first: int, last: int) -> None:
+        """Judge some intervals."""
+        sweep(
+            self.task,
+            self.motion,
+            self.desk,
+            results,
+            self.culling,
+            first,
+            last,
+            False,
+        )
+
+
+def _chunk(proving: _Proving, dense: Dense, first: int, count: int) -> ClearanceChunk:
+    own, other = dense.own[:count], dense.other[:count]
     # In a pair of links the sweep moves the second one against the first.
-    swapped = np.flatnonzero(task.pairs.frame != BASE)
-    numbers[:, swapped, 3:] = np.roll(numbers[:, swapped, 3:], 3, axis=2)
-    columns = [frozen(numbers[..., c]) for c in range(3)]
+    swapped = (proving.task.pairs.frame != BASE)[None, :, None]
     return ClearanceChunk(
         first_interval=first,
-        lower=columns[0],
-        upper=columns[1],
-        time=columns[2],
-        verdict=frozen(results.verdicts[:count], np.int64),
-        link_point=frozen(numbers[..., 3:6]),
-        other_point=frozen(numbers[..., 6:9]),
+        # No interval is worse than what narrowing proved of all of them.
+        lower=frozen(np.maximum(dense.lower[:count], proving.results.best[:, LOW])),
+        upper=frozen(dense.upper[:count]),
+        time=frozen(dense.time[:count]),
+        verdict=frozen(dense.verdict[:count], np.int64),
+        link_point=frozen(np.where(swapped, other, own)),
+        other_point=frozen(np.where(swapped, own, other)),
     )
 
 
 def _profile(problem: PlanningProblem, results: Results) -> ClearanceProfile:
-    n_links = problem.manipulator.n_links
-    low, high = results.profile[:, 0], results.profile[:, 1]
-    first = np.arange(len(low)) * results.stride
+    n_links, profile = problem.manipulator.n_links, results.profile
+    profile.setflags(write=False)
+    first = np.arange(profile.shape[2]) * results.stride
     return ClearanceProfile(
-        link_lower=frozen(low[:, :n_links]),
-        link_upper=frozen(high[:, :n_links]),
-        obstacle_lower=frozen(low[:, n_links:]),
-        obstacle_upper=frozen(high[:, n_links:]),
+        link_lower=profile[0, :n_links].T,
+        link_upper=profile[1, :n_links].T,
+        obstacle_lower=profile[0, n_links:].T,
+        obstacle_upper=profile[1, n_links:].T,
         first_interval=frozen(first, np.int64),
+    )
+
+
+def _proving(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    errors: ErrorBox,
+    pieces: PackedPieces | None = None,
+    values: int = PROFILE_VALUES,
+) -> _Proving:
+    task = make_task(problem, errors, pieces)
+    n_pairs, n_links = task.pairs.link.size, problem.manipulator.n_links
+    n_intervals = max(1, trajectory.n_samples - 1)
+    n_obstacles = len(problem.scene.obstacles)
+    return _Proving(
+        task=task,
+        motion=Motion(trajectory.x0, trajectory.alpha, trajectory.theta),
+        desk=new_desk(n_links, n_pairs, BUDGET),
+        results=new_results(n_pairs, n_links + n_obstacles, n_intervals, values),
+        culling=new_culling(task.pieces, n_links, n_obstacles, n_pairs),
+        n_intervals=n_intervals,
     )
 
 
@@ -187,6 +279,7 @@ def prove_clearance(
     trajectory: Trajectory,
     errors: ErrorBox,
     sinks: Sequence[ClearanceSink] = (),
+    pieces: PackedPieces | None = None,
 ) -> ClearanceProof:
     """Bracket the clearance of every pair over every interval.
 
@@ -194,62 +287,106 @@ def prove_clearance(
         problem: Arm, scene, required clearances.
         trajectory: The motion; one row counts as an interval without motion.
         errors: The proof covers every motion within it.
-        sinks: Receive the brackets in chunks, in order.
+        sinks: Receive the brackets in chunks, in order, once all is proved.
+        pieces: `pack_scene(problem)`, where it is known already.
 
     Returns:
         The proof, its least brackets narrowed.
     """
-    task = make_task(problem, errors)
-    pairs, n_pairs = all_pairs(problem), task.pairs.link.size
-    motion = Motion(trajectory.x0, trajectory.alpha, trajectory.theta)
-    n_intervals = max(1, trajectory.n_samples - 1)
-    length = CHUNK_VALUES // max(1, n_pairs) // BLOCK * BLOCK
-    length = min(CHUNK, n_intervals, max(BLOCK, length))
-    results = _new_results(problem, n_pairs, n_intervals, length if sinks else 0)
-    desk = new_desk(problem.manipulator.n_links, n_pairs, BUDGET)
-    n_obstacles = len(problem.scene.obstacles)
-    for first in range(0, n_intervals, length):
-        last = min(first + length, n_intervals)
-        sweep(task, motion, desk, results, first, last, n_obstacles, False)
-        for sink in sinks:
-            sink(_chunk(results, task, first, last - first))
-    for group in range(2):
-        _narrow(task, motion, desk, results, group)
+    proving = _proving(problem, trajectory, errors, pieces)
+    results = proving.results
+    proving.sweep(results, 0, proving.n_intervals)
+    _merge_far(problem, trajectory, proving)
+    for group in (OBSTACLES, LINKS):
+        _narrow(proving, group)
+    if sinks:
+        _send(proving, sinks)
+    order = np.lexsort((results.best[:, TIME], results.best[:, AT_UPPER]))
+    place_best(proving.task, proving.motion, proving.desk.ends, results.best, order)
     return ClearanceProof(
-        pairs=pairs,
+        pairs=all_pairs(problem),
         counts=frozen(results.counts, np.int64),
         best=frozen(results.best),
         profile=_profile(problem, results),
-        slices=int(results.tally[1]),
+        slices=int(results.tally[SLICES]),
     )
 
 
-def _narrow(
-    task: Task, motion: Motion, desk: Desk, results: Results, group: int
+def _merge_far(
+    problem: PlanningProblem, trajectory: Trajectory, proving: _Proving
 ) -> None:
-    """Narrow the least bracket over the obstacles (group 0) or over the links (1)."""
-    mine = (task.pairs.frame != BASE) == bool(group)
-    if not mine.any():
+    """Bring what culling settled to the results of the pairs."""
+    far, best, arm = proving.culling, proving.results.best, problem.manipulator
+    size = far.settled.size
+    proving.results.counts[:size, 0] += far.settled.T.ravel()
+    mine, lower, upper = best[:size], far.lower.T.ravel(), far.upper.T.ravel()
+    better = lower < mine[:, LOW]
+    mine[better, LOW] = lower[better]
+    mine[better, AT_LOWER] = far.at_lower.T.ravel()[better]
+    found = np.flatnonzero(upper < mine[:, UP])
+    at, link = far.at_upper.T.ravel()[found], found % arm.n_links
+    rows = (trajectory.x0[at], trajectory.alpha[at], trajectory.theta[at])
+    start = joint_centres(arm, *rows)[np.arange(len(at)), link]
+    point = far.point.T[found // arm.n_links]
+    gap = np.linalg.norm(point - start, axis=1)
+    mine[found, UP] = gap - arm.link_radius + proving.task.rules.pad
+    mine[found, AT_UPPER], mine[found, TIME] = at, 0.0
+    mine[found, OTHER:] = point
+
+
+def _narrow(proving: _Proving, group: int) -> None:
+    """Narrow the least bracket over the obstacles or over the links."""
+    task, results = proving.task, proving.results
+    mine = (task.pairs.frame == BASE) == (group == OBSTACLES)
+    held, n = results.candidates, results.tally[HELD]
+    near = np.flatnonzero(mine[held.pair[:n]])
+    near = near[held.lower[near] < results.limit[group] - task.rules.gap]
+    if not near.size:
         return
-    heap = np.zeros((int(results.tally[0]) + BUDGET, 5))
-    witnesses = np.zeros((len(mine), 10))
-    witnesses[:, [0, 9]] = np.inf
-    witnesses[0, 9] = results.limit[group]
-    count = narrow(task, motion, desk, results, group, heap, witnesses)
-    if not count:
-        return
-    results.limit[group] = witnesses[:, 9].min()
-    least = np.full(len(mine), results.limit[group] - results.gap)
-    np.minimum.at(least, heap[:count, 2].astype(np.int64), heap[:count, 0])
-    least = np.minimum(least, results.overflow[group])
-    of_candidates = results.candidates[: results.tally[0], 2].astype(np.int64)
-    touched = np.zeros(len(mine), bool)
-    touched[of_candidates[mine[of_candidates]]] = True
-    if group == 0:
+    # The least first, since it lowers the limit most; then block by block.
+    order = near[np.lexsort((held.pair[near], held.first[near]))]
+    least = np.argmin(held.lower[order])
+    order = np.concatenate([order[[least]], np.delete(order, least)])
+    n_pairs = len(mine)
+    found = Witnesses(
+        upper=np.full(n_pairs, np.inf),
+        interval=np.zeros(n_pairs, np.int64),
+        time=np.zeros(n_pairs),
+        points=np.zeros((n_pairs, 6)),
+        instant=np.full(n_pairs, np.inf),
+    )
+    heap = np.zeros((CANDIDATES + BUDGET, SLICE))
+    again = results._replace(counts=np.zeros_like(results.counts))
+    count = narrow(task, proving.motion, proving.desk, again, group, order, heap, found)
+    proved = np.full(n_pairs, results.limit[group] - task.rules.gap)
+    np.minimum.at(proved, heap[:count, PAIR].astype(np.int64), heap[:count, KEY])
+    proved = np.minimum(proved, results.overflow[group])[mine]
+    results.best[mine, LOW] = np.maximum(results.best[mine, LOW], proved)
+    if group == OBSTACLES:
         # Every interval keeps what the narrowing proved of all of them.
-        lower = results.profile[:, 0]
-        np.maximum(lower, least[mine].min(), out=lower)
-    results.best[touched, 0] = np.maximum(results.best[touched, 0], least[touched])
+        lower = results.profile[0]
+        np.maximum(lower, proved.min(), out=lower)
+
+
+def _send(proving: _Proving, sinks: Sequence[ClearanceSink]) -> None:
+    """Sweep once more, closely and for the sinks, now that the least is known."""
+    n_intervals, n_pairs = proving.n_intervals, proving.task.pairs.link.size
+    length = CHUNK_VALUES // max(1, n_pairs) // BLOCK * BLOCK
+    length = min(CHUNK, n_intervals, max(BLOCK, length))
+    again = proving.results._replace(
+        best=proving.results.best.copy(),
+        counts=np.zeros((n_pairs, 3), np.int64),
+        profile=np.full_like(proving.results.profile, np.inf),
+        candidates=_room(0),
+        tally=np.zeros(TALLY, np.int64),
+        dense=_dense_rows(length, n_pairs),
+    )
+    for first in range(0, n_intervals, length):
+        last = min(first + length, n_intervals)
+        proving.sweep(again, first, last)
+        chunk = _chunk(proving, again.dense, first, last - first)
+        for sink in sinks:
+            sink(chunk)
 
 
 class HastyProof:
@@ -261,24 +398,23 @@ class HastyProof:
     """
 
     def __init__(self, problem: PlanningProblem, trajectory: Trajectory) -> None:
-        self._problem, self._pieces = problem, pack_scene(problem)
-        self._motion = Motion(trajectory.x0, trajectory.alpha, trajectory.theta)
-        self.n_intervals = max(1, trajectory.n_samples - 1)
         # Nobody asks for a profile: all intervals share its one bin.
-        results = _new_results(problem, len(all_pairs(problem)), 1, 0)
-        self._results = results._replace(stride=self.n_intervals)
+        self._proving = _proving(problem, trajectory, ErrorBox(), values=1)
+        self._problem = problem
+        self.n_intervals = self._proving.n_intervals
 
     def holds(self, errors: ErrorBox, first: int, last: int) -> bool:
         """Whether every interval from `first` to below `last` is proved.
 
         Stops at the first that is not.
         """
-        task = make_task(self._problem, errors, self._pieces)
-        arm, n_obstacles = self._problem.manipulator, len(self._problem.scene.obstacles)
+        known = self._proving
+        task = make_task(self._problem, errors, known.task.pieces)
         # Pairs that remember nothing: the answer depends on the question alone.
-        desk = new_desk(arm.n_links, task.pairs.link.size, BUDGET)
-        args = task, self._motion, desk, self._results, first, last, n_obstacles, True
-        return bool(sweep(*args))
+        forget(known.desk.planes)
+        known.results.limit[:] = np.inf
+        args = task, known.motion, known.desk, known.results, known.culling
+        return bool(sweep(*args, first, last, True))
 
 
 def is_certified(

@@ -9,30 +9,27 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.links import link_clearances
-from vdsm_pin.geometry.pieces import pack_pieces
+from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.scene import Mesh
 from vdsm_pin.tolerances import TOLERANCES
 
 
-def arithmetic_pad(problem: PlanningProblem) -> float:
+def arithmetic_pad(problem: PlanningProblem, pieces: PackedPieces) -> float:
     """Bound of all rounding in one clearance evaluation for this problem; [m].
 
     `TOLERANCES.arithmetic` holds within `TOLERANCES.scene_extent`; rounding grows in
     proportion beyond it.
+
+    Args:
+        problem: The arm.
+        pieces: The scene.
     """
     arm = problem.manipulator
-    sizes = [arm.total_length, *np.abs(arm.base_range)]
-    for obstacle in problem.scene.obstacles:
-        for piece in obstacle.pieces:
-            sizes += [float(np.abs(value).max()) for value in _numbers(piece)]
-    return TOLERANCES.arithmetic * max(1.0, float(max(sizes)) / TOLERANCES.scene_extent)
-
-
-def _numbers(piece: object) -> list[FloatArray]:
-    """The lengths and coordinates that a piece is made of; [m]."""
-    names = ("points", "centre", "half_length", "radius", "offset")
-    return [np.asarray(getattr(piece, n)) for n in names if hasattr(piece, n)]
+    largest = max(arm.total_length, *np.abs(arm.base_range))
+    for values in (pieces.points, pieces.centre, pieces.radius, pieces.extent):
+        largest = max(largest, np.abs(values).max(initial=0.0))
+    return TOLERANCES.arithmetic * max(1.0, float(largest) / TOLERANCES.scene_extent)
 
 
 def link_clearance(problem: PlanningProblem) -> Callable[[FloatArray], FloatArray]:
@@ -49,7 +46,7 @@ def link_clearance(problem: PlanningProblem) -> Callable[[FloatArray], FloatArra
     obstacles = problem.scene.obstacles
     pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
     closed = np.array([float(isinstance(o, Mesh) and o.watertight) for o in obstacles])
-    radius, pad = problem.manipulator.link_radius, arithmetic_pad(problem)
+    radius, pad = problem.manipulator.link_radius, arithmetic_pad(problem, pieces)
 
     def clearances(centres: FloatArray) -> FloatArray:
         rows = np.ascontiguousarray(centres, dtype=np.float64)

@@ -18,9 +18,9 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import HastyProof, prove_clearance
 from vdsm_pin.verification.counterexample import Search, moments_of
+from vdsm_pin.verification.proof.results import LOW
+from vdsm_pin.verification.proof.terms import UNDECIDED
 from vdsm_pin.verification.records import ErrorBox
-from vdsm_pin.verification.search import UNDECIDED
-from vdsm_pin.verification.sweep import LOW
 
 LARGEST: Final = float(np.deg2rad(45.0))
 """Errors beyond this are not looked at; [rad]."""

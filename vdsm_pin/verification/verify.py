@@ -22,6 +22,14 @@ from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.clearance_check import check_clearance
 from vdsm_pin.verification.counterexample import find_counterexamples
 from vdsm_pin.verification.limits import check_limits
+from vdsm_pin.verification.proof.results import (
+    AT_UPPER,
+    LOW,
+    OTHER,
+    OWN,
+    TIME,
+    UP,
+)
 from vdsm_pin.verification.records import (
     Check,
     ClearanceChunk,
@@ -32,14 +40,6 @@ from vdsm_pin.verification.records import (
     Verification,
 )
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
-from vdsm_pin.verification.sweep import (
-    AT_UPPER,
-    LOW,
-    OTHER,
-    OWN,
-    TIME,
-    UP,
-)
 from vdsm_pin.verification.tip import check_tip
 
 CLOSEST: Final = 10

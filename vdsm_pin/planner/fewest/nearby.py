@@ -13,7 +13,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Piece
-from vdsm_pin.geometry.pieces import coherent_order
+from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.planner.fewest.cores import blocked_by, cores_of
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem

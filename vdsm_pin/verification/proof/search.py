@@ -5,49 +5,35 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from vdsm_pin.geometry.arm import bends_and_drifts, place_between
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import BRACKET, LOWER, NEAR, UPPER
-from vdsm_pin.geometry.pieces import PackedPieces
-from vdsm_pin.verification.slices import Ends, Pairs, Rules, Space, slice_bound
+from vdsm_pin.verification.proof.heaps import (
+    END,
+    INTERVAL,
+    KEY,
+    PAIR,
+    SLICE,
+    START,
+    pop,
+    push,
+)
+from vdsm_pin.verification.proof.slices import Ends, Space, slice_bound
+from vdsm_pin.verification.proof.terms import (
+    CERTIFIED,
+    REFUTED,
+    UNDECIDED,
+    Motion,
+    Task,
+)
 
-CERTIFIED: Final = 0
-REFUTED: Final = 1
-UNDECIDED: Final = 2
-"""Verdicts as the chunks number them."""
-
-KEY: Final = 0
-INTERVAL: Final = 1
-PAIR: Final = 2
-START: Final = 3
-END: Final = 4
-SLICE: Final = 5
-"""Layout of a slice in a heap: lower bound, interval, pair, start, end."""
+MET: Final = 0
+WHEN: Final = 1
+INSTANT: Final = 2
+"""Layout of a witness: least upper bound, its time, least bound of one instant."""
 
 SHORTEST: Final = 2.0**-30
 """Shortest slice, in parts of an interval."""
-
-
-class Motion(NamedTuple):
-    """Rows of joint values.
-
-    Args:
-        x0: Shape (n_rows,); [m].
-        alpha: Shape (n_rows, N); [rad].
-        theta: Shape (n_rows, N); [rad].
-    """
-
-    x0: FloatArray
-    alpha: FloatArray
-    theta: FloatArray
-
-
-class Task(NamedTuple):
-    """Everything that stays the same while a motion is judged."""
-
-    pieces: PackedPieces
-    pairs: Pairs
-    rules: Rules
 
 
 class Witness(NamedTuple):
@@ -62,50 +48,31 @@ class Witness(NamedTuple):
     points: FloatArray
 
 
+class Witnesses(NamedTuple):
+    """The least upper bounds that `tighten` met, of every pair.
+
+    Args:
+        upper: Least upper bounds, shape (n_pairs,); [m].
+        interval: Where they were met, shape (n_pairs,).
+        time: When in that interval, shape (n_pairs,).
+        points: Core points of the link and of the partner, shape (n_pairs, 6); [m].
+        instant: Least bounds proved for one instant, shape (n_pairs,); [m].
+    """
+
+    upper: FloatArray
+    interval: IntArray
+    time: FloatArray
+    points: FloatArray
+    instant: FloatArray
+
+
 @compiled
 def new_witness() -> Witness:
     """A witness of nothing: infinite bounds."""
     apart()
     value = np.zeros(3)
-    value[0] = value[2] = np.inf
+    value[MET] = value[INSTANT] = np.inf
     return Witness(value, np.zeros(6))
-
-
-@compiled
-def push(heap: FloatArray, count: int, row: FloatArray) -> int:
-    """Add a slice to a heap of `count` slices; returns the new count."""
-    apart()
-    at = count
-    while at > 0:
-        parent = (at - 1) // 2
-        if heap[parent, KEY] <= row[KEY]:
-            break
-        heap[at] = heap[parent]
-        at = parent
-    heap[at] = row
-    return count + 1
-
-
-@compiled
-def pop(heap: FloatArray, count: int, row: FloatArray) -> int:
-    """Take the slice of the least bound; returns the new count."""
-    apart()
-    row[:] = heap[0]
-    count -= 1
-    last = heap[count].copy()
-    at = 0
-    while True:
-        child = 2 * at + 1
-        if child >= count:
-            break
-        if child + 1 < count and heap[child + 1, KEY] < heap[child, KEY]:
-            child += 1
-        if last[KEY] <= heap[child, KEY]:
-            break
-        heap[at] = heap[child]
-        at = child
-    heap[at] = last
-    return count
 
 
 @compiled
@@ -159,11 +126,11 @@ def examine(
     instant[START] = instant[END] = t
     bound_between(task, motion, ends, space, instant)
     upper = space.out[UPPER] - task.rules.radius + task.rules.pad
-    if upper < witness.value[0]:
-        witness.value[0], witness.value[1] = upper, t
+    if upper < witness.value[MET]:
+        witness.value[MET], witness.value[WHEN] = upper, t
         for c in range(NEAR, BRACKET):
             witness.points[c - NEAR] = space.out[c]
-    witness.value[2] = min(witness.value[2], instant[KEY])
+    witness.value[INSTANT] = min(witness.value[INSTANT], instant[KEY])
     return float(instant[KEY])
 
 
@@ -228,12 +195,12 @@ def resolve(
         if heap[0, KEY] >= required:
             verdict = CERTIFIED
             break
-        if witness.value[0] < required:
+        if witness.value[MET] < required:
             verdict = REFUTED
             break
         # No slice can prove more than its instants: there is nothing to hope for where
         # they fall short, or where slices already prove as much but for rounding.
-        least = witness.value[2]
+        least = witness.value[INSTANT]
         if least < required or least - heap[0, KEY] <= rounding:
             verdict = UNDECIDED
             break
@@ -260,8 +227,8 @@ def tighten(
     space: Space,
     heap: FloatArray,
     count: int,
-    gap: float,
-    witnesses: FloatArray,
+    limit: float,
+    witnesses: Witnesses,
 ) -> int:
     """Split the slices of the least bounds until the bracket of the least is narrow.
 
@@ -272,20 +239,17 @@ def tighten(
         space: Working space.
         heap: A heap of slices with room for more: the budget.
         count: Slices in it.
-        gap: Width of the bracket at which to stop; [m].
-        witnesses: One row per pair: least upper bound, its interval, its time, core
-            points (6), least instant bound; updated; shape (n_pairs, 10).
+        limit: Least upper bound met before; [m].
+        witnesses: Updated.
 
     Returns:
         Number of slices in the heap; the first is the least bound.
     """
     apart()
     row = np.zeros(SLICE)
-    least = np.inf
-    for pair in range(witnesses.shape[0]):
-        least = min(least, witnesses[pair, 9])
+    least = limit
     while count > 0 and count + 2 <= heap.shape[0]:
-        if heap[0, KEY] >= least - gap or least < 0.0:
+        if heap[0, KEY] >= least - task.rules.gap or least < 0.0:
             break
         count = pop(heap, count, row)
         if row[END] - row[START] <= SHORTEST:
@@ -294,12 +258,13 @@ def tighten(
         witness = new_witness()
         middle = 0.5 * (row[START] + row[END])
         examine(task, motion, ends, space, row, middle, witness)
-        least = min(least, witness.value[2])
-        keep = witnesses[int(row[PAIR])]
-        keep[9] = min(keep[9], witness.value[2])
-        if witness.value[0] < keep[0]:
-            keep[0], keep[1], keep[2] = witness.value[0], row[INTERVAL], middle
-            for c in range(6):
-                keep[3 + c] = witness.points[c]
+        least = min(least, witness.value[INSTANT])
+        pair = int(row[PAIR])
+        witnesses.instant[pair] = min(witnesses.instant[pair], witness.value[INSTANT])
+        if witness.value[MET] < witnesses.upper[pair]:
+            witnesses.upper[pair] = witness.value[MET]
+            witnesses.interval[pair] = int(row[INTERVAL])
+            witnesses.time[pair] = middle
+            witnesses.points[pair] = witness.points
         count = split(task, motion, ends, space, row, heap, count)
     return count

@@ -5,30 +5,13 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.compiled import apart, compiled
+from vdsm_pin.geometry.compiled import apart, borrowed, compiled
 from vdsm_pin.geometry.kernels import NEAR, NORMAL
-from vdsm_pin.verification.search import (
-    CERTIFIED,
-    END,
-    INTERVAL,
-    KEY,
-    PAIR,
-    SLICE,
-    START,
-    Motion,
-    Task,
-    bound_between,
-    new_witness,
-    resolve,
-)
-from vdsm_pin.verification.slices import (
-    losses,
-    node_bound,
-    obstacle_support,
-    piece_bound,
-    reach_along,
-)
-from vdsm_pin.verification.sweep import Desk
+from vdsm_pin.verification.proof.blocks import Desk
+from vdsm_pin.verification.proof.heaps import END, INTERVAL, KEY, PAIR, SLICE, START
+from vdsm_pin.verification.proof.search import bound_between, new_witness, resolve
+from vdsm_pin.verification.proof.slices import leaf_bound, node_bound, plane_bound
+from vdsm_pin.verification.proof.terms import CERTIFIED, Motion, Task
 
 FIRST: Final = 4
 LAST: Final = 5
@@ -40,25 +23,19 @@ last) counted from the obstacle's first, n (3), the clearance it proves."""
 
 
 @compiled
-def _claim(
-    task: Task, desk: Desk, row: FloatArray, first: int, last: int, n: FloatArray
-) -> float:
-    """Clearance that one plane proves of the pieces [first, last) over a slice."""
-    apart()
-    pair = int(row[PAIR])
+def _claim(task: Task, desk: Desk, row: FloatArray, node: int, n: FloatArray) -> float:
+    """Clearance that one plane proves of the pieces of a node over a slice; [m]."""
+    pair, h = int(row[PAIR]), row[END] - row[START]
     link, frame = task.pairs.link[pair], task.pairs.frame[pair]
-    space, h = desk.space, row[END] - row[START]
-    support = obstacle_support(task.pieces, first, last, n, space.scratch[0])
-    reach = reach_along(task.rules, desk.ends, space, link, frame, n, h)
-    return support - reach - losses(task.rules, frame)
+    pieces, rules, ends, space = task.pieces, task.rules, desk.ends, desk.space
+    return plane_bound(pieces, rules, ends, space, node, link, frame, h, n)
 
 
 @compiled
 def _write(
     task: Task,
     row: FloatArray,
-    first: int,
-    last: int,
+    node: int,
     n: FloatArray,
     claim: float,
     records: FloatArray,
@@ -69,6 +46,7 @@ def _write(
         return -1
     pair = int(row[PAIR])
     start = task.pieces.first_piece[task.pairs.obstacle[pair]]
+    first, last = task.pieces.node_range[node]
     out = records[count]
     out[0], out[1], out[2], out[3] = row[INTERVAL], pair, row[START], row[END]
     out[FIRST], out[LAST] = first - start, last - start
@@ -86,32 +64,28 @@ def _write_ranges(
     pieces, space, pair = task.pieces, desk.space, int(row[PAIR])
     link, frame = task.pairs.link[pair], task.pairs.frame[pair]
     needed, h = task.pairs.required[pair], row[END] - row[START]
-    n = np.zeros(3)
+    n, nodes = np.zeros(3), space.nodes
     waiting = 1
-    space.stack[0] = pieces.root[task.pairs.obstacle[pair]]
+    nodes[0] = pieces.root[task.pairs.obstacle[pair]]
     while waiting > 0 and count >= 0:
         waiting -= 1
-        node = space.stack[waiting]
-        first, last = pieces.node_range[node]
-        if last - first == 1:
-            piece_bound(
-                pieces, task.rules, desk.ends, space, first, link, frame, h, space.trial
+        node = nodes[waiting]
+        if pieces.node_range[node, 1] - pieces.node_range[node, 0] == 1:
+            leaf_bound(
+                pieces, task.rules, desk.ends, space, node, link, frame, h, space.trial
             )
             n[:] = space.trial[NORMAL:NEAR]
-            claim = _claim(task, desk, row, first, last, n)
-            count = _write(task, row, first, last, n, claim, records, count)
+            claim = _claim(task, desk, row, node, n)
+            count = _write(task, row, node, n, claim, records, count)
             continue
         bound = node_bound(
             pieces, task.rules, desk.ends, space, node, link, frame, h, n
         )
         if bound >= needed:
-            claim = _claim(task, desk, row, first, last, n)
-            count = _write(task, row, first, last, n, claim, records, count)
+            claim = _claim(task, desk, row, node, n)
+            count = _write(task, row, node, n, claim, records, count)
             continue
-        space.stack[waiting], space.stack[waiting + 1] = (
-            pieces.node_right[node],
-            node + 1,
-        )
+        nodes[waiting], nodes[waiting + 1] = pieces.node_right[node], node + 1
         waiting += 2
     return count
 
@@ -132,13 +106,12 @@ def _write_slice(
     apart()
     bound_between(task, motion, desk.ends, desk.space, row)
     pair = int(row[PAIR])
-    obstacle = task.pairs.obstacle[pair]
-    first = task.pieces.first_piece[obstacle]
-    last = task.pieces.first_piece[obstacle + 1]
+    root = task.pieces.root[task.pairs.obstacle[pair]]
     n = desk.space.out[NORMAL:NEAR].copy()
-    claim = _claim(task, desk, row, first, last, n)
+    claim = _claim(task, desk, row, root, n)
+    first, last = task.pieces.node_range[root]
     if last - first == 1 or claim >= task.pairs.required[pair]:
-        return _write(task, row, first, last, n, claim, records, count)
+        return _write(task, row, root, n, claim, records, count)
     desk.space.trial[NORMAL:NEAR] = n
     return _write_ranges(task, desk, row, records, count)
 
@@ -201,6 +174,10 @@ def record(
         ended; all its pairs are missing) and the pair that is not proved in it, or -1.
     """
     apart()
+    task = borrowed(task)
+    motion = borrowed(motion)
+    desk = borrowed(desk)
+    records = borrowed(records)
     row, count = np.zeros(SLICE), 0
     for k in range(first, last):
         before = count

@@ -1,11 +1,6 @@
-"""Bounds over one slice of an interval for one pair, in compiled code.
+"""Bounds over one slice of an interval for one pair, in compiled code."""
 
-A pair is a link and an obstacle or, in the frame of another link, that link. Both
-are the same to the kernels: two moving joint centres against an obstacle of the packed
-scene, in which the axes of the links stand behind the obstacles.
-"""
-
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,58 +15,17 @@ from vdsm_pin.geometry.kernels import (
     SCRATCH_ROWS,
     UPPER,
     bracket,
-    piece_support,
-    rounding_radius,
 )
 from vdsm_pin.geometry.obstacles import (
     STACK,
     box_of,
     box_support,
     facing,
+    node_support,
     push_children,
 )
-from vdsm_pin.geometry.pieces import HALF_SPACE, PackedPieces
-
-BASE: Final = -1
-"""Frame of a pair whose partner rests in the base frame."""
-
-
-class Pairs(NamedTuple):
-    """All pairs, in the order of the certificate.
-
-    Args:
-        link: The moving link, from 0, shape (n_pairs,).
-        obstacle: Its partner in the packed scene, shape (n_pairs,).
-        frame: Link in whose frame the partner rests, or BASE, shape (n_pairs,).
-        required: Least clearance, shape (n_pairs,); [m].
-    """
-
-    link: IntArray
-    obstacle: IntArray
-    frame: IntArray
-    required: FloatArray
-
-
-class Rules(NamedTuple):
-    """What a proof has to cover and what it may assume.
-
-    Args:
-        lengths: Link lengths, shape (N,); [m].
-        radius: Radius of the links; [m].
-        joint_error: Largest error of an angle; [rad].
-        base_error: Largest error of x0; [m].
-        obstacle_error: Largest displacement of an obstacle's surface; [m].
-        pad: Bound of all rounding in one evaluation; [m].
-        goal: Width of a distance bracket at which to stop; [m].
-    """
-
-    lengths: FloatArray
-    radius: float
-    joint_error: float
-    base_error: float
-    obstacle_error: float
-    pad: float
-    goal: float
+from vdsm_pin.geometry.pieces import PackedPieces
+from vdsm_pin.verification.proof.terms import BASE, Pairs, Rules, losses
 
 
 class Ends(NamedTuple):
@@ -95,17 +49,33 @@ class Space(NamedTuple):
 
     Args:
         points: O_i and O_{i+1} at the start, then at the end, shape (4, 3); [m].
+        sags: How far either may leave its chord in between, shape (2,); [m].
         scratch: Shape (SCRATCH_ROWS + 2, 3).
-        stack: Shape (STACK,).
+        nodes: Nodes still to look at, shape (STACK,).
+        stack: The same while a support is looked for, shape (STACK,).
         trial: Shape (BRACKET + 4,).
         out: The result, in the layout of a bracket, shape (BRACKET + 4,).
     """
 
     points: FloatArray
+    sags: FloatArray
     scratch: FloatArray
+    nodes: IntArray
     stack: IntArray
     trial: FloatArray
     out: FloatArray
+
+
+@compiled
+def new_ends(n_links: int) -> Ends:
+    """Fresh working space for two configurations."""
+    n = n_links + 1
+    return Ends(
+        np.zeros((2, n, 3)),
+        np.zeros((2, n_links, 3, 3)),
+        np.zeros((n, n)),
+        np.zeros((n, n)),
+    )
 
 
 @compiled
@@ -114,7 +84,9 @@ def new_space() -> Space:
     apart()
     return Space(
         np.zeros((4, 3)),
+        np.zeros(2),
         np.zeros((SCRATCH_ROWS + 2, 3)),
+        np.zeros(STACK, np.int64),
         np.zeros(STACK, np.int64),
         np.zeros(BRACKET + 4),
         np.zeros(BRACKET + 4),
@@ -194,8 +166,8 @@ def reach_along(
 
     Args:
         rules: The error box.
-        ends: The slice.
-        space: Its `points` are those of the link; `scratch` is used.
+        ends: The slice; read only where joints may err.
+        space: Its `points` and `sags` are those of the link; `scratch` is used.
         link: The link.
         frame: Frame of the partner.
         n: Unit vector towards the partner, in its frame, shape (3,); [-].
@@ -207,7 +179,7 @@ def reach_along(
     for k in range(2):
         start = n[0] * p[k, 0] + n[1] * p[k, 1] + n[2] * p[k, 2]
         end = n[0] * p[2 + k, 0] + n[1] * p[2 + k, 1] + n[2] * p[2 + k, 2]
-        far = max(start, end) + 0.125 * ends.bends[frame + 1, link + k] * h * h
+        far = max(start, end) + space.sags[k]
         if rules.joint_error > 0.0:
             turned = space.scratch[SCRATCH_ROWS - 1]
             far += _error_growth(rules, ends, frame, link + k, n, h, turned)
@@ -218,67 +190,32 @@ def reach_along(
 
 
 @compiled
-def losses(rules: Rules, frame: int) -> float:
-    """What every plane loses: radius of the link, obstacle error, rounding; [m]."""
-    own = rules.radius + rules.pad
-    return own + rules.obstacle_error if frame == BASE else own
-
-
-@compiled
-def load_points(ends: Ends, space: Space, link: int, frame: int) -> None:
-    """Write the four points of a link over a slice to the working space."""
+def load_points(ends: Ends, space: Space, link: int, frame: int, h: float) -> None:
+    """Write the points and sags of a link over a slice to the working space."""
     apart()
     local_points(ends.centres[0], ends.frames[0], link, frame, space.points[:2])
     local_points(ends.centres[1], ends.frames[1], link, frame, space.points[2:])
+    for k in range(2):
+        space.sags[k] = 0.125 * ends.bends[frame + 1, link + k] * h * h
 
 
 @compiled
-def obstacle_support(
-    pieces: PackedPieces, first: int, last: int, n: FloatArray, point: FloatArray
-) -> float:
-    """Least n.x over the pieces [first, last), n of unit length; [m]."""
-    apart()
-    least = np.inf
-    for p in range(first, last):
-        if pieces.kind[p] == HALF_SPACE:
-            return float(-pieces.extent[p])
-        core = piece_support(pieces, p, n[0], n[1], n[2], point)
-        least = min(least, core - rounding_radius(pieces, p))
-    return least
-
-
-@compiled
-def piece_bound(
+def plane_bound(
     pieces: PackedPieces,
     rules: Rules,
     ends: Ends,
     space: Space,
-    p: int,
+    node: int,
     link: int,
     frame: int,
     h: float,
-    out: FloatArray,
-) -> None:
-    """Replace the distance bracket of a piece by the clearance that its plane proves.
-
-    Args:
-        pieces: The scene.
-        rules: The error box.
-        ends: The slice.
-        space: Its `points` are those of the link.
-        p: The piece.
-        link: The link.
-        frame: Frame of the partner.
-        h: Length of the slice.
-        out: Guess of n on entry; bracket on return, whose `lower` is the bound over
-            the slice and whose `upper` is of the hull of the points alone.
-    """
+    n: FloatArray,
+) -> float:
+    """Clearance that a plane proves of all pieces of a node over a slice; [m]."""
     apart()
-    bracket(pieces, p, space.points, 4, rules.goal, space.scratch, out)
-    n = out[NORMAL:NEAR]
-    support = obstacle_support(pieces, p, p + 1, n, space.scratch[0])
+    support = node_support(pieces, node, n, space.stack, space.scratch[0])
     reach = reach_along(rules, ends, space, link, frame, n, h)
-    out[LOWER] = support - reach - losses(rules, frame)
+    return support - reach - losses(rules, frame)
 
 
 @compiled
@@ -293,13 +230,46 @@ def node_bound(
     h: float,
     n: FloatArray,
 ) -> float:
-    """Clearance that one plane proves of all pieces of a node, by its box; [m]."""
+    """The same of a plane that faces the node's box, written to n, by that box; [m]."""
     apart()
     if not facing(pieces, node, space.points, n):
         return -np.inf
     support = box_support(pieces, node, n[0], n[1], n[2])
     reach = reach_along(rules, ends, space, link, frame, n, h)
     return support - reach - losses(rules, frame)
+
+
+@compiled
+def leaf_bound(
+    pieces: PackedPieces,
+    rules: Rules,
+    ends: Ends,
+    space: Space,
+    node: int,
+    link: int,
+    frame: int,
+    h: float,
+    out: FloatArray,
+) -> None:
+    """Replace the distance bracket of a piece by the clearance that its plane proves.
+
+    Args:
+        pieces: The scene.
+        rules: The error box.
+        ends: The slice.
+        space: Its `points` and `sags` are those of the link.
+        node: Node of the one piece.
+        link: The link.
+        frame: Frame of the partner.
+        h: Length of the slice.
+        out: Guess of n on entry; bracket on return, whose `lower` is the bound over
+            the slice and whose `upper` is of the hull of the points alone.
+    """
+    apart()
+    p = pieces.node_range[node, 0]
+    bracket(pieces, p, space.points, 4, rules.goal, space.scratch, out)
+    n = out[NORMAL:NEAR]
+    out[LOWER] = plane_bound(pieces, rules, ends, space, node, link, frame, h, n)
 
 
 @compiled
@@ -313,32 +283,54 @@ def _mesh_bound(
     frame: int,
     h: float,
 ) -> None:
-    """`slice_bound` for an obstacle of many pieces, by its hierarchy."""
+    """`loaded_bound` for an obstacle of many pieces, by its hierarchy."""
     apart()
     low, high = space.scratch[SCRATCH_ROWS], space.scratch[SCRATCH_ROWS + 1]
     box_of(space.points, 4, low, high)
-    trial, out = space.trial, space.out
+    nodes, trial, out = space.nodes, space.trial, space.out
     trial[NORMAL:NEAR] = out[NORMAL:NEAR]
     out[LOWER] = out[UPPER] = np.inf
-    space.stack[0] = root
+    nodes[0] = root
     waiting = 1
     while waiting > 0:
         waiting -= 1
-        node = space.stack[waiting]
+        node = nodes[waiting]
+        n = trial[BRACKET : BRACKET + 3]
+        bound = node_bound(pieces, rules, ends, space, node, link, frame, h, n)
+        if bound >= out[LOWER]:
+            continue
         first, last = pieces.node_range[node]
         if last - first > 1:
-            n = trial[BRACKET : BRACKET + 3]
-            bound = node_bound(pieces, rules, ends, space, node, link, frame, h, n)
-            if not bound >= out[LOWER]:
-                waiting = push_children(pieces, node, low, high, space.stack, waiting)
+            waiting = push_children(pieces, node, low, high, nodes, waiting)
             continue
-        piece_bound(pieces, rules, ends, space, first, link, frame, h, trial)
+        leaf_bound(pieces, rules, ends, space, node, link, frame, h, trial)
         if trial[UPPER] < out[UPPER]:
             out[UPPER] = trial[UPPER]
             out[NEAR:BRACKET] = trial[NEAR:BRACKET]
         if trial[LOWER] < out[LOWER]:
             out[LOWER] = trial[LOWER]
             out[NORMAL:NEAR] = trial[NORMAL:NEAR]
+
+
+@compiled
+def loaded_bound(
+    pieces: PackedPieces,
+    pairs: Pairs,
+    rules: Rules,
+    ends: Ends,
+    space: Space,
+    pair: int,
+    h: float,
+) -> None:
+    """`slice_bound` where points and sags are in the working space already."""
+    apart()
+    link, frame = pairs.link[pair], pairs.frame[pair]
+    root = pieces.root[pairs.obstacle[pair]]
+    first, last = pieces.node_range[root]
+    if last - first == 1:
+        leaf_bound(pieces, rules, ends, space, root, link, frame, h, space.out)
+    else:
+        _mesh_bound(pieces, rules, ends, space, root, link, frame, h)
 
 
 @compiled
@@ -365,11 +357,5 @@ def slice_bound(
         h: Length of the slice; 0 for an instant, where `upper` is a true distance.
     """
     apart()
-    link, frame = pairs.link[pair], pairs.frame[pair]
-    load_points(ends, space, link, frame)
-    root = pieces.root[pairs.obstacle[pair]]
-    first, last = pieces.node_range[root]
-    if last - first == 1:
-        piece_bound(pieces, rules, ends, space, first, link, frame, h, space.out)
-    else:
-        _mesh_bound(pieces, rules, ends, space, root, link, frame, h)
+    load_points(ends, space, pairs.link[pair], pairs.frame[pair], h)
+    loaded_bound(pieces, pairs, rules, ends, space, pair, h)

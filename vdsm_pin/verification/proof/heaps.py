@@ -1,0 +1,51 @@
+"""Slices of intervals in a heap, the one of the least bound first."""
+
+from typing import Final
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.compiled import apart, compiled
+
+KEY: Final = 0
+INTERVAL: Final = 1
+PAIR: Final = 2
+START: Final = 3
+END: Final = 4
+SLICE: Final = 5
+"""Layout of a slice in a heap: lower bound, interval, pair, start, end."""
+
+
+@compiled
+def push(heap: FloatArray, count: int, row: FloatArray) -> int:
+    """Add a slice to a heap of `count` slices; returns the new count."""
+    apart()
+    at = count
+    while at > 0:
+        parent = (at - 1) // 2
+        if heap[parent, KEY] <= row[KEY]:
+            break
+        heap[at] = heap[parent]
+        at = parent
+    heap[at] = row
+    return count + 1
+
+
+@compiled
+def pop(heap: FloatArray, count: int, row: FloatArray) -> int:
+    """Take the slice of the least bound; returns the new count."""
+    apart()
+    row[:] = heap[0]
+    count -= 1
+    last = heap[count].copy()
+    at = 0
+    while True:
+        child = 2 * at + 1
+        if child >= count:
+            break
+        if child + 1 < count and heap[child + 1, KEY] < heap[child, KEY]:
+            child += 1
+        if last[KEY] <= heap[child, KEY]:
+            break
+        heap[at] = heap[child]
+        at = child
+    heap[at] = last
+    return count

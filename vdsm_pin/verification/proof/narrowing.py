@@ -1,0 +1,114 @@
+"""A second look at what may hold the least clearance, in compiled code."""
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.compiled import apart, borrowed, compiled
+from vdsm_pin.verification.proof.blocks import Desk, sweep_pair
+from vdsm_pin.verification.proof.heaps import (
+    END,
+    INTERVAL,
+    KEY,
+    PAIR,
+    SLICE,
+    push,
+)
+from vdsm_pin.verification.proof.results import (
+    AT_UPPER,
+    OTHER,
+    TIME,
+    UP,
+    Results,
+)
+from vdsm_pin.verification.proof.rows import fill_rows
+from vdsm_pin.verification.proof.search import Witnesses, tighten
+from vdsm_pin.verification.proof.terms import Motion, Task
+
+
+@compiled
+def _look_again(
+    task: Task,
+    motion: Motion,
+    desk: Desk,
+    results: Results,
+    group: int,
+    order: IntArray,
+    heap: FloatArray,
+) -> int:
+    """Sweep the candidates closely and push the intervals that are still below.
+
+    Returns:
+        Number of intervals in the heap. What finds no room in it, or is not looked at
+        since links and obstacles meet, is left in `results.overflow`.
+    """
+    apart()
+    held, lower, count = results.candidates, desk.runs.lower, 0
+    row, beyond = np.zeros(SLICE), results.overflow
+    row[END], filled = 1.0, -1
+    for c in order:
+        if not held.lower[c] < results.limit[group] - task.rules.gap:
+            continue
+        if results.limit[group] < 0.0:
+            beyond[group] = min(beyond[group], held.lower[c])
+            continue
+        start, size, pair = held.first[c], held.size[c], held.pair[c]
+        if start != filled:
+            fill_rows(motion, task.rules, desk.rows, start, size)
+            filled = start
+        sweep_pair(task, motion, desk, results, start, 0, size, pair, True, False)
+        for local in range(size):
+            if not lower[local] < results.limit[group] - task.rules.gap:
+                continue
+            if count + 1 >= heap.shape[0]:
+                beyond[group] = min(beyond[group], lower[local])
+                continue
+            row[KEY], row[INTERVAL], row[PAIR] = lower[local], start + local, pair
+            count = push(heap, count, row)
+    return count
+
+
+@compiled
+def narrow(
+    task: Task,
+    motion: Motion,
+    desk: Desk,
+    results: Results,
+    group: int,
+    order: IntArray,
+    heap: FloatArray,
+    found: Witnesses,
+) -> int:
+    """Narrow the least bracket of a group of pairs.
+
+    Args:
+        task: The scene, pairs and rules.
+        motion: Rows of joint values.
+        desk: Working space.
+        results: Holds the candidates; best upper bounds and the limit are improved. Its
+            counts are spoilt: every candidate is counted again.
+        group: OBSTACLES or LINKS.
+        order: The group's candidates, those of one block together.
+        heap: Room for intervals and their slices.
+        found: Working space, nothing met yet.
+
+    Returns:
+        Number of slices in the heap: together with `results.overflow` they hold all
+        that is not proved to be above the limit, less the gap.
+    """
+    task = borrowed(task)
+    motion = borrowed(motion)
+    desk = borrowed(desk)
+    results = borrowed(results)
+    order = borrowed(order)
+    heap = borrowed(heap)
+    found = borrowed(found)
+    count = _look_again(task, motion, desk, results, group, order, heap)
+    limit = results.limit[group]
+    count = tighten(task, motion, desk.ends, desk.space, heap, count, limit, found)
+    for pair in range(found.upper.size):
+        if found.upper[pair] < results.best[pair, UP]:
+            best = results.best[pair]
+            best[UP], best[AT_UPPER] = found.upper[pair], found.interval[pair]
+            best[TIME], best[OTHER:] = found.time[pair], found.points[pair, 3:]
+        results.limit[group] = min(results.limit[group], found.instant[pair])
+    return count

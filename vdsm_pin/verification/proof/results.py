@@ -1,0 +1,242 @@
+"""Where a sweep writes: least bounds, counts, profile, candidates, dense rows."""
+
+from typing import Final, NamedTuple
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.compiled import apart, compiled
+from vdsm_pin.verification.proof.terms import (
+    Task,
+    group_of,
+)
+
+LOW: Final = 0
+AT_LOWER: Final = 1
+UP: Final = 2
+AT_UPPER: Final = 3
+TIME: Final = 4
+OWN: Final = 5
+OTHER: Final = 8
+BEST: Final = 11
+"""Layout of a pair's best row: lower bound and its interval, upper bound, its interval
+and time, witnesses on the link and on the partner in the base frame (3 each). Until
+`place_best` the last is a core point of the partner, in its frame."""
+
+HELD: Final = 0
+SLICES: Final = 1
+RENEWED: Final = 2
+LOST: Final = 3
+TALLY: Final = 4
+"""Layout of what is counted: candidates held, slices tried, planes found, candidates
+that found no room."""
+
+
+class Candidates(NamedTuple):
+    """Blocks of one pair that may hold the least bound.
+
+    Args:
+        lower: Least lower bound over the block, shape (room,); [m].
+        first: First interval of the block, shape (room,).
+        size: Intervals in it, shape (room,).
+        pair: The pair, shape (room,).
+    """
+
+    lower: FloatArray
+    first: IntArray
+    size: IntArray
+    pair: IntArray
+
+
+class Dense(NamedTuple):
+    """Brackets of every interval and pair, or arrays of no rows if nobody wants them.
+
+    Args:
+        lower: Shape (m, n_pairs); [m].
+        upper: Shape (m, n_pairs); [m].
+        time: Place of the upper bounds in their intervals, shape (m, n_pairs).
+        verdict: Shape (m, n_pairs).
+        own: Witnesses on the links, base frame, shape (m, n_pairs, 3); [m].
+        other: Witnesses on the partners, shape (m, n_pairs, 3); [m].
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    time: FloatArray
+    verdict: IntArray
+    own: FloatArray
+    other: FloatArray
+
+
+class Results(NamedTuple):
+    """Where a sweep writes.
+
+    Args:
+        best: Least bounds of each pair, shape (n_pairs, BEST).
+        counts: Intervals of each pair by verdict, shape (n_pairs, 3).
+        profile: Lower and upper bounds by link, then by obstacle, in each bin, shape
+            (2, N + n_obstacles, n_bins); [m].
+        stride: Intervals per bin.
+        limit: Least bound that some instant cannot pass, by group, shape (2,); [m].
+        candidates: Blocks that may hold the least bound.
+        overflow: Least bounds of candidates that found no room, shape (2,); [m].
+        tally: What is counted, shape (TALLY,).
+        dense: Dense rows.
+    """
+
+    best: FloatArray
+    counts: IntArray
+    profile: FloatArray
+    stride: int
+    limit: FloatArray
+    candidates: Candidates
+    overflow: FloatArray
+    tally: IntArray
+    dense: Dense
+
+
+@compiled
+def any_below(values: FloatArray, bar: float) -> bool:
+    """Whether a value is below the bar."""
+    below = 0
+    for k in range(values.size):
+        below |= values[k] < bar
+    return below != 0
+
+
+@compiled
+def _least(values: FloatArray) -> int:
+    """Number of the least value."""
+    at = 0
+    for k in range(1, values.size):
+        if values[k] < values[at]:
+            at = k
+    return at
+
+
+@compiled
+def note_upper(
+    best: FloatArray,
+    upper: FloatArray,
+    at_rows: FloatArray,
+    point: FloatArray,
+    start: int,
+    first: int,
+    last: int,
+) -> None:
+    """Keep the least upper bound of intervals that one witness bounds.
+
+    Args:
+        best: The pair's, shape (BEST,).
+        upper: Upper bounds of the block, shape (>= last,); [m].
+        at_rows: Core distances at its rows, shape (> last,); [m].
+        point: The witness, shape (3,); [m].
+        start: First interval of the block.
+        first: First interval, counted in the block.
+        last: One past the last.
+    """
+    if any_below(upper[first:last], best[UP]):
+        at = first + _least(upper[first:last])
+        later = 1.0 if at_rows[at + 1] < at_rows[at] else 0.0
+        best[UP], best[AT_UPPER], best[TIME] = upper[at], start + at, later
+        best[OTHER:] = point
+
+
+@compiled
+def _drop_candidates(task: Task, results: Results) -> None:
+    """Drop the candidates that can no longer hold the least bound."""
+    apart()
+    held, kept = results.candidates, 0
+    for k in range(results.tally[HELD]):
+        group = group_of(task.pairs.frame[held.pair[k]])
+        if held.lower[k] < results.limit[group] - task.rules.gap:
+            held.lower[kept], held.first[kept] = held.lower[k], held.first[k]
+            held.size[kept], held.pair[kept] = held.size[k], held.pair[k]
+            kept += 1
+    results.tally[HELD] = kept
+
+
+@compiled
+def nominate(
+    task: Task, results: Results, pair: int, first: int, lower: FloatArray
+) -> None:
+    """Remember a block of a pair whose least bound is below the limit.
+
+    Args:
+        task: The scene, pairs and rules.
+        results: Where to.
+        pair: The pair.
+        first: First interval of the block.
+        lower: Lower bounds of its intervals, shape (count,); [m].
+    """
+    apart()
+    held, room = results.candidates, results.candidates.lower.size
+    least = lower[_least(lower)]
+    if results.tally[HELD] == room:
+        # Not each time: where nothing can be dropped that would take for ever.
+        if results.tally[LOST] % max(1, room // 4) == 0:
+            _drop_candidates(task, results)
+        results.tally[LOST] += 1
+    at = results.tally[HELD]
+    if at == room:
+        group = group_of(task.pairs.frame[pair])
+        results.overflow[group] = min(results.overflow[group], least)
+        return
+    held.lower[at], held.first[at], held.size[at] = least, first, lower.size
+    held.pair[at] = pair
+    results.tally[HELD] = at + 1
+
+
+@compiled
+def _lower_column(
+    column: FloatArray, stride: int, values: FloatArray, first: int
+) -> None:
+    """Lower one column of the profile to the bounds of consecutive intervals."""
+    if stride == 1:
+        part = column[first : first + values.size]
+        for r in range(part.size):
+            part[r] = part[r] if part[r] < values[r] else values[r]
+        return
+    for r in range(values.size):
+        at = (first + r) // stride
+        column[at] = min(column[at], values[r])
+
+
+@compiled
+def note_block(
+    best: FloatArray,
+    profile: FloatArray,
+    stride: int,
+    link: int,
+    column: int,
+    lower: FloatArray,
+    upper: FloatArray,
+    first: int,
+    bar: float,
+) -> bool:
+    """Record the bounds of a pair over a block, but for the least upper one.
+
+    It takes bare arrays, because it runs for every block of every pair.
+
+    Args:
+        best: The pair's, shape (BEST,).
+        profile: As in the results.
+        stride: Intervals per bin of it.
+        link: Its column of the link.
+        column: Its column of the obstacle; below 0 for a pair of links.
+        lower: Lower bounds of the intervals, shape (count,); [m].
+        upper: Upper bounds, shape (count,); [m].
+        first: First interval of the block.
+        bar: Below which a bound may be the least of all; [m].
+
+    Returns:
+        Whether one is below the bar.
+    """
+    apart()
+    if column >= 0:
+        _lower_column(profile[0, link], stride, lower, first)
+        _lower_column(profile[1, link], stride, upper, first)
+        _lower_column(profile[0, column], stride, lower, first)
+        _lower_column(profile[1, column], stride, upper, first)
+    if any_below(lower, best[LOW]):
+        at = _least(lower)
+        best[LOW], best[AT_LOWER] = lower[at], first + at
+    return any_below(lower, bar)
