@@ -142,6 +142,12 @@ class Tolerances:
     cut time finely where the clearance just suffices.
     """
 
+    whole_parts: float = _held(1e-9, "-")
+    """Excess over a whole number of parts that counts as rounding; [-].
+
+    1e6 rows leave 1e-10 of a row; without it a row of 10 mm would be cut in two.
+    """
+
     search_gain: float = _held(1e-12, "m")
     """Cost by which one way must be cheaper than another to replace it; [m].
 

@@ -8,7 +8,6 @@ import numpy as np
 from vdsm_pin.cables import cable_lengths
 from vdsm_pin.errors import Infeasible, NoPlanFound, PathBlocked
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.avoidance import Avoidance, Straight, avoidances
 from vdsm_pin.planner.feasibility import check_feasibility
 from vdsm_pin.planner.lift import lift
@@ -16,6 +15,7 @@ from vdsm_pin.planner.project import project
 from vdsm_pin.planner.records import LinkClearance, Plan
 from vdsm_pin.planner.scale import scale
 from vdsm_pin.planner.solve import solve
+from vdsm_pin.planner.spacing import row_steps
 from vdsm_pin.planner.tip_path import Route, subdivided
 from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
@@ -130,11 +130,12 @@ def _motion(problem: PlanningProblem, avoidance: Avoidance) -> Motion:
         planar = avoidance.joints(route, reference)  # Step 5
         centres = lift(manipulator, planar, points[:, 0])  # Step 6
         trajectory = solve(manipulator, route, centres)  # Step 7
-        steps, strays = _intervals(manipulator, trajectory)
+        steps, strays = row_steps(manipulator, trajectory.alpha, trajectory.theta)
+        drawn = trajectory.on_path[1:] & trajectory.on_path[:-1]
         turns = steps / TOLERANCES.planned_step
         # Halving an interval leaves a quarter of the way by which the tip strays. A
         # jump is not filled with rows for the tip's sake.
-        bows = np.sqrt(strays / TOLERANCES.planned_stray)
+        bows = np.sqrt(np.where(drawn, strays, 0.0) / TOLERANCES.planned_stray)
         needed = bows if (turns <= 1.0).all() else turns
         motion = Motion(route, centres, trajectory)
         if (needed <= 1.0).all():
@@ -148,26 +149,6 @@ def _motion(problem: PlanningProblem, avoidance: Avoidance) -> Motion:
         f"{int(np.argmax(steps))}: the paper's rule is not continuous there"
     )
     raise NoPlanFound(message)
-
-
-def _intervals(
-    manipulator: Manipulator, trajectory: Trajectory
-) -> tuple[FloatArray, FloatArray]:
-    """How far joints turn and the tip may stray from its path between two waypoints.
-
-    The tip's second derivative is at most M = sum of L_l W_l^2, where W_l is how much
-    all joints up to link l turn; so the tip stays within M / 8 of its chord.
-
-    Returns:
-        Largest change of a joint angle [rad], and M / 8 where the path is drawn, 0
-        elsewhere [m], each of shape (n_samples - 1,).
-    """
-    yaw = np.abs(np.diff(trajectory.alpha, axis=0))
-    pitch = np.abs(np.diff(trajectory.theta, axis=0))
-    turning = np.cumsum(yaw + pitch, axis=1)
-    bound = (turning * turning) @ manipulator.link_lengths / 8.0
-    drawn = trajectory.on_path[1:] & trajectory.on_path[:-1]
-    return np.maximum(yaw, pitch).max(axis=1), np.where(drawn, bound, 0.0)
 
 
 def _refuse_touch(problem: PlanningProblem, clearance: float) -> None:

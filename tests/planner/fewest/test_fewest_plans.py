@@ -1,3 +1,8 @@
+import hashlib
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from scenes_for_fewest import problem, random_problem
@@ -64,6 +69,51 @@ def test_the_tip_is_on_the_path_wherever_a_row_says_so() -> None:
     stations = np.mod(trajectory.path_m[drawn], task.path.length)
     gap = np.linalg.norm(centres[drawn, -1] - task.path.at(stations), axis=1)
     assert gap.max() < TOLERANCES.tip_on_path
+
+
+def test_between_two_rows_the_tip_stays_on_the_path_it_draws() -> None:
+    trajectory = planned(read_problem("paper/obs3").problem).trajectory
+    drawn = trajectory.on_path[1:] & trajectory.on_path[:-1]
+    tips = joint_centres(ARM, trajectory.x0, trajectory.alpha, trajectory.theta)[:, -1]
+    side = np.diff(tips, axis=0)
+    square = np.maximum((side * side).sum(axis=1), 1e-30)
+    worst = 0.0
+    for share in np.linspace(0.1, 0.9, 9):
+        x0, alpha, theta = (
+            (1.0 - share) * rows[:-1] + share * rows[1:]
+            for rows in (trajectory.x0, trajectory.alpha, trajectory.theta)
+        )
+        between = joint_centres(ARM, x0, alpha, theta)[:, -1] - tips[:-1]
+        along = np.minimum(1.0, np.maximum(0.0, (between * side).sum(axis=1) / square))
+        gap = np.linalg.norm(between - along[:, None] * side, axis=1)
+        worst = max(worst, float(gap[drawn].max()))
+    assert 1e-6 < worst <= 1.05 * TOLERANCES.planned_stray
+
+
+@pytest.mark.parametrize("name", ["obs2"])
+def test_cores_and_threads_do_not_change_a_plan(name: str) -> None:
+    """Another process, one core, other thread counts: the same bytes."""
+    code = (
+        "import os, sys, hashlib\n"
+        "os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:int(sys.argv[2])])\n"
+        "from vdsm_pin.io.problem_file import read_problem\n"
+        "from vdsm_pin.planner.fewest.strategy import plan_fewest\n"
+        "from vdsm_pin.verification.link_clearance import link_clearance\n"
+        "task = read_problem(f'paper/{sys.argv[1]}').problem\n"
+        "plan = plan_fewest(task, link_clearance(task), 0.0)\n"
+        "joints = plan.trajectory.joints\n"
+        "print(hashlib.sha256(joints.tobytes()).hexdigest())\n"
+    )
+    task = read_problem(f"paper/{name}").problem
+    here = hashlib.sha256(planned(task).trajectory.joints.tobytes()).hexdigest()
+    for cores in ("1", "4"):
+        threads = {f"{lib}_NUM_THREADS": cores for lib in ("OPENBLAS", "OMP", "NUMBA")}
+        told = subprocess.run(
+            [sys.executable, "-c", code, name, cores],
+            env={**os.environ, **threads, "PYTHONHASHSEED": cores},
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        assert told.stdout.strip() == here
 
 
 def test_a_single_point_is_a_path() -> None:

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.tolerances import TOLERANCES
 
 FAMILY = 8
 """Children tried for each parent."""
@@ -23,6 +24,10 @@ RETRIES = 4
 """Rounds of change at rest before a population that cannot go on is given up."""
 KEPT = 6
 """Configurations at the farthest layer whose ancestors are kept."""
+COPIED, AT_KNEE, STRAIGHTENED = 0.05, 0.3, 0.45
+"""Of a half: up to where a child is its parent, moves a knee, moves any joint; beyond,
+a joint is put in line with its neighbours; [-]."""
+STRAIGHT = TOLERANCES.straight_slope
 SCALES = (0.008, 0.025, 0.06)
 """Sizes of a change over the arm's length; [-]."""
 
@@ -40,6 +45,40 @@ class Grown:
     layer: IntArray
     offsets: FloatArray
     parent: IntArray
+
+
+@compiled
+def _bent_joints(row: FloatArray, stations: FloatArray, bent: BoolArray) -> IntArray:
+    """Set which joints of a configuration bend; they are returned in order too."""
+    last = stations.size - 1
+    for i in range(1, last):
+        turn = 0.0
+        for c in range(2):
+            after = (row[i + 1, c] - row[i, c]) / (stations[i + 1] - stations[i])
+            before = (row[i, c] - row[i - 1, c]) / (stations[i] - stations[i - 1])
+            turn = max(turn, abs(after - before))
+        bent[i] = turn > STRAIGHT
+    return np.flatnonzero(bent)
+
+
+@compiled
+def _line_up(
+    row: FloatArray, stations: FloatArray, first: int, last: int, place: FloatArray
+) -> None:
+    """Put the joints between two others, and the last one, on a line.
+
+    Args:
+        row: Offsets of one configuration, shape (N + 1, 2); [m].
+        stations: Arc length of the joints, shape (N + 1,); [m].
+        first: The joint the line begins at.
+        last: The joint it ends at.
+        place: Where that one comes to be, shape (2,); [m].
+    """
+    span = stations[last] - stations[first]
+    for i in range(last, first, -1):
+        share = (stations[i] - stations[first]) / span
+        for c in range(2):
+            row[i, c] = (1.0 - share) * row[first, c] + share * place[c]
 
 
 @compiled
@@ -64,66 +103,35 @@ def vary(
     Returns:
         Children, shape (n, N + 1, 2); [m].
     """
-    n_rows, last = offsets.shape[0], offsets.shape[1] - 1
-    total = stations[last]
+    last = stations.size - 1
     result = offsets.copy()
     bent = np.zeros(last + 1, dtype=np.bool_)
-    for r in range(n_rows):
+    for r in range(offsets.shape[0]):
         row = result[r]
-        count = 0
-        final = 0
-        for i in range(1, last):
-            span0 = stations[i] - stations[i - 1]
-            span1 = stations[i + 1] - stations[i]
-            gap = 0.0
-            for c in range(2):
-                before = (row[i, c] - row[i - 1, c]) / span0
-                after = (row[i + 1, c] - row[i, c]) / span1
-                gap = max(gap, abs(after - before))
-            bent[i] = gap > 1e-9
-            if bent[i]:
-                count += 1
-                final = i
-        if kind[r] < 0.5 and final > 0:
+        knees = _bent_joints(row, stations, bent)
+        if kind[r] < 0.5 and knees.size > 0:
             # The projections stay where they are up to the last knee.
-            for c in range(2):
-                for i in range(1, final + 1):
-                    row[i, c] -= stations[i] / total * moved[r, c]
-                for i in range(final + 1, last):
-                    share = (total - stations[i]) / (total - stations[final])
-                    row[i, c] = share * row[final, c]
+            for i in range(1, knees[-1] + 1):
+                for c in range(2):
+                    row[i, c] -= stations[i] / stations[last] * moved[r, c]
+            _line_up(row, stations, knees[-1], last, row[last].copy())
         half = kind[r] % 0.5
-        if half < 0.05:
+        if half < COPIED:
             continue
-        if half < 0.3 and count > 0:
-            wanted = int(joint[r] * count)
-            m = 0
-            for i in range(1, last):
-                if bent[i]:
-                    if wanted == 0:
-                        m = i
-                        break
-                    wanted -= 1
-        else:
-            m = 1 + int(joint[r] * (last - 1))
-        low = m - 1
+        m = 1 + int(joint[r] * (last - 1))
+        if half < AT_KNEE and knees.size > 0:
+            m = knees[int(joint[r] * knees.size)]
+        low, high = m - 1, m + 1
         while low > 0 and not bent[low]:
             low -= 1
-        high = m + 1
         while high < last and not bent[high]:
             high += 1
-        for c in range(2):
-            target = row[m, c] + shift[r, c]
-            if half > 0.45:
-                share = (stations[m] - stations[low]) / (stations[high] - stations[low])
-                target = (1.0 - share) * row[low, c] + share * row[high, c]
-            for i in range(low + 1, m):
-                share = (stations[i] - stations[low]) / (stations[m] - stations[low])
-                row[i, c] = (1.0 - share) * row[low, c] + share * target
-            row[m, c] = target
-            for i in range(m + 1, high):
-                share = (stations[i] - stations[m]) / (stations[high] - stations[m])
-                row[i, c] = (1.0 - share) * target + share * row[high, c]
+        place = row[m] + shift[r]
+        if half > STRAIGHTENED:
+            share = (stations[m] - stations[low]) / (stations[high] - stations[low])
+            place = (1.0 - share) * row[low] + share * row[high]
+        _line_up(row, stations, low, m, place)
+        _line_up(row, stations, m, high, row[high].copy())
     return result
 
 

@@ -20,6 +20,7 @@ from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.fewest.poses import centres_between, knees_between
 from vdsm_pin.planner.fewest.roadmap import Roadmap
 from vdsm_pin.planner.fewest.sequence import Sequence
+from vdsm_pin.planner.spacing import count_of, row_steps
 from vdsm_pin.tolerances import TOLERANCES
 
 ROUNDS: Final = 12
@@ -192,7 +193,8 @@ def dense_rows(
 ) -> Rows:
     """Rows close enough that straight lines in joint space follow the chart.
 
-    Every knot is a row.
+    Every knot is a row. Midway between two rows the tip strays from the path it draws
+    by no more than `TOLERANCES.planned_stray`.
 
     Args:
         manipulator: The arm.
@@ -206,15 +208,16 @@ def dense_rows(
         NoPlanFound: If no number of rows is enough, as where a joint angle jumps.
     """
     way = np.linalg.norm(np.diff(knots.tips, axis=0), axis=1)
-    counts = np.maximum(1, np.ceil(way / spacing - 1e-9)).astype(np.int64)
+    counts = np.maximum(1, count_of(way / spacing))
     for _ in range(ROUNDS):
         rows = rows_at(manipulator, knots, *spread(counts))
         alpha, theta = joint_angles(manipulator, rows.centres)
-        step = np.maximum(
-            np.abs(np.diff(alpha, axis=0)), np.abs(np.diff(theta, axis=0))
-        ).max(axis=1)
+        step, _ = row_steps(manipulator, alpha, theta)
+        strays = _stray(manipulator, knots, rows, alpha, theta)
         # Straying falls with the square of the distance of the rows.
-        bow = np.sqrt(_stray(manipulator, knots, rows, alpha, theta) / stray)
+        bow = np.sqrt(strays.max(axis=1) / stray)
+        tip = np.sqrt(strays[:, -1] / TOLERANCES.planned_stray)
+        bow = np.where(knots.drawn[rows.interval[:-1]], np.maximum(bow, tip), bow)
         excess = np.zeros(len(counts))
         np.maximum.at(excess, rows.interval[:-1], np.maximum(step / turn, bow))
         if (excess <= 1.0).all():
@@ -235,7 +238,11 @@ def _stray(
     alpha: FloatArray,
     theta: FloatArray,
 ) -> FloatArray:
-    """How far joint space and chart differ midway between rows, (r - 1,); [m]."""
+    """How far joint space and chart differ midway between rows, centre by centre.
+
+    Returns:
+        Shape (r - 1, N + 1); [m].
+    """
     ends = np.where(np.diff(rows.interval) > 0, 1.0, rows.share[1:])
     middle = (rows.share[:-1] + ends) / 2.0
     chart = rows_at(manipulator, knots, rows.interval[:-1], middle).centres
@@ -245,4 +252,4 @@ def _stray(
         (alpha[:-1] + alpha[1:]) / 2.0,
         (theta[:-1] + theta[1:]) / 2.0,
     )
-    return np.asarray(np.linalg.norm(chart - joint, axis=2).max(axis=1))
+    return np.asarray(np.linalg.norm(chart - joint, axis=2))

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.planner.spacing import count_of
 from vdsm_pin.problem import DesiredPath, Order, PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ def nearest_station(path: DesiredPath, point: FloatArray) -> float:
         square = float(side @ side)
         t = min(max(float((point - a) @ side) / square, 0.0), 1.0) if square else 0.0
         distance = float(np.linalg.norm(a + t * side - point))
-        if distance < best - 1e-12:
+        if distance < best - TOLERANCES.on_path_length:
             best, where = distance, station + t * float(np.sqrt(square))
     return where
 
@@ -81,7 +83,7 @@ def path_rows(path: DesiredPath) -> PathRows:
     for a, b in itertools.pairwise(corners):
         if not b > a:
             continue
-        count = max(1, int(np.ceil((b - a) / path.spacing - 1e-9)))
+        count = max(1, int(count_of((b - a) / path.spacing)))
         side = a + (b - a) * np.arange(1, count + 1) / count
         side[-1] = b
         stations.append(side)
@@ -105,7 +107,7 @@ def _layer_rows(rows: PathRows, closed: BoolArray, coarse: float) -> IntArray:
     layers = [marks[:1]]
     for a, b in itertools.pairwise(marks):
         length = rows.stations[b] - rows.stations[a]
-        count = max(1, min(int(b - a), int(np.ceil(length / coarse - 1e-9))))
+        count = max(1, min(int(b - a), int(count_of(length / coarse))))
         inner = np.round(a + (b - a) * np.arange(1, count + 1) / count)
         layers.append(inner.astype(np.int64))
     return np.concatenate(layers)

@@ -1,0 +1,35 @@
+"""How close rows of a trajectory must be."""
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.tolerances import TOLERANCES
+
+
+def count_of(parts: FloatArray) -> IntArray:
+    """Whole numbers not less than these, but for rounding; same shape."""
+    whole = np.ceil(np.asarray(parts) - TOLERANCES.whole_parts)
+    return np.asarray(whole.astype(np.int64))
+
+
+def row_steps(
+    manipulator: Manipulator, alpha: FloatArray, theta: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """How far joints turn and the tip may stray from a straight line between two rows.
+
+    The tip's second derivative is at most M = sum of L_l W_l^2, where W_l is how much
+    all joints up to link l turn; so the tip stays within M / 8 of its chord.
+
+    Args:
+        manipulator: The arm.
+        alpha: Yaw angles, shape (n_samples, N); [rad].
+        theta: Pitch angles, shape (n_samples, N); [rad].
+
+    Returns:
+        Largest change of a joint angle [rad] and M / 8 [m], (n_samples - 1,) each.
+    """
+    yaw, pitch = np.abs(np.diff(alpha, axis=0)), np.abs(np.diff(theta, axis=0))
+    turning = np.cumsum(yaw + pitch, axis=1)
+    bound = (turning * turning) @ manipulator.link_lengths / 8.0
+    return np.maximum(yaw, pitch).max(axis=1), bound
