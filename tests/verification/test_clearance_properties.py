@@ -36,7 +36,9 @@ from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_bodies import coal_bodies, distance_request, measure
 from vdsm_pin.verification.coal_clearance import capsule_transforms
+from vdsm_pin.verification.counterexample import find_counterexamples
 from vdsm_pin.verification.records import ClearanceChunk, ErrorBox
+from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 
 N_LINKS, RADIUS, SAMPLES = 3, 0.05, 1000
 LENGTHS = np.array([0.5, 0.4, 0.3])
@@ -232,6 +234,32 @@ def test_growing_an_obstacle_never_raises_a_lower_bound(shape: str, seed: int) -
         # Inside a mesh its surface is what is measured: growing moves it away.
         asked = np.full(limit.shape, True) if shape != "mesh" else limit > RADIUS
         assert (shown(two.lower)[:, :N_LINKS] <= limit + PADDING)[asked].all()
+
+
+@pytest.mark.slow
+@settings(few, max_examples=12)
+@given(shape=shapes, seed=seeds)
+def test_no_error_is_both_certified_and_refuted(shape: str, seed: int) -> None:
+    """The search for counterexamples attacks the proof for error boxes, and fails."""
+    rng = np.random.default_rng(seed)
+    obstacle, rows = obstacle_of(shape, rng), motion_of(rng, 3, 0.05)
+    box = ErrorBox(base=rng.choice([0.0, 0.003]), obstacle=rng.choice([0.0, 0.002]))
+    problem = problem_of(obstacle, required=0.001)
+    certified = largest_joint_error(problem, rows, box)
+    refuted = refuted_joint_error(problem, rows, box, certified)
+    assert not refuted <= certified
+    for error in (0.5 * certified, certified, 2.0 * certified):
+        asked = replace(box, joint=error)
+        proof = prove_clearance(problem, rows, asked)
+        found = find_counterexamples(problem, rows, asked, proof)
+        if found and not proof.counts[:, 1].any():
+            assert error > certified
+            assert found[0].clearance < 0.001
+            chunk = brackets(
+                replace(problem, required_clearance=0.001 + box.obstacle),
+                rows_of(found[0].joints[None]),
+            )
+            assert (chunk.verdict == 1).any()
 
 
 # ---- rigid motion of everything ------------------------------------------------------
