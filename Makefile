@@ -31,6 +31,7 @@ figures: $(VENV)/.installed
 report: figures
 	$(BIN)/python analysis/paper_table.py --out reports/paper
 	$(BIN)/python analysis/obs2_orientations.py --out reports/paper
+	$(BIN)/python analysis/scaling_choices.py --out reports/paper
 
 soundness: $(VENV)/.installed
 	$(BIN)/python analysis/soundness.py --queries 10000000 --save reports/soundness.md

@@ -1,0 +1,182 @@
+"""The paper's future work measured: another scaling centre, ratios that vary.
+
+    python analysis/scaling_choices.py --out reports/paper
+
+At positions along each desired path, is there an arm within the limits that keeps the
+clearance? Four ways to place the joints' projections P_i for a tip T are compared:
+
+* constant: P_i = k_i T, the paper's scaling about Y = Z = 0; the arm is straight.
+* varying ratios: P_i = k'_i T, one joint's ratio free, the others in proportion; the
+  arm bends in the plane through rail and tip.
+* another centre: P_i = C + k'_i (T - C) from one joint on, with C anywhere.
+
+For each the smallest largest psi is told too. Every choice but the first changes one
+link angle more.
+"""
+
+import argparse
+import json
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.hrm1000.generate import generate
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.kinematics import joint_angles, link_angles
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.verification.link_clearance import link_clearance
+
+PAPER = ("obs1", "obs2", "obs2-small", "obs3")
+FAMILIES = ("prismatic_x", "crossing", "clutter", "wall", "narrow")
+SPACING = 0.15
+"""Distance of the tip positions; [m]."""
+LATTICE = 0.06
+"""Step of the slopes P / s that are tried; [-]."""
+NAMES = ("constant", "varying ratios", "another centre")
+
+
+def bent(arm: Manipulator, tip: FloatArray, joint: int, at: FloatArray) -> FloatArray:
+    """Joint centres with joint `joint` (from 0) projected to `at` and no other bend.
+
+    Args:
+        arm: The arm.
+        tip: Shape (3,); [m].
+        joint: 1..N - 1.
+        at: Shape (n, 2); [m].
+
+    Returns:
+        Shape (m, N + 1, 3), without those whose links would be too short; [m].
+    """
+    s, total = arm.stations, arm.total_length
+    ahead = np.minimum(s / s[joint], 1.0)
+    after = np.maximum((s - s[joint]) / (total - s[joint]), 0.0)
+    planar = ahead[:, None] * at[:, None] + after[:, None] * (tip[1:] - at)[:, None]
+    gaps = np.linalg.norm(np.diff(planar, axis=1), axis=2)
+    planar = planar[(gaps < arm.link_lengths).all(axis=1)]
+    gaps = np.linalg.norm(np.diff(planar, axis=1), axis=2)
+    rises = np.sqrt(arm.link_lengths**2 - gaps**2)
+    back = np.cumsum(rises[:, ::-1], axis=1)[:, ::-1]
+    x = np.column_stack([tip[0] - back, np.full(len(planar), tip[0])])
+    return np.concatenate([x[..., None], planar], axis=2)
+
+
+def candidates(arm: Manipulator, tip: FloatArray, name: str) -> FloatArray:
+    """Every configuration that a choice allows at a tip, on a lattice."""
+    ray = tip[1:] / arm.total_length
+    if name == "constant":
+        return bent(arm, tip, 1, arm.stations[1] * ray[None])
+    limit = np.sin(arm.max_link_angle)
+    found = []
+    for joint in range(1, arm.n_links):
+        if name == "varying ratios":
+            length = max(float(np.linalg.norm(ray)), 1e-9)
+            part = np.arange(-limit, limit, LATTICE / 4.0) / length
+            slopes = part[:, None] * ray
+        else:
+            side = np.arange(-limit, limit, LATTICE)
+            slopes = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+            slopes = slopes[np.hypot(*slopes.T) <= limit]
+        found.append(bent(arm, tip, joint, arm.stations[joint] * slopes))
+    return np.concatenate(found)
+
+
+def least_angle(problem: PlanningProblem, tip: FloatArray, name: str) -> float:
+    """Smallest largest psi of the clear configurations, inf without any; [rad]."""
+    arm = problem.manipulator
+    centres = candidates(arm, tip, name)
+    alpha, theta = joint_angles(arm, centres)
+    psi = link_angles(alpha, theta).max(axis=1)
+    box = np.maximum(np.abs(alpha), np.abs(theta)).max(axis=1)
+    low, high = arm.base_range
+    fine = (psi <= arm.max_link_angle) & (box <= arm.max_joint_angle)
+    fine &= (centres[:, 0, 0] >= low) & (centres[:, 0, 0] <= high)
+    centres, psi = centres[fine], psi[fine]
+    if not len(centres):
+        return np.inf
+    room = link_clearance(problem)(np.ascontiguousarray(centres)).min(axis=1)
+    return float(psi[room >= problem.required_clearance].min(initial=np.inf))
+
+
+def measured(problem: PlanningProblem) -> FloatArray:
+    """Least angle of each choice at each tip position, shape (k, 3); [rad]."""
+    path = problem.path
+    tips = path.at(np.arange(0.0, path.length, SPACING))
+    angles = np.array([[least_angle(problem, tip, n) for n in NAMES] for tip in tips])
+    # One ratio that varies is a centre on the ray to the tip, tried on a finer lattice.
+    angles[:, 2] = np.minimum(angles[:, 1], angles[:, 2])
+    return angles
+
+
+def row(name: str, angles: FloatArray) -> dict[str, object]:
+    """Shares of positions with a clear arm, and angles where all three have one."""
+    clear = np.isfinite(angles)
+    blocked = ~clear[:, 0]
+    both = clear[:, 1] & clear[:, 2] & blocked
+    return {
+        "scene": name,
+        "positions": len(angles),
+        "clear": clear.mean(axis=0).round(4).tolist(),
+        "blocked": int(blocked.sum()),
+        "of_blocked": clear[blocked].sum(axis=0).tolist(),
+        "psi_deg": _medians(angles[both]),
+    }
+
+
+def _medians(angles: FloatArray) -> list[float | None]:
+    """Medians of each choice, None where the choice has no clear arm; [deg]."""
+    if not len(angles):
+        return [None] * len(NAMES)
+    values = np.rad2deg(np.median(angles, axis=0)).tolist()
+    return [round(value, 1) if np.isfinite(value) else None for value in values]
+
+
+def table(rows: list[dict[str, object]]) -> str:
+    """The rows as Markdown."""
+    lines = [
+        "| scene | tip positions | straight arm blocked | of those clear with varying "
+        "ratios | with another centre | median largest psi there, ratios / centre [deg]"
+        " |",
+        "|---|---|---|---|---|---|",
+    ]
+    for one in rows:
+        _, ratios, centre = one["of_blocked"]  # type: ignore[misc]
+        _, psi_r, psi_c = one["psi_deg"]  # type: ignore[misc]
+        psi = "-" if psi_r is None else f"{psi_r} / {psi_c}"
+        cells = [one["scene"], one["positions"], one["blocked"], ratios, centre, psi]
+        lines.append("| " + " | ".join(map(str, cells)) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Measure, print, save."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path)
+    parser.add_argument("--per-family", type=int, default=3)
+    options = parser.parse_args()
+    rows = []
+    for name in PAPER:
+        rows.append(
+            row(f"paper/{name}", measured(read_problem(f"paper/{name}").problem))
+        )
+        print(rows[-1], flush=True)
+    for family in FAMILIES:
+        found = []
+        for number in range(options.per_family):
+            with tempfile.TemporaryDirectory() as folder:
+                path = generate(Path(folder), family, number)
+                found.append(measured(read_problem(path).problem))
+        title = f"{options.per_family} of {family}"
+        rows.append(row(title, np.concatenate(found)))
+        print(rows[-1], flush=True)
+    print(table(rows))
+    if options.out:
+        text = json.dumps(rows, indent=1) + "\n"
+        (options.out / "scaling_choices.json").write_text(text, encoding="utf-8")
+        (options.out / "scaling_choices.md").write_text(table(rows), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
