@@ -1,72 +1,84 @@
-"""Time per waypoint of planning the paper's problems.
+"""Time per waypoint of planning the paper's problems, beside damped least squares.
 
-    python benchmarks/plan.py
-    python benchmarks/plan.py --strategy paper --save reports/performance/plan.json
+    python -m benchmarks.plan [--repeats N] [--save FILE]
+    python -m benchmarks.plan --compare OLD.json NEW.json
 
-Each figure is the median of the repeats after a warm-up, with the 95th percentile, in
-microseconds of processor time a waypoint, on one thread.
+Processor time on one thread. The peer is damped least squares on Pinocchio with
+avoidance by Coal's distances (`benchmarks/hrm1000/references`); it makes a motion of
+the same problem that the same verifier judges, and is timed in the same run.
 """
 
 import argparse
-import json
 import os
-import platform
 import time
-from importlib.metadata import version
-from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import numpy as np
-
+from benchmarks.common import MICRO, Results, command, timed
+from benchmarks.hrm1000.references import reference
+from vdsm_pin.errors import VdsmError
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.planner.strategies import STRATEGIES, strategy
+from vdsm_pin.planner.strategies import strategy
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.robot_model import load_robot
 from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.verify import verify
 
-PROBLEMS = ("free", "obs1", "obs2", "obs2-small", "obs3")
-LIBRARIES = ("vdsm-pin", "numpy", "numba")
-
-
-def timed(name: str, strategy_name: str, repeats: int) -> dict[str, float]:
-    """Waypoints, and median and 95th percentile in microseconds a waypoint."""
-    problem = read_problem(f"paper/{name}").problem
-    clearance, plan_with = link_clearance(problem), strategy(strategy_name)
-    rows = plan_with(problem, clearance, 0.0).trajectory.n_samples
-    seconds = []
-    for _ in range(repeats):
-        start = time.process_time()
-        plan_with(problem, clearance, 0.0)
-        seconds.append(time.process_time() - start)
-    median, p95 = np.quantile(seconds, [0.5, 0.95]) / rows * 1e6
-    return {"waypoints": rows, "median_us": float(median), "p95_us": float(p95)}
+PROBLEMS = ("free", "obs1", "obs2", "obs3")
+STRATEGIES = ("paper", "fewest")
+PEER = "damped-least-squares"
 
 
-def main() -> None:
-    """Print the table and save it where asked."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--strategy", choices=tuple(STRATEGIES), default="paper")
-    parser.add_argument("--repeats", type=int, default=20)
-    parser.add_argument("--save", type=Path)
-    arguments = parser.parse_args()
-    results = {}
+def measure(repeats: int) -> Results:
+    """Every strategy and the peer on every problem."""
+    results: Results = {}
     for name in PROBLEMS:
-        results[name] = timed(name, arguments.strategy, arguments.repeats)
-        row = results[name]
-        print(
-            f"{name:12} {row['waypoints']:6.0f} waypoints "
-            f"{row['median_us']:9.2f} us median {row['p95_us']:9.2f} us p95"
-        )
-    if arguments.save:
-        record = {
-            "strategy": arguments.strategy,
-            "machine": platform.processor() or platform.machine(),
-            "python": platform.python_version(),
-            "versions": {name: version(name) for name in LIBRARIES},
-            "us_per_waypoint": results,
-        }
-        arguments.save.parent.mkdir(parents=True, exist_ok=True)
-        arguments.save.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+        problem = read_problem(f"paper/{name}").problem
+        clearance = link_clearance(problem)
+        for which in STRATEGIES:
+            plan = strategy(which)
+            motion = plan(problem, clearance, 0.0).trajectory
+            count = repeats if which == "paper" else max(3, repeats // 4)
+            spans = timed(
+                lambda: plan(problem, clearance, 0.0),  # noqa: B023
+                count,
+                MICRO / motion.n_samples,
+            )
+            spans["waypoints"] = motion.n_samples
+            results[f"plan {name}, {which} [us/waypoint]"] = spans
+        results[f"plan {name}, {PEER} [us/waypoint]"] = _peer(problem)
+    _note_ratios(results)
+    return results
+
+
+def _peer(problem: PlanningProblem, repeats: int = 3) -> dict[str, float]:
+    """The peer's time a waypoint and whether the verifier passes its motion."""
+    robot, clearance = load_robot(problem.manipulator), link_clearance(problem)
+    follow = reference(PEER)
+    start = time.process_time()
+    try:
+        motion = follow(problem, robot, clearance)
+    except VdsmError:
+        return {"median": time.process_time() - start, "completes": 0.0}
+    spans = timed(
+        lambda: follow(problem, robot, clearance), repeats, MICRO / motion.n_samples
+    )
+    passed = verify(problem, motion, robot).verdict.value == "certified"
+    whole = {"waypoints": float(motion.n_samples), "certified": float(passed)}
+    return spans | whole | {"completes": 1.0}
+
+
+def _note_ratios(results: Results) -> None:
+    """How many times as fast each plan is as the peer that completes the problem."""
+    for name, row in results.items():
+        peer = results[name.rsplit(",", 1)[0] + f", {PEER} [us/waypoint]"]
+        if row is not peer and peer["completes"]:
+            row["times as fast as the peer"] = peer["median"] / row["median"]
+
+
+def _options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--repeats", type=int, default=20)
 
 
 if __name__ == "__main__":
-    main()
+    command(__doc__, lambda asked: measure(asked.repeats), _options)

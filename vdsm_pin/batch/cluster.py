@@ -24,7 +24,7 @@ from vdsm_pin.report.run_record import versions
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-_LONGEST_ERRAND: Final = 16  # problems; keeps the scheduler below 100 messages a second
+LONGEST_ERRAND: Final = 64  # problems; one scheduler then feeds thousands of cores
 _ERRANDS_AHEAD: Final = 3  # for each thread, so that none waits for the scheduler
 _CONNECT: Final = "20s"
 
@@ -103,7 +103,7 @@ def _errands(
 ) -> Iterator[_Errand]:
     """Long errands for large batches, short ones to share out few problems."""
     share = len(tasks) // (threads * 8)
-    size = max(1, min(_LONGEST_ERRAND, share))
+    size = max(1, min(LONGEST_ERRAND, share))
     folder, ours = Path.cwd(), versions()
     for k in range(0, len(tasks), size):
         yield _Errand(tuple(tasks[k : k + size]), folder, time_limit, ours)

@@ -1,1 +1,0 @@
-"""What users would use instead, behind one call each."""
