@@ -3,9 +3,10 @@
     python -m benchmarks.batch [--problems 1000] [--rounds 1] [--keep none]
 
 Says seconds by the wall clock, and processor time of a problem in the processes that do
-it and in the one that hands it out. Other work on the machine hardly changes the latter,
-so they tell what two free cores would do: all processes together, shared by two, against
-one that is never kept waiting. The results are compared byte for byte.
+it and in the one that hands it out. Other work on the machine hardly changes the
+latter, so they tell what two free cores would do: all processes together, shared by
+two cores, against one process that is never kept waiting. The results are compared
+byte for byte.
 """
 
 import argparse

@@ -1,0 +1,157 @@
+"""Guards on cost that no busy machine can upset: counts, and ratios of counts.
+
+Compiled once, never again; Python's work does not grow with the rows; the proof needs
+few subdivisions and Coal few calls.
+"""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType
+
+import numba
+import numpy as np
+import pytest
+from numba.core import event
+from problem_files import NEAR, write_problem
+
+from vdsm_pin.cables import angles_from_cables, cable_lengths
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
+from vdsm_pin.kinematics import joint_angles, joint_centres
+from vdsm_pin.planner.strategies import strategy
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification import coal_clearance
+from vdsm_pin.verification.clearance import prove_clearance
+from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.records import ErrorBox
+
+COUNTED = """
+import sys
+from numba.core import event
+from vdsm_pin.cli import main
+with event.install_recorder("numba:compile") as recorded:
+    for words in (
+        ["plan", sys.argv[1], "--strategy", "paper", "--out", sys.argv[2]],
+        ["verify", sys.argv[1], "--trajectory", sys.argv[2] + "/trajectory.csv",
+         "--out", sys.argv[2]],
+    ):
+        try:
+            main(words)
+        except SystemExit as ended:
+            assert not ended.code, ended.code
+begun = [one for _, one in recorded.buffer if one.is_start]
+names = {one.data["dispatcher"].__qualname__ for one in begun}
+sys.stderr.write("compiled: " + " ".join(sorted(names)))
+"""
+
+
+def compiled_by(problem: Path, out: Path) -> list[str]:
+    """Functions that a process compiled to plan and verify a problem."""
+    words = [sys.executable, "-c", COUNTED, str(problem), str(out)]
+    ended = subprocess.run(words, capture_output=True, text=True, check=True)
+    return ended.stderr.rpartition("compiled:")[2].split()
+
+
+def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
+    problem = write_problem(tmp_path / "near.yaml", NEAR)
+    compiled_by(problem, tmp_path / "first")
+    assert compiled_by(problem, tmp_path / "second") == []
+
+
+def test_a_compilation_would_be_counted() -> None:
+    with event.install_recorder("numba:compile") as recorded:
+        numba.njit(lambda x: x + 1)(1)
+    assert recorded.buffer
+
+
+def calls(run: Callable[[], object]) -> int:
+    """How often Python calls a function, its own or C's, to run this once more."""
+    run()
+    count = 0
+
+    def note(frame: FrameType, kind: str, argument: object) -> None:
+        nonlocal count
+        count += kind in ("call", "c_call")
+
+    sys.setprofile(note)
+    try:
+        run()
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def swaying(rows: int) -> Trajectory:
+    t = np.linspace(0.0, 6.0, rows)[:, None] + np.arange(8.0)
+    off = np.zeros(rows, bool)
+    x0 = 0.05 * np.sin(t[:, 0])
+    return Trajectory(off, off, x0, 0.1 * np.sin(t), 0.1 * np.cos(t))
+
+
+def near() -> PlanningProblem:
+    return read_problem("paper/obs1").problem
+
+
+def work(rows: int, folder: Path) -> dict[str, int]:
+    """Calls by what is done to the rows."""
+    problem, motion = near(), swaying(rows)
+    arm = problem.manipulator
+    joints = motion.x0, motion.alpha, motion.theta
+    centres, file = joint_centres(arm, *joints), folder / f"{rows}.csv"
+    lengths = cable_lengths(arm, motion.alpha, motion.theta)
+    return {
+        "cables": calls(lambda: cable_lengths(arm, *joint_angles(arm, centres))),
+        "angles": calls(lambda: angles_from_cables(arm, lengths)),
+        "proof": calls(lambda: prove_clearance(problem, motion, ErrorBox())),
+    } | {"write": calls(lambda: write_trajectory(file, motion)),
+         "read": calls(lambda: read_trajectory(file, arm))}  # fmt: skip
+
+
+def test_python_does_not_work_row_by_row(tmp_path: Path) -> None:
+    few, many = work(200, tmp_path), work(1000, tmp_path)
+    for what in ("cables", "angles", "proof"):
+        assert many[what] <= 1.1 * few[what], what
+    # Of a line there is one call to put it together, and four to read and look at it.
+    assert many["write"] <= few["write"] + 1.5 * 800
+    assert many["read"] <= few["read"] + 4.5 * 800
+
+
+def test_a_loop_over_rows_would_be_noticed() -> None:
+    def row_by_row(values: FloatArray) -> float:
+        return sum(float(np.sin(value)) for value in values)
+
+    counts = [calls(lambda n=n: row_by_row(np.ones(n))) for n in (200, 1000)]  # type: ignore[misc]
+    assert counts[1] > 4 * counts[0]
+
+
+@pytest.fixture(scope="module")
+def planned() -> Trajectory:
+    problem = near()
+    return strategy("paper")(problem, link_clearance(problem), 0.0).trajectory
+
+
+def test_the_proof_of_a_plan_needs_few_subdivisions(planned: Trajectory) -> None:
+    proof = prove_clearance(near(), planned, ErrorBox())
+    assert proof.slices <= 0.01 * proof.counts.sum()
+
+
+def test_coal_is_asked_where_it_adds_evidence(
+    planned: Trajectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem, asked = near(), 0
+    measure = coal_clearance.measure
+
+    def counting(*arguments: object) -> object:
+        nonlocal asked
+        asked += 1
+        return measure(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(coal_clearance, "measure", counting)
+    coal_clearance.check_coal(load_robot(problem.manipulator), problem, planned)
+    pairs = planned.n_samples * problem.manipulator.n_links
+    assert 8 <= asked <= 0.4 * pairs
