@@ -1,4 +1,4 @@
-"""A million rows from file to report in less than a gibibyte; the process's own peak."""
+"""A million rows from file to report in less than a gibibyte; its own peak."""
 
 import subprocess
 import sys

@@ -24,7 +24,7 @@ from vdsm_pin.report.run_record import versions
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-LONGEST_ERRAND: Final = 64  # problems; one scheduler then feeds thousands of cores
+LONGEST_ERRAND: Final = 64  # problems; a scheduler then feeds two thousand cores
 _ERRANDS_AHEAD: Final = 3  # for each thread, so that none waits for the scheduler
 _CONNECT: Final = "20s"
 
