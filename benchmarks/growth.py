@@ -17,42 +17,28 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from benchmarks.certify import beside, far_away, sway
+from benchmarks.certify import ARM, NEAR, beside, certify_growth, problem_of, sway
 from benchmarks.common import MILLI, Results, command, timed
 from vdsm_pin.cables import angles_from_cables, cable_lengths
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.kinematics import joint_angles, joint_centres
 from vdsm_pin.manipulator import (
     CableLayout,
-    Manipulator,
-    built_in,
     paper_hole_angles,
 )
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.scene import Cylinder, Mesh, Obstacle, Scene
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.robust import largest_joint_error
 
-ARM = built_in("hrm8")
-NEAR = 3.5e-3
 ROWS = 1_000  # where rows are not what grows
 NOMINAL = ErrorBox()
 Runs = dict[str, Callable[[], object]]
 
 
-def asked(arm: Manipulator, *obstacles: Obstacle) -> PlanningProblem:
-    """A problem that asks for a clearance and for no way of the tip."""
-    point = np.array([arm.total_length, 0.0, 0.0])
-    path = DesiredPath(point, point[None])
-    return PlanningProblem("bench", arm, Scene(obstacles), path, NEAR, np.eye(4))
-
-
 def at_waypoints(n: int, folder: Path) -> Runs:
     """Everything that is done to the rows of a motion."""
     motion = sway(n - 1)
-    problem = asked(ARM, beside(motion, NEAR + 0.01))
+    problem = problem_of(ARM, [beside(motion, NEAR)], 0.5 * NEAR)
     joints = motion.x0, motion.alpha, motion.theta
     centres = joint_centres(ARM, *joints)
     lengths = cable_lengths(ARM, *joints[1:])
@@ -64,18 +50,10 @@ def at_waypoints(n: int, folder: Path) -> Runs:
     return {
         "cables from centres": lambda: cable_lengths(ARM, *joint_angles(ARM, centres)),
         "centres from cables": back,
-        "clearance proof": lambda: prove_clearance(problem, motion, NOMINAL),
         "largest joint error": lambda: largest_joint_error(problem, motion, NOMINAL),
         "write trajectory": lambda: write_trajectory(file, motion),
         "read trajectory": lambda: read_trajectory(file, ARM),
     }
-
-
-def at_obstacles(n: int, folder: Path) -> Runs:
-    """A bar that is near, and balls around the arm."""
-    motion = sway(ROWS)
-    problem = asked(ARM, beside(motion, NEAR), *far_away(n - 1))
-    return {"clearance proof": lambda: prove_clearance(problem, motion, NOMINAL)}
 
 
 def at_links(n: int, folder: Path) -> Runs:
@@ -93,43 +71,9 @@ def at_links(n: int, folder: Path) -> Runs:
         off, off, 0.1 * np.sin(t[:, 0]), bend * np.sin(t), bend * np.cos(t)
     )
     centres = joint_centres(arm, motion.x0, motion.alpha, motion.theta)
-    height = float(centres[..., 2].max()) + arm.link_radius + NEAR + 0.21
-    middle, along = np.array([1.5, 0.0, height]), np.array([1.0, 0.0, 0.0])
-    problem = asked(arm, Cylinder("bar", middle, along, 4.0, 0.2))
     return {
-        "clearance proof": lambda: prove_clearance(problem, motion, NOMINAL),
         "cables from centres": lambda: cable_lengths(arm, *joint_angles(arm, centres)),
     }
-
-
-def at_triangles(n: int, folder: Path) -> Runs:
-    """One ball of more and more triangles beside the arm."""
-    motion = sway(ROWS)
-    centres = joint_centres(ARM, motion.x0, motion.alpha, motion.theta)
-    top = float(centres[..., 2].max()) + ARM.link_radius + NEAR + 0.21
-    problem = asked(ARM, _ball(np.array([1.5, 0.0, top]), 0.2, n))
-    return {"clearance proof": lambda: prove_clearance(problem, motion, NOMINAL)}
-
-
-def _ball(centre: np.ndarray, radius: float, triangles: int) -> Mesh:
-    """A closed ball of about so many triangles, by rings."""
-    rings = max(3, round((triangles / 4.0) ** 0.5))
-    turns = 2 * rings
-    polar = np.linspace(0.0, np.pi, rings + 1)[1:-1]
-    around = np.arange(turns) * 2.0 * np.pi / turns
-    p, a = (grid.ravel() for grid in np.meshgrid(polar, around, indexing="ij"))
-    middle = np.column_stack([np.sin(p) * np.cos(a), np.sin(p) * np.sin(a), np.cos(p)])
-    points = np.concatenate([[[0, 0, 1.0]], middle, [[0, 0, -1.0]]])
-    k, after = np.arange(turns), (np.arange(turns) + 1) % turns
-    last = len(points) - 1
-    faces = [np.column_stack([0 * k, 1 + k, 1 + after])]
-    for ring in range(rings - 2):
-        a, b = 1 + ring * turns, 1 + (ring + 1) * turns
-        faces.append(np.column_stack([a + k, b + k, b + after]))
-        faces.append(np.column_stack([a + k, b + after, a + after]))
-    a = 1 + (rings - 2) * turns
-    faces.append(np.column_stack([a + k, 0 * k + last, a + after]))
-    return Mesh("ball", centre + radius * points, np.concatenate(faces), True)
 
 
 def _decades(first: int, most: int) -> list[int]:
@@ -140,11 +84,15 @@ def measure(most: int) -> Results:
     """Every row of the table, in milliseconds."""
     groups: dict[str, tuple[Callable[[int, Path], Runs], list[int]]] = {
         "waypoints": (at_waypoints, _decades(100, most)),
-        "obstacles": (at_obstacles, _decades(1, min(most, 1_000))),
         "links": (at_links, [2, 5, 10, 20, 40]),
-        "mesh triangles": (at_triangles, _decades(100, most)),
     }
-    results: Results = {}
+    results: Results = {
+        f"clearance proof, {row.table}, {row.size:.0f} [ms]": {
+            "median": row.cpu_ms, "p95": row.p95_ms, "least": row.cpu_ms,
+        }
+        for row in certify_growth(3, quick=most < 1_000_000)
+        if row.table != "clearance"
+    }  # fmt: skip
     with tempfile.TemporaryDirectory() as folder:
         for what, (at, sizes) in groups.items():
             for n in sizes:
