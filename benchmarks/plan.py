@@ -46,7 +46,9 @@ def measure(repeats: int) -> Results:
             )
             spans["waypoints"] = motion.n_samples
             results[f"plan {name}, {which} [us/waypoint]"] = spans
-        results[f"plan {name}, {PEER} [us/waypoint]"] = _peer(problem)
+        peer = _peer(problem)
+        unit = "us/waypoint" if peer["completes"] else "s until it gives up"
+        results[f"plan {name}, {PEER} [{unit}]"] = peer
     _note_ratios(results)
     return results
 
@@ -71,8 +73,8 @@ def _peer(problem: PlanningProblem, repeats: int = 3) -> dict[str, float]:
 def _note_ratios(results: Results) -> None:
     """How many times as fast each plan is as the peer that completes the problem."""
     for name, row in results.items():
-        peer = results[name.rsplit(",", 1)[0] + f", {PEER} [us/waypoint]"]
-        if row is not peer and peer["completes"]:
+        peer = results.get(name.rsplit(",", 1)[0] + f", {PEER} [us/waypoint]")
+        if peer is not None and row is not peer:
             row["times as fast as the peer"] = peer["median"] / row["median"]
 
 

@@ -44,7 +44,7 @@ Least of a few runs. The exponent is the slope of the last two decades; 1 is lin
 {growth}
 ![time against size, both axes logarithmic](growth.svg)
 
-## Memory of a million rows
+## Memory of a long motion
 
 {memory}
 ## Batch
