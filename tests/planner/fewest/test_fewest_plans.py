@@ -19,8 +19,9 @@ from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.scene import Box, Cylinder, HalfSpace, Sphere
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.clearance import is_certified
 from vdsm_pin.verification.link_clearance import link_clearance
-from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.records import ErrorBox, Verdict
 from vdsm_pin.verification.verify import verify
 
 ARM = built_in("hrm8")
@@ -221,13 +222,22 @@ def test_an_arm_that_starts_bent_starts_there() -> None:
     assert result.coverage == pytest.approx(1.0, abs=1e-9)
 
 
-def test_clearest_keeps_more_clearance_than_fewest() -> None:
-    task = read_problem("paper/obs3").problem
+@pytest.mark.parametrize(("name", "gain"), [("obs1", 0.02), ("obs3", 0.09)])
+def test_clearest_keeps_much_more_clearance_and_survives_larger_joint_errors(
+    name: str, gain: float
+) -> None:
+    task = read_problem(f"paper/{name}").problem
     clearance = link_clearance(task)
     wide = plan_clearest(task, clearance, 0.0)
     lean = plan_fewest(task, clearance, 0.0)
-    assert clearance(wide.centres).min() > clearance(lean.centres).min() + 0.02
+    assert clearance(wide.centres).min() > clearance(lean.centres).min() + gain
     assert changed_along(wide) >= changed_along(lean)
+    result = verify(task, wide.trajectory, load_robot(task.manipulator))
+    assert result.verdict is Verdict.CERTIFIED
+    assert result.coverage == pytest.approx(1.0, abs=1e-9)
+    error = float(np.deg2rad(0.12))
+    assert is_certified(task, wide.trajectory, ErrorBox(joint=error))
+    assert not is_certified(task, lean.trajectory, ErrorBox(joint=error))
 
 
 def test_a_time_limit_stops_and_tells_how_far_it_came_and_never_steers() -> None:

@@ -74,6 +74,9 @@ LEVELS: Final = (
     Level(0.05, 0.013, 10, 60, 1.0, 3, 3e-5, 5e-4),
 )
 
+QUICK: Final = LEVELS[:2]
+"""Levels for plans that are only better than one there is already."""
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -98,7 +101,11 @@ class Outcome:
 
 
 def explore(
-    problem: PlanningProblem, clearance: Nearby, margin: float, taste: Taste
+    problem: PlanningProblem,
+    clearance: Nearby,
+    margin: float,
+    taste: Taste,
+    levels: tuple[Level, ...] = LEVELS,
 ) -> Iterator[Outcome]:
     """Search level by level until all that can be drawn is drawn.
 
@@ -107,6 +114,7 @@ def explore(
         clearance: The clearance function.
         margin: Kept beyond the required clearance; [m].
         taste: What the strategy prefers.
+        levels: How finely to look, in this order.
 
     Yields:
         Outcomes, each better than the one before; the first is what is known before
@@ -122,7 +130,7 @@ def explore(
     # The way out of a start that is bent more than is liked must be allowed.
     bent = largest_start_angle(problem) / link_limit(problem)
     least_ease = min(1.0, bent + TOLERANCES.joint_limit)
-    for number, level in enumerate(LEVELS):
+    for number, level in enumerate(levels):
         ease = max(level.ease, least_ease)
         worth = problem.required_clearance + margin + level.slack + taste.room
         judge = Judge(
@@ -137,7 +145,7 @@ def explore(
             yield best
         if not best.missing > 0.0:
             return
-        if number == 0:
+        if number == 0 and len(levels) > len(QUICK):
             # Seldom needed, so only now: is there any way for the tip at all?
             proof = replace(proof, cut_off=cut_off(problem, rows.tips))
             best = replace(best, proof=proof)

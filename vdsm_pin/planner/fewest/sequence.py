@@ -78,7 +78,10 @@ class Planner:
                 row = slice(route.first[u], route.first[u + 1])
                 link = route.links[row] == v
                 self.way_gaps[row] += link * (route.gaps[row] + DISTRUST)
-        if on_ways:
+        # Blocked on the path, an edge may be part of a way from home all the same.
+        here, there = edges.T
+        on_tree = (self.before[here] == there) | (self.before[there] == here)
+        if on_ways or on_tree.any():
             self.from_home, self.before = self.ways(self.home)
 
     def ways(self, source: int, target: int = -1) -> tuple[FloatArray, IntArray]:

@@ -1,5 +1,6 @@
 """The strategies `fewest` and `clearest`: search, smooth, write down, explain."""
 
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -9,7 +10,7 @@ from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.kinematics import joint_angles
 from vdsm_pin.planner.fewest.explain import how_far, notes_of, refuse
-from vdsm_pin.planner.fewest.explore import Outcome, explore
+from vdsm_pin.planner.fewest.explore import LEVELS, QUICK, Level, Outcome, explore
 from vdsm_pin.planner.fewest.motion import Knots, Rows, dense_rows
 from vdsm_pin.planner.fewest.nearby import Nearby, nearby
 from vdsm_pin.planner.fewest.roadmap import Taste
@@ -20,6 +21,7 @@ from vdsm_pin.planner.fewest.unbend import (
     unbend,
     with_unbending,
 )
+from vdsm_pin.planner.fewest.widest import widest
 from vdsm_pin.planner.records import LinkClearance, Plan, TipPath
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
@@ -48,7 +50,7 @@ def plan_fewest(
 def plan_clearest(
     problem: PlanningProblem, clearance: LinkClearance, margin: float
 ) -> Plan:
-    """The same search with clearance worth more than straight joints.
+    """The plan with the largest clearance found, at the price of straight joints.
 
     Args:
         problem: What is asked.
@@ -58,7 +60,52 @@ def plan_clearest(
     Raises:
         Infeasible: With the proof where there is one, else `NoPlanFound`.
     """
-    return _plan(problem, clearance, margin, "clearest", CLEAREST)
+    search = _Search(problem, clearance, margin, "clearest", CLEAREST)
+    plan, reserve = _clearest(search)
+    if not problem.scene.obstacles:
+        return plan
+    most = problem.required_clearance + margin + reserve
+    note = (
+        f"of the plans tried none with a clearance above {most * 1e3:.1f} mm draws as "
+        "much"
+    )
+    return replace(plan, notes=(*plan.notes, note))
+
+
+def _clearest(search: "_Search") -> tuple[Plan, float]:
+    """The plan with the largest clearance found, and what it has in reserve; [m]."""
+    first, clearance = search.plan(), search.clearance
+    kept = search.problem.required_clearance + search.margin
+    low = float(clearance(first.centres).min()) - kept
+    start = float(clearance(first.centres[:1]).min())
+    high = min(_room_at_tips(clearance, first), start) - kept
+    return widest(search.with_reserve, first, low, high)
+
+
+def _room_at_tips(clearance: LinkClearance, plan: Plan) -> float:
+    """Least clearance of the tip alone where it draws: no plan has more; [m]."""
+    tips = plan.tip_path.points[plan.tip_path.on_path]
+    return float(clearance(np.stack([tips, tips], axis=1)).min(initial=np.inf))
+
+
+@dataclass(frozen=True)
+class _Search:
+    """Plans of one problem with more and more in reserve."""
+
+    problem: PlanningProblem
+    clearance: LinkClearance
+    margin: float
+    name: str
+    taste: Taste
+
+    def plan(self) -> Plan:
+        return _plan(self.problem, self.clearance, self.margin, self.name, self.taste)
+
+    def with_reserve(self, reserve: float) -> Plan:
+        return _plan(
+            self.problem, self.clearance, self.margin + reserve, self.name,
+            self.taste, levels=QUICK,
+        )  # fmt: skip
 
 
 def _plan(
@@ -67,24 +114,24 @@ def _plan(
     margin: float,
     name: str,
     taste: Taste,
+    levels: tuple[Level, ...] = LEVELS,
 ) -> Plan:
     if not leans_ahead(problem):
         rows = unbend(problem, clearance, margin)
         there = from_there(problem, rows[-1])
-        return with_unbending(
-            problem, rows, _plan(there, clearance, margin, name, taste)
-        )
+        rest = _plan(there, clearance, margin, name, taste, levels)
+        return with_unbending(problem, rows, rest)
     quick = nearby(problem, clearance)
     best: Outcome | None = None
     try:
-        for outcome in explore(problem, quick, margin, taste):
+        for outcome in explore(problem, quick, margin, taste, levels):
             best = outcome
         assert best is not None
         refuse(problem, best)
         return _written(problem, quick, name, taste, best)
-    except OutOfTime as error:
+    except OutOfTime as ended:
         reached = "" if best is None else how_far(problem, best)
-        raise OutOfTime(error.limit, reached) from None
+        raise OutOfTime(ended.limit, reached) from None
 
 
 def _written(

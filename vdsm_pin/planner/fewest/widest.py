@@ -1,0 +1,53 @@
+"""The largest reserve for which there is still a plan, by bisection."""
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.errors import Infeasible, OutOfTime
+from vdsm_pin.planner.records import Plan
+from vdsm_pin.tolerances import TOLERANCES
+
+ROUNDS: Final = 6
+"""Halvings of the reserve; the last tells it to 1/64 of where it was sought."""
+
+
+def drawn_length(plan: Plan) -> float:
+    """Length that the tip draws; [m]."""
+    on = plan.trajectory.on_path
+    step = np.linalg.norm(np.diff(plan.tip_path.points, axis=0), axis=1)
+    return float(step[on[:-1] & on[1:]].sum())
+
+
+def widest(
+    plan_with: Callable[[float], Plan], first: Plan, low: float, high: float
+) -> tuple[Plan, float]:
+    """The plan with the largest reserve found that draws as much as the first one.
+
+    Args:
+        plan_with: A plan that keeps a reserve; raises `Infeasible` where it has none.
+        first: What there is without any search.
+        low: A reserve it has.
+        high: A reserve that nothing has.
+
+    Returns:
+        The plan and its reserve.
+    """
+    best, whole = first, drawn_length(first) - TOLERANCES.joint_centre
+    for _ in range(ROUNDS):
+        if not low < high < np.inf:
+            break
+        middle = (low + high) / 2.0
+        try:
+            plan = plan_with(middle)
+        except OutOfTime:
+            raise
+        except Infeasible:
+            high = middle
+            continue
+        if drawn_length(plan) < whole:
+            high = middle
+        else:
+            best, low = plan, middle
+    return best, low
