@@ -64,6 +64,23 @@ except ValueError as error:
     print(error.args)
 print(early)
 """
+SIGNALLED = """
+import signal
+class Stop(Exception):
+    pass
+def stop(number, frame):
+    raise Stop
+signal.signal(signal.SIGALRM, stop)
+values, stopped = np.ones(200_000), 0
+for k in range(50):
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 1e-3 + 1e-5 * k)
+        while True:
+            kernels.pair(values, 0.5)
+    except Stop:
+        stopped += 1
+print(stopped)
+"""
 ANSWER = "2.0\nPair [2.0, 2.0] 0.5\n('below zero', -1.0)\n"
 
 
@@ -117,9 +134,9 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return names
 
 
-def run(folder: Path, where: Path) -> subprocess.Popen[str]:
+def run(folder: Path, where: Path, more: str = "") -> subprocess.Popen[str]:
     (where / "kernels.py").write_text(SOURCE, encoding="utf-8")
-    words = [sys.executable, "-c", PROGRAM, str(folder), str(where)]
+    words = [sys.executable, "-c", PROGRAM + more, str(folder), str(where)]
     return subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
 
 
@@ -131,6 +148,13 @@ def test_later_processes_do_without_numba(tmp_path: Path) -> None:
     assert later.communicate()[0] == f"{ANSWER}False\n"
     names = [path.name.split("-")[0] for path in (tmp_path / "code").iterdir()]
     assert sorted(names) == ["kernels.pair", "kernels.refuse", "kernels.twice"]
+
+
+def test_what_a_signal_raises_is_not_lost(tmp_path: Path) -> None:
+    """Not even while compiled code makes its result: a time limit rests on it."""
+    run(tmp_path / "code", tmp_path).communicate()
+    later = run(tmp_path / "code", tmp_path, SIGNALLED)
+    assert later.communicate()[0] == f"{ANSWER}False\n50\n"
 
 
 def test_changed_source_is_compiled_again(

@@ -27,8 +27,6 @@ from vdsm_pin import kept
 IN_THE_WAY: Final = ("NUMBA_NUM_THREADS", "NUMBA_CACHE_DIR")
 """Settings of numba that leave the code as it is."""
 
-_unpickled: Final[dict[int, Any]] = {}
-
 _engines: Final[list[Any]] = []
 """Owners of the loaded code; it stays until the process ends."""
 
@@ -142,23 +140,41 @@ def _runtime() -> Any:
     for prefix, module in (("numba_", helpers), ("NRT_", memory)):
         for name, address in module.c_helpers.items():
             llvm.add_symbol(name if name.startswith("_") else prefix + name, address)
-    llvm.add_symbol("numba_unpickle", ctypes.cast(_UNPICKLE, ctypes.c_void_p).value)
+    _teach_unpickling(helpers.c_helpers["unpickle"])
     return _extension("numba._dynfunc")
 
 
-def _unpickle(address: int, size: int, digest: int) -> Any:
-    """The type of a result or what is raised, from the pickle in the code.
+def _teach_unpickling(unpickle: int) -> None:
+    """Have numba's C function for pickles call ours, which imports nothing of numba.
 
-    As numba's own, which imports all of numba.
+    It asks for its Python half once, by the name of a module. A callback made by ctypes
+    would do without, but lose what a signal raises inside of it, such as the end of a
+    time limit.
+
+    Args:
+        unpickle: Address of the C function.
     """
-    if address not in _unpickled:
-        _unpickled[address] = pickle.loads(ctypes.string_at(address, size))
-    return _unpickled[address]
+    if "numba" in sys.modules:
+        return
+    stand_in = ModuleType("numba.core.serialize")
+    vars(stand_in)["_numba_unpickle"] = _unpickle
+    shown = {"numba": ModuleType("numba"), stand_in.__name__: stand_in}
+    prototype = ctypes.PYFUNCTYPE(
+        ctypes.py_object, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p
+    )
+    content = pickle.dumps(None)
+    sys.modules.update(shown)
+    try:
+        prototype(unpickle)(content, len(content), bytes(20))
+    finally:
+        for name in shown:
+            del sys.modules[name]
 
 
-_UNPICKLE: Final = ctypes.PYFUNCTYPE(
-    ctypes.py_object, ctypes.c_void_p, ctypes.c_int, ctypes.c_void_p
-)(_unpickle)
+@cache  # in C, where no signal comes between
+def _unpickle(address: int, content: bytes, digest: bytes) -> Any:
+    """The type of a result or what is raised, from the pickle in the code."""
+    return pickle.loads(content)
 
 
 def _extension(name: str) -> ModuleType:
