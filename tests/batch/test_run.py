@@ -132,10 +132,13 @@ def test_killed_fifty_times_and_resumed_is_the_same_to_the_byte(
     assert check_kills(problems, reference, tmp_path / "out", 50) >= 10
 
 
-def test_ctrl_c_ends_with_what_is_done(problems: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
+def test_ctrl_c_ends_with_what_is_done(tmp_path: Path) -> None:
+    many, out = tmp_path / "many", tmp_path / "out"
+    many.mkdir()
+    for k in range(40):  # far from done when the first is
+        write_problem(many / f"{k}.yaml", NEAR)
     with subprocess.Popen(
-        command(problems, out),
+        command(many, out),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -147,7 +150,7 @@ def test_ctrl_c_ends_with_what_is_done(problems: Path, tmp_path: Path) -> None:
     assert process.returncode == 130
     assert "--resume does the rest" in said
     assert "Traceback" not in said
-    assert 1 <= len(read_summary(out / "summary.csv")) < len(NAMES)
+    assert 1 <= len(read_summary(out / "summary.csv")) < 40
     assert not (out / ".unfinished").exists()
 
 
