@@ -37,6 +37,10 @@ PLAN: Final = "plan.json"
 VERIFICATION: Final = "verification.json"
 REPORT: Final = "report.html"
 
+AGAIN: Final = 0.5
+"""A time limit is raised again after this, should the first have come where Python can
+only print it, such as at the end of a generator; [s]."""
+
 
 @dataclass(frozen=True)
 class Order:
@@ -85,7 +89,7 @@ def within(seconds: float | None) -> Iterator[None]:
         raise OutOfTime(limit)  # a strategy that hears it adds how far it came
 
     before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    signal.setitimer(signal.ITIMER_REAL, seconds, AGAIN)
     try:
         yield
     finally:

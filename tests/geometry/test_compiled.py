@@ -98,8 +98,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def kernels(tmp_path: Path) -> Iterator[Callable[..., ModuleType]]:
+def kernels(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Callable[..., ModuleType]]:
     """A maker of modules with compiled functions, as a new process would import it."""
+    # Python takes a file of the same size, changed within a second, for the same.
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
     path = tmp_path / "kernels.py"
 
     def make(source: str = SOURCE) -> ModuleType:
