@@ -45,16 +45,14 @@ from vdsm_pin.problem import DesiredPath, PlanningProblem
 from vdsm_pin.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.clearance import (
-    BUDGET,
-    SLACK,
-    new_results,
-    prove_clearance,
-)
-from vdsm_pin.verification.proof.blocks import new_desk, sweep
+from vdsm_pin.verification.clearance import prove_clearance
+from vdsm_pin.verification.proof.blocks import sweep
 from vdsm_pin.verification.proof.culling import new_culling
+from vdsm_pin.verification.proof.desk import new_desk
 from vdsm_pin.verification.proof.terms import Motion, Pairs, Rules, Task
+from vdsm_pin.verification.proving import BUDGET, new_results
 from vdsm_pin.verification.records import ClearanceChunk, ErrorBox
+from vdsm_pin.verification.task import SLACK
 
 FAR: Final = 1e-6
 """From here on a query must be decided; [m]."""

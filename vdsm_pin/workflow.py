@@ -28,8 +28,8 @@ from vdsm_pin.report.tables import ClearanceCsv, write_cables, write_link_angles
 from vdsm_pin.robot_model import RobotModel, load_robot
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
-from vdsm_pin.verification.clearance import all_pairs
 from vdsm_pin.verification.records import ErrorBox, Verdict, Verification
+from vdsm_pin.verification.task import all_pairs
 from vdsm_pin.verification.verify import verify
 
 TRAJECTORY: Final = "trajectory.csv"

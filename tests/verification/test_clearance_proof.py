@@ -12,11 +12,8 @@ from vdsm_pin.problem import DesiredPath, PlanningProblem
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.scene import Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Scene, Sphere
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.clearance import (
-    ClearanceProof,
-    is_certified,
-    prove_clearance,
-)
+from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
+from vdsm_pin.verification.hasty import is_certified
 from vdsm_pin.verification.inside import check_inside
 from vdsm_pin.verification.records import ClearanceChunk, ErrorBox, Verdict
 from vdsm_pin.verification.verify import verify

@@ -21,8 +21,9 @@ from vdsm_pin.scene import (
     Sphere,
 )
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.clearance import is_certified, prove_clearance
+from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.counterexample import find_counterexamples
+from vdsm_pin.verification.hasty import is_certified
 from vdsm_pin.verification.records import Counterexample, ErrorBox, Verdict
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.verify import verify

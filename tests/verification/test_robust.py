@@ -13,7 +13,7 @@ from vdsm_pin.problem import DesiredPath, PlanningProblem
 from vdsm_pin.scene import Scene, Sphere
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.clearance import HastyProof, is_certified
+from vdsm_pin.verification.hasty import HastyProof, is_certified
 from vdsm_pin.verification.proof.coasting import crude_growth
 from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.robust import LARGEST, STRETCH, largest_joint_error

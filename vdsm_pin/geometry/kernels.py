@@ -123,6 +123,22 @@ def _half_space_bracket(
 
 
 @compiled
+def keep_least(trial: FloatArray, out: FloatArray) -> None:
+    """Fold the bracket of one more piece into the least one of several.
+
+    Args:
+        trial: The bracket of the piece.
+        out: The least bounds, n of the lower one, witnesses of the upper; updated.
+    """
+    if trial[UPPER] < out[UPPER]:
+        out[UPPER] = trial[UPPER]
+        out[NEAR:BRACKET] = trial[NEAR:BRACKET]
+    if trial[LOWER] < out[LOWER]:
+        out[LOWER] = trial[LOWER]
+        out[NORMAL:NEAR] = trial[NORMAL:NEAR]
+
+
+@compiled
 def _compact(scratch: FloatArray, m: int, weights: FloatArray) -> int:
     """Drop the corners of weight 0; rows k, 4 + k and 8 + k belong together."""
     kept = 0

@@ -8,12 +8,12 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import (
-    BRACKET,
     LOWER,
     NEAR,
     NORMAL,
     UPPER,
     bracket,
+    keep_least,
     piece_support,
     rounding_radius,
 )
@@ -116,12 +116,7 @@ def obstacle_bracket(
             waiting = push_children(pieces, node, low, high, stack, waiting)
             continue
         bracket(pieces, first, points, count, goal, scratch, trial)
-        if trial[UPPER] < out[UPPER]:
-            out[UPPER] = trial[UPPER]
-            out[NEAR:BRACKET] = trial[NEAR:BRACKET]
-        if trial[LOWER] < out[LOWER]:
-            out[LOWER] = trial[LOWER]
-            out[NORMAL:NEAR] = trial[NORMAL:NEAR]
+        keep_least(trial, out)
 
 
 @compiled

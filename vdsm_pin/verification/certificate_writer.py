@@ -21,19 +21,14 @@ from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.scene import Prism
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.clearance import BUDGET, all_pairs, make_task
 from vdsm_pin.verification.limits import extremes
-from vdsm_pin.verification.proof.blocks import new_desk
-from vdsm_pin.verification.proof.recording import (
-    CLAIM,
-    FIRST,
-    LAST,
-    PLANE_NORMAL,
-    RECORD,
-    record,
-)
+from vdsm_pin.verification.proof.desk import new_desk
+from vdsm_pin.verification.proof.layouts import CLAIM, FIRST, LAST, PLANE_NORMAL, RECORD
+from vdsm_pin.verification.proof.recording import record
 from vdsm_pin.verification.proof.terms import BASE, Motion, Task
+from vdsm_pin.verification.proving import BUDGET
 from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.task import all_pairs, make_task
 
 CHUNK: Final = 512
 """Intervals recorded at once."""

@@ -21,14 +21,9 @@ from vdsm_pin.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
-from vdsm_pin.verification.proof.results import AT_LOWER, AT_UPPER, LOW, TIME
+from vdsm_pin.verification.proof.layouts import AT_LOWER, AT_UPPER, LOW, TIME
 from vdsm_pin.verification.proof.terms import REFUTED, UNDECIDED
-from vdsm_pin.verification.records import (
-    ClearanceChunk,
-    Counterexample,
-    ErrorBox,
-    Pair,
-)
+from vdsm_pin.verification.records import ClearanceChunk, Counterexample, ErrorBox, Pair
 
 PAIRS: Final = 8
 """Pairs looked at, those of the least lower bounds first."""

@@ -16,9 +16,10 @@ import numpy as np
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.clearance import HastyProof, prove_clearance
+from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.counterexample import Search, moments_of
-from vdsm_pin.verification.proof.results import LOW
+from vdsm_pin.verification.hasty import HastyProof
+from vdsm_pin.verification.proof.layouts import LOW
 from vdsm_pin.verification.proof.terms import UNDECIDED
 from vdsm_pin.verification.records import ErrorBox
 

@@ -19,7 +19,7 @@ from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.scene import Box, Cylinder, HalfSpace, Sphere
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.clearance import is_certified
+from vdsm_pin.verification.hasty import is_certified
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import ErrorBox, Verdict
 from vdsm_pin.verification.verify import verify

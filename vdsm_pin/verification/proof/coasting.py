@@ -4,22 +4,16 @@ They take bare arrays with the rows last: a few operations an interval, many at 
 """
 
 from math import sqrt
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from vdsm_pin.geometry.arm import second_order
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import apart, compiled
+from vdsm_pin.verification.proof.layouts import POINT, SUPPORT, WIDTH
 from vdsm_pin.verification.proof.rows import BLOCK, Rows, error_growth
 from vdsm_pin.verification.proof.terms import BASE, Rules, losses
-
-SUPPORT: Final = 3
-POINT: Final = 4
-WIDTH: Final = 7
-PLANE: Final = 8
-"""Layout of what a pair remembers: n (3), support in n, witness on the partner (3),
-width of the bracket when they were found."""
 
 
 class Runs(NamedTuple):

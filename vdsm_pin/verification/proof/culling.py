@@ -2,8 +2,7 @@
 
 A pair is far where the distance of the boxes exceeds the required clearance, the
 least clearance met so far, and the distance of the link's nearest obstacle: then no
-narrower bracket could change what is reported. Arrays have the obstacles last: the
-loops over them are what a compiler turns into vector instructions.
+narrower bracket could change what is reported.
 """
 
 from math import sqrt
@@ -11,20 +10,19 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.geometry.arm import second_order
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import NORMAL, UPPER
 from vdsm_pin.geometry.obstacles import obstacle_bracket
 from vdsm_pin.geometry.pieces import PackedPieces
+from vdsm_pin.verification.proof.bodies import Space
+from vdsm_pin.verification.proof.boxes import box_gaps, box_reaches, link_box
 from vdsm_pin.verification.proof.results import Dense, Results
 from vdsm_pin.verification.proof.rows import Rows
-from vdsm_pin.verification.proof.slices import Space
 from vdsm_pin.verification.proof.terms import (
     BASE,
     CERTIFIED,
     OBSTACLES,
-    Rules,
     Task,
     is_nominal,
     losses,
@@ -94,79 +92,6 @@ def new_culling(
         np.zeros(shape, np.int64),
         np.zeros((2, n)),
     )
-
-
-@compiled
-def _growth(rules: Rules, rows: Rows, count: int, joint: int) -> float:
-    """How far O_joint may leave the box of its rows: sag and error box; [m]."""
-    sag = drift = swing = behind = 0.0
-    for r in range(count):
-        sag = max(sag, rows.sags[0, joint, r])
-        drift = max(drift, rows.drifts[0, joint, r])
-    for link in range(joint - 1, -1, -1):
-        behind += rules.lengths[link]
-        swing += 2.0 * behind
-    error = rules.joint_error * (swing + 0.5 * drift) + rules.base_error
-    return error + sag + second_order(rules.lengths, 0, joint, rules.joint_error)
-
-
-@compiled
-def _link_box(
-    rules: Rules, rows: Rows, count: int, link: int, low: FloatArray, high: FloatArray
-) -> None:
-    """Box of a link over a block and the error box, shape (3,) each; [m]."""
-    apart()
-    low[:], high[:] = np.inf, -np.inf
-    for joint in (link, link + 1):
-        grown = _growth(rules, rows, count, joint)
-        for c in range(3):
-            at = rows.centres[0, joint, c, : count + 1]
-            for r in range(at.size):
-                low[c] = min(low[c], at[r] - grown)
-                high[c] = max(high[c], at[r] + grown)
-
-
-@compiled
-def _gaps(
-    box: FloatArray, low: FloatArray, high: FloatArray, lost: float, gap: FloatArray
-) -> None:
-    """Distance of a link's box from every obstacle's, less what every bound loses."""
-    apart()
-    lx, ly, lz, hx, hy, hz = (
-        box[0, 0],
-        box[0, 1],
-        box[0, 2],
-        box[1, 0],
-        box[1, 1],
-        box[1, 2],
-    )
-    ax, ay, az, bx, by, bz = low[0], low[1], low[2], high[0], high[1], high[2]
-    for o in range(gap.size):
-        x = max(lx[o] - bx, ax - hx[o], 0.0)
-        y = max(ly[o] - by, ay - hy[o], 0.0)
-        z = max(lz[o] - bz, az - hz[o], 0.0)
-        gap[o] = sqrt(x * x + y * y + z * z) - lost
-
-
-@compiled
-def _reaches(
-    point: FloatArray,
-    low: FloatArray,
-    high: FloatArray,
-    rise: float,
-    far: BoolArray,
-    reach: FloatArray,
-) -> None:
-    """Upper bounds: the farthest corner from a point of the obstacle; inf if near."""
-    apart()
-    px, py, pz = point[0], point[1], point[2]
-    ax, ay, az, bx, by, bz = low[0], low[1], low[2], high[0], high[1], high[2]
-    for o in range(reach.size):
-        x = max(px[o] - ax, bx - px[o])
-        y = max(py[o] - ay, by - py[o])
-        z = max(pz[o] - az, bz - pz[o])
-        corner = sqrt(x * x + y * y + z * z) + rise
-        reach[o] = corner if far[o] else np.inf
 
 
 @compiled
@@ -337,14 +262,14 @@ def cull(
     low, high = np.zeros(3), np.zeros(3)
     for link in range(n_links):
         gap, reach = culling.gap[link], culling.reach[link]
-        _link_box(rules, rows, count, link, low, high)
-        _gaps(culling.box, low, high, lost, gap)
+        link_box(rules, rows, count, link, low, high)
+        box_gaps(culling.box, low, high, lost, gap)
         upper = _nearest_upper(task, rows, space, link, int(np.argmin(gap)))
         if is_nominal(rules):
             results.limit[OBSTACLES] = min(results.limit[OBSTACLES], upper)
         n_near = _settle_link(task, results, culling, link, upper, n_near)
         far, settled = culling.far[link], culling.settled[link]
-        _reaches(culling.point, low, high, rise, far, reach)
+        box_reaches(culling.point, low, high, rise, far, reach)
         for o in range(n_obstacles):
             settled[o] += count if far[o] else 0
         _keep_least(gap, culling.lower[link], culling.at_lower[link], start)

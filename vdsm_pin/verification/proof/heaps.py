@@ -1,17 +1,8 @@
 """Slices of intervals in a heap, the one of the least bound first."""
 
-from typing import Final
-
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import apart, compiled
-
-KEY: Final = 0
-INTERVAL: Final = 1
-PAIR: Final = 2
-START: Final = 3
-END: Final = 4
-SLICE: Final = 5
-"""Layout of a slice in a heap: lower bound, interval, pair, start, end."""
+from vdsm_pin.verification.proof.layouts import KEY
 
 
 @compiled

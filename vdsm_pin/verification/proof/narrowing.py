@@ -4,22 +4,21 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import apart, borrowed, compiled
-from vdsm_pin.verification.proof.blocks import Desk, sweep_pair
-from vdsm_pin.verification.proof.heaps import (
+from vdsm_pin.verification.proof.desk import Desk
+from vdsm_pin.verification.proof.heaps import push
+from vdsm_pin.verification.proof.layouts import (
+    AT_UPPER,
     END,
     INTERVAL,
     KEY,
+    OTHER,
     PAIR,
     SLICE,
-    push,
-)
-from vdsm_pin.verification.proof.results import (
-    AT_UPPER,
-    OTHER,
     TIME,
     UP,
-    Results,
 )
+from vdsm_pin.verification.proof.pair_sweep import sweep_pair
+from vdsm_pin.verification.proof.results import Results
 from vdsm_pin.verification.proof.rows import fill_rows
 from vdsm_pin.verification.proof.search import Witnesses, tighten
 from vdsm_pin.verification.proof.terms import Motion, Task

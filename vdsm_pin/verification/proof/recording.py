@@ -1,25 +1,26 @@
 """The planes of a proof, written down interval by interval, in compiled code."""
 
-from typing import Final
-
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import apart, borrowed, compiled
 from vdsm_pin.geometry.kernels import NEAR, NORMAL
-from vdsm_pin.verification.proof.blocks import Desk
-from vdsm_pin.verification.proof.heaps import END, INTERVAL, KEY, PAIR, SLICE, START
+from vdsm_pin.verification.proof.desk import Desk
+from vdsm_pin.verification.proof.layouts import (
+    CLAIM,
+    END,
+    FIRST,
+    INTERVAL,
+    KEY,
+    LAST,
+    PAIR,
+    PLANE_NORMAL,
+    SLICE,
+    START,
+)
 from vdsm_pin.verification.proof.search import bound_between, new_witness, resolve
 from vdsm_pin.verification.proof.slices import leaf_bound, node_bound, plane_bound
 from vdsm_pin.verification.proof.terms import CERTIFIED, Motion, Task
-
-FIRST: Final = 4
-LAST: Final = 5
-PLANE_NORMAL: Final = 6
-CLAIM: Final = 9
-RECORD: Final = 10
-"""Layout of a written plane: interval, pair, start and end of the slice, pieces [first,
-last) counted from the obstacle's first, n (3), the clearance it proves."""
 
 
 @compiled

@@ -1,33 +1,20 @@
 """Where a sweep writes: least bounds, counts, profile, candidates, dense rows."""
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import apart, compiled
-from vdsm_pin.verification.proof.terms import (
-    Task,
-    group_of,
+from vdsm_pin.verification.proof.layouts import (
+    AT_LOWER,
+    AT_UPPER,
+    HELD,
+    LOST,
+    LOW,
+    OTHER,
+    TIME,
+    UP,
 )
-
-LOW: Final = 0
-AT_LOWER: Final = 1
-UP: Final = 2
-AT_UPPER: Final = 3
-TIME: Final = 4
-OWN: Final = 5
-OTHER: Final = 8
-BEST: Final = 11
-"""Layout of a pair's best row: lower bound and its interval, upper bound, its interval
-and time, witnesses on the link and on the partner in the base frame (3 each). Until
-`place_best` the last is a core point of the partner, in its frame."""
-
-HELD: Final = 0
-SLICES: Final = 1
-RENEWED: Final = 2
-LOST: Final = 3
-TALLY: Final = 4
-"""Layout of what is counted: candidates held, slices tried, planes found, candidates
-that found no room."""
+from vdsm_pin.verification.proof.terms import Task, group_of
 
 
 class Candidates(NamedTuple):

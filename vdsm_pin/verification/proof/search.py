@@ -8,17 +8,20 @@ from vdsm_pin.geometry.arm import bends_and_drifts, place_between
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import BRACKET, LOWER, NEAR, UPPER
-from vdsm_pin.verification.proof.heaps import (
+from vdsm_pin.verification.proof.bodies import Ends, Space
+from vdsm_pin.verification.proof.heaps import pop, push
+from vdsm_pin.verification.proof.layouts import (
     END,
+    INSTANT,
     INTERVAL,
     KEY,
+    MET,
     PAIR,
     SLICE,
     START,
-    pop,
-    push,
+    WHEN,
 )
-from vdsm_pin.verification.proof.slices import Ends, Space, slice_bound
+from vdsm_pin.verification.proof.slices import slice_bound
 from vdsm_pin.verification.proof.terms import (
     CERTIFIED,
     REFUTED,
@@ -26,11 +29,6 @@ from vdsm_pin.verification.proof.terms import (
     Motion,
     Task,
 )
-
-MET: Final = 0
-WHEN: Final = 1
-INSTANT: Final = 2
-"""Layout of a witness: least upper bound, its time, least bound of one instant."""
 
 SHORTEST: Final = 2.0**-30
 """Shortest slice, in parts of an interval."""

@@ -1,0 +1,47 @@
+"""Whether a clearance proof goes through, and nothing else."""
+
+import numpy as np
+
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.proof.blocks import sweep
+from vdsm_pin.verification.proof.desk import forget
+from vdsm_pin.verification.proving import new_proving
+from vdsm_pin.verification.records import ErrorBox
+from vdsm_pin.verification.task import make_task
+
+
+class HastyProof:
+    """Asks whether the proof goes through, for stretches of a motion and error boxes.
+
+    Args:
+        problem: Arm, scene, required clearances.
+        trajectory: The motion; one row counts as an interval without motion.
+    """
+
+    def __init__(self, problem: PlanningProblem, trajectory: Trajectory) -> None:
+        # Nobody asks for a profile: all intervals share its one bin.
+        self._proving = new_proving(problem, trajectory, ErrorBox(), values=1)
+        self._problem = problem
+        self.n_intervals = self._proving.n_intervals
+
+    def holds(self, errors: ErrorBox, first: int, last: int) -> bool:
+        """Whether every interval from `first` to below `last` is proved.
+
+        Stops at the first that is not.
+        """
+        known = self._proving
+        task = make_task(self._problem, errors, known.task.pieces)
+        # Pairs that remember nothing: the answer depends on the question alone.
+        forget(known.desk.planes)
+        known.results.limit[:] = np.inf
+        args = task, known.motion, known.desk, known.results, known.culling
+        return bool(sweep(*args, first, last, True))
+
+
+def is_certified(
+    problem: PlanningProblem, trajectory: Trajectory, errors: ErrorBox
+) -> bool:
+    """Whether the clearance proof goes through; stops at the first gap."""
+    proof = HastyProof(problem, trajectory)
+    return proof.holds(errors, 0, proof.n_intervals)

@@ -1,0 +1,51 @@
+"""How rows of numbers are laid out that compiled code hands on."""
+
+from typing import Final
+
+SUPPORT: Final = 3
+POINT: Final = 4
+WIDTH: Final = 7
+PLANE: Final = 8
+"""Layout of what a pair remembers: n (3), support in n, witness on the partner (3),
+width of the bracket when they were found."""
+
+KEY: Final = 0
+INTERVAL: Final = 1
+PAIR: Final = 2
+START: Final = 3
+END: Final = 4
+SLICE: Final = 5
+"""Layout of a slice in a heap: lower bound, interval, pair, start, end."""
+
+MET: Final = 0
+WHEN: Final = 1
+INSTANT: Final = 2
+"""Layout of a witness: least upper bound, its time, least bound of one instant."""
+
+LOW: Final = 0
+AT_LOWER: Final = 1
+UP: Final = 2
+AT_UPPER: Final = 3
+TIME: Final = 4
+OWN: Final = 5
+OTHER: Final = 8
+BEST: Final = 11
+"""Layout of a pair's best row: lower bound and its interval, upper bound, its interval
+and time, witnesses on the link and on the partner in the base frame (3 each). Until
+`place_best` the last is a core point of the partner, in its frame."""
+
+HELD: Final = 0
+SLICES: Final = 1
+RENEWED: Final = 2
+LOST: Final = 3
+TALLY: Final = 4
+"""Layout of what is counted: candidates held, slices tried, planes found, candidates
+that found no room."""
+
+FIRST: Final = 4
+LAST: Final = 5
+PLANE_NORMAL: Final = 6
+CLAIM: Final = 9
+RECORD: Final = 10
+"""Layout of a written plane: interval, pair, start and end of the slice, pieces [first,
+last) counted from the obstacle's first, n (3), the clearance it proves."""

@@ -1,0 +1,251 @@
+"""One pair over a block of intervals, in compiled code.
+
+Each pair keeps the plane and the witness point that served it last. Most intervals are
+proved by that plane alone; a pair whose bracket grows too wide gets a new one; where
+the bound misses the required clearance the interval is subdivided.
+"""
+
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.compiled import apart, compiled
+from vdsm_pin.geometry.kernels import BRACKET, FAR, LOWER, NEAR, NORMAL, bracket
+from vdsm_pin.geometry.obstacles import node_support
+from vdsm_pin.verification.proof.coasting import coast
+from vdsm_pin.verification.proof.desk import Desk, load_rows, take_rows
+from vdsm_pin.verification.proof.layouts import (
+    AT_UPPER,
+    END,
+    INSTANT,
+    INTERVAL,
+    KEY,
+    MET,
+    OTHER,
+    PAIR,
+    POINT,
+    RENEWED,
+    SLICE,
+    SLICES,
+    START,
+    SUPPORT,
+    TIME,
+    UP,
+    WHEN,
+    WIDTH,
+)
+from vdsm_pin.verification.proof.results import Results, note_upper
+from vdsm_pin.verification.proof.search import bound_between, new_witness, resolve
+from vdsm_pin.verification.proof.slices import loaded_bound
+from vdsm_pin.verification.proof.terms import (
+    CERTIFIED,
+    Motion,
+    Task,
+    group_of,
+    is_nominal,
+)
+from vdsm_pin.verification.proof.witnesses import witness_at
+
+STRETCH: Final = 8
+"""Intervals that a new plane is tried on at first; doubled as long as it serves."""
+
+ROUGH: Final = 0.1
+"""Part of the slack that a new plane may miss, where it is not looked at closely."""
+
+
+@compiled
+def _renew(
+    task: Task, desk: Desk, results: Results, local: int, pair: int, goal: float
+) -> float:
+    """A new plane and witness for a pair, from one interval of the block.
+
+    Returns:
+        The clearance proved for that interval, where the partner is of many pieces and
+        needs more than one plane, else -inf; [m].
+    """
+    apart()
+    pieces, space, plane = task.pieces, desk.space, desk.planes[pair]
+    root, proved = pieces.root[task.pairs.obstacle[pair]], -np.inf
+    p, last = pieces.node_range[root]
+    load_rows(task, desk, pair, local, local + 1)
+    space.out[NORMAL:NEAR] = plane[:3]
+    if last - p == 1:
+        bracket(pieces, p, space.points, 4, goal, space.scratch, space.out)
+    else:
+        loaded_bound(pieces, task.pairs, task.rules, desk.ends, space, pair, 1.0)
+        proved = space.out[LOWER]
+    plane[:3], plane[POINT:WIDTH] = space.out[NORMAL:NEAR], space.out[FAR:BRACKET]
+    n, stack, point = plane[:3], space.stack, space.scratch[0]
+    plane[SUPPORT] = node_support(pieces, root, n, stack, point)
+    results.tally[RENEWED] += 1
+    return proved
+
+
+@compiled
+def _look_at_row(
+    task: Task, desk: Desk, results: Results, local: int, pair: int
+) -> None:
+    """Lower the limit to what can be proved at a row at all, within the error box."""
+    apart()
+    load_rows(task, desk, pair, local, local)
+    rules, space, pieces = task.rules, desk.space, task.pieces
+    space.out[NORMAL:NEAR] = desk.planes[pair, :3]
+    loaded_bound(pieces, task.pairs, rules, desk.ends, space, pair, 0.0)
+    group = group_of(task.pairs.frame[pair])
+    results.limit[group] = min(results.limit[group], space.out[LOWER])
+
+
+@compiled
+def _dense_row(
+    task: Task,
+    desk: Desk,
+    results: Results,
+    m: int,
+    local: int,
+    pair: int,
+    verdict: int,
+    time: float,
+    point: FloatArray,
+) -> None:
+    """Write one interval to row m of the dense results; the ends are at its time."""
+    apart()
+    dense, places = results.dense, np.zeros(6)
+    witness_at(task, desk.ends, pair, point, places)
+    dense.lower[m, pair] = desk.runs.lower[local]
+    dense.upper[m, pair] = desk.runs.upper[local]
+    dense.time[m, pair], dense.verdict[m, pair] = time, verdict
+    dense.own[m, pair], dense.other[m, pair] = places[:3], places[3:]
+
+
+@compiled
+def _subdivide(
+    task: Task,
+    motion: Motion,
+    desk: Desk,
+    results: Results,
+    k: int,
+    m: int,
+    local: int,
+    pair: int,
+) -> int:
+    """Decide interval k by subdivision, row m of the dense results; its verdict."""
+    apart()
+    row, witness = np.zeros(SLICE), new_witness()
+    row[INTERVAL], row[PAIR], row[END] = k, pair, 1.0
+    verdict, count = resolve(
+        task, motion, desk.ends, desk.space, desk.heap, row, witness
+    )
+    results.tally[SLICES] += count
+    lower, upper, time = row[KEY], witness.value[MET], witness.value[WHEN]
+    group = group_of(task.pairs.frame[pair])
+    results.limit[group] = min(results.limit[group], witness.value[INSTANT])
+    desk.runs.lower[local], desk.runs.upper[local] = lower, upper
+    results.counts[pair, verdict] += 1
+    best, point = results.best[pair], witness.points[3:]
+    if upper < best[UP]:
+        best[UP], best[AT_UPPER], best[TIME] = upper, k, time
+        best[OTHER:] = point
+    if results.dense.verdict.shape[0] > 0:
+        row[START] = row[END] = time
+        bound_between(task, motion, desk.ends, desk.space, row)
+        _dense_row(task, desk, results, m, local, pair, verdict, time, point)
+    desk.planes[pair, SUPPORT] = -np.inf
+    return verdict
+
+
+@compiled
+def _dense_stretch(
+    task: Task,
+    desk: Desk,
+    results: Results,
+    pair: int,
+    offset: int,
+    first: int,
+    last: int,
+) -> None:
+    """Write intervals that one plane and witness bound to the dense results."""
+    apart()
+    at_rows, point = desk.runs.at_rows, desk.planes[pair, POINT:WIDTH]
+    for r in range(first, last):
+        later = 1 if at_rows[r + 1] < at_rows[r] else 0
+        take_rows(desk.rows, r + later, r + later, desk.ends)
+        _dense_row(
+            task, desk, results, offset + r, r, pair, CERTIFIED, float(later), point
+        )
+
+
+@compiled
+def sweep_pair(
+    task: Task,
+    motion: Motion,
+    desk: Desk,
+    results: Results,
+    start: int,
+    offset: int,
+    count: int,
+    pair: int,
+    closely: bool,
+    hasty: bool,
+) -> bool:
+    """All intervals of a block for one pair; False where `hasty` and one is not proved.
+
+    Args:
+        task: The scene, pairs and rules.
+        motion: Rows of joint values.
+        desk: Working space, its rows filled; its runs are written.
+        results: Where to write.
+        start: First interval of the block.
+        offset: Its row in the dense results.
+        count: Intervals in the block.
+        pair: The pair.
+        closely: Whether bounds below the least clearance met are made as good as they
+            can be.
+        hasty: Whether to stop at the first interval that is not proved.
+    """
+    apart()
+    rules, rows, runs, plane = task.rules, desk.rows, desk.runs, desk.planes[pair]
+    link, frame = task.pairs.link[pair], task.pairs.frame[pair]
+    required, group = task.pairs.required[pair], group_of(frame)
+    counts, best, limit = results.counts[pair], results.best[pair], results.limit
+    nominal, dense = is_nominal(rules), results.dense.verdict.shape[0] > 0
+    goal = rules.goal if closely else max(rules.goal, ROUGH * rules.slack * required)
+    slack = np.inf if hasty else rules.slack
+    local, stretch, fresh, proved = 0, count, False, -np.inf
+    while True:
+        last, bar = min(count, local + stretch), required
+        if closely:
+            bar = max(bar, limit[group] - rules.gap)
+        done = coast(
+            rules, rows, runs, plane, link, frame, local, last, bar, slack, fresh
+        )
+        if fresh and done == local:
+            # This interval allows no more, and may be proved nevertheless.
+            runs.lower[local] = max(runs.lower[local], proved)
+            done += runs.lower[local] >= required
+        if done > local:
+            counts[CERTIFIED] += done - local
+            point = plane[POINT:WIDTH]
+            note_upper(best, runs.upper, runs.at_rows, point, start, local, done)
+            if nominal:
+                limit[group] = min(limit[group], best[UP])
+            if dense:
+                _dense_stretch(task, desk, results, pair, offset, local, done)
+        elif fresh:
+            if hasty and runs.upper[local] < required:
+                return False
+            k, m = start + local, offset + local
+            verdict = _subdivide(task, motion, desk, results, k, m, local, pair)
+            if hasty and verdict != CERTIFIED:
+                return False
+            done = local + 1
+        fresh, local = False, done
+        if local == count:
+            return True
+        if done == last:
+            stretch *= 2
+            continue
+        proved = _renew(task, desk, results, local, pair, goal)
+        if not (nominal or hasty):
+            _look_at_row(task, desk, results, local, pair)
+        fresh, stretch = True, STRETCH

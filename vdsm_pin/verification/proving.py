@@ -1,0 +1,129 @@
+"""A clearance proof at work: its task, its working space, where it writes."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.pieces import PackedPieces
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.proof.blocks import sweep
+from vdsm_pin.verification.proof.culling import Culling, new_culling
+from vdsm_pin.verification.proof.desk import Desk, new_desk
+from vdsm_pin.verification.proof.layouts import AT_LOWER, AT_UPPER, BEST, TALLY, TIME
+from vdsm_pin.verification.proof.results import Candidates, Dense, Results
+from vdsm_pin.verification.proof.terms import Motion, Task
+from vdsm_pin.verification.records import ErrorBox
+from vdsm_pin.verification.task import make_task
+
+BUDGET: Final = 20_000
+"""Most slices of one interval and pair."""
+
+CANDIDATES: Final = 65_536
+"""Most blocks, and then intervals, kept for narrowing the least bracket."""
+
+PROFILE_VALUES: Final = 4_000_000
+"""Most values of a profile; beyond it intervals share a bin."""
+
+
+def new_results(
+    n_pairs: int, columns: int, n_intervals: int, values: int = PROFILE_VALUES
+) -> Results:
+    """Where a sweep writes, with nothing found yet and no dense rows.
+
+    Args:
+        n_pairs: Number of pairs.
+        columns: Links and obstacles.
+        n_intervals: Of the motion.
+        values: Most values of its profile.
+    """
+    stride = -(-n_intervals * columns * 2 // values)
+    n_bins = -(-n_intervals // stride)
+    best = np.full((n_pairs, BEST), np.inf)
+    best[:, [AT_LOWER, AT_UPPER, TIME]] = 0.0
+    return Results(
+        best=best,
+        counts=np.zeros((n_pairs, 3), np.int64),
+        profile=np.full((2, columns, n_bins), np.inf),
+        stride=stride,
+        limit=np.full(2, np.inf),
+        candidates=room_for(CANDIDATES),
+        overflow=np.full(2, np.inf),
+        tally=np.zeros(TALLY, np.int64),
+        dense=dense_rows(0, n_pairs),
+    )
+
+
+def room_for(size: int) -> Candidates:
+    """Room for so many candidates."""
+    numbers = (np.zeros(size, np.int64) for _ in range(3))
+    return Candidates(np.zeros(size), *numbers)
+
+
+def dense_rows(size: int, n_pairs: int) -> Dense:
+    """Room for the brackets of so many intervals."""
+    shape = (size, n_pairs)
+    return Dense(
+        lower=np.zeros(shape),
+        upper=np.zeros(shape),
+        time=np.zeros(shape),
+        verdict=np.zeros(shape, np.int64),
+        own=np.zeros((*shape, 3)),
+        other=np.zeros((*shape, 3)),
+    )
+
+
+@dataclass(frozen=True)
+class Proving:
+    """One problem and motion, and the working space of their proof."""
+
+    task: Task
+    motion: Motion
+    desk: Desk
+    results: Results
+    culling: Culling
+    n_intervals: int
+
+    def sweep(self, results: Results, first: int, last: int) -> None:
+        """Judge some intervals."""
+        sweep(
+            self.task,
+            self.motion,
+            self.desk,
+            results,
+            self.culling,
+            first,
+            last,
+            False,
+        )
+
+
+def new_proving(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    errors: ErrorBox,
+    pieces: PackedPieces | None = None,
+    values: int = PROFILE_VALUES,
+) -> Proving:
+    """Everything ready, nothing judged.
+
+    Args:
+        problem: Arm, scene, required clearances.
+        trajectory: The motion; one row counts as an interval without motion.
+        errors: The proof covers every motion within it.
+        pieces: `pack_scene(problem)`, where it is known already.
+        values: Most values of the profile.
+    """
+    task = make_task(problem, errors, pieces)
+    n_pairs, n_links = task.pairs.link.size, problem.manipulator.n_links
+    n_intervals = max(1, trajectory.n_samples - 1)
+    n_obstacles = len(problem.scene.obstacles)
+    return Proving(
+        task=task,
+        motion=Motion(trajectory.x0, trajectory.alpha, trajectory.theta),
+        desk=new_desk(n_links, n_pairs, BUDGET),
+        results=new_results(n_pairs, n_links + n_obstacles, n_intervals, values),
+        culling=new_culling(task.pieces, n_links, n_obstacles, n_pairs),
+        n_intervals=n_intervals,
+    )
