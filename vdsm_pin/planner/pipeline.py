@@ -60,6 +60,7 @@ def plan_paper(
     Raises:
         Infeasible: With the reason, where the paper's rule has no plan.
     """
+    _check_start(problem)
     check_feasibility(problem.manipulator, problem.path)
     motion = _best_motion(problem, clearance, margin)
     trajectory = motion.trajectory
@@ -73,6 +74,23 @@ def plan_paper(
         cables,
         motion.route.notes,
     )
+
+
+def _check_start(problem: PlanningProblem) -> None:
+    """Refuse a start with a bend past joint 1: the paper's arm starts straight.
+
+    Raises:
+        NoPlanFound: If the arm starts bent.
+    """
+    joints = problem.path.start_joints
+    if joints is None:
+        return
+    if np.abs(joints[3:]).max(initial=0.0) > TOLERANCES.start_joints:
+        message = (
+            "the arm starts bent; the paper's rule starts with a straight arm (the "
+            "strategy 'fewest' takes any start)"
+        )
+        raise NoPlanFound(message)
 
 
 def _best_motion(

@@ -9,13 +9,14 @@ import pytest
 import yaml
 from scenes_for_fewest import problem
 
-from vdsm_pin.errors import NoPlanFound
+from vdsm_pin.errors import Infeasible, NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io.problem_file import built_in_text, read_problem
 from vdsm_pin.kinematics import joint_centres, link_angles
 from vdsm_pin.manipulator import CableLayout, Manipulator, paper_hole_angles
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.unbend import leans_ahead, unbend
+from vdsm_pin.planner.pipeline import plan_paper
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.scene import Obstacle, Sphere
@@ -140,3 +141,25 @@ def test_a_problem_moved_as_a_whole_has_the_same_plan(tmp_path: Path) -> None:
     result = verify(there, other, load_robot(there.manipulator))
     assert result.verdict is Verdict.CERTIFIED
     assert result.coverage == pytest.approx(1.0, abs=1e-9)
+
+
+def test_the_papers_rule_starts_with_a_straight_arm_only() -> None:
+    arm, alpha, theta = equal_links(4), np.zeros(4), np.zeros(4)
+    theta[0] = 0.1
+    leaning = starting(arm, alpha, theta)
+    plan = plan_paper(leaning, link_clearance(leaning), 0.0)
+    verified = verify(leaning, plan.trajectory, load_robot(arm))
+    assert verified.verdict is Verdict.CERTIFIED
+    theta[2] = 0.1
+    bent = starting(arm, alpha, theta)
+    with pytest.raises(NoPlanFound, match="starts bent"):
+        plan_paper(bent, link_clearance(bent), 0.0)
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_a_short_arm_with_every_way_blocked_is_refused_in_words(count: int) -> None:
+    arm = equal_links(count)
+    ball = Sphere("ball", np.array([1.5, 0.0, 0.0]), 0.6)
+    task = replace(problem(ball, points=POINTS), manipulator=arm)
+    with pytest.raises(Infeasible, match="ball"):
+        plan_fewest(task, link_clearance(task), 0.0)

@@ -64,7 +64,7 @@ class Nearby:
             room[near[blocked]] = -np.inf
             near = near[~blocked]
             room[near] = self.clearance(ends[near])[:, 0]
-        return room.reshape(len(centres), -1)
+        return room.reshape(len(centres), centres.shape[1] - 1)
 
     def up_to(self, far: float) -> "Nearby":
         """The same, exact only below another bound; [m]."""
