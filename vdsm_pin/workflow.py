@@ -15,6 +15,7 @@ from typing import Final
 from pydantic import ValidationError
 
 from vdsm_pin.errors import NoPlanFound, OutOfTime
+from vdsm_pin.geometry.compiled import is_compiling
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.refinement import plan_and_verify
@@ -86,6 +87,8 @@ def within(seconds: float | None) -> Iterator[None]:
     limit = seconds
 
     def stop(number: int, frame: FrameType | None) -> None:
+        if is_compiling():
+            return  # it is raised again
         raise OutOfTime(limit)  # a strategy that hears it adds how far it came
 
     before = signal.signal(signal.SIGALRM, stop)

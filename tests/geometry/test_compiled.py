@@ -1,6 +1,7 @@
 """Machine code kept on disk: found again, never stale, never for other arguments."""
 
 import itertools
+import signal
 import subprocess
 import sys
 import threading
@@ -14,8 +15,10 @@ import numpy as np
 import pytest
 
 from vdsm_pin import kept
+from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry import compiled, compiling, machine_code
 from vdsm_pin.geometry.machine_code import MachineCode, Unusable
+from vdsm_pin.workflow import within
 
 SOURCE = """
 from typing import NamedTuple
@@ -159,6 +162,24 @@ def test_what_a_signal_raises_is_not_lost(tmp_path: Path) -> None:
     run(tmp_path / "code", tmp_path).communicate()
     later = run(tmp_path / "code", tmp_path, SIGNALLED)
     assert later.communicate()[0] == f"{ANSWER}False\n50\n"
+
+
+def test_time_limit_waits_for_the_compiler(
+    folder: Path,
+    kernels: Callable[..., ModuleType],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It calls back from C, where an exception is printed and gone."""
+    ask = compiling.machine_code
+
+    def late(function: Callable[..., Any], arguments: tuple[Any, ...]) -> MachineCode:
+        signal.raise_signal(signal.SIGALRM)
+        return ask(function, arguments)
+
+    monkeypatch.setattr(compiling, "machine_code", late)
+    with within(1e6), pytest.raises(OutOfTime):
+        assert kernels().twice(np.ones(2)) == 2.0
+        signal.raise_signal(signal.SIGALRM)
 
 
 def test_changed_source_is_compiled_again(

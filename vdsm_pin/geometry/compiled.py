@@ -10,8 +10,8 @@ compiled functions therefore import little.
 import hashlib
 import inspect
 import re
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from threading import RLock
@@ -39,6 +39,24 @@ _SCALARS: Final[dict[type, type]] = {
 """What a scalar is to compiled code."""
 
 _one_at_a_time: Final = RLock()
+_being_made: Final[list[str]] = []
+
+
+def is_compiling() -> bool:
+    """Whether machine code is being made, where an exception from outside is lost.
+
+    The compiler calls back from C: what a signal raises there ends up on the terminal.
+    """
+    return bool(_being_made)
+
+
+@contextmanager
+def _making(name: str) -> Iterator[None]:
+    _being_made.append(name)
+    try:
+        yield
+    finally:
+        _being_made.pop()
 
 
 def _kind(value: Any) -> Any:
@@ -117,10 +135,11 @@ class _Compiled:
         name = _file_name(self._function, kind)
         with suppress(Unusable):
             return load(read(name), self._function)
-        from vdsm_pin.geometry.compiling import machine_code
+        with _making(name):
+            from vdsm_pin.geometry.compiling import machine_code
 
-        code = machine_code(self._function, arguments)
-        write(name, code)
+            code = machine_code(self._function, arguments)
+            write(name, code)
         return load(code, self._function)
 
     @property
