@@ -101,7 +101,7 @@ def test_random_arms_and_scenes_are_accepted(seed: int, tmp_path: Path) -> None:
     assert outcome.accepted, outcome.reason
 
 
-def test_slices_and_sections_are_accepted(tmp_path: Path) -> None:
+def test_slices_and_pieces_are_accepted(tmp_path: Path) -> None:
     """A link that dips into the notch of a prism needs its triangles one by one."""
     corners = [[-0.3, -0.3], [0.3, -0.3], [0.3, 0.2], [0.1, 0.2], [0.1, -0.1]]
     corners += [[-0.1, -0.1], [-0.1, 0.2], [-0.3, 0.2]]
@@ -109,11 +109,11 @@ def test_slices_and_sections_are_accepted(tmp_path: Path) -> None:
     data = with_obstacles(bar | {"from": 0.5, "to": 2.0})
     q = straight_rows([0.0, 0.5])
     case = Case(tmp_path, data, q, NO_ERRORS)
-    assert case.lines[0]["sections"]["bar"]
+    assert case.lines[0]["pieces"]["bar"]
     assert judge(case).accepted
     planes = case.lines[1]["proofs"][2][0][2]
     assert len(planes) > 1
-    assert "the ranges end" in refused(
+    assert "the pieces end" in refused(
         case, sealed(edited(case, lambda ls: planes_of(ls).pop()))
     )
 
@@ -218,13 +218,13 @@ def test_a_mesh_with_a_hole_is_a_surface(tmp_path: Path) -> None:
     assert outcome.surfaces == ("shell",)
 
 
-def test_piece_order_is_a_permutation(tmp_path: Path) -> None:
+def test_pieces_of_a_mesh_are_a_permutation(tmp_path: Path) -> None:
     write_cube(tmp_path / "c.stl", 0.2)
     case = cube_around(tmp_path, "c.stl", center=[0.5, 0, 0.4])
     order = list(range(12))[::-1]
 
     def reverse(lines: Any) -> None:
-        lines[0]["piece_order"]["shell"] = order
+        lines[0]["pieces"]["shell"] = order
         for line in lines[1:]:
             for proof in line["proofs"][:3]:
                 for entry in proof:
@@ -233,7 +233,7 @@ def test_piece_order_is_a_permutation(tmp_path: Path) -> None:
 
     assert judge(case, sealed(edited(case, reverse))).accepted
     order[0] = 3
-    assert "piece_order" in refused(case, sealed(edited(case, reverse)))
+    assert "pieces of shell" in refused(case, sealed(edited(case, reverse)))
 
 
 # ---- wrong files ---------------------------------------------------------------------
@@ -353,7 +353,7 @@ CLOSING = (
     "errors",
     "required_clearance_m",
     "required_self_clearance_m",
-    "sections",
+    "pieces",
 )
 
 
@@ -365,7 +365,7 @@ def assert_still_true(
     Whatever is not a clearance is what it was but for the tolerance; the clearances
     are proved again by the writer's own formulas, and held against samples.
     """
-    every |= lines[0]["sections"] != case.lines[0]["sections"]
+    every |= lines[0]["pieces"] != case.lines[0]["pieces"]
     if lines[0]["errors"] != case.lines[0]["errors"]:  # proved for those as well
         case, every = beside(case, tuple(lines[0]["errors"].values())), True
     for number, (old, new) in enumerate(zip(case.lines, lines, strict=True)):
@@ -374,7 +374,7 @@ def assert_still_true(
         for where in places if number == 0 else ():
             assert where[0] in CLOSING, where
             before, after = (place(line, where)[0][where[-1]] for line in (old, new))
-            if where[0] not in ("sections", "errors"):
+            if where[0] not in ("pieces", "errors"):
                 assert abs(before - after) <= 2.0 * STATED
         if number and every:
             places = [p for p in numbers_in(new) if len(p) == 6]
@@ -387,13 +387,11 @@ def assert_still_true(
 
 
 def pieces_of(case: Case, lines: Any, obstacle: Any) -> Any:
-    """An obstacle's pieces in the order of the certificate's sections."""
+    """An obstacle's pieces in the order of the certificate."""
     name = obstacle.name
-    old, new = (
-        header["sections"].get(name, []) for header in (case.lines[0], lines[0])
-    )
+    old, new = (header["pieces"].get(name, []) for header in (case.lines[0], lines[0]))
     corners = [sorted(loop) for loop in old]
-    assert sorted(corners) == sorted(sorted(loop) for loop in new), "other sections"
+    assert sorted(corners) == sorted(sorted(loop) for loop in new), "other pieces"
     order = [corners.index(sorted(loop)) for loop in new]
     return [obstacle.pieces[k] for k in order] if order else obstacle.pieces
 

@@ -18,7 +18,7 @@ from problem_files import NEAR, OUT_OF_REACH, write_problem
 from vdsm_pin.cli import app, main
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.planner.strategies import STRATEGIES, strategy
-from vdsm_pin.report.files import schema
+from vdsm_pin.report.files import SCHEMA_NAMES, schema
 
 COMMANDS = [
     command.name or command.callback.__name__ for command in app.registered_commands
@@ -272,7 +272,7 @@ def test_problems_are_listed_and_printed(vdsm: Shell) -> None:
     assert vdsm("problems", "--show", "poem").status == 2
 
 
-@pytest.mark.parametrize("name", ["problem", "plan", "verification", "manifest"])
+@pytest.mark.parametrize("name", SCHEMA_NAMES)
 def test_schemas_are_printed(vdsm: Shell, name: str) -> None:
     jsonschema.Draft202012Validator.check_schema(json.loads(vdsm("schema", name).out))
 

@@ -243,15 +243,16 @@ def problems(
 @app.command(epilog=_examples("vdsm schema verification"))
 def schema(
     name: Annotated[
-        str, typer.Argument(help="problem, plan, verification, manifest or timing.")
+        str,
+        typer.Argument(
+            help="problem, certificate, verification, plan, manifest or timing."
+        ),
     ] = "problem",
 ) -> None:
-    """Print the JSON Schema of a file."""
-    from vdsm_pin.io.problem_file import problem_schema
-    from vdsm_pin.report.files import PROBLEM, schema, schema_text
+    """Print the JSON Schema of a file, or of each line of a certificate."""
+    from vdsm_pin.report.files import schema, schema_text
 
-    found = problem_schema() if name == PROBLEM else schema(name)
-    typer.echo(schema_text(found), nl=False)
+    typer.echo(schema_text(schema(name)), nl=False)
 
 
 @app.command(epilog=_examples("vdsm urdf hrm8 --out hrm8.urdf"))
@@ -291,13 +292,12 @@ def check_certificate(
 ) -> None:
     """Recheck a certificate.
 
-    The checker is a second program that shares no code with the verifier.
+    The checker is a second program that shares only the reading of files with the
+    verifier.
     """
     from vdsm_pin.certificate_checker import main as check
-    from vdsm_pin.io.problem_file import find_problem
 
-    file = find_problem(problem)
-    raise typer.Exit(check([str(certificate), str(file), str(trajectory)]))
+    raise typer.Exit(check([str(certificate), problem, str(trajectory)]))
 
 
 @app.command(epilog=_examples("vdsm diff out/monday out/tuesday"))

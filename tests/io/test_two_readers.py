@@ -1,7 +1,8 @@
-"""The certificate checker's own reader and this one find the same in the same files.
+"""The reader and a second one find the same in the same files.
 
 The strongest oracle there is for reading: two readers without a common line, one in
-floating point, one in ball arithmetic.
+floating point, one in ball arithmetic. Planner, verifier and certificate checker all
+rest on the first.
 """
 
 from pathlib import Path
@@ -9,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from oracles import ball_reader
 from problem_texts import TETRAHEDRON, binary_stl, edited, write_everything
 
 from vdsm_pin import scene
-from vdsm_pin.certificate_checker import files as checker
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull
 from vdsm_pin.io.problem_file import built_in_names, find_problem, read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
@@ -39,7 +40,7 @@ def assert_same_solid(ours: scene.Obstacle, theirs: Any) -> None:
         found = ours.vertices[ours.triangles]
         np.testing.assert_allclose(found, corners, rtol=0, atol=CLOSE)
         return
-    if isinstance(theirs, checker.SweptPolygon):
+    if isinstance(theirs, ball_reader.SweptPolygon):
         assert isinstance(ours, scene.Prism)
         ends = [
             np.column_stack([ours.polygon, np.full(len(ours.polygon), s)])
@@ -52,14 +53,14 @@ def assert_same_solid(ours: scene.Obstacle, theirs: Any) -> None:
         return
     (piece,) = ours.pieces
     match piece, theirs:
-        case Hull(), checker.Hull():
+        case Hull(), ball_reader.Hull():
             found, expected = (
                 points[np.lexsort(np.round(points, 9).T)]
                 for points in (piece.points, numbers(theirs.points))
             )
             np.testing.assert_allclose(found, expected, rtol=0, atol=CLOSE)
             assert piece.radius == pytest.approx(float(theirs.radius), abs=CLOSE)
-        case FlatCylinder(), checker.FlatCylinder():
+        case FlatCylinder(), ball_reader.FlatCylinder():
             for name in ("centre", "axis", "half_length", "radius"):
                 np.testing.assert_allclose(
                     getattr(piece, name),
@@ -67,7 +68,7 @@ def assert_same_solid(ours: scene.Obstacle, theirs: Any) -> None:
                     rtol=0,
                     atol=CLOSE,
                 )
-        case HalfSpacePiece(), checker.HalfSpace():
+        case HalfSpacePiece(), ball_reader.HalfSpace():
             np.testing.assert_allclose(
                 piece.normal, numbers(theirs.normal), rtol=0, atol=CLOSE
             )
@@ -77,7 +78,7 @@ def assert_same_solid(ours: scene.Obstacle, theirs: Any) -> None:
 
 
 def assert_same_problem(path: Path) -> None:
-    file, theirs = read_problem(path), checker.Problem(path)
+    file, theirs = read_problem(path), ball_reader.Problem(path)
     ours = file.problem
     assert file.sha256 == theirs.sha256
     arm = ours.manipulator
@@ -179,7 +180,7 @@ def test_both_read_trajectories_alike(tmp_path: Path) -> None:
     trajectory = Trajectory(on_path, abs(q[:, 1]), q[:, 0], q[:, 1::2], q[:, 2::2])
     write_trajectory(tmp_path / "t.csv", trajectory)
     ours = read_trajectory(tmp_path / "t.csv", built_in("hrm8"))
-    rows = list(checker.read_rows(tmp_path / "t.csv", 8))
+    rows = list(ball_reader.read_rows(tmp_path / "t.csv", 8))
     np.testing.assert_array_equal(ours.joints, [numbers(row.joints) for row in rows])
     np.testing.assert_array_equal(ours.path_m, [float(row.path_m) for row in rows])
     assert ours.on_path.tolist() == [row.on_path for row in rows]
@@ -190,7 +191,7 @@ def test_the_comparison_can_fail(tmp_path: Path) -> None:
     ours = read_problem(path).problem.scene.obstacles
     (tmp_path / "part.stl").write_bytes(binary_stl(TETRAHEDRON[::-1]))
     path.write_text(path.read_text().replace("radius: 200", "radius: 200.000001"))
-    theirs = list(checker.Problem(path).shapes.values())
+    theirs = list(ball_reader.Problem(path).shapes.values())
     for i in (0, 6):
         with pytest.raises(AssertionError):
             assert_same_solid(ours[i], theirs[i])

@@ -65,9 +65,9 @@ def changes(old: Any, new: Any) -> list[tuple[Any, ...]] | None:
 
 
 def a_list(lines: list[Any], rng: Rng) -> tuple[list[Any], str]:
-    """Some list worth damaging: pairs, proofs, slices, planes, sections, .."""
+    """Some list worth damaging: pairs, pieces, proofs, slices, planes, .."""
     found: list[tuple[list[Any], str]] = [(lines[0]["pairs"], "pairs")]
-    found += [(loops, "section") for loops in lines[0]["sections"].values()]
+    found += [(loops, "pieces") for loops in lines[0]["pieces"].values()]
     for line in lines[1:]:
         found.append((line["proofs"], "proofs"))
         for proof in line["proofs"]:
@@ -111,7 +111,7 @@ def repeat_line(lines: list[Any], rng: Rng) -> str:
 
 def drop_obstacle(lines: list[Any], rng: Rng) -> str:
     """One obstacle vanishes from the header and from every interval, consistently."""
-    names = [pair.get("obstacle") for pair in lines[0]["pairs"]]
+    names = [name for _, name in lines[0]["pairs"]]
     name = names[rng.integers(len(names))]
     kept = [k for k, other in enumerate(names) if other != name]
     lines[0]["pairs"] = [lines[0]["pairs"][k] for k in kept]
@@ -171,6 +171,7 @@ def raw(content: bytes, rng: Rng) -> tuple[bytes, str]:
     k, n = int(rng.integers(len(lines))), len(lines)
     match int(rng.integers(7)):
         case 0:  # one number of one line
+            k %= n - 1  # the last one has none
             line = json.loads(lines[k])
             places = numbers_in(line)
             holder, key = place(line, places[rng.integers(len(places))])

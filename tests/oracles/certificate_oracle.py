@@ -75,6 +75,13 @@ def nearest(support: Any, start: Any, rounds: int = 30) -> Any:
     return x
 
 
+def area(polygon: Any, loop: Any) -> float:
+    """Twice the signed area of some corners of a polygon."""
+    u = polygon[list(loop)] - polygon[loop[0]]
+    v = np.roll(u, -1, axis=0)
+    return float((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]).sum())
+
+
 def least(piece: Any, n: Any) -> tuple[float, Any]:
     """Least n.x over a piece, for any n, and where."""
     if isinstance(piece, Hull):
@@ -204,15 +211,15 @@ class OracleWriter:
             return local[np.argmin(local @ d)] - fixed[np.argmax(fixed @ d)]
 
         v = nearest(difference, local[0] - fixed[0])
-        n = v / np.linalg.norm(v)
+        n = -v / np.linalg.norm(v)
         return n, self.proved_of_link(k, a, b, link, other, n) - PAD
 
     def proved_of_link(
         self, k: int, a: float, b: float, link: int, other: int, n: Any
     ) -> float:
-        """What a plane with unit normal n, from link to link, proves of a pair."""
-        tops = [self.top(k, a, b, j, link + 1, -n, link) for j in (other, other + 1)]
-        own = max(0.0, self.lengths[link] * n[0]) + 2 * self.arm.link_radius
+        """What a plane with unit normal n, from `other` to `link`, proves of a pair."""
+        tops = [self.top(k, a, b, j, link + 1, n, link) for j in (other, other + 1)]
+        own = max(0.0, -self.lengths[link] * n[0]) + 2 * self.arm.link_radius
         return float(-max(tops) - own)
 
     # ---- slices ----------------------------------------------------------------------
@@ -257,14 +264,19 @@ class OracleWriter:
         pairs: list[Any] = [(i, o) for o in self.problem.scene.obstacles for i in links]
         return pairs + [(i, k) for i in links for k in links if k >= i + 2]
 
-    def sections(self) -> Any:
+    def pieces(self) -> Any:
         found = {}
         for obstacle in self.problem.scene.obstacles:
             if isinstance(obstacle, Prism) and len(obstacle.convex_sections) > 1:
                 corners = obstacle.polygon.tolist()
-                found[obstacle.name] = [
+                loops = [
                     [corners.index(point) for point in section.tolist()]
                     for section in obstacle.convex_sections
+                ]
+                sense = area(obstacle.polygon, range(len(corners)))
+                found[obstacle.name] = [
+                    loop[:: int(np.sign(area(obstacle.polygon, loop) * sense))]
+                    for loop in loops
                 ]
         return found
 
@@ -319,13 +331,13 @@ class OracleWriter:
             np.cos(theta) * np.cos(alpha),
         )
         pairs = [
-            {"link": i + 1, "other_link": other + 1}
+            [other + 1, f"link {i + 1}"]
             if isinstance(other, int)
-            else {"link": i + 1, "obstacle": other.name, "pieces": len(other.pieces)}
+            else [i + 1, other.name]
             for i, other in self.partners()
         ]
         return {
-            "vdsm_certificate": 1,
+            "vdsm_certificate": 2,
             "problem_sha256": self.file.sha256,
             "trajectory_sha256": sha256(self.trajectory_path.read_bytes()),
             "urdf_sha256": "0" * 64,
@@ -336,10 +348,8 @@ class OracleWriter:
                 zip(("joint_rad", "base_m", "obstacle_m"), self.errors, strict=True)
             ),
             "n_rows": self.trajectory.n_samples,
-            "n_intervals": len(self.q) - 1,
             "pairs": pairs,
-            "sections": self.sections(),
-            "piece_order": {},
+            "pieces": self.pieces(),
             "limits": {
                 "alpha_rad": float(np.abs(alpha).max()),
                 "theta_rad": float(np.abs(theta).max()),
@@ -367,6 +377,5 @@ def sha256(content: bytes) -> str:
 def sealed(lines: list[Any]) -> bytes:
     """The file of these lines, with a last line that fits them."""
     body = "".join(json.dumps(line) + "\n" for line in lines).encode()
-    count = sum(1 for line in lines if "k" in line)
-    end = {"end": True, "n_intervals": count, "sha256": sha256(body)}
+    end = {"end": True, "sha256": sha256(body)}
     return body + json.dumps(end).encode() + b"\n"

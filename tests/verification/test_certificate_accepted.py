@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 from oracles.certificate_cases import SHAPES, random_case
@@ -14,6 +15,7 @@ from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.robot_model import load_robot
+from vdsm_pin.verification.certificate_file import certificate_schema
 from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
 from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.verify import verify
@@ -42,6 +44,11 @@ def test_the_verifiers_certificate_is_accepted(seed: int, tmp_path: Path) -> Non
     written(case, case.certificate)
     outcome = check_certificate(case.certificate, case.problem, case.trajectory)
     assert outcome.accepted, outcome.reason
+    lines = [json.loads(line) for line in case.certificate.read_text().splitlines()]
+    fits = jsonschema.Draft202012Validator(certificate_schema()).is_valid
+    assert all(map(fits, lines))
+    assert not fits(lines[0] | {"coverage": 2.0})
+    assert not fits(lines[1] | {"proofs": [[[0.0, 1.0, [[0, 1, 0.0]]]]]})
 
 
 def test_mutations_of_the_verifiers_certificate_are_rejected(tmp_path: Path) -> None:

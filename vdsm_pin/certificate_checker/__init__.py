@@ -1,10 +1,10 @@
-"""Rechecks certificates in ball arithmetic: a program of its own.
+"""Rechecks certificates in ball arithmetic: a program of its own, below 500 lines.
 
-It shares no code with planner, verifier and their readers, so that an error in them
-does not repeat itself here. `claims.py` is the program, `files.py` reads the files,
-`solids.py` holds the support functions of the obstacles, `balls.py` vectors of balls.
+Read `claims.py` first: it recomputes every claim. `motion.py` bounds how far the arm
+reaches, `solids.py` how near the obstacles come, `path.py` what the tip draws;
+`program.py` reads the files and says the verdict, `balls.py` has vectors of balls.
 """
 
-from vdsm_pin.certificate_checker.claims import Outcome, check_certificate, main
+from vdsm_pin.certificate_checker.program import Outcome, check_certificate, main
 
 __all__ = ["Outcome", "check_certificate", "main"]

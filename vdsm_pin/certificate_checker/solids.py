@@ -1,175 +1,162 @@
-"""Obstacles as the certificate checker sees them: support functions and an inside."""
+"""Solids as the checker sees them: support functions, and the inside of a mesh.
+
+A solid is the union of convex pieces, and a piece the hull of a few points grown by a
+ball or a disc. Of a half-space the point that its plane goes through is enough.
+"""
 
 from collections import Counter
-from collections.abc import Sequence
-from functools import reduce
-from itertools import pairwise
+from collections.abc import Iterable, Sequence
+from itertools import pairwise, product
 from typing import Any, Final
 
 import numpy as np
-from flint import arb, arb_mat
+from flint import arb
 
-from vdsm_pin.certificate_checker import files
-from vdsm_pin.certificate_checker.balls import (
-    SLACK,
-    Ball,
-    Matrix,
-    claim,
-    column,
-    cross,
-    dot,
-    is_index,
-    norm,
-    require,
-    sign,
-)
+from vdsm_pin import scene
+from vdsm_pin.certificate_checker.balls import Ball, Matrix, claim, column, dot, unit
 
-RAYS: Final = ((0.531, 0.627, 0.571), (-0.283, 0.919, 0.277), (0.711, -0.129, -0.69))
-"""Directions without symmetry, of length below 1.01, to cross a mesh along; [-]."""
+ROUNDING: Final = 2.0**-46
+"""Error of a height in doubles over the extent of the points; [-].
+
+A point is a sum of four terms and off by 28 units of 2^-53 at most, its product with a
+rounded n by seven: 35 in all, and this is 128.
+"""
+
+DOUBT: Final = 2.0**-44
+"""Error of a triple product over the lengths of its factors: 20 units, this is 512."""
+
+RAYS: Final = np.array([[0.53, 0.63, 0.56], [-0.28, 0.92, 0.27], [0.71, -0.13, -0.69]])
+"""Directions without symmetry, shorter than 1, to cross a mesh along; [-]."""
 
 
 class Solid:
-    """An obstacle as convex pieces in the order of the certificate.
+    """An obstacle, or a link in its own frame.
 
     Args:
-        name: Name in the problem file.
-        shape: What it is.
+        name: Name in the certificate.
+        points: Of each piece, shape (n_pieces, k, 3); [m].
+        origin: What the points were computed from, shape (3,); [m].
+        radius: Of the ball that grows the pieces; [m].
     """
 
-    def __init__(self, name: str, shape: Any) -> None:
-        self.name, self.shape, self.pieces = name, shape, [shape]
-        if isinstance(shape, files.SweptPolygon):
-            self.pieces = [self._swept(range(len(shape.section)))]
-
-    @property
-    def count(self) -> int:
-        """Number of pieces."""
-        return len(self.pieces)
-
-    def reorder(self, order: list[int]) -> None:
-        """Take the pieces in this order."""
-        self.pieces = [self.pieces[k] for k in order]
+    def __init__(
+        self, name: str, points: Any, *, origin: Any = 0.0, radius: float = 0.0
+    ) -> None:
+        self.name, self.points, self.radius = name, np.array(points), arb(radius)
+        self.disc: tuple[Matrix, Ball] | None = None  # axis and radius of a cylinder
+        self.normal: Matrix | None = None  # of a half-space
+        self.ends: Any = None  # of a prism: its corners at both, shape (2, c, 3)
+        self.extent = float(np.abs(self.points).max() + np.abs(origin).max())
 
     def support(self, n: Matrix, first: int, last: int) -> Ball:
         """Least n.x over the pieces first..last-1, for a unit n."""
-        return reduce(arb.min, (_support(p, n) for p in self.pieces[first:last]))
+        rounded = np.array([float(entry) for entry in n.entries()])
+        least = (self.points[first:last].reshape(-1, 3) @ rounded).min()
+        height = arb(float(least), self.extent * ROUNDING) - self.radius
+        if self.disc is not None:
+            axis, radius = self.disc
+            height -= radius * (1 - dot(axis, n) ** 2).nonnegative_part().sqrt()
+        return height
 
     def direction(self, n: Matrix) -> Matrix:
         """The exact direction that n stands for: a half-space has only one."""
-        if not isinstance(self.shape, files.HalfSpace):
+        if self.normal is None:
             return n
-        off = (n + self.shape.normal).entries()
-        claim(all(abs(x) <= SLACK for x in off), "n is not the half-space's -normal")
-        return -self.shape.normal
+        off = (n + self.normal).entries()
+        claim(all(abs(x) <= 1e-9 for x in off), "n is not the half-space's -normal")
+        return -self.normal
 
-    def cut(self, loops: list[list[int]]) -> None:
-        """Take triangles of a prism as pieces, once their edges cancel to its own."""
-        claim(isinstance(self.shape, files.SweptPolygon), f"{self.name} is no prism")
-        corners = range(len(self.shape.section))
-        good = all(len(x) == 3 and all(is_index(k, corners) for k in x) for x in loops)
-        require(good and loops, f"sections of {self.name} are not triangles")
-        rest = self._boundary(corners)
-        for loop in loops:
-            rest.subtract(self._boundary(loop))
-        claim(not any(rest.values()), f"sections do not cover {self.name}")
-        self.pieces = [self._swept(loop) for loop in loops]
+    def cut(self, pieces: list[Any]) -> None:
+        """Take the certificate's pieces: parts of a prism, or the mesh's in its order.
 
-    def _swept(self, loop: Sequence[int]) -> files.Hull:
-        return files.Hull([end[k] for end in self.shape.ends for k in loop], arb(0))
-
-    def _boundary(self, loop: Sequence[int]) -> Counter[tuple[int, int]]:
-        """The loop's edges as a chain, run so that its area is positive."""
-        chain: Counter[tuple[int, int]] = Counter()
-        edges, corners = list(pairwise([*loop, loop[0]])), self.shape.section
-        ends = [(corners[i], corners[j]) for i, j in edges]
-        area = sum(a[0] * b[1] - a[1] * b[0] for a, b in ends)
-        for i, j in edges:
-            chain[min(i, j), max(i, j)] += 1 if (i < j) == (area > 0) else -1
-        return chain
+        Args:
+            pieces: Corner numbers of polygons that make up the prism's section, all
+                of as many corners; or a permutation of the numbers of the triangles.
+        """
+        numbers = np.array(pieces, dtype=int)
+        if self.ends is None:
+            whole = sorted(pieces) == [*range(len(self.points))]
+            self.points = self.points[numbers]
+        else:
+            whole = boundary(pieces) == boundary([range(self.ends.shape[1])])
+            self.points = np.concatenate(self.ends[:, numbers], axis=1)
+        claim(whole, f"pieces of {self.name} do not make up the whole")
 
 
-def _support(piece: files.Shape, n: Matrix) -> Ball:
-    """Least n.x over a convex piece, for a unit n (a half-space's own)."""
-    match piece:
-        case files.Hull():
-            heights = (arb_mat(piece.points) * n).entries()
-            return reduce(arb.min, heights) - piece.radius
-        case files.FlatCylinder():
-            along = dot(piece.axis, n)
-            across = (1 - along * along).nonnegative_part().sqrt()
-            reach = piece.half_length * abs(along) + piece.radius * across
-            return dot(piece.centre, n) - reach
-        case files.HalfSpace():
-            return -piece.offset
-    raise AssertionError(piece)
+def boundary(loops: Iterable[Sequence[int]]) -> dict[tuple[int, int], int]:
+    """How often loops run along each edge, forwards less backwards, where not equal.
+
+    Loops of the same boundary wind round each point equally often in sum. A polygon
+    winds round every point of its inside, so one of the loops does: its hull has it.
+    """
+    chain: Counter[tuple[int, int]] = Counter()
+    for loop in loops:
+        for i, j in pairwise([*loop, loop[0]]):
+            chain[min(i, j), max(i, j)] += (i < j) - (j < i)
+    return {edge: times for edge, times in chain.items() if times}
 
 
 class Mesh(Solid):
-    """Triangles as the file has them, with an inside where they enclose one."""
+    """Triangles, with an inside where they enclose one."""
 
-    def __init__(self, name: str, shape: Any) -> None:
-        super().__init__(name, shape)
-        self.corners, self.extent = shape.corners, float(np.abs(shape.corners).max())
-        points = self.corners.reshape(-1, 3) + 0.0  # makes -0 and 0 equal
-        start = np.unique(points, axis=0, return_inverse=True)[1].reshape(-1, 3)
-        ends = np.stack([start, np.roll(start, -1, axis=1)], axis=-1).reshape(-1, 2)
-        ends = ends[ends[:, 0] != ends[:, 1]]
-        edge = np.unique(np.sort(ends), axis=0, return_inverse=True)[1].ravel()
-        self.has_inside = not (np.bincount(edge) % 2).any()
-        self.oriented = not np.bincount(edge, np.sign(ends[:, 1] - ends[:, 0])).any()
+    def __init__(self, name: str, triangles: Any) -> None:
+        super().__init__(name, triangles)
+        self.faces = self.points[(self.points != self.points[:, :1]).any(axis=(1, 2))]
+        corners = self.points.reshape(-1, 3) + 0.0  # makes -0 and 0 equal
+        names = np.unique(corners, axis=0, return_inverse=True)[1].reshape(-1, 3)
+        edges = boundary(names.tolist())
+        self.oriented = not edges
+        self.has_inside = not any(times % 2 for times in edges.values())
 
-    @property
-    def count(self) -> int:
-        """Number of triangles."""
-        return len(self.corners)
-
-    def reorder(self, order: list[int]) -> None:
-        """Take the triangles in this order."""
-        self.corners = self.corners[order]
-
-    def support(self, n: Matrix, first: int, last: int) -> Ball:
-        """As for any solid, with the dot products in doubles.
-
-        Three products, two sums and a rounded n cost at most 9 units of 2^-53 |x| |n|;
-        the ball is 16 units wide either way.
-        """
-        turned = self.shape.linear.transpose() * n
-        rounded = np.array([float(entry) for entry in turned.entries()])
-        least = float((self.corners[first:last].reshape(-1, 3) @ rounded).min())
-        width = self.extent * float(norm(turned)) * 2.0**-49
-        return dot(self.shape.shift, n) + arb(least, width)
-
-    def excludes(self, point: Matrix) -> bool:
-        """Whether a point of the base frame is proved not to lie inside."""
-        local = self.shape.linear.solve(point - self.shape.shift)
+    def excludes(self, point: Any) -> bool:
+        """Whether a point, shape (3,), is proved not to lie inside."""
+        corners = self.faces - point
+        size = float(np.linalg.norm(corners, axis=2).max(initial=0.0))
+        normals = np.cross(corners, np.roll(corners, -1, axis=1))
+        heights = (normals[:, 0] * corners[:, 2]).sum(axis=1)
+        ahead = np.sign(heights) * (abs(heights) > DOUBT * size**3)
         for ray in RAYS if self.has_inside else ():
-            signs = self._crossings(local, ray)
-            if signs is not None:
-                return len(signs) % 2 == 0 and (sum(signs) == 0 or not self.oriented)
+            turns = normals @ ray
+            signs = np.sign(turns) * (abs(turns) > DOUBT * size**2)
+            missed = (signs.min(axis=1) < 0) & (signs.max(axis=1) > 0)
+            met = (abs(signs.sum(axis=1)) == 3) & (ahead != 0)
+            if (missed | met).all():
+                crossed = signs[met & (ahead == signs[:, 0]), 0]
+                return len(crossed) % 2 == 0 and not (self.oriented and crossed.sum())
         return not self.has_inside
 
-    def _crossings(self, point: Matrix, ray: tuple[float, ...]) -> list[int] | None:
-        """The sense in which a ray crosses each triangle it meets; None if unsure."""
-        corners = self.corners - np.array([float(x) for x in point.entries()])
-        areas = np.cross(corners, np.roll(corners, -1, axis=1)) @ np.array(ray)
-        # Corners are shorter than the bracket; rounding is below 2^-46 of its square.
-        doubt = (4.0 * (self.extent + float(norm(point)))) ** 2 * 2.0**-46
-        missed = (areas.max(axis=1) > doubt) & (areas.min(axis=1) < -doubt)
-        missed |= (self.corners == self.corners[:, :1]).all(axis=(1, 2))
-        signs: list[int] = []
-        for triangle in self.corners[~missed]:
-            a, b, c = (column(*map(float, corner)) - point for corner in triangle)
-            normals = cross(a, b), cross(b, c), cross(c, a)
-            across = {sign(dot(column(*ray), normal)) for normal in normals}
-            ahead = sign(dot(c, normals[0]))
-            if {1, -1} <= across:
-                continue
-            if 0 in across or ahead == 0:
-                return None
-            signs += across if {ahead} == across else ()
-        return signs
+
+def _ends(round_: scene.Capsule | scene.Cylinder) -> Any:
+    half = round_.half_length * round_.axis
+    return [[round_.centre - half, round_.centre + half]]
 
 
-def solid(name: str, shape: files.Shape) -> Solid:
-    """The obstacle of a shape, not yet cut or reordered."""
-    return (Mesh if isinstance(shape, files.Triangles) else Solid)(name, shape)
+def solid(obstacle: scene.Obstacle) -> Solid:
+    """The solid of an obstacle as it was read."""
+    name = obstacle.name
+    match obstacle:
+        case scene.Sphere():
+            found = Solid(name, [[obstacle.centre]], radius=obstacle.radius)
+        case scene.Capsule():
+            found = Solid(name, _ends(obstacle), radius=obstacle.radius)
+        case scene.Cylinder():
+            found = Solid(name, _ends(obstacle))
+            found.disc = unit(column(*obstacle.axis.tolist())), arb(obstacle.radius)
+        case scene.Box():
+            corners = np.array([*product((-1, 1), repeat=3)]) * obstacle.half_size
+            corners = obstacle.centre + corners @ obstacle.rotation.T
+            found = Solid(name, [corners], origin=obstacle.centre)
+        case scene.Prism():
+            flat = [[[*uv, s] for uv in obstacle.polygon] for s in obstacle.span]
+            both = obstacle.origin + np.array(flat) @ obstacle.rotation.T
+            corners = both.reshape(1, -1, 3)
+            found = Solid(name, corners, origin=obstacle.origin)
+            found.ends = both
+        case scene.HalfSpace():
+            normal = unit(column(*obstacle.normal.tolist()))
+            foot = normal * dot(normal, column(*obstacle.point.tolist()))
+            found = Solid(name, [[[float(entry) for entry in foot.entries()]]])
+            found.normal = normal
+        case scene.Mesh():
+            found = Mesh(name, obstacle.vertices[obstacle.triangles])
+    return found

@@ -1,11 +1,14 @@
 """The JSON files as models: what is written is what `vdsm schema` describes."""
 
 import json
+from collections.abc import Callable
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from vdsm_pin.errors import UnknownName
+from vdsm_pin.io.problem_file import SCHEMA_DIALECT, problem_schema
+from vdsm_pin.verification.certificate_file import certificate_schema
 
 Point = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 VerdictWord = Annotated[
@@ -265,23 +268,28 @@ _MODELS: Final[dict[str, type[FileModel]]] = {
     "manifest": ManifestFile,
     "timing": TimingFile,
 }
-PROBLEM: Final = "problem"
-"""Name of the problem file's schema, which its reader knows."""
+_ELSEWHERE: Final[dict[str, Callable[[], dict[str, Any]]]] = {
+    "problem": problem_schema,
+    "certificate": certificate_schema,
+}
+"""Files that are described where they are read or written."""
 
-SCHEMA_NAMES: Final = (PROBLEM, *_MODELS)
+SCHEMA_NAMES: Final = (*_ELSEWHERE, *_MODELS)
 """Every file with a schema."""
 
 
 def schema(name: str) -> dict[str, Any]:
-    """JSON Schema of one file.
+    """JSON Schema of one file; of a certificate, of each of its lines.
 
     Raises:
         UnknownName: If no such file exists.
     """
-    if name not in _MODELS:
+    if name not in SCHEMA_NAMES:
         raise UnknownName(kind="schema", name=name, known=SCHEMA_NAMES)
-    head = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
-    return head | _MODELS[name].model_json_schema(mode="serialization")
+    if name in _ELSEWHERE:
+        return {"$schema": SCHEMA_DIALECT} | _ELSEWHERE[name]()
+    found = _MODELS[name].model_json_schema(mode="serialization")
+    return {"$schema": SCHEMA_DIALECT} | found
 
 
 def schema_text(description: dict[str, Any]) -> str:

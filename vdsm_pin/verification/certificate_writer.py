@@ -8,6 +8,8 @@ import hashlib
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
+from fractions import Fraction
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,11 +23,18 @@ from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.scene import Prism
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.certificate_file import (
+    ClaimedLimits,
+    ErrorLimits,
+    HeaderLine,
+    LastLine,
+    Pair,
+)
 from vdsm_pin.verification.limits import extremes
 from vdsm_pin.verification.proof.desk import new_desk
-from vdsm_pin.verification.proof.layouts import CLAIM, FIRST, LAST, PLANE_NORMAL, RECORD
+from vdsm_pin.verification.proof.layouts import FIRST, LAST, PLANE_NORMAL, RECORD
 from vdsm_pin.verification.proof.recording import record
-from vdsm_pin.verification.proof.terms import BASE, Motion, Task
+from vdsm_pin.verification.proof.terms import Motion, Task
 from vdsm_pin.verification.proving import BUDGET
 from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.task import all_pairs, make_task
@@ -70,86 +79,88 @@ def write_certificate(path: Path, verification: Verification, hashes: Hashes) ->
         raise VerificationFailed(message)
     task = make_task(verification.problem, verification.errors)
     digest = hashlib.sha256()
-    n_intervals = max(1, verification.trajectory.n_samples - 1)
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         header = _header(verification, hashes, task.pieces)
-        for text in (json.dumps(header), *_lines(verification, task)):
+        for text in chain([header.model_dump_json()], _lines(verification, task)):
             line = text.encode() + b"\n"
             digest.update(line)
             file.write(line)
-        last = {"end": True, "n_intervals": n_intervals, "sha256": digest.hexdigest()}
-        file.write(json.dumps(last).encode() + b"\n")
+        last = LastLine(end=True, sha256=digest.hexdigest())
+        file.write(last.model_dump_json().encode() + b"\n")
 
 
 def _header(
     verification: Verification, hashes: Hashes, pieces: PackedPieces
-) -> dict[str, Any]:
+) -> HeaderLine:
     problem, trajectory = verification.problem, verification.trajectory
     box, found = verification.errors, extremes(trajectory)
-    rounding = TOLERANCES.arithmetic
-    return {
-        "vdsm_certificate": 1,
-        "problem_sha256": hashes.problem,
-        "trajectory_sha256": hashes.trajectory,
-        "urdf_sha256": hashes.urdf,
-        "versions": {"vdsm_pin": __version__, "numpy": np.__version__},
-        "required_clearance_m": problem.required_clearance,
-        "required_self_clearance_m": problem.required_self_clearance,
-        "errors": {
-            "joint_rad": box.joint,
-            "base_m": box.base,
-            "obstacle_m": box.obstacle,
-        },
-        "n_rows": trajectory.n_samples,
-        "n_intervals": max(1, trajectory.n_samples - 1),
-        "pairs": _pairs(problem),
-        "sections": _sections(problem),
-        "piece_order": _piece_order(problem, pieces),
-        "limits": {
-            "alpha_rad": found.alpha,
-            "theta_rad": found.theta,
-            "psi_rad": found.psi + rounding,
-            "x0_min_m": found.x0_min,
-            "x0_max_m": found.x0_max,
-        },
-        "tip_deviation_m": verification.tip_deviation,
-        "coverage": verification.coverage,
-    }
+    return HeaderLine(
+        problem_sha256=hashes.problem,
+        trajectory_sha256=hashes.trajectory,
+        urdf_sha256=hashes.urdf,
+        versions={"vdsm_pin": __version__, "numpy": np.__version__},
+        required_clearance_m=problem.required_clearance,
+        required_self_clearance_m=problem.required_self_clearance,
+        errors=ErrorLimits(
+            joint_rad=box.joint, base_m=box.base, obstacle_m=box.obstacle
+        ),
+        n_rows=trajectory.n_samples,
+        pairs=_pairs(problem),
+        pieces=_pieces(problem, pieces),
+        limits=ClaimedLimits(
+            alpha_rad=found.alpha,
+            theta_rad=found.theta,
+            psi_rad=found.psi + TOLERANCES.arithmetic,
+            x0_min_m=found.x0_min,
+            x0_max_m=found.x0_max,
+        ),
+        tip_deviation_m=verification.tip_deviation,
+        coverage=verification.coverage,
+    )
 
 
-def _pairs(problem: PlanningProblem) -> list[dict[str, Any]]:
-    sizes = {o.name: len(o.pieces) for o in problem.scene.obstacles}
+def _pairs(problem: PlanningProblem) -> list[Pair]:
+    """The moving link of each pair and what it is proved clear of."""
     return [
-        {"link": p.link, "obstacle": p.obstacle, "pieces": sizes[p.obstacle]}
-        if p.obstacle
-        else {"link": p.link, "other_link": p.other_link}
-        for p in all_pairs(problem)
+        (pair.link, pair.obstacle)
+        if pair.obstacle
+        else (pair.other_link, f"link {pair.link}")
+        for pair in all_pairs(problem)
     ]
 
 
-def _sections(problem: PlanningProblem) -> dict[str, list[list[int]]]:
-    """The triangles that cut prisms are made of, by corner numbers."""
-    result = {}
-    for obstacle in problem.scene.obstacles:
-        if isinstance(obstacle, Prism) and len(obstacle.pieces) > 1:
-            corners = {tuple(c): k for k, c in enumerate(obstacle.polygon.tolist())}
-            result[obstacle.name] = [
-                [corners[tuple(corner)] for corner in section.tolist()]
-                for section in obstacle.convex_sections
-            ]
-    return result
+def _pieces(problem: PlanningProblem, pieces: PackedPieces) -> dict[str, list[Any]]:
+    """The pieces of cut prisms and of meshes in the order in which planes count them.
 
-
-def _piece_order(
-    problem: PlanningProblem, pieces: PackedPieces
-) -> dict[str, list[int]]:
-    """The order of the pieces of those obstacles that were sorted."""
-    result = {}
+    Triangles by the numbers of their corners for a prism, numbers of the file's
+    triangles for a mesh that was sorted.
+    """
+    result: dict[str, list[Any]] = {}
     for k, obstacle in enumerate(problem.scene.obstacles):
         order = pieces.order[pieces.first_piece[k] : pieces.first_piece[k + 1]]
-        if (np.diff(order) != 1).any():
+        if isinstance(obstacle, Prism) and len(order) > 1:
+            triangles = _triangles(obstacle)
+            result[obstacle.name] = [triangles[i] for i in order]
+        elif (np.diff(order) != 1).any():
             result[obstacle.name] = order.tolist()
     return result
+
+
+def _triangles(prism: Prism) -> list[list[int]]:
+    """The section's triangles by corner numbers, run in the sense of the polygon."""
+    corners = {tuple(corner): k for k, corner in enumerate(prism.polygon.tolist())}
+    sense = _sense(prism.polygon)
+    return [
+        [corners[tuple(c)] for c in part.tolist()][:: sense * _sense(part)]
+        for part in prism.convex_sections
+    ]
+
+
+def _sense(polygon: FloatArray) -> int:
+    """1 where the corners, shape (n, 2), run anticlockwise, -1 where clockwise."""
+    corners = [(Fraction(x), Fraction(y)) for x, y in polygon.tolist()]
+    edges = pairwise([*corners, corners[0]])
+    return 1 if sum(a[0] * b[1] - a[1] * b[0] for a, b in edges) > 0 else -1
 
 
 def _lines(verification: Verification, task: Task) -> Iterator[str]:
@@ -178,9 +189,6 @@ def _interval_lines(
     task: Task, records: FloatArray, first: int, last: int
 ) -> Iterator[str]:
     """The lines of the intervals [first, last)."""
-    # A pair of links is written with n from the lower link to the higher one.
-    own = task.pairs.frame[records[:, 1].astype(np.int64)] != BASE
-    records[own, PLANE_NORMAL:CLAIM] *= -1.0
     order = np.lexsort((records[:, FIRST], records[:, 2], records[:, 1], records[:, 0]))
     rows = records[order]
     for k in range(first, last):

@@ -1,15 +1,13 @@
-"""Reads certificate, problem, meshes and trajectory for the certificate checker.
+"""A second reader of problems, meshes and trajectories, in ball arithmetic.
 
-Shares nothing with `vdsm_pin.io`: the checker must not inherit a reader's mistake.
-Decimals become the nearest double, units are converted in balls, and everything comes
-out in metres, radians and the base frame.
+Shares nothing with `vdsm_pin.io`, whose numbers it is held against: decimals become the
+nearest double, units are converted in balls, and everything comes out in metres,
+radians and the base frame.
 """
 
 import hashlib
-import json
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise, product
@@ -21,17 +19,8 @@ import numpy as np
 import yaml
 from flint import arb
 
-from vdsm_pin.certificate_checker.balls import (
-    Ball,
-    Matrix,
-    claim,
-    column,
-    dot,
-    require,
-    turn,
-    unit,
-)
-from vdsm_pin.errors import InvalidFile
+from vdsm_pin.certificate_checker.balls import Ball, Matrix, column, dot, unit
+from vdsm_pin.certificate_checker.motion import turn
 
 NUMBER: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 HRM8: Final = {
@@ -43,17 +32,16 @@ HRM8: Final = {
 }
 """Table 1 of the paper; [mm]."""
 ZERO: Final = ("0", "0", "0")
-DAMAGE: Final = (
-    ValueError,
-    TypeError,
-    LookupError,
-    AttributeError,
-    ArithmeticError,
-    RecursionError,
-    OSError,
-    yaml.YAMLError,
-)
-"""What reading a file of another kind raises."""
+
+
+def require(holds: object, problem: str) -> None:
+    """Refuse a file.
+
+    Raises:
+        ValueError: If the condition does not hold.
+    """
+    if not holds:
+        raise ValueError(problem)
 
 
 @dataclass(frozen=True)
@@ -332,55 +320,15 @@ class Problem:
         )
 
 
-@contextmanager
-def reading(file: Path, where: str = "") -> Iterator[None]:
-    """Turn whatever a damaged file causes into one clear error.
-
-    Raises:
-        InvalidFile: In place of the errors in `DAMAGE`.
-    """
-    try:
-        yield
-    except DAMAGE as error:
-        text = " ".join(str(error).split()) or type(error).__name__
-        raise InvalidFile(file=file, where=where, problem=text) from None
-
-
-def read_lines(path: Path) -> Iterator[dict[str, Any]]:
-    """The lines of a certificate but the last one, which must seal them.
-
-    Raises:
-        InvalidFile: If a line is no JSON object.
-        Rejected: If the last line is missing, not the last or does not fit the others.
-    """
-    digest, count = hashlib.sha256(), 0
-    with reading(path), path.open("rb") as lines:
-        for place, raw in enumerate(lines, 1):
-            with reading(path, f"line {place}"):
-                require(raw.endswith(b"\n"), "is truncated")
-                line = json.loads(raw.decode(), object_pairs_hook=_unique)
-                require(isinstance(line, dict), "is not an object")
-            if "end" in line:
-                sha256, n_intervals = digest.hexdigest(), count - 1
-                seal = {"end": True, "n_intervals": n_intervals, "sha256": sha256}
-                claim(line == seal, "the last line does not fit the lines before it")
-                claim(not lines.read(1), "something follows the last line")
-                return
-            digest.update(raw)
-            count += 1
-            yield line
-    claim(False, "the last line is missing")
-
-
 def read_rows(path: Path, n_links: int) -> Iterator[Row]:
     """The rows of a trajectory, one by one.
 
     Raises:
-        InvalidFile: If it is not a trajectory of that many links.
+        ValueError: If it is not a trajectory of that many links.
     """
     angles = [f"{x}{i + 1}_rad" for i in range(n_links) for x in ("alpha", "theta")]
     names = ["waypoint", "on_path", "path_m", "x0_m", *angles]
-    with reading(path), path.open("rb") as lines:
+    with path.open("rb") as lines:
         first = lines.readline().decode().rstrip("\r\n").split(",")
         require(first == names, f"line 1: columns are not {','.join(names)}")
         for number, line in enumerate(lines, 2):

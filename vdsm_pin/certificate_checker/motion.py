@@ -1,0 +1,119 @@
+"""The arm between two rows: how far it reaches in a direction (docs/certificate.md).
+
+Links and joint centres count from 0 in here: link i joins centres i and i + 1.
+"""
+
+from collections.abc import Sequence
+
+from flint import arb, arb_mat
+
+from vdsm_pin.certificate_checker.balls import Ball, Matrix, column, dot, norm
+
+
+def cross(a: Matrix, b: Matrix) -> Matrix:
+    """Vector product."""
+    (ax, ay, az), (bx, by, bz) = a.entries(), b.entries()
+    return column(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
+
+
+def turn(axis: int, angle: Ball) -> Matrix:
+    """Rotation about x, y or z (0, 1, 2)."""
+    matrix, i, j = arb_mat(3, 3, 1), (axis + 1) % 3, (axis + 2) % 3
+    sine, cosine = angle.sin_cos()
+    matrix[i, i], matrix[i, j], matrix[j, i], matrix[j, j] = cosine, -sine, sine, cosine
+    return matrix
+
+
+class Pose:
+    """One configuration: joint centres, largest psi, and frames with their origins.
+
+    The base's frame is number 0, that of link i number i + 1.
+    """
+
+    def __init__(self, lengths: Sequence[Ball], joints: Sequence[Ball]) -> None:
+        self.frames, self.centres = [arb_mat(3, 3, 1)], [column(joints[0], 0, 0)]
+        self.psi = arb(0)
+        for i, length in enumerate(lengths):
+            step = turn(2, joints[2 * i + 1]) * turn(1, joints[2 * i + 2])
+            x, y, z = (step[k, 0] for k in range(3))
+            self.psi = self.psi.max(arb.atan2(norm(column(0, y, z)), x))
+            self.frames.append(self.frames[i] * step)
+            along = self.frames[i + 1] * column(length, 0, 0)
+            self.centres.append(self.centres[i] + along)
+        self.origins = [column(0, 0, 0), *self.centres]
+
+    def height(self, n: Matrix, first: int, j: int) -> Ball:
+        """n.O_j from the origin of frame `first`, in which n is."""
+        return dot(self.frames[first] * n, self.centres[j] - self.origins[first])
+
+    def gain(self, n: Matrix, first: int, j: int) -> Ball:
+        """G_j: how fast n.O_j grows at most with the angles of joints first..j-1."""
+        total, turned = arb(0), self.frames[first] * n
+        for i in range(first, j):
+            lever = cross(self.centres[j] - self.centres[i], turned)
+            for frame, axis in ((self.frames[i], 2), (self.frames[i + 1], 1)):
+                total += abs(dot(column(*(frame[k, axis] for k in range(3))), lever))
+        return total
+
+
+class Interval:
+    """The motion between two rows of joint values, under joint errors up to E.
+
+    Args:
+        lengths: Of the links; [m].
+        ends: Joint values x0, alpha1, theta1, .. of both rows; [m], [rad].
+        error: E; [rad].
+    """
+
+    def __init__(
+        self, lengths: Sequence[Ball], ends: Sequence[list[Ball]], error: Ball
+    ) -> None:
+        self.lengths, self.start, self.error = lengths, ends[0], error
+        self.change = [b - a for a, b in zip(*ends, strict=True)]
+        self.poses: dict[float, Pose] = {}
+        self._bounds: dict[int, list[tuple[Ball, Ball, Ball]]] = {}
+
+    def pose(self, time: float) -> Pose:
+        """The configuration at a time in [0, 1]."""
+        if time not in self.poses:
+            steps = zip(self.start, self.change, strict=True)
+            joints = [start + change * time for start, change in steps]
+            self.poses[time] = Pose(self.lengths, joints)
+        return self.poses[time]
+
+    def bounds(self, first: int) -> list[tuple[Ball, Ball, Ball]]:
+        """M_j, D_j and the second order in E, by j, where joints first.. move O_j."""
+        if first not in self._bounds:
+            rate = bend = drift = second = arb(0)
+            found = [(bend, drift, second)] * (first + 1)
+            for i in range(first, len(self.lengths)):
+                length, angles = self.lengths[i], 2 * (i - first + 1)
+                rate += abs(self.change[2 * i + 1]) + abs(self.change[2 * i + 2])
+                bend += length * rate * rate
+                drift += angles * length * rate
+                second += length * (angles * self.error) ** 2 / 2
+                found.append((bend, drift, second))
+            self._bounds[first] = found
+        return self._bounds[first]
+
+    def reach(self, link: int, first: int, times: Sequence[float], n: Matrix) -> Ball:
+        """Largest n.x over the axis of a link, a slice [a, b] and all joint errors.
+
+        Args:
+            link: The link.
+            first: Of the poses' frames the one that n and x are in; only the joints
+                from this one on move the link in it.
+            times: a and b.
+            n: A unit vector.
+        """
+        a, b = map(self.pose, times)
+        h, tops = arb(times[1]) - times[0], []
+        for j in (link, link + 1):
+            bend, drift, second = self.bounds(first)[j]
+            top = a.height(n, first, j).max(b.height(n, first, j))
+            top += bend * h * h / 8 + second
+            if self.error > 0:
+                gain = a.gain(n, first, j) + b.gain(n, first, j)
+                top += self.error * (gain + h * drift) / 2
+            tops.append(top)
+        return tops[0].max(tops[1])

@@ -1,0 +1,96 @@
+"""The desired path against the tip: how far it strays and how much it draws."""
+
+from bisect import bisect_right
+from itertools import pairwise
+
+from flint import arb
+
+from vdsm_pin.certificate_checker.balls import Ball, Matrix, column, norm
+from vdsm_pin.problem import DesiredPath
+
+
+class Drawing:
+    """The desired path, and what the tip has drawn of it so far.
+
+    A station is an arc length. On a closed path stations go on past the seam, on an
+    open one those beyond an end stand for the end.
+    """
+
+    def __init__(self, path: DesiredPath) -> None:
+        self.closed = path.closed and len(path.points) > 1
+        self.corners = [column(*point) for point in path.points.tolist()]
+        self.corners += self.corners[: int(self.closed)]
+        self.stations = [arb(0)]
+        for a, b in pairwise(self.corners):
+            self.stations.append(self.stations[-1] + norm(b - a))
+        self.length = self.stations[-1]
+        self.deviation = arb(0)
+        self.stretches: list[tuple[Ball, Ball]] = []
+        self.last: Ball | None = None  # station of the row before; None off the path
+
+    def laps(self, station: Ball) -> int:
+        """Whole laps in a station; the nearest number where that is not certain."""
+        laps = station / self.length if self.closed else arb(0)
+        whole = laps.floor().unique_fmpz()
+        return round(float(laps)) if whole is None else int(whole)
+
+    def local(self, station: Ball) -> Ball:
+        """The station within [0, length]."""
+        if self.closed:
+            return station - self.laps(station) * self.length
+        return station.max(arb(0)).min(self.length)
+
+    def point(self, station: Ball) -> Matrix:
+        """The point of the path at a station."""
+        s, last = self.local(station), len(self.corners) - 2
+        if last < 0:
+            return self.corners[0]
+        i = min(max(bisect_right(self.stations, s) - 1, 0), last)
+        a, b = self.corners[i : i + 2]
+        return a + (b - a) * ((s - self.stations[i]) / norm(b - a))
+
+    def draw(self, stations: list[Ball], tips: list[Matrix], bend: Ball) -> None:
+        """Take in an interval with both rows on the path.
+
+        Args:
+            stations: path_m of both rows; [m].
+            tips: The tip at both.
+            bend: How far it may lie off the chord in between; [m].
+        """
+        a, b = stations if self.closed else map(self.local, stations)
+        start = a if self.last is None else self.last
+        stop = start + (b - a) - self.laps(b - a + self.length / 2) * self.length
+        if self.last is None:
+            self.stretches.append((start, start))
+        low, high = self.stretches[-1]
+        self.stretches[-1], self.last = (low.min(stop), high.max(stop)), stop
+        worst = norm(tips[0] - self.point(start)).max(norm(tips[1] - self.point(stop)))
+        for station, corner in self._corners(start.min(stop), start.max(stop)):
+            part = (station - start) / (stop - start)
+            worst = worst.max(norm(tips[0] + (tips[1] - tips[0]) * part - corner))
+        self.deviation = self.deviation.max(worst + bend)
+
+    def _corners(self, low: Ball, high: Ball) -> list[tuple[Ball, Matrix]]:
+        """The corners between two stations."""
+        found = []
+        for lap in range(self.laps(low), self.laps(high) + 1):
+            shift = lap * self.length
+            for k in range(bisect_right(self.stations, low - shift), len(self.corners)):
+                if not self.stations[k] + shift < high:
+                    break
+                found.append((self.stations[k] + shift, self.corners[k]))
+        return found
+
+    def coverage(self) -> Ball:
+        """Share of the path in the union of the stretches; never above the true one."""
+        parts = []
+        for low, high in self.stretches:
+            start = self.local(low)
+            stop = start + (high - low)
+            parts += [(start, stop), (arb(0), stop - self.length)]
+        total, reached = arb(0), arb(0)
+        for start, stop in sorted(parts, key=lambda part: float(part[0])):
+            # Only what lies beyond everything before it is added: none counts twice.
+            total += (stop.min(self.length) - start.max(reached)).max(arb(0))
+            reached = reached.max(stop)
+        return total / self.length if self.length > 0 else arb(len(self.stretches) > 0)

@@ -1,0 +1,132 @@
+"""The checker as a program: files in, one verdict out.
+
+The files are read by the readers that everybody uses; from there on nothing is shared
+with planner or verifier. The certificate itself is read here, line by line.
+
+    python -m vdsm_pin.certificate_checker CERTIFICATE PROBLEM TRAJECTORY
+"""
+
+import hashlib
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from flint import ctx
+
+from vdsm_pin.certificate_checker.balls import Rejected, claim
+from vdsm_pin.certificate_checker.claims import Check
+from vdsm_pin.certificate_checker.solids import Mesh
+from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.io.source import check_is_file
+from vdsm_pin.io.trajectory_file import read_trajectory
+
+PRECISION: Final = 128
+"""Bits of a ball: lengths are known to about 1e-35 m."""
+
+DAMAGE: Final = ValueError, TypeError, LookupError, ArithmeticError, RecursionError
+"""What a file of another make raises where it is taken for a certificate."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a check found.
+
+    Args:
+        accepted: Whether every claim holds.
+        reason: Empty, or the claim that fails with its interval and pair.
+        n_intervals: Intervals found good.
+        n_claims: Clearances recomputed and found good.
+        surfaces: Meshes without an inside: only their surface is proved clear.
+    """
+
+    accepted: bool
+    reason: str
+    n_intervals: int
+    n_claims: int
+    surfaces: tuple[str, ...]
+
+
+def _lines(path: Path) -> Iterator[dict[str, Any]]:
+    """The lines of a certificate but the last one, which must seal them.
+
+    Raises:
+        Rejected: If the last line is missing, not the last or does not fit the others.
+    """
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        for raw in file:
+            line = json.loads(raw.decode(), object_pairs_hook=_unique)
+            claim(isinstance(line, dict), "a line is not an object")
+            if "end" in line:
+                seal = {"end": True, "sha256": digest.hexdigest()}
+                fits = line == seal and raw.endswith(b"\n") and not file.read(1)
+                claim(fits, "the last line does not fit what is before or behind it")
+                return
+            digest.update(raw)
+            yield line
+    claim(False, "the last line is missing")
+
+
+def _unique(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
+    claim(len(dict(pairs)) == len(pairs), "a key is doubled")
+    return dict(pairs)
+
+
+def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Outcome:
+    """Recompute every claim of a certificate.
+
+    Args:
+        certificate: The certificate.
+        problem: The problem file it is about.
+        trajectory: The trajectory file it is about.
+
+    Returns:
+        Whether it is accepted, else why not.
+
+    Raises:
+        InvalidFile: If one of the files is not what its format says.
+    """
+    check_is_file(certificate)
+    source = read_problem(problem)
+    rows = read_trajectory(trajectory, source.problem.manipulator)
+    sha256, reason = hashlib.sha256(trajectory.read_bytes()).hexdigest(), ""
+    hashes = {"problem_sha256": source.sha256, "trajectory_sha256": sha256}
+    with ctx.workprec(PRECISION):
+        check = Check(source.problem, rows, hashes)
+        try:
+            check.run(_lines(certificate))
+        except Rejected as error:
+            reason = f"{check.place}: {error}"
+        except DAMAGE as error:
+            text = " ".join(str(error).split()) or type(error).__name__
+            raise InvalidFile(
+                file=certificate, where=check.place, problem=text
+            ) from None
+    meshes = [mesh for mesh in check.solids if isinstance(mesh, Mesh)]
+    surfaces = tuple(mesh.name for mesh in meshes if not mesh.has_inside)
+    return Outcome(not reason, reason, check.n_intervals, check.n_claims, surfaces)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Check one certificate and say the outcome in one line.
+
+    Returns:
+        0 accepted, 1 rejected, 2 unreadable or wrong usage.
+    """
+    if len(arguments) != 3:
+        sys.stderr.write("usage: check-certificate CERTIFICATE PROBLEM TRAJECTORY\n")
+        return 2
+    try:
+        outcome = check_certificate(*map(Path, arguments))
+    except InvalidInput as error:
+        sys.stderr.write(f"{error}\n")
+        return 2
+    found = f"{outcome.n_intervals} intervals, {outcome.n_claims} clearances"
+    verdict = "accepted" if outcome.accepted else f"rejected: {outcome.reason}"
+    notes = "".join(f"; {name} is a surface only" for name in outcome.surfaces)
+    sys.stdout.write(f"{verdict} ({found} recomputed{notes})\n")
+    return 0 if outcome.accepted else 1

@@ -1,0 +1,87 @@
+"""The lines of a certificate as models: what `vdsm schema certificate` describes."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, RootModel
+
+Number = Annotated[int, Field(ge=0)]
+Share = Annotated[FiniteFloat, Field(ge=0.0, le=1.0)]
+Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+Pair = tuple[Annotated[int, Field(ge=1)], str]
+Plane = tuple[Number, Number, FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat]
+Slice = tuple[Share, Share, Annotated[list[Plane], Field(min_length=1)]]
+
+
+class LineModel(BaseModel):
+    """Common rules: no unknown keys, nothing changes after it is built."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+
+
+class ErrorLimits(LineModel):
+    """The errors that every clearance is proved under."""
+
+    joint_rad: Annotated[FiniteFloat, Field(ge=0.0)]
+    base_m: Annotated[FiniteFloat, Field(ge=0.0)]
+    obstacle_m: Annotated[FiniteFloat, Field(ge=0.0)]
+
+
+class ClaimedLimits(LineModel):
+    """Largest values over the motion, rounded outwards, and the range of x0."""
+
+    alpha_rad: FiniteFloat
+    theta_rad: FiniteFloat
+    psi_rad: FiniteFloat
+    x0_min_m: FiniteFloat
+    x0_max_m: FiniteFloat
+
+
+class HeaderLine(LineModel):
+    """Line 1."""
+
+    vdsm_certificate: Literal[2] = Field(default=2, description="version of the format")
+    problem_sha256: Sha256 = Field(description="problem file and the meshes it names")
+    trajectory_sha256: Sha256
+    urdf_sha256: Sha256 = Field(description="told, not proved")
+    versions: dict[str, str] = Field(description="of the writer; told, not proved")
+    required_clearance_m: FiniteFloat
+    required_self_clearance_m: FiniteFloat
+    errors: ErrorLimits
+    n_rows: int = Field(ge=1, description="rows of the trajectory")
+    pairs: list[Pair] = Field(
+        description="moving link, counted from 1, and what it is proved clear of: an "
+        "obstacle's name, or `link 1` and so on at rest"
+    )
+    pieces: dict[str, list[Number] | list[list[Number]]] = Field(
+        description="numbers of a mesh's triangles, or corner numbers of a prism's, in "
+        "the order in which planes count them"
+    )
+    limits: ClaimedLimits
+    tip_deviation_m: FiniteFloat = Field(ge=0.0)
+    coverage: Share
+
+
+class IntervalLine(LineModel):
+    """One line per interval."""
+
+    k: Number
+    proofs: list[Annotated[list[Slice], Field(min_length=1)]] = Field(
+        description="per pair its slices [from, to, planes] of the interval; a plane "
+        "is [first piece, one past the last, nx, ny, nz, clearance in m]"
+    )
+
+
+class LastLine(LineModel):
+    """The seal."""
+
+    end: Literal[True]
+    sha256: Sha256 = Field(description="of all lines before")
+
+
+class CertificateLine(RootModel[HeaderLine | IntervalLine | LastLine]):
+    """Every line of a certificate fits this."""
+
+
+def certificate_schema() -> dict[str, Any]:
+    """JSON Schema of each line of a certificate."""
+    return CertificateLine.model_json_schema(mode="serialization")
