@@ -149,7 +149,7 @@ def notes_of(
     centres: FloatArray,
 ) -> tuple[str, ...]:
     """Notes of a plan: what is not drawn, how sparse it is, what is proved."""
-    notes = [*_undrawn(outcome), *_order(outcome)]
+    notes = [*_undrawn(problem, outcome), *_order(outcome)]
     on_path = trajectory.on_path
     if not on_path.any():
         return tuple(notes)
@@ -214,7 +214,7 @@ def _order(outcome: Outcome) -> list[str]:
     return [f"drawn in another order than given, as the problem allows: {pieces}"]
 
 
-def _undrawn(outcome: Outcome) -> list[str]:
+def _undrawn(problem: PlanningProblem, outcome: Outcome) -> list[str]:
     """One note for each stretch that is not drawn."""
     assert outcome.found is not None
     route = outcome.found.roadmap.route
@@ -226,11 +226,29 @@ def _undrawn(outcome: Outcome) -> list[str]:
         if after == k + 1 and route.closed[after] == route.closed[k]:
             continue
         a, b = route.stations[stretch[0] - 1], route.stations[k]
-        why = (
-            "proved: out of reach, within an obstacle's margin, or no way leads there"
-            if route.closed[k]
-            else "no way was found, which proves nothing"
-        )
+        why = "no way was found, which proves nothing"
+        if route.closed[k]:
+            why = f"proved: {_closed_by(problem, outcome, a, b)}"
         notes.append(f"not drawn from {a:.4f} m to {b:.4f} m along the path ({why})")
         stretch = []
     return notes
+
+
+def _closed_by(
+    problem: PlanningProblem, outcome: Outcome, start: float, stop: float
+) -> str:
+    """What is proved to close rows of the path between two stations, in words."""
+    rows, proof = outcome.rows, outcome.proof
+    here = (rows.stations >= start) & (rows.stations <= stop)
+    reasons = []
+    if (proof.far & here).any():
+        reasons.append("beyond the reach of the curled arm")
+    tips = rows.tips[proof.buried & here]
+    if len(tips):
+        room = upper_clearance(problem, np.stack([tips, tips], axis=1)).min(axis=0)
+        near = np.flatnonzero(room < problem.required_clearance)
+        names = [repr(problem.scene.obstacles[int(o)].name) for o in near]
+        reasons.append(f"within the margin of {', '.join(names)}")
+    if (proof.cut_off & here).any():
+        reasons.append("no way wide enough leads there")
+    return " and ".join(reasons)
