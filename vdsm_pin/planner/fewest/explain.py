@@ -225,7 +225,7 @@ def _undrawn(problem: PlanningProblem, outcome: Outcome) -> list[str]:
         stretch.append(k)
         if after == k + 1 and route.closed[after] == route.closed[k]:
             continue
-        a, b = route.stations[stretch[0] - 1], route.stations[k]
+        a, b = float(route.stations[stretch[0] - 1]), float(route.stations[k])
         why = "no way was found, which proves nothing"
         if route.closed[k]:
             why = f"proved: {_closed_by(problem, outcome, a, b)}"
