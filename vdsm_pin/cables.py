@@ -3,9 +3,7 @@
 The three cables that drive link j run through the joints 1..j, each time through the
 holes at link j's own angles phi. At a joint a cable spans from the hole of one end
 face, -d e_x + h, to that of the next, R (d e_x + h), with h = r (0, sin phi, cos phi)
-and R = Rz(alpha) Ry(theta). Multiplied out, the squared span (Eq. 20) is a sum of seven
-functions of the joint's angles times seven constants of the hole, so that one matrix
-product per joint gives all spans.
+and R = Rz(alpha) Ry(theta). `geometry/cable_kernels.py` has Eq. 20 multiplied out.
 
 Back: the cables of link 1 depend on joint 1 only, so its two angles follow from three
 lengths; what the other cables spend in joint 1 is then known and taken off, and so on
@@ -14,12 +12,13 @@ in which every function is rational.
 """
 
 from collections.abc import Iterator
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
 from vdsm_pin.errors import InconsistentCables, InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, frozen, read_only
+from vdsm_pin.geometry.cable_kernels import add_spans, solve_joint, take_off
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -32,6 +31,10 @@ NEWTON_STEPS: Final = 60
 
 STARTS: Final = frozen(np.linspace(-0.8, 0.8, 9))
 """Tangents of half the angles, up to 77 deg, from which the solver starts again."""
+
+
+_Holes: TypeAlias = tuple[float, float, FloatArray, FloatArray]
+"""d, r, and y and z of all holes, (3N,) each, as the compiled code takes them; [m]."""
 
 
 def cable_lengths(
@@ -49,19 +52,9 @@ def cable_lengths(
         (n_samples, N, 3); [m].
     """
     n_samples, n_links = alpha.shape
-    holes = _hole_constants(manipulator)
-    straight = _straight_parts(manipulator)[:, None]
-    lengths = np.zeros((n_samples, 3 * n_links))
-    for rows in _chunks(n_samples):
-        # Joints first, so that the samples of one joint lie side by side.
-        yaw, pitch = alpha[rows].T.copy(), theta[rows].T.copy()
-        joints = _joint_functions(
-            np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch)
-        )
-        total = np.repeat(straight, yaw.shape[1], axis=1)
-        for i in range(n_links):
-            total[3 * i :] += _spans(joints[:, i], holes[3 * i :])
-        lengths[rows] = total.T
+    lengths = np.repeat(_straight_parts(manipulator)[None], n_samples, axis=0)
+    d, r, y, z = _holes(manipulator)
+    add_spans(read_only(alpha), read_only(theta), d, r, y, z, lengths)
     return lengths.reshape(n_samples, n_links, 3)
 
 
@@ -90,7 +83,7 @@ def angles_from_cables(
         shape = lengths.shape
         message = f"cable lengths have shape {shape}, expected (n, {n_links}, 3)"
         raise InvalidInput(message)
-    holes, guesses = _hole_constants(manipulator), _first_guesses(manipulator)
+    holes, guesses = _holes(manipulator), _first_guesses(manipulator)
     straight = _straight_parts(manipulator)[:, None]
     alpha, theta = np.zeros((n_samples, n_links)), np.zeros((n_samples, n_links))
     for rows in _chunks(n_samples):
@@ -101,12 +94,12 @@ def angles_from_cables(
 
 
 def _peel(
-    holes: FloatArray, guesses: FloatArray, left: FloatArray, first_waypoint: int
+    holes: _Holes, guesses: FloatArray, left: FloatArray, first_waypoint: int
 ) -> FloatArray:
     """Solve joint by joint; a solved joint's spans come off all cables through it.
 
     Args:
-        holes: Constants of all holes, shape (3N, 7); [m^2].
+        holes: All of them.
         guesses: First guesses as linear maps of spans, shape (N, 2, 3); [1/m].
         left: Cable lengths inside the joints, shape (3N, n), used up; [m].
         first_waypoint: Number of the first column, for messages.
@@ -117,19 +110,17 @@ def _peel(
     Raises:
         InconsistentCables: If a link's cables contradict each other.
     """
-    # Compiled code takes half a second to import, and the planners never come here.
-    from vdsm_pin.geometry.cable_kernels import solve_joint, take_off
-
+    d, r, y, z = holes
     half = np.zeros((2, len(guesses), left.shape[1]))
     for i, guess in enumerate(guesses):
         own, beyond = slice(3 * i, 3 * i + 3), slice(3 * i + 3, None)
-        spans = left[own]
+        here, spans = (d, r, y[own], z[own]), left[own]
         half[:, i] = guess @ spans
         u, v = half[:, i]
-        solve_joint(holes[own], spans, u, v, NEWTON_STEPS, TOLERANCES.cable_step)
-        residual = _residual(holes[own], spans, u, v)
+        solve_joint(*here, spans, u, v, NEWTON_STEPS, TOLERANCES.cable_step)
+        residual = _residual(here, spans, u, v)
         for k in np.flatnonzero(~(residual <= TOLERANCES.cable_length)):
-            u[k], v[k] = _search(holes[own], spans[:, k])
+            u[k], v[k] = _search(here, spans[:, k])
             if np.isnan(u[k]):
                 raise InconsistentCables(
                     waypoint=first_waypoint + int(k),
@@ -137,40 +128,36 @@ def _peel(
                     residual=float(residual[k]),
                     tolerance=TOLERANCES.cable_length,
                 )
-        take_off(holes[beyond], u, v, left[beyond])
+        take_off(d, r, y[beyond], z[beyond], u, v, left[beyond])
     return half
 
 
 def _residual(
-    holes: FloatArray, spans: FloatArray, u: FloatArray, v: FloatArray
+    holes: _Holes, spans: FloatArray, u: FloatArray, v: FloatArray
 ) -> FloatArray:
     """Largest error of a joint's three spans, shape (n,); NaN if there is one; [m]."""
-    from vdsm_pin.geometry.cable_kernels import take_off
-
     left = spans.copy()
-    take_off(holes, u, v, left)
+    take_off(*holes, u, v, left)
     return np.asarray(np.abs(left).max(axis=0))
 
 
-def _search(holes: FloatArray, spans: FloatArray) -> FloatArray:
+def _search(holes: _Holes, spans: FloatArray) -> FloatArray:
     """Newton's method from a grid of starts, for the rare joint that needs it.
 
     Near the end of the domain, and with holes close to each other, the residual has
     hollows in which the first guess may end.
 
     Args:
-        holes: Constants of the joint's three holes, shape (3, 7); [m^2].
+        holes: The joint's three.
         spans: Cable lengths inside the joint, shape (3,); [m].
 
     Returns:
         tan(alpha / 2) and tan(theta / 2), shape (2,): the fitting ones nearest to
         straight, NaN if none fit; [-].
     """
-    from vdsm_pin.geometry.cable_kernels import solve_joint
-
     u, v = np.stack(np.meshgrid(STARTS, STARTS)).reshape(2, -1)
     many = np.repeat(spans[:, None], u.size, axis=1)
-    solve_joint(holes, many, u, v, NEWTON_STEPS, 0.0)
+    solve_joint(*holes, many, u, v, NEWTON_STEPS, 0.0)
     size = u * u + v * v
     size[~(_residual(holes, many, u, v) <= TOLERANCES.cable_length)] = np.inf
     best = int(np.argmin(size))
@@ -188,38 +175,11 @@ def _straight_parts(manipulator: Manipulator) -> FloatArray:
     return np.repeat(inside, 3)
 
 
-def _hole_constants(manipulator: Manipulator) -> FloatArray:
-    """The factors of `_joint_functions` in the squared span, shape (3N, 7); [m^2]."""
+def _holes(manipulator: Manipulator) -> _Holes:
+    """Where cables run through the joints."""
     cables = manipulator.cables
-    d, r = cables.half_gap, cables.hole_radius
-    phi = cables.hole_angles.ravel()
-    y, z = r * np.sin(phi), r * np.cos(phi)
-    columns = [
-        np.full_like(phi, 2.0 * (d * d + r * r)),
-        np.full_like(phi, 2.0 * d * d),
-        -2.0 * d * y,
-        2.0 * d * z,
-        -2.0 * y * y,
-        -2.0 * z * z,
-        -2.0 * y * z,
-    ]
-    return np.stack(columns, axis=1)
-
-
-def _joint_functions(
-    ca: FloatArray, sa: FloatArray, ct: FloatArray, st: FloatArray
-) -> FloatArray:
-    """The seven functions of Eq. 20, multiplied out, shape (7, ..); [-]."""
-    one = np.ones_like(ca)
-    return np.stack([one, ca * ct, sa * (one + ct), st * (one + ca), ca, ct, sa * st])
-
-
-def _spans(joint: FloatArray, holes: FloatArray) -> FloatArray:
-    """Cable length inside one joint per hole and sample (Eq. 20); [m]."""
-    squared = holes @ joint
-    # Rounding may take a square below zero where the two holes coincide.
-    np.maximum(squared, 0.0, out=squared)
-    return np.sqrt(squared, out=squared)
+    phi, r = cables.hole_angles.ravel(), cables.hole_radius
+    return cables.half_gap, r, read_only(r * np.sin(phi)), read_only(r * np.cos(phi))
 
 
 def _first_guesses(manipulator: Manipulator) -> FloatArray:

@@ -18,6 +18,13 @@ def frozen(value: Any, dtype: type[Any] = np.float64) -> npt.NDArray[Any]:
     return array
 
 
+def read_only(values: FloatArray) -> FloatArray:
+    """The same values for reading, C-ordered: one kind of array for compiled code."""
+    view = np.ascontiguousarray(values, dtype=np.float64).view()
+    view.setflags(write=False)
+    return view
+
+
 def rotation_from_rpy(rpy: FloatArray) -> FloatArray:
     """Rotation matrix Rz(yaw) @ Ry(pitch) @ Rx(roll), the URDF order.
 

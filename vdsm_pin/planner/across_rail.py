@@ -54,7 +54,7 @@ class AcrossRail:
     side: int
     bend: int
 
-    def route(self) -> Route:
+    def route(self, missing: float) -> Route:
         """Step 4: as without obstacles; the tip itself must stay clear."""
         route = straight_route(self.problem.path)
         points = route.tip_path.points[:, [0, 1 + self.axis]]
@@ -149,14 +149,18 @@ class AcrossRail:
         """Lengths of the two straight pieces, shape (2,); [m]."""
         return np.diff(self.problem.manipulator.stations[[0, self.bend - 1, -1]])
 
-    def largest_angle(self) -> float:
-        """Largest link angle over a few waypoints; infinite where there is none; [rad].
+    def largest_angle(self, points: FloatArray) -> float:
+        """Largest link angle with the tip at points; infinite where there is none.
 
         The link angles follow from the directions of the two straight pieces.
+
+        Args:
+            points: Shape (n, 3); [m].
+
+        Returns:
+            The angle; [rad].
         """
-        manipulator, path = self.problem.manipulator, self.problem.path
-        points = drawn_rows(path, 0.0).points
-        points = points[:: max(1, len(points) // TRIAL_ROWS)]
+        manipulator = self.problem.manipulator
         reference, tip_x = scale(manipulator, project(points)), points[:, 0]
         blocked = ~self.clear(reference, tip_x)
         try:
@@ -185,6 +189,8 @@ def across_rail(
     manipulator = problem.manipulator
     growth = grown_by(problem, margin)
     which = VIEWS[axis][1] - 1
+    points = drawn_rows(problem.path, 0.0).points
+    points = points[:: max(1, len(points) // TRIAL_ROWS)]
     # The side nearer to the rail first: from there the straight arm comes.
     first = -1 if section.centre[1] > 0.0 else 1
     for side in (first, -first):
@@ -193,7 +199,7 @@ def across_rail(
             AcrossRail(problem, region, which, side, bend)
             for bend in range(2, manipulator.n_links + 1)
         ]
-        yield from sorted(choices, key=AcrossRail.largest_angle)
+        yield from sorted(choices, key=lambda choice: choice.largest_angle(points))
 
 
 def _with_lee(

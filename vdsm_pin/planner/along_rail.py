@@ -16,6 +16,7 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.danger_region import DangerRegion
 from vdsm_pin.planner.detours import detour_route, first_station, path_rows
 from vdsm_pin.planner.project import project
+from vdsm_pin.planner.region_kernels import core_gaps
 from vdsm_pin.planner.sections import Section, grown_by, planned_gap
 from vdsm_pin.planner.shadow import Shadow
 from vdsm_pin.planner.side_rules import SideRule, anchors, choose_rule, slid, stands
@@ -42,9 +43,9 @@ class AlongRail:
     region: DangerRegion
     rules: dict[int, SideRule]
 
-    def route(self) -> Route:
+    def route(self, missing: float) -> Route:
         """Step 4."""
-        return detour_route(self.problem.path, self.region, self.stands)
+        return detour_route(self.problem.path, self.region, self.stands, missing)
 
     def clearance(self, centres: FloatArray) -> float:
         """From the section, taken as endless along the rail, less the margin."""
@@ -107,7 +108,7 @@ def _shapes(
     shapes = [_grown(section, growth)]
     for rounding in ROUNDINGS[1:] if len(section.points) > 1 else ():
         shape = _grown(section.rounded(rounding), growth)
-        if shape.contains(anchors(problem)).any():
+        if not core_gaps(shape.corners, anchors(problem)).min() > shape.radius:
             break
         shapes.append(shape)
     return shapes

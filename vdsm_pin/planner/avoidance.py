@@ -26,8 +26,11 @@ SPARSE: Final = 16
 class Avoidance(Protocol):
     """Steps 4 and 5 of one plan."""
 
-    def route(self) -> Route:
-        """Step 4: the tip's route; raises Infeasible where there is none."""
+    def route(self, missing: float) -> Route:
+        """Step 4: the tip's route that leaves less than this of the path undrawn; [m].
+
+        Raises Infeasible where there is none.
+        """
         ...
 
     def clearance(self, centres: FloatArray) -> float:
@@ -67,8 +70,8 @@ class Straight:
         few = float(self.link_clearance(centres[::SPARSE]).min())
         return few if few < needed else float(self.link_clearance(centres).min())
 
-    def route(self) -> Route:
-        """Step 4 without obstacles."""
+    def route(self, missing: float) -> Route:
+        """Step 4 without obstacles: the whole path."""
         return straight_route(self.problem.path)
 
     def joints(self, route: Route, reference: FloatArray) -> FloatArray:

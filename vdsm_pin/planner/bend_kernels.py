@@ -4,7 +4,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.geometry.compiled import compiled
-from vdsm_pin.planner.region_kernels import segment_to_core
+from vdsm_pin.planner.region_kernels import keeps_out
 
 
 @compiled
@@ -27,9 +27,9 @@ def _clear(
         return False
     bend_x = tip_x - np.sqrt(second)
     base_x = bend_x - np.sqrt(first)
-    if segment_to_core(corners, base_x, 0.0, bend_x, along) < radius:
-        return False
-    return bool(segment_to_core(corners, bend_x, along, tip_x, tip[axis]) >= radius)
+    return keeps_out(corners, radius, base_x, 0.0, bend_x, along) and keeps_out(
+        corners, radius, bend_x, along, tip_x, tip[axis]
+    )
 
 
 @compiled

@@ -12,8 +12,14 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
-from vdsm_pin.planner.region_kernels import core_distances, sides_of
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen, read_only
+from vdsm_pin.planner.region_kernels import (
+    core_distances,
+    core_gaps,
+    covered,
+    sides_of,
+    walk_round,
+)
 from vdsm_pin.tolerances import TOLERANCES
 
 ARC_STEP: Final = float(np.deg2rad(0.25))
@@ -50,34 +56,17 @@ class DangerRegion:
 
     def core_distance(self, chains: FloatArray) -> FloatArray:
         """Distance of polylines to the core, shape (n, m, 2) to (n,); [m]."""
-        return core_distances(self.corners, chains)
+        return core_distances(self.corners, read_only(chains))
 
     def contains(self, points: FloatArray) -> BoolArray:
         """Whether points lie inside, shape (n, 2) to (n,); the boundary is outside."""
-        distance = self.core_distance(np.repeat(points[:, None], 2, axis=1))
-        return np.asarray(distance < self.radius - TOLERANCES.on_boundary)
+        gaps = core_gaps(self.corners, read_only(points))
+        return np.asarray(gaps < self.radius - TOLERANCES.on_boundary)
 
-    def tangent(self, point: FloatArray, sense: int) -> tuple[FloatArray, float]:
-        """Where the tangent from a point outside touches.
-
-        Args:
-            point: Shape (2,); [m].
-            sense: 1 for the tangent a counterclockwise walk leaves on (region on the
-                left), -1 for the other.
-
-        Returns:
-            The corner whose arc is touched, shape (2,), and the direction of the
-            boundary's outward normal there; [m], [rad].
-        """
-        offsets = self.corners - point
-        distances = np.linalg.norm(offsets, axis=1)
-        bearings = np.arctan2(offsets[:, 1], offsets[:, 0])
-        towards = np.arctan2(*(self.centre - point)[::-1])
-        spread = np.arcsin(np.minimum(self.radius / distances, 1.0))
-        swing = _wrap(bearings - towards) - sense * spread
-        touched = int(np.argmin(sense * swing))
-        heading = towards + swing[touched]
-        return self.corners[touched], float(heading - sense * np.pi / 2.0)
+    def covers(self, points: FloatArray) -> BoolArray:
+        """Whether points outside lie behind the region as seen from P_1, (n,)."""
+        touch = self.radius - TOLERANCES.on_boundary
+        return covered(self.corners, self.radius, self.centre, touch, read_only(points))
 
     def walk(self, start: FloatArray, end: FloatArray, sense: int) -> FloatArray:
         """The taut way from start round the region to end.
@@ -90,27 +79,12 @@ class DangerRegion:
         Returns:
             Polyline from start to end, shape (m, 2); [m].
         """
-        _, leave = self.tangent(start, sense)
-        _, arrive = self.tangent(end, -sense)
-        turn = float(np.mod(sense * (arrive - leave), 2.0 * np.pi))
-        turns = np.append(np.arange(0.0, turn, ARC_STEP), turn)
-        normals = leave + sense * turns
-        outward = np.stack([np.cos(normals), np.sin(normals)], axis=1)
-        corners = self.corners[np.argmax(outward @ self.corners.T, axis=1)]
-        # Corners of a walk lie outside the arc, so that its chords do not cut in.
-        grown = self.radius / float(np.cos(0.5 * ARC_STEP))
-        arcs = corners + grown * outward
-        # The straight sides passed on the way, each by its two ends.
-        sides = sides_of(self.corners, grown)[:, :: 1 if sense > 0 else -1]
-        along = self.sides[:, 1] - self.sides[:, 0]
-        bearings = np.arctan2(along[:, 1], along[:, 0]) - np.pi / 2.0
-        when = np.mod(sense * (bearings - leave), 2.0 * np.pi)
-        sides, when = sides[when < turn], when[when < turn]
-        points = np.concatenate([arcs, sides.reshape(-1, 2)])
-        order = np.argsort(np.concatenate([turns, np.repeat(when, 2)]), kind="stable")
-        return np.concatenate([start[None], points[order], end[None]])
-
-
-def _wrap(angle: FloatArray) -> FloatArray:
-    """Angles brought into [-pi, pi); [rad]."""
-    return np.mod(angle + np.pi, 2.0 * np.pi) - np.pi
+        return walk_round(
+            self.corners,
+            self.radius,
+            self.centre,
+            read_only(start),
+            read_only(end),
+            sense,
+            ARC_STEP,
+        )

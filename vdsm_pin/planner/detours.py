@@ -10,6 +10,7 @@ other side (A5).
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
@@ -24,9 +25,11 @@ from vdsm_pin.planner.tip_path import (
     Rows,
     drawn_rows,
     join,
+    length_of,
     nearest_station,
     off_path_rows,
     rows_at,
+    undrawn_by,
 )
 from vdsm_pin.problem import Approach, DesiredPath
 from vdsm_pin.tolerances import TOLERANCES
@@ -90,19 +93,23 @@ def first_station(path: DesiredPath, region: DangerRegion) -> tuple[float, str]:
     return float(stations[np.argmin(along)]), note
 
 
-def detour_route(path: DesiredPath, region: DangerRegion, judge: Judge) -> Route:
+def detour_route(
+    path: DesiredPath, region: DangerRegion, judge: Judge, missing: float = np.inf
+) -> Route:
     """The tip's whole route round one region: onto the path, along it, and back.
 
     Args:
         path: The desired path.
         region: The danger region of the tip.
         judge: Which tip positions the arm can take on a side.
+        missing: Less than this of the path must be left undrawn; [m].
 
     Returns:
         The route with the arm's side at every waypoint.
 
     Raises:
-        PathBlocked: If nothing of the path can be drawn, or a way cannot be joined.
+        PathBlocked: If nothing or too little of the path can be drawn, or a way cannot
+            be joined.
     """
     shadow = Shadow(region)
     station, note = first_station(path, region)
@@ -112,6 +119,10 @@ def detour_route(path: DesiredPath, region: DangerRegion, judge: Judge) -> Route
         raise PathBlocked(
             obstacle=region.name, reason="no point of the path can be drawn"
         )
+    undrawn = length_of(undrawn_by(path, pieces))
+    if not undrawn < missing:
+        reason = f"{undrawn:.4f} m of the path cannot be drawn"
+        raise PathBlocked(obstacle=region.name, reason=reason)
     start = _End(path.start, 0, path.start[None, 1:])
     ways: list[Rows] = []
     here = start
@@ -141,21 +152,13 @@ def _drawable(rows: Rows, shadow: Shadow, judge: Judge) -> list[Rows]:
         both = np.flatnonzero((before != 0) & (after != 0) & (before != after))
         cut[visit.first + both] = True
     parts = []
-    k = 0
-    while k < len(rows):
-        if not drawn[k]:
-            k += 1
-            continue
-        first = k
-        while k + 1 < len(rows) and drawn[k + 1]:
-            k += 1
-            if cut[k]:
-                break
-        side = joining[first : k + 1].copy()
-        side[-1] = leaving[k]
-        parts.append(rows.part(first, k, side))
-        if not cut[k] or first == k:
-            k += 1
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], drawn, [False]])))
+    for begin, end in zip(edges[::2], edges[1::2] - 1, strict=True):
+        cuts = begin + 1 + np.flatnonzero(cut[begin + 1 : end])
+        for first, last in pairwise([begin, *cuts, end]):
+            side = joining[first : last + 1].copy()
+            side[-1] = leaving[last]
+            parts.append(rows.part(first, last, side))
     return parts
 
 
@@ -241,9 +244,9 @@ def _connect(
     it first goes back along the path it can draw, out of the shadow.
     """
     lines = []
-    for k, m in ((1, 1), (len(begin.retreat), 1), (1, len(end.retreat)), (-1, -1)):
-        out = begin.retreat[:k] if k > 0 else begin.retreat
-        back = (end.retreat[:m] if m > 0 else end.retreat)[::-1]
+    far, farther = len(begin.retreat), len(end.retreat)
+    for k, m in dict.fromkeys([(1, 1), (far, 1), (1, farther), (far, farther)]):
+        out, back = begin.retreat[:k], end.retreat[:m][::-1]
         lines += [
             np.concatenate([out, line, back])
             for line in _ways_round(shadow.region, out[-1], back[0])

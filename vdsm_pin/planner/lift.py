@@ -1,25 +1,13 @@
 """Step 6: 2D to 3D (paper, 4.4, Eq. 7)."""
 
+from typing import NoReturn
+
 import numpy as np
 
 from vdsm_pin.errors import LinkTooShort
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, read_only
 from vdsm_pin.manipulator import Manipulator
-
-
-def rises_squared(manipulator: Manipulator, planar: FloatArray) -> FloatArray:
-    """(x_{i+1} - x_i)^2, what Eq. 7 takes the root of, negative where a link is short.
-
-    Args:
-        manipulator: The arm.
-        planar: Projected joint centres, shape (n_samples, N + 1, 2); [m].
-
-    Returns:
-        Shape (n_samples, N); [m^2].
-    """
-    y, z = planar[..., 0], planar[..., 1]
-    gap_y, gap_z = y[:, 1:] - y[:, :-1], z[:, 1:] - z[:, :-1]
-    return np.asarray(manipulator.link_lengths**2 - gap_y * gap_y - gap_z * gap_z)
+from vdsm_pin.planner.row_kernels import lift_rows
 
 
 def lift(manipulator: Manipulator, planar: FloatArray, tip_x: FloatArray) -> FloatArray:
@@ -39,17 +27,26 @@ def lift(manipulator: Manipulator, planar: FloatArray, tip_x: FloatArray) -> Flo
     Raises:
         LinkTooShort: If two projections are farther apart than their link.
     """
-    squares = rises_squared(manipulator, planar)
-    if not (squares >= 0.0).all():
-        waypoint, link = np.unravel_index(int(np.argmin(squares)), squares.shape)
-        gap = np.linalg.norm(planar[waypoint, link + 1] - planar[waypoint, link])
-        length = float(manipulator.link_lengths[link])
-        raise LinkTooShort(
-            waypoint=int(waypoint), link=int(link) + 1, gap=float(gap), length=length
-        )
-    rises = np.sqrt(squares)
-    centres = np.zeros((*planar.shape[:2], 3))
-    centres[..., 1:] = planar
-    centres[:, -1, 0] = tip_x
-    centres[:, :-1, 0] = tip_x[:, None] - np.cumsum(rises[:, ::-1], axis=1)[:, ::-1]
+    n_samples = len(planar)
+    centres = np.zeros((n_samples, manipulator.n_links + 1, 3))
+    points, x = read_only(planar), read_only(tip_x)
+    if not lift_rows(points, x, manipulator.link_lengths, centres):
+        _refuse_gap(manipulator, planar)
     return centres
+
+
+def _refuse_gap(manipulator: Manipulator, planar: FloatArray) -> NoReturn:
+    """Name the link that falls shortest of the gap it spans.
+
+    Raises:
+        LinkTooShort: Always.
+    """
+    gaps = np.linalg.norm(np.diff(planar, axis=1), axis=2)
+    squares = manipulator.link_lengths**2 - gaps**2
+    waypoint, link = np.unravel_index(int(np.argmin(squares)), squares.shape)
+    raise LinkTooShort(
+        waypoint=int(waypoint),
+        link=int(link) + 1,
+        gap=float(gaps[waypoint, link]),
+        length=float(manipulator.link_lengths[link]),
+    )

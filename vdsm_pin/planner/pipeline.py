@@ -107,23 +107,23 @@ def _best_motion(
         margin: Aimed at beyond the required clearance; [m].
         reserve: Part of the margin that rows between judged ones may use up; [m].
     """
-    motion = _motion(problem, straight := Straight(problem, clearance))
+    straight = Straight(problem, clearance)
+    motion = _motion(problem, straight, straight.route(np.inf))
     if straight.clearance(motion.centres) >= problem.required_clearance + margin:
         return motion
     best: Motion | None = None
     missing, reason, grazing = np.inf, None, np.inf
     for avoidance in avoidances(problem, margin):
         try:
-            motion = _motion(problem, avoidance)
+            route = avoidance.route(missing)  # Step 4
+            motion = _motion(problem, avoidance, route)
             kept = avoidance.clearance(motion.centres) + reserve
             grazing = min(grazing, problem.required_clearance - kept)
             _refuse_touch(problem, kept)
         except Infeasible as error:
             reason = reason or error
             continue
-        undrawn = float(np.diff(motion.route.undrawn, axis=1).sum())
-        if undrawn < missing:
-            best, missing = motion, undrawn
+        best, missing = motion, route.missing
         if missing == 0.0:
             break
     if best is None and reserve == 0.0 and grazing <= GRAZE:
@@ -134,13 +134,12 @@ def _best_motion(
     return best
 
 
-def _motion(problem: PlanningProblem, avoidance: Avoidance) -> Motion:
-    """Steps 2 to 7 for one avoidance; rows are inserted where joints move fast.
+def _motion(problem: PlanningProblem, avoidance: Avoidance, route: Route) -> Motion:
+    """Steps 2 to 7 for one route; rows are inserted where joints move fast.
 
     They are also where the tip would stray from its path between two rows.
     """
     manipulator = problem.manipulator
-    route = avoidance.route()  # Step 4
     for _ in range(SUBDIVISIONS):
         points = route.tip_path.points
         tip = project(points)  # Step 2

@@ -1,5 +1,7 @@
 """Step 3: scale the tip's projected path to the joints (paper, 3.4-3.5, Eq. 5, 6)."""
 
+import numpy as np
+
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.manipulator import Manipulator
 
@@ -14,4 +16,7 @@ def scale(manipulator: Manipulator, tip: FloatArray) -> FloatArray:
     Returns:
         Projected joint centres, shape (n_samples, N + 1, 2); [m].
     """
-    return tip[:, None, :] * manipulator.ratios[:, None]
+    planar = np.zeros((len(tip), manipulator.n_links + 1, 2))
+    for column in (0, 1):
+        planar[..., column] = tip[:, column, None] * manipulator.ratios
+    return planar

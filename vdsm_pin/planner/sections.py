@@ -7,6 +7,7 @@ side.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -40,7 +41,7 @@ class Section:
         """Freeze the array."""
         object.__setattr__(self, "points", frozen(self.points))
 
-    @property
+    @cached_property
     def centre(self) -> FloatArray:
         """Centre of the corners' bounding circle, shape (2,); [m]."""
         circle = shapely.minimum_bounding_circle(shapely.MultiPoint(self.points))

@@ -47,20 +47,7 @@ class Shadow:
 
     def covers(self, points: FloatArray) -> BoolArray:
         """Whether the straight arm to points outside the region would meet it, (n,)."""
-        origin = np.zeros(2)
-        (low, low_normal), (high, high_normal) = (
-            self.region.tangent(origin, 1),
-            self.region.tangent(origin, -1),
-        )
-        radius = self.region.radius
-        right = low + radius * np.array([np.cos(low_normal), np.sin(low_normal)])
-        left = high + radius * np.array([np.cos(high_normal), np.sin(high_normal)])
-        x, y = points[:, 0], points[:, 1]
-        between = (right[0] * y - right[1] * x > 0.0) & (left[0] * y - left[1] * x < 0)
-        # Outside the region but inside the wedge: beyond it iff beyond its chord.
-        chord = left - right
-        beyond = chord[0] * (y - right[1]) - chord[1] * (x - right[0]) < 0.0
-        return np.asarray(between & beyond & ~self.region.contains(points))
+        return self.region.covers(points)
 
     def visits(self, points: FloatArray) -> list[Visit]:
         """Stays in the shadow along a sequence of points outside or inside, (n, 2)."""

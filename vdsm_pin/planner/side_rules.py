@@ -7,7 +7,6 @@ then oblique ones; the region starts as the section grown by body, clearance and
 and is grown on until the links between the joints, not only the joints, keep clear.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 from typing import Final
@@ -19,7 +18,8 @@ from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.danger_region import DangerRegion
 from vdsm_pin.planner.joint_paths import chain_ratios, slide_joints
 from vdsm_pin.planner.project import project
-from vdsm_pin.planner.sliding_kernels import reach_of_rule, standing
+from vdsm_pin.planner.region_kernels import core_gaps
+from vdsm_pin.planner.sliding_kernels import best_rule, standing
 from vdsm_pin.problem import PlanningProblem
 
 GROWTHS: Final = (0.0, 0.01, 0.02, 0.03, 0.04, 0.06, 0.08, 0.1, 0.12, 0.15)
@@ -80,75 +80,49 @@ def choose_rule(
         The rule that brings the tip farthest; of several, the one that shortens the
         arm least, which is the one that moves the base least.
     """
-    best: SideRule | None = None
-    best_score = (-1.0, 0.0)
-    for k, rule in _trials(problem, shapes, side):
-        score = _score(problem, forbidden, rule, sequences)
-        if best is None or score > best_score:
-            best, best_score = rule, score
-        if score[0] == 1.0 and k < CROSS:
-            break
-    assert best is not None
-    return best
+    arm = problem.manipulator
+    lines, regions = _lines(shapes[0], side), _regions(problem, shapes)
+    numbers = [*product(range(CROSS), range(len(regions)))]
+    n_cross = len(numbers)
+    numbers += product(range(CROSS, len(lines)), range(len(regions)))
+    n_corners = np.array([len(region.corners) for region in regions])
+    cores = np.zeros((len(regions), n_corners.max(), 2))
+    for core, region in zip(cores, regions, strict=True):
+        core[: len(region.corners)] = region.corners
+    chosen = best_rule(
+        np.concatenate([np.zeros((0, 2)), *sequences]),
+        np.cumsum([0, *map(len, sequences)]),
+        COARSE,
+        np.array([SideRule(shapes[0], side, line).line for line in lines]),
+        cores,
+        n_corners,
+        np.array([region.radius for region in regions]),
+        np.array(numbers),
+        n_cross,
+        side,
+        (chain_ratios(arm), arm.link_lengths, least_cosine(arm)),
+        (forbidden.corners, forbidden.radius),
+        LARGEST_SWING,
+    )
+    line, number = numbers[chosen]
+    return SideRule(regions[number], side, lines[line])
 
 
-def _trials(
-    problem: PlanningProblem, shapes: list[DangerRegion], side: int
-) -> Iterator[tuple[int, SideRule]]:
-    """Every rule that is tried, with the number of its line, the cross first."""
+def _regions(
+    problem: PlanningProblem, shapes: list[DangerRegion]
+) -> list[DangerRegion]:
+    """The shapes, each grown on as far as the rail and the start stay free."""
     longest = float(problem.manipulator.link_lengths.max())
-    free = np.repeat(anchors(problem)[:, None], 2, axis=1)
-    lines = _lines(shapes[0], side)
     regions = []
     for shape in shapes:
-        room = float(shape.core_distance(free).min())
+        room = float(core_gaps(shape.corners, anchors(problem)).min())
         radii = [shape.radius + growth * longest for growth in GROWTHS]
         regions += [
             DangerRegion(shape.name, shape.corners, radius)
             for radius in radii
             if radius < room
         ]
-    for numbers in (range(CROSS), range(CROSS, len(lines))):
-        for k, region in product(numbers, regions):
-            yield k, SideRule(region, side, lines[k])
-
-
-def _score(
-    problem: PlanningProblem,
-    forbidden: DangerRegion,
-    rule: SideRule,
-    sequences: list[FloatArray],
-) -> tuple[float, float]:
-    """Part of the wanted waypoints reached without a break, and minus the shortening.
-
-    Compared on some waypoints, confirmed on all; [-], [m].
-    """
-    arm = problem.manipulator
-    cosine = least_cosine(arm)
-    reached = total = 0
-    shortening = 0.0
-    for tip in sequences:
-        for stride, swing in ((COARSE, np.inf), (1, LARGEST_SWING)):
-            count, shortened = reach_of_rule(
-                tip[::stride],
-                rule.region.corners,
-                rule.region.radius,
-                chain_ratios(arm),
-                rule.side,
-                rule.line,
-                arm.link_lengths,
-                cosine,
-                forbidden.corners,
-                forbidden.radius,
-                swing,
-            )
-            count = min(count * stride, len(tip))
-            if count < len(tip):
-                break
-        reached += count
-        total += len(tip)
-        shortening = max(shortening, shortened)
-    return (reached / total if total else 1.0), -shortening
+    return regions
 
 
 def _lines(region: DangerRegion, side: int) -> list[FloatArray | None]:

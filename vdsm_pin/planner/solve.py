@@ -46,8 +46,12 @@ def check_limits(
         LimitExceeded: With the worst waypoint, the joint, the value and the limit.
     """
     box, cone = manipulator.max_joint_angle, manipulator.max_link_angle
+    psi = np.zeros_like(alpha)
+    # psi is at most the root of alpha^2 + theta^2, as a sphere curves inwards.
+    near = ~(alpha * alpha + theta * theta < cone * cone)
+    psi[near] = link_angles(alpha[near], theta[near])
     for name, values, limit in (
-        ("psi", link_angles(alpha, theta), cone),
+        ("psi", psi, cone),
         ("|theta|", np.abs(theta), box),
         ("|alpha|", np.abs(alpha), box),
     ):

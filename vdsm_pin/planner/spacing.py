@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, read_only
 from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.planner.row_kernels import steps_between
 from vdsm_pin.tolerances import TOLERANCES
 
 
@@ -29,7 +30,7 @@ def row_steps(
     Returns:
         Largest change of a joint angle [rad] and M / 8 [m], (n_samples - 1,) each.
     """
-    yaw, pitch = np.abs(np.diff(alpha, axis=0)), np.abs(np.diff(theta, axis=0))
-    turning = np.cumsum(yaw + pitch, axis=1)
-    bound = (turning * turning) @ manipulator.link_lengths / 8.0
-    return np.maximum(yaw, pitch).max(axis=1), bound
+    steps = np.zeros((2, max(len(alpha) - 1, 0)))
+    rows = read_only(alpha), read_only(theta)
+    steps_between(*rows, manipulator.link_lengths, steps)
+    return steps[0], steps[1]

@@ -38,6 +38,16 @@ class Route:
         object.__setattr__(self, "side", frozen(self.side, np.int64))
         object.__setattr__(self, "undrawn", frozen(self.undrawn))
 
+    @property
+    def missing(self) -> float:
+        """How much of the desired path is left out; [m]."""
+        return length_of(self.undrawn)
+
+
+def length_of(stretches: FloatArray) -> float:
+    """Length of stretches from and to, shape (k, 2), together; [m]."""
+    return float((stretches[:, 1] - stretches[:, 0]).sum())
+
 
 @dataclass(frozen=True)
 class Rows:
@@ -83,12 +93,10 @@ def drawn_rows(path: DesiredPath, first: float) -> Rows:
     inner = corners[(corners > first) & (corners < last)]
     knots = np.concatenate([[first], inner, [last] if last > first else []])
     counts = np.ceil(np.diff(knots) / path.spacing).astype(int)
-    parts = [
-        np.linspace(a, b, n, endpoint=False)
-        for a, b, n in zip(knots[:-1], knots[1:], counts, strict=True)
-    ]
-    stations = np.concatenate([*parts, knots[-1:]])
-    return rows_at(path, stations)
+    steps = np.repeat(np.diff(knots) / counts, counts)
+    rank = np.arange(len(steps)) - np.repeat(np.cumsum(counts) - counts, counts)
+    stations = np.repeat(knots[:-1], counts) + rank * steps
+    return rows_at(path, np.append(stations, knots[-1]))
 
 
 def rows_at(path: DesiredPath, stations: FloatArray) -> Rows:
@@ -181,7 +189,7 @@ def join(path: DesiredPath, parts: list[Rows], notes: tuple[str, ...] = ()) -> R
     on_path = np.concatenate([np.full(len(rows), rows.on_path) for rows in kept])
     points = np.concatenate([rows.points for rows in kept])
     side = np.concatenate([rows.side for rows in kept])
-    undrawn = _undrawn(path, [rows for rows in kept if rows.on_path])
+    undrawn = undrawn_by(path, [rows for rows in kept if rows.on_path])
     route = Route(TipPath(points, on_path, stations), side, undrawn, notes)
     gaps = tuple(
         f"the desired path is not drawn from {a:.4f} m to {b:.4f} m" for a, b in undrawn
@@ -189,7 +197,7 @@ def join(path: DesiredPath, parts: list[Rows], notes: tuple[str, ...] = ()) -> R
     return replace(route, notes=(*gaps, *notes))
 
 
-def _undrawn(path: DesiredPath, drawn: list[Rows]) -> FloatArray:
+def undrawn_by(path: DesiredPath, drawn: list[Rows]) -> FloatArray:
     """Stretches no drawn part covers, shape (k, 2); [m]."""
     covered = []
     for rows in drawn:
