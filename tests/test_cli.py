@@ -229,6 +229,11 @@ def bad_inputs(folder: Path, planned: Path) -> dict[str, list[object]]:
         "unknown schema": ["schema", "poem"],
         "unknown manipulator": ["urdf", "octopus", "--out", folder / "o.urdf"],
         "neither summary.csv": ["diff", folder, folder],
+        "none.cert: does not exist": [
+            *("check-certificate", folder / "none.cert", good, rows),
+        ],
+        "text.yaml: header: Expecting value": ["check-certificate", text, good, rows],
+        "'': is a folder": ["plan", "", "--out", out],
     }
 
 

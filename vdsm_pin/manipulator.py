@@ -15,6 +15,9 @@ from vdsm_pin.units import MM_PER_M
 MAX_LINKS: Final = 40
 """Largest number of links the package is tested with."""
 
+MAX_LENGTH: Final = 1e6
+"""Largest length of an arm; far beyond it inertias overflow; [m]."""
+
 
 @dataclass(frozen=True)
 class CableLayout:
@@ -96,11 +99,13 @@ class Manipulator:
             known = f"2 to {MAX_LINKS} lengths"
             message = f"link_lengths has shape {lengths.shape}, expected {known}"
             raise InvalidInput(message)
-        if not ((lengths > 0.0) & np.isfinite(lengths)).all():
-            message = f"link_lengths are {lengths.tolist()} m, expected all above 0"
+        if not ((lengths > 0.0) & (lengths <= MAX_LENGTH)).all():
+            known = f"all above 0 and up to {MAX_LENGTH:g}"
+            message = f"link_lengths are {lengths.tolist()} m, expected {known}"
             raise InvalidInput(message)
-        if not 0.0 < self.link_radius < np.inf:
-            message = f"link_radius is {self.link_radius} m, expected above 0"
+        if not 0.0 < self.link_radius <= MAX_LENGTH:
+            known = f"above 0 and up to {MAX_LENGTH:g}"
+            message = f"link_radius is {self.link_radius} m, expected {known}"
             raise InvalidInput(message)
         for name in ("max_link_angle", "max_joint_angle"):
             if not 0.0 < getattr(self, name) < np.pi / 2.0:

@@ -194,6 +194,7 @@ def test_what_is_no_table_is_refused(tmp_path: Path) -> None:
     assert refusal(tmp_path / "none.csv") == "does not exist"
     assert refused(tmp_path, "") == "is empty"
     assert refused(tmp_path, csv()[0] + "\n") == "has no row"
+    assert "column 1 is 'steps'" in refused(tmp_path, "steps,x\n")
     assert "cut short" in refused(tmp_path, b"\0" * 1000)
     assert "column 1 is" in refused(tmp_path, bytes(range(256)) * 100 + b"\n\n")
     assert "line 2: waypoint is" in refused(tmp_path, csv()[0] + "\n" + "\n" * 20_000)

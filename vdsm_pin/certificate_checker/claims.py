@@ -73,14 +73,14 @@ class Check:
             Rejected: At the first claim that does not hold; `place` says where.
         """
         self._header(next(lines, {}))
-        expected = max(1, self.rows.n_samples - 1)
+        self.place, expected = "after the header", max(1, self.rows.n_samples - 1)
         for k, line in enumerate(lines):
             self.place = f"interval {k}"
             claim(k < expected, "lies beyond the last row")
             self._interval(k, line)
             self.n_intervals += 1
-        self.place = f"interval {self.n_intervals}"
-        claim(self.n_intervals == expected, "is missing")
+            self.place = f"after interval {k}"
+        claim(self.n_intervals == expected, f"interval {self.n_intervals} is missing")
         self.place = "header"
         self._close()
 

@@ -102,10 +102,8 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
         except Rejected as error:
             reason = f"{check.place}: {error}"
         except DAMAGE as error:
-            text = " ".join(str(error).split()) or type(error).__name__
-            raise InvalidFile(
-                file=certificate, where=check.place, problem=text
-            ) from None
+            text, at = " ".join(str(error).split()) or type(error).__name__, check.place
+            raise InvalidFile(file=certificate, where=at, problem=text) from None
     meshes = [mesh for mesh in check.solids if isinstance(mesh, Mesh)]
     surfaces = tuple(mesh.name for mesh in meshes if not mesh.has_inside)
     return Outcome(not reason, reason, check.n_intervals, check.n_claims, surfaces)

@@ -85,7 +85,7 @@ def find_problem(name_or_path: str | Path) -> Path:
     except InvalidFile as error:
         known = ", ".join(built_in_names())
         problem = f"{error.problem}; built-in problems: {known}"
-        raise InvalidFile(file=name, problem=problem) from None
+        raise InvalidFile(file=name or "''", problem=problem) from None
     return path
 
 

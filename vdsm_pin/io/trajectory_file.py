@@ -110,6 +110,8 @@ class _Reader:
     def read(self) -> Trajectory:
         count = self._count_rows()
         self._check_header(self.stream.readline(MAX_LINE))
+        if count == 0:
+            raise InvalidFile(file=self.file, problem="has no row")
         n_links = (len(self.columns) - len(_FIXED)) // 2
         on_path = np.zeros(count, dtype=np.bool_)
         path_m, x0 = np.zeros(count), np.zeros(count)
@@ -135,8 +137,6 @@ class _Reader:
         if last != b"\n":
             problem = "does not end in a line end: the file is cut short"
             raise self._invalid(count + 1, problem)
-        if count < 2:
-            raise InvalidFile(file=self.file, problem="has no row")
         if count - 1 > MAX_ROWS:
             problem = f"has {count - 1} rows, the most is {MAX_ROWS}"
             raise InvalidFile(file=self.file, problem=problem)

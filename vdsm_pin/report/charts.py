@@ -20,8 +20,12 @@ _INK: Final = "currentColor"
 
 
 def packed(values: Any, dtype: str = "<f4") -> str:
-    """An array as base64 of its little-endian bytes, as the page reads it."""
-    return base64.b64encode(np.ascontiguousarray(values, dtype).tobytes()).decode()
+    """An array as base64 of its little-endian bytes, as the page reads it.
+
+    What single precision cannot hold becomes infinite, which the page calls missing.
+    """
+    with np.errstate(over="ignore"):
+        return base64.b64encode(np.ascontiguousarray(values, dtype).tobytes()).decode()
 
 
 def charts(verification: Verification, shown: Thinned) -> list[dict[str, Any]]:

@@ -1,6 +1,7 @@
 """HTML pages: report.html, the 3D view, index.html; each is one file, no request."""
 
 import hashlib
+from collections import Counter
 from collections.abc import Container, Sequence
 from functools import cache
 from importlib.util import find_spec
@@ -182,7 +183,13 @@ def write_index(
         with_files = {row.folder for row in rows}
     counts = {word: sum(row.outcome == word for row in rows) for word in OUTCOMES}
     passed = sum(count for word, count in counts.items() if outcome(word).passed)
+    names = Counter(row.problem for row in rows)
     page = _rendered(
-        "index.html.j2", rows=rows, counts=counts, passed=passed, with_files=with_files
+        "index.html.j2",
+        rows=rows,
+        repeated={name for name, times in names.items() if times > 1},
+        counts=counts,
+        passed=passed,
+        with_files=with_files,
     )
     path.write_text(page, encoding="utf-8")
