@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.bodies import new_body
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
 from vdsm_pin.geometry.kernels import (
     BRACKET,
@@ -29,7 +30,9 @@ def measure(pieces: PackedPieces, p: int, points: FloatArray) -> FloatArray:
     out = np.zeros(BRACKET + 4)
     out[NORMAL:NEAR] = [0.3, -0.5, 0.7]
     scratch = np.zeros((SCRATCH_ROWS, 3))
-    bracket(pieces, p, np.ascontiguousarray(points), len(points), GOAL, scratch, out)
+    body = new_body(len(points), 0)
+    body.points[:] = points
+    bracket(pieces, p, body, GOAL, scratch, out)
     return out
 
 
@@ -190,9 +193,10 @@ def test_the_hierarchy_finds_the_nearest_of_many_pieces() -> None:
     assert sorted(many.order) == list(range(300))
     scratch, stack = np.zeros((SCRATCH_ROWS + 2, 3)), np.zeros(STACK, np.int64)
     for _ in range(20):
-        ends = rng.uniform(-3, 3, (2, 3))
+        ends, body = rng.uniform(-3, 3, (2, 3)), new_body(2, 0)
+        body.points[:] = ends
         out, trial = np.ones(BRACKET + 4), np.zeros(BRACKET + 4)
-        obstacle_bracket(many, 0, ends, 2, GOAL, scratch, stack, trial, out)
+        obstacle_bracket(many, 0, body, GOAL, scratch, stack, trial, out)
         each = np.array([measure(single, p, ends)[:2] for p in range(300)])
         if each[:, 1].min() > GOAL:
             assert out[LOWER] == pytest.approx(each[:, 0].min(), abs=2.0 * GOAL)

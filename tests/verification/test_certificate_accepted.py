@@ -18,15 +18,16 @@ from vdsm_pin.robot_model import load_robot
 from vdsm_pin.verification.certificate_file import certificate_schema
 from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
 from vdsm_pin.verification.records import ErrorBox
+from vdsm_pin.verification.robust import largest_joint_error
 from vdsm_pin.verification.verify import verify
 
 
-def written(case: object, path: Path) -> None:
+def written(case: object, path: Path, box: ErrorBox | None = None) -> None:
     """A certificate by the verifier of a case that need not draw its path."""
     file = read_problem(case.problem)
     arm = file.problem.manipulator
     trajectory = read_trajectory(case.trajectory, arm)
-    box = ErrorBox(*case.writer.errors)
+    box = box or ErrorBox(*case.writer.errors)
     found = verify(file.problem, trajectory, load_robot(arm), errors=box)
     kept = [
         c for c in found.checks if not c.name.startswith(("tip", "change", "joints at"))
@@ -49,6 +50,20 @@ def test_the_verifiers_certificate_is_accepted(seed: int, tmp_path: Path) -> Non
     assert all(map(fits, lines))
     assert not fits(lines[0] | {"coverage": 2.0})
     assert not fits(lines[1] | {"proofs": [[[0.0, 1.0, [[0, 1, 0.0]]]]]})
+
+
+@pytest.mark.parametrize("seed", range(len(SHAPES)))
+def test_the_certificate_of_the_survived_error_is_accepted(
+    seed: int, tmp_path: Path
+) -> None:
+    case = random_case(np.random.default_rng(seed + 50), tmp_path, [SHAPES[seed]])
+    problem = read_problem(case.problem).problem
+    rows = read_trajectory(case.trajectory, problem.manipulator)
+    found = largest_joint_error(problem, rows, ErrorBox())
+    assert found > 0.0
+    written(case, case.certificate, ErrorBox(joint=found))
+    outcome = check_certificate(case.certificate, case.problem, case.trajectory)
+    assert outcome.accepted, outcome.reason
 
 
 def test_mutations_of_the_verifiers_certificate_are_rejected(tmp_path: Path) -> None:

@@ -5,16 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vdsm_pin.geometry.arm import place, second_order, sway
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arm import place
+from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.geometry.bodies import body_reach, new_body
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
 from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.scene import Scene, Sphere
+from vdsm_pin.scene import Box, Cylinder, Obstacle, Scene, Sphere
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.hasty import HastyProof, is_certified
 from vdsm_pin.verification.proof.coasting import crude_growth
+from vdsm_pin.verification.proof.swept_links import load_errors, new_ends, room_of
+from vdsm_pin.verification.proof.terms import CERTIFIED, Rules
 from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.robust import LARGEST, STRETCH, largest_joint_error
 
@@ -46,6 +50,39 @@ def test_what_is_found_is_proved_and_little_more_is_not(n_rows: int) -> None:
     assert not is_certified(problem, rows, ErrorBox(joint=above))
     besides = ErrorBox(base=0.001, obstacle=0.002)
     assert largest_joint_error(problem, rows, besides) < found
+
+
+def as_printed(error: float) -> float:
+    """Rounded down to a ten-thousandth of a degree."""
+    return float(np.deg2rad(np.floor(np.rad2deg(error) * 1e4) / 1e4))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_whole_proof_certifies_what_is_survived(seed: int) -> None:
+    """Random scenes and motions, near the limit and far; other errors besides."""
+    rng = np.random.default_rng(seed)
+    rows = swaying(int(rng.integers(1, 400)))
+    bodies: list[Obstacle] = []
+    for k in range(int(rng.integers(1, 12))):
+        away = 0.35 + rng.exponential(0.3)
+        turn, x = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.3, 3.0)
+        centre = np.array([x, away * np.cos(turn), away * np.sin(turn)])
+        axis = rng.normal(size=3)
+        axis /= np.linalg.norm(axis)
+        size = rng.uniform(0.02, 0.15, 3)
+        bodies.append(
+            Cylinder(f"bar{k}", centre, axis, 0.3, size[0])
+            if k % 2
+            else Box(f"box{k}", centre, rotation_from_rpy(axis), size)
+        )
+    problem = replace(asked(BALL), scene=Scene(tuple(bodies)))
+    besides = ErrorBox(base=rng.choice([0.0, 0.001]), obstacle=rng.choice([0.0, 0.001]))
+    found = largest_joint_error(problem, rows, besides)
+    assert found == 0.0 or found > TOLERANCES.joint_error
+    for joint in (found, as_printed(found)) if found else ():
+        proof = prove_clearance(problem, rows, replace(besides, joint=joint))
+        assert proof.counts[:, CERTIFIED].all()
+        assert proof.counts.sum() == proof.counts[:, CERTIFIED].sum()
 
 
 def test_no_motion_of_the_box_comes_too_near() -> None:
@@ -115,13 +152,17 @@ def test_the_crude_growth_is_above_every_exact_one() -> None:
         size = rng.choice([0.0, 1e-7, 0.7])
         angles = rng.uniform(-size, size, (2, n_links))
         place(0.1, angles[0], angles[1], lengths, centres, frames)
-        first, joint = sorted(rng.integers(0, n_links + 1, 2))
+        first, joint = sorted(rng.choice(n_links + 1, 2, replace=False))
         n, error = rng.normal(size=3), rng.uniform(0.0, 0.1)
         n /= np.linalg.norm(n)
-        exact = second_order(lengths, first, joint, error)
-        exact += error * sway(n, centres, frames, first, joint)
+        rules = Rules(lengths, 0.0, error, 0.0, 0.0, 0.0, 1e-9, 1e-6, 0.02)
+        ends, body = new_ends(n_links), new_body(4, room_of(n_links))
+        ends.centres[0], ends.frames[0] = centres, frames
+        load_errors(rules, ends, body, joint - 1, first - 1, 0.0)
+        # End 1 alone: the points are all in the origin of the partner's frame.
+        body.sizes[0], body.balls[0] = 0, 0.0
+        exact = body_reach(body, *n)
         crude = crude_growth(lengths, error, first, joint)
         assert crude >= exact
-        if joint > first:
-            nearest = min(nearest, crude / exact)
+        nearest = min(nearest, crude / exact)
     assert nearest < 1.2

@@ -1,4 +1,4 @@
-"""The arm in compiled code: joint centres, their bend off a chord, their sway.
+"""The arm in compiled code: joint centres, their bend off a chord.
 
 Formulas of docs/certificate.md, "The bound".
 
@@ -114,37 +114,3 @@ def second_order(lengths: FloatArray, f: int, j: int, error: float) -> float:
         angles = 2.0 * (link - f + 1) * error
         total += lengths[link] * angles * angles
     return 0.5 * total
-
-
-@compiled
-def _turned(n: FloatArray, axis: FloatArray, arm: FloatArray) -> float:
-    """|n . (axis x arm)|."""
-    x = axis[1] * arm[2] - axis[2] * arm[1]
-    y = axis[2] * arm[0] - axis[0] * arm[2]
-    z = axis[0] * arm[1] - axis[1] * arm[0]
-    return float(abs(n[0] * x + n[1] * y + n[2] * z))
-
-
-@compiled
-def sway(
-    n: FloatArray, centres: FloatArray, frames: FloatArray, f: int, j: int
-) -> float:
-    """G: sum of |n . dO_j/dq| over the angles of joints f to j - 1; [m/rad].
-
-    Args:
-        n: Unit vector in the base frame, shape (3,); [-].
-        centres: Joint centres, shape (N + 1, 3); [m].
-        frames: R_base_link, shape (N, 3, 3); [-].
-        f: First joint that errs.
-        j: Joint centre.
-    """
-    apart()
-    total = 0.0
-    for joint in range(f, j):
-        arm = centres[j] - centres[joint]
-        total += _turned(n, frames[joint, :, 1], arm)
-        if joint > 0:
-            total += _turned(n, frames[joint - 1, :, 2], arm)
-        else:
-            total += float(abs(n[1] * arm[0] - n[0] * arm[1]))
-    return total

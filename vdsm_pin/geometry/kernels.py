@@ -1,4 +1,4 @@
-"""Distance between the hull of a few points and a convex piece, as a bracket.
+"""Distance between a body and a convex piece, as a bracket.
 
 The iteration (Gilbert, Johnson and Keerthi) only proposes. What it returns is proved by
 itself: `lower` is the gap between the supports of a separating plane, `upper` the
@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.bodies import Body, body_support
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.pieces import CYLINDER, HALF_SPACE, PackedPieces
 from vdsm_pin.geometry.simplex import nearest
@@ -21,8 +22,8 @@ NORMAL: Final = 2
 NEAR: Final = 5
 FAR: Final = 8
 BRACKET: Final = 11
-"""Layout of a bracket: lower, upper, n (3), point of the points' hull (3), point of the
-piece (3); n is a unit vector from the hull to the piece."""
+"""Layout of a bracket: lower, upper, n (3), point of the body (3), point of the piece
+(3); n is a unit vector from the body to the piece."""
 
 ALIGNED: Final = 1e-14
 """Sine below which a direction counts as that of a cylinder's axis; [-]."""
@@ -51,7 +52,6 @@ def piece_support(
     Returns:
         The least value.
     """
-    apart()
     if pieces.kind[p] == CYLINDER:
         a, c = pieces.axis[p], pieces.centre[p]
         along = nx * a[0] + ny * a[1] + nz * a[2]
@@ -93,28 +93,14 @@ def rounding_radius(pieces: PackedPieces, p: int) -> float:
 
 
 @compiled
-def points_support(
-    points: FloatArray, count: int, nx: float, ny: float, nz: float, point: FloatArray
-) -> float:
-    """Largest n.x over some points, and the point it is taken at."""
-    best = -np.inf
-    for k in range(count):
-        value = nx * points[k, 0] + ny * points[k, 1] + nz * points[k, 2]
-        if value > best:
-            best = value
-            point[0], point[1], point[2] = points[k, 0], points[k, 1], points[k, 2]
-    return best
-
-
-@compiled
 def _half_space_bracket(
-    pieces: PackedPieces, p: int, points: FloatArray, count: int, out: FloatArray
+    pieces: PackedPieces, p: int, body: Body, out: FloatArray
 ) -> None:
     """The exact distance to a half-space."""
     apart()
     n = pieces.axis[p]
     near = out[NEAR:FAR]
-    high = points_support(points, count, -n[0], -n[1], -n[2], near)
+    high = body_support(body, -n[0], -n[1], -n[2], near)
     gap = -pieces.extent[p] - high
     out[LOWER] = out[UPPER] = gap
     for c in range(3):
@@ -196,8 +182,7 @@ def _known(scratch: FloatArray, m: int) -> bool:
 def _iterate(
     pieces: PackedPieces,
     p: int,
-    points: FloatArray,
-    count: int,
+    body: Body,
     goal: float,
     scratch: FloatArray,
     out: FloatArray,
@@ -209,7 +194,7 @@ def _iterate(
     out[LOWER], out[UPPER] = -np.inf, np.inf
     m = 0
     for _ in range(MAX_STEPS):
-        high = points_support(points, count, nx, ny, nz, scratch[4 + m])
+        high = body_support(body, nx, ny, nz, scratch[4 + m])
         gap = piece_support(pieces, p, nx, ny, nz, scratch[8 + m]) - high
         if gap > out[LOWER]:
             out[LOWER] = gap
@@ -235,19 +220,17 @@ def _iterate(
 def bracket(
     pieces: PackedPieces,
     p: int,
-    points: FloatArray,
-    count: int,
+    body: Body,
     goal: float,
     scratch: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Distance between the hull of some points and a piece.
+    """Distance between a body and a piece.
 
     Args:
         pieces: The scene.
         p: Number of the piece.
-        points: Shape (>= count, 3); [m].
-        count: How many of them.
+        body: The body.
         goal: Width of the bracket at which to stop; [m].
         scratch: Working space, shape (SCRATCH_ROWS, 3).
         out: Shape (BRACKET + 4,). On entry out[NORMAL:NEAR] is a first guess of n, not
@@ -256,7 +239,7 @@ def bracket(
     """
     apart()
     if pieces.kind[p] == HALF_SPACE:
-        _half_space_bracket(pieces, p, points, count, out)
+        _half_space_bracket(pieces, p, body, out)
         return
     length = sqrt(out[NORMAL] ** 2 + out[NORMAL + 1] ** 2 + out[NORMAL + 2] ** 2)
     if not length > 0.0:
@@ -264,7 +247,7 @@ def bracket(
         length = 1.0
     for c in range(3):
         out[NORMAL + c] /= length
-    _iterate(pieces, p, points, count, goal, scratch, out)
+    _iterate(pieces, p, body, goal, scratch, out)
     radius = rounding_radius(pieces, p)
     if radius > 0.0:
         out[LOWER] -= radius

@@ -3,6 +3,7 @@
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.bodies import new_body
 from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.geometry.kernels import BRACKET, LOWER, NORMAL, SCRATCH_ROWS
 from vdsm_pin.geometry.obstacles import (
@@ -50,23 +51,23 @@ def link_clearances(
     n_obstacles = pieces.root.size
     result = np.full((n_samples, n_links), np.inf)
     scratch = np.zeros((SCRATCH_ROWS + 2, 3))
-    box = np.zeros((2, 3))
+    box, body = np.zeros((2, 3)), new_body(2, 0)
     stack = np.zeros(STACK, np.int64)
     trial, out = np.zeros(BRACKET + 4), np.zeros(BRACKET + 4)
     normals = np.ones((n_obstacles, n_links, 3))
     for link in range(n_links):
         for sample in range(n_samples):
-            ends = centres[sample, link : link + 2]
-            box_of(ends, 2, box[0], box[1])
+            body.points[:] = centres[sample, link : link + 2]
+            box_of(body.points, box[0], box[1])
             best = np.inf
             for o in range(n_obstacles):
                 if box_distance(pieces, pieces.root[o], box[0], box[1]) >= best:
                     continue
                 out[NORMAL : NORMAL + 3] = normals[o, link]
-                obstacle_bracket(pieces, o, ends, 2, goal, scratch, stack, trial, out)
+                obstacle_bracket(pieces, o, body, goal, scratch, stack, trial, out)
                 normals[o, link] = out[NORMAL : NORMAL + 3]
                 gap = out[LOWER]
-                if closed[o] > 0.0 and gap > 0.0 and _inside(pieces, o, ends[0]):
+                if closed[o] > 0.0 and gap > 0.0 and _inside(pieces, o, body.points[0]):
                     gap = -gap
                 best = min(best, gap)
             result[sample, link] = best - radius - pad

@@ -1,4 +1,4 @@
-"""Distance between the hull of a few points and a whole obstacle."""
+"""Distance between a body and a whole obstacle."""
 
 from math import sqrt
 from typing import Final
@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.bodies import Body, body_reach
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import (
     LOWER,
@@ -27,11 +28,11 @@ TURNS: Final = 3
 
 
 @compiled
-def box_of(points: FloatArray, count: int, low: FloatArray, high: FloatArray) -> None:
+def box_of(points: FloatArray, low: FloatArray, high: FloatArray) -> None:
     """The box of some points, written to `low` and `high`, shape (3,) each; [m]."""
     for c in range(3):
         low[c] = high[c] = points[0, c]
-        for k in range(1, count):
+        for k in range(1, points.shape[0]):
             low[c] = min(low[c], points[k, c])
             high[c] = max(high[c], points[k, c])
 
@@ -69,21 +70,19 @@ def box_support(
 def obstacle_bracket(
     pieces: PackedPieces,
     obstacle: int,
-    points: FloatArray,
-    count: int,
+    body: Body,
     goal: float,
     scratch: FloatArray,
     stack: IntArray,
     trial: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Distance between the hull of some points and an obstacle's pieces.
+    """Distance between a body and an obstacle's pieces.
 
     Args:
         pieces: The scene.
         obstacle: Number of the obstacle.
-        points: Shape (>= count, 3); [m].
-        count: How many of them.
+        body: The body, not grown.
         goal: Width of the bracket at which to stop; [m].
         scratch: Working space, shape (SCRATCH_ROWS + 2, 3).
         stack: Working space, shape (STACK,).
@@ -96,10 +95,10 @@ def obstacle_bracket(
     root = pieces.root[obstacle]
     first = pieces.node_range[root, 0]
     if pieces.node_range[root, 1] - first == 1:
-        bracket(pieces, first, points, count, goal, scratch, out)
+        bracket(pieces, first, body, goal, scratch, out)
         return
     low, high = scratch[-2], scratch[-1]
-    box_of(points, count, low, high)
+    box_of(body.points, low, high)
     trial[NORMAL:NEAR] = out[NORMAL:NEAR]
     out[LOWER] = out[UPPER] = np.inf
     stack[0] = root
@@ -109,13 +108,13 @@ def obstacle_bracket(
         node = stack[waiting]
         if box_distance(pieces, node, low, high) >= out[LOWER]:
             continue
-        if _plane_gap(pieces, node, points, count, scratch[0]) >= out[LOWER]:
+        if _plane_gap(pieces, node, body, scratch[0]) >= out[LOWER]:
             continue
         first = pieces.node_range[node, 0]
         if pieces.node_range[node, 1] - first > 1:
             waiting = push_children(pieces, node, low, high, stack, waiting)
             continue
-        bracket(pieces, first, points, count, goal, scratch, trial)
+        bracket(pieces, first, body, goal, scratch, trial)
         keep_least(trial, out)
 
 
@@ -204,16 +203,11 @@ def facing(pieces: PackedPieces, node: int, points: FloatArray, n: FloatArray) -
 
 
 @compiled
-def _plane_gap(
-    pieces: PackedPieces, node: int, points: FloatArray, count: int, n: FloatArray
-) -> float:
-    """Gap of one plane between some points and a node's box; a lower bound; [m]."""
-    if not facing(pieces, node, points, n):
+def _plane_gap(pieces: PackedPieces, node: int, body: Body, n: FloatArray) -> float:
+    """Gap of one plane between a body and a node's box; a lower bound; [m]."""
+    if not facing(pieces, node, body.points, n):
         return -np.inf
-    reach = -np.inf
-    for k in range(count):
-        value = n[0] * points[k, 0] + n[1] * points[k, 1] + n[2] * points[k, 2]
-        reach = max(reach, value)
+    reach = body_reach(body, n[0], n[1], n[2])
     return box_support(pieces, node, n[0], n[1], n[2]) - reach
 
 

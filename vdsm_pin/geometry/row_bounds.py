@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.bodies import new_body
 from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.geometry.kernels import BRACKET, LOWER, NORMAL, SCRATCH_ROWS, UPPER
 from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
@@ -87,11 +88,11 @@ def row_brackets(
     scratch = np.zeros((SCRATCH_ROWS + 2, 3))
     stack = np.zeros(STACK, np.int64)
     trial, out = np.zeros(BRACKET + 4), np.zeros(BRACKET + 4)
+    body = new_body(2, 0)
     out[NORMAL] = 1.0
     for m in range(obstacle.size):
-        obstacle_bracket(
-            pieces, obstacle[m], ends[m], 2, goal, scratch, stack, trial, out
-        )
+        body.points[:] = ends[m]
+        obstacle_bracket(pieces, obstacle[m], body, goal, scratch, stack, trial, out)
         bounds[m, 0], bounds[m, 1] = out[LOWER], out[UPPER]
     return bounds
 

@@ -1,14 +1,24 @@
 """Whether a clearance proof goes through, and nothing else."""
 
+from typing import Final
+
 import numpy as np
 
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.proof.blocks import sweep
 from vdsm_pin.verification.proof.desk import forget
 from vdsm_pin.verification.proving import new_proving
 from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.task import make_task
+
+BEYOND: Final = 4.0 * TOLERANCES.bracket_gap
+"""Clearance asked for beyond the required one; [m].
+
+The planes of the full proof are the best ones to within the width of a bracket, so that
+it misses nothing that is held here by whichever plane.
+"""
 
 
 class HastyProof:
@@ -32,6 +42,8 @@ class HastyProof:
         """
         known = self._proving
         task = make_task(self._problem, errors, known.task.pieces)
+        asked = task.pairs._replace(required=task.pairs.required + BEYOND)
+        task = task._replace(pairs=asked)
         # Pairs that remember nothing: the answer depends on the question alone.
         forget(known.desk.planes)
         known.results.limit[:] = np.inf

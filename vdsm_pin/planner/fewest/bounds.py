@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.bodies import new_body
 from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.geometry.kernels import BRACKET, NORMAL, SCRATCH_ROWS, UPPER
 from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
@@ -65,12 +66,12 @@ def upper_bounds(pieces: PackedPieces, segments: FloatArray) -> FloatArray:
     scratch = np.zeros((SCRATCH_ROWS + 2, 3))
     stack = np.zeros(STACK, np.int64)
     trial, out = np.zeros(BRACKET + 4), np.zeros(BRACKET + 4)
+    body = new_body(2, 0)
     for n in range(segments.shape[0]):
+        body.points[:] = segments[n]
         for o in range(count):
             out[NORMAL : NORMAL + 3] = 1.0
-            obstacle_bracket(
-                pieces, o, segments[n], 2, GOAL, scratch, stack, trial, out
-            )
+            obstacle_bracket(pieces, o, body, GOAL, scratch, stack, trial, out)
             result[n, o] = out[UPPER]
     return result
 

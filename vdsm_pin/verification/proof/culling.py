@@ -11,14 +11,15 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.bodies import Body, new_body
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import NORMAL, UPPER
 from vdsm_pin.geometry.obstacles import obstacle_bracket
 from vdsm_pin.geometry.pieces import PackedPieces
-from vdsm_pin.verification.proof.bodies import Space
 from vdsm_pin.verification.proof.boxes import box_gaps, box_reaches, link_box
 from vdsm_pin.verification.proof.results import Dense, Results
 from vdsm_pin.verification.proof.rows import Rows
+from vdsm_pin.verification.proof.slices import Space
 from vdsm_pin.verification.proof.terms import (
     BASE,
     CERTIFIED,
@@ -105,19 +106,18 @@ def _keep_least(values: FloatArray, least: FloatArray, at: IntArray, k: int) -> 
 
 @compiled
 def _nearest_upper(
-    task: Task, rows: Rows, space: Space, link: int, obstacle: int
+    task: Task, rows: Rows, space: Space, body: Body, link: int, obstacle: int
 ) -> float:
     """Upper bound of the clearance of a link and an obstacle at a block's first row."""
     apart()
     for k in range(2):
         for c in range(3):
-            space.points[k, c] = rows.centres[0, link + k, c, 0]
+            body.points[k, c] = rows.centres[0, link + k, c, 0]
     space.out[NORMAL : NORMAL + 3] = 1.0
     obstacle_bracket(
         task.pieces,
         obstacle,
-        space.points,
-        2,
+        body,
         task.rules.goal,
         space.scratch,
         space.nodes,
@@ -259,12 +259,12 @@ def cull(
         return culling.near.size
     rules, n_near = task.rules, 0
     lost, rise = losses(rules, BASE), rules.pad - rules.radius
-    low, high = np.zeros(3), np.zeros(3)
+    low, high, body = np.zeros(3), np.zeros(3), new_body(2, 0)
     for link in range(n_links):
         gap, reach = culling.gap[link], culling.reach[link]
         link_box(rules, rows, count, link, low, high)
         box_gaps(culling.box, low, high, lost, gap)
-        upper = _nearest_upper(task, rows, space, link, int(np.argmin(gap)))
+        upper = _nearest_upper(task, rows, space, body, link, int(np.argmin(gap)))
         if is_nominal(rules):
             results.limit[OBSTACLES] = min(results.limit[OBSTACLES], upper)
         n_near = _settle_link(task, results, culling, link, upper, n_near)

@@ -6,10 +6,11 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import apart, compiled
-from vdsm_pin.verification.proof.bodies import Ends, Space, new_ends, new_space
 from vdsm_pin.verification.proof.coasting import Runs, new_runs
 from vdsm_pin.verification.proof.layouts import PLANE, SLICE, SUPPORT
 from vdsm_pin.verification.proof.rows import BLOCK, Rows, new_rows
+from vdsm_pin.verification.proof.slices import Space, new_space
+from vdsm_pin.verification.proof.swept_links import Ends, load_errors, new_ends
 from vdsm_pin.verification.proof.terms import Task
 
 
@@ -47,7 +48,7 @@ def new_desk(n_links: int, n_pairs: int, budget: int) -> Desk:
     planes = np.zeros((n_pairs, PLANE))
     forget(planes)
     heap = np.zeros((budget, SLICE))
-    ends, space = new_ends(n_links), new_space()
+    ends, space = new_ends(n_links), new_space(n_links)
     return Desk(new_rows(n_links), new_runs(), planes, ends, space, heap)
 
 
@@ -74,14 +75,16 @@ def load_rows(task: Task, desk: Desk, pair: int, first: int, last: int) -> None:
     Of the ends only what joint errors ask for is written.
     """
     apart()
-    rows, space, ends = desk.rows, desk.space, desk.ends
-    link, f = task.pairs.link[pair], task.pairs.frame[pair] + 1
+    rules, rows, body, ends = task.rules, desk.rows, desk.space.body, desk.ends
+    link, frame = task.pairs.link[pair], task.pairs.frame[pair]
+    f, h = frame + 1, float(last - first)
     for k in range(2):
-        space.sags[k] = rows.sags[f, link + k, first] if last > first else 0.0
+        body.balls[k] = rows.sags[f, link + k, first] if last > first else 0.0
         for c in range(3):
-            space.points[k, c] = rows.centres[f, link + k, c, first]
-            space.points[2 + k, c] = rows.centres[f, link + k, c, last]
-        if task.rules.joint_error > 0.0:
+            body.points[k, c] = rows.centres[f, link + k, c, first]
+            body.points[2 + k, c] = rows.centres[f, link + k, c, last]
+        if rules.joint_error > 0.0:
             ends.drifts[f, link + k] = rows.drifts[f, link + k, min(first, BLOCK - 1)]
-    if task.rules.joint_error > 0.0:
+    if rules.joint_error > 0.0:
         take_rows(rows, first, last, ends)
+    load_errors(rules, ends, body, link, frame, h)

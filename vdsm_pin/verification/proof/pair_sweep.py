@@ -11,7 +11,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import apart, compiled
-from vdsm_pin.geometry.kernels import BRACKET, FAR, LOWER, NEAR, NORMAL, bracket
+from vdsm_pin.geometry.kernels import BRACKET, FAR, LOWER, NEAR, NORMAL
 from vdsm_pin.geometry.obstacles import node_support
 from vdsm_pin.verification.proof.coasting import coast
 from vdsm_pin.verification.proof.desk import Desk, load_rows, take_rows
@@ -37,7 +37,7 @@ from vdsm_pin.verification.proof.layouts import (
 )
 from vdsm_pin.verification.proof.results import Results, note_upper
 from vdsm_pin.verification.proof.search import bound_between, new_witness, resolve
-from vdsm_pin.verification.proof.slices import loaded_bound
+from vdsm_pin.verification.proof.slices import leaf_bracket, loaded_bound
 from vdsm_pin.verification.proof.terms import (
     CERTIFIED,
     Motion,
@@ -71,9 +71,9 @@ def _renew(
     load_rows(task, desk, pair, local, local + 1)
     space.out[NORMAL:NEAR] = plane[:3]
     if last - p == 1:
-        bracket(pieces, p, space.points, 4, goal, space.scratch, space.out)
+        leaf_bracket(pieces, space, p, goal, True, space.out)
     else:
-        loaded_bound(pieces, task.pairs, task.rules, desk.ends, space, pair, 1.0)
+        loaded_bound(pieces, task.pairs, task.rules, space, pair, True)
         proved = space.out[LOWER]
     plane[:3], plane[POINT:WIDTH] = space.out[NORMAL:NEAR], space.out[FAR:BRACKET]
     n, stack, point = plane[:3], space.stack, space.scratch[0]
@@ -91,7 +91,7 @@ def _look_at_row(
     load_rows(task, desk, pair, local, local)
     rules, space, pieces = task.rules, desk.space, task.pieces
     space.out[NORMAL:NEAR] = desk.planes[pair, :3]
-    loaded_bound(pieces, task.pairs, rules, desk.ends, space, pair, 0.0)
+    loaded_bound(pieces, task.pairs, rules, space, pair, False)
     group = group_of(task.pairs.frame[pair])
     results.limit[group] = min(results.limit[group], space.out[LOWER])
 

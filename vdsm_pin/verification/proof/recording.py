@@ -26,10 +26,8 @@ from vdsm_pin.verification.proof.terms import CERTIFIED, Motion, Task
 @compiled
 def _claim(task: Task, desk: Desk, row: FloatArray, node: int, n: FloatArray) -> float:
     """Clearance that one plane proves of the pieces of a node over a slice; [m]."""
-    pair, h = int(row[PAIR]), row[END] - row[START]
-    link, frame = task.pairs.link[pair], task.pairs.frame[pair]
-    pieces, rules, ends, space = task.pieces, task.rules, desk.ends, desk.space
-    return plane_bound(pieces, rules, ends, space, node, link, frame, h, n)
+    frame = task.pairs.frame[int(row[PAIR])]
+    return plane_bound(task.pieces, task.rules, desk.space, node, frame, n)
 
 
 @compiled
@@ -63,8 +61,7 @@ def _write_ranges(
     """Write planes for ranges of pieces, as few as the hierarchy allows."""
     apart()
     pieces, space, pair = task.pieces, desk.space, int(row[PAIR])
-    link, frame = task.pairs.link[pair], task.pairs.frame[pair]
-    needed, h = task.pairs.required[pair], row[END] - row[START]
+    frame, needed = task.pairs.frame[pair], task.pairs.required[pair]
     n, nodes = np.zeros(3), space.nodes
     waiting = 1
     nodes[0] = pieces.root[task.pairs.obstacle[pair]]
@@ -72,16 +69,12 @@ def _write_ranges(
         waiting -= 1
         node = nodes[waiting]
         if pieces.node_range[node, 1] - pieces.node_range[node, 0] == 1:
-            leaf_bound(
-                pieces, task.rules, desk.ends, space, node, link, frame, h, space.trial
-            )
+            leaf_bound(pieces, task.rules, space, node, frame, False, space.trial)
             n[:] = space.trial[NORMAL:NEAR]
             claim = _claim(task, desk, row, node, n)
             count = _write(task, row, node, n, claim, records, count)
             continue
-        bound = node_bound(
-            pieces, task.rules, desk.ends, space, node, link, frame, h, n
-        )
+        bound = node_bound(pieces, task.rules, space, node, frame, n)
         if bound >= needed:
             claim = _claim(task, desk, row, node, n)
             count = _write(task, row, node, n, claim, records, count)

@@ -1,8 +1,11 @@
 """Bounds over one slice of an interval for one pair, in compiled code."""
 
+from typing import NamedTuple
+
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.bodies import Body, body_reach, new_body
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import (
     BRACKET,
@@ -15,6 +18,7 @@ from vdsm_pin.geometry.kernels import (
     keep_least,
 )
 from vdsm_pin.geometry.obstacles import (
+    STACK,
     box_of,
     box_support,
     facing,
@@ -22,98 +26,168 @@ from vdsm_pin.geometry.obstacles import (
     push_children,
 )
 from vdsm_pin.geometry.pieces import PackedPieces
-from vdsm_pin.verification.proof.bodies import Ends, Space, load_points, reach_along
+from vdsm_pin.verification.proof.swept_links import Ends, load_link, room_of
 from vdsm_pin.verification.proof.terms import Pairs, Rules, losses
+
+
+class Space(NamedTuple):
+    """Working space of the bounds, and their result.
+
+    Args:
+        body: The link over the slice and the error box, in its partner's frame: O_i and
+            O_{i+1} at the start, then at the end.
+        core: The same points, not grown.
+        scratch: Shape (SCRATCH_ROWS + 2, 3).
+        nodes: Nodes still to look at, shape (STACK,).
+        stack: The same while a support is looked for, shape (STACK,).
+        trial: Shape (BRACKET + 4,).
+        wide: The bracket of the grown body, shape (BRACKET + 4,).
+        out: The result, in the layout of a bracket, shape (BRACKET + 4,).
+    """
+
+    body: Body
+    core: Body
+    scratch: FloatArray
+    nodes: IntArray
+    stack: IntArray
+    trial: FloatArray
+    wide: FloatArray
+    out: FloatArray
+
+
+@compiled
+def new_space(n_links: int) -> Space:
+    """Fresh working space."""
+    apart()
+    body, core = new_body(4, room_of(n_links)), new_body(4, 0)
+    return Space(
+        body,
+        Body(body.points, core.swings, core.sizes, core.balls),
+        np.zeros((SCRATCH_ROWS + 2, 3)),
+        np.zeros(STACK, np.int64),
+        np.zeros(STACK, np.int64),
+        np.zeros(BRACKET + 4),
+        np.zeros(BRACKET + 4),
+        np.zeros(BRACKET + 4),
+    )
 
 
 @compiled
 def plane_bound(
     pieces: PackedPieces,
     rules: Rules,
-    ends: Ends,
     space: Space,
     node: int,
-    link: int,
     frame: int,
-    h: float,
     n: FloatArray,
 ) -> float:
-    """Clearance that a plane proves of all pieces of a node over a slice; [m]."""
+    """Clearance that a plane proves of all pieces of a node over a slice; [m].
+
+    Args:
+        pieces: The scene.
+        rules: What the plane loses.
+        space: Its `body` is loaded.
+        node: The node.
+        frame: Frame of the partner.
+        n: Unit vector towards the partner, in its frame, shape (3,); [-].
+    """
     apart()
     support = node_support(pieces, node, n, space.stack, space.scratch[0])
-    reach = reach_along(rules, ends, space, link, frame, n, h)
-    return support - reach - losses(rules, frame)
+    return support - body_reach(space.body, n[0], n[1], n[2]) - losses(rules, frame)
 
 
 @compiled
 def node_bound(
     pieces: PackedPieces,
     rules: Rules,
-    ends: Ends,
     space: Space,
     node: int,
-    link: int,
     frame: int,
-    h: float,
     n: FloatArray,
 ) -> float:
     """The same of a plane that faces the node's box, written to n, by that box; [m]."""
     apart()
-    if not facing(pieces, node, space.points, n):
+    if not facing(pieces, node, space.body.points, n):
         return -np.inf
     support = box_support(pieces, node, n[0], n[1], n[2])
-    reach = reach_along(rules, ends, space, link, frame, n, h)
-    return support - reach - losses(rules, frame)
+    return support - body_reach(space.body, n[0], n[1], n[2]) - losses(rules, frame)
+
+
+@compiled
+def leaf_bracket(
+    pieces: PackedPieces,
+    space: Space,
+    p: int,
+    goal: float,
+    sighted: bool,
+    out: FloatArray,
+) -> None:
+    """Distance bracket of a piece, with the plane that serves the loaded body best.
+
+    Args:
+        pieces: The scene.
+        space: Its `body` is loaded.
+        p: Number of the piece.
+        goal: Width of the bracket at which to stop; [m].
+        sighted: Whether witnesses are wanted where errors grow the body.
+        out: Guess of n on entry. On return `lower` and n are of the best plane; `upper`
+            and the witnesses are of the hull of the points alone, inf where not wanted.
+    """
+    body, wide = space.body, space.wide
+    grown = body.sizes[0] + body.sizes[1] > 0
+    wide[NORMAL:NEAR] = out[NORMAL:NEAR]
+    if sighted or not grown:
+        bracket(pieces, p, space.core, goal, space.scratch, out)
+    else:
+        out[UPPER] = np.inf
+    if grown:
+        bracket(pieces, p, body, goal, space.scratch, wide)
+        out[LOWER] = wide[LOWER]
+        out[NORMAL:NEAR] = wide[NORMAL:NEAR]
+    else:
+        nx, ny, nz = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
+        out[LOWER] -= body_reach(body, nx, ny, nz) - body_reach(space.core, nx, ny, nz)
 
 
 @compiled
 def leaf_bound(
     pieces: PackedPieces,
     rules: Rules,
-    ends: Ends,
     space: Space,
     node: int,
-    link: int,
     frame: int,
-    h: float,
+    sighted: bool,
     out: FloatArray,
 ) -> None:
     """Replace the distance bracket of a piece by the clearance that its plane proves.
 
     Args:
         pieces: The scene.
-        rules: The error box.
-        ends: The slice.
-        space: Its `points` and `sags` are those of the link.
+        rules: What the plane loses.
+        space: Its `body` is loaded.
         node: Node of the one piece.
-        link: The link.
         frame: Frame of the partner.
-        h: Length of the slice.
-        out: Guess of n on entry; bracket on return, whose `lower` is the bound over
-            the slice and whose `upper` is of the hull of the points alone.
+        sighted: As for `leaf_bracket`.
+        out: The same; on return `lower` is the bound over the slice.
     """
-    apart()
     p = pieces.node_range[node, 0]
-    bracket(pieces, p, space.points, 4, rules.goal, space.scratch, out)
-    n = out[NORMAL:NEAR]
-    out[LOWER] = plane_bound(pieces, rules, ends, space, node, link, frame, h, n)
+    leaf_bracket(pieces, space, p, rules.goal, sighted, out)
+    out[LOWER] -= losses(rules, frame)
 
 
 @compiled
 def _mesh_bound(
     pieces: PackedPieces,
     rules: Rules,
-    ends: Ends,
     space: Space,
     root: int,
-    link: int,
     frame: int,
-    h: float,
+    sighted: bool,
 ) -> None:
     """`loaded_bound` for an obstacle of many pieces, by its hierarchy."""
     apart()
     low, high = space.scratch[SCRATCH_ROWS], space.scratch[SCRATCH_ROWS + 1]
-    box_of(space.points, 4, low, high)
+    box_of(space.body.points, low, high)
     nodes, trial, out = space.nodes, space.trial, space.out
     trial[NORMAL:NEAR] = out[NORMAL:NEAR]
     out[LOWER] = out[UPPER] = np.inf
@@ -123,14 +197,13 @@ def _mesh_bound(
         waiting -= 1
         node = nodes[waiting]
         n = trial[BRACKET : BRACKET + 3]
-        bound = node_bound(pieces, rules, ends, space, node, link, frame, h, n)
-        if bound >= out[LOWER]:
+        if node_bound(pieces, rules, space, node, frame, n) >= out[LOWER]:
             continue
         first, last = pieces.node_range[node]
         if last - first > 1:
             waiting = push_children(pieces, node, low, high, nodes, waiting)
             continue
-        leaf_bound(pieces, rules, ends, space, node, link, frame, h, trial)
+        leaf_bound(pieces, rules, space, node, frame, sighted, trial)
         keep_least(trial, out)
 
 
@@ -139,20 +212,18 @@ def loaded_bound(
     pieces: PackedPieces,
     pairs: Pairs,
     rules: Rules,
-    ends: Ends,
     space: Space,
     pair: int,
-    h: float,
+    sighted: bool,
 ) -> None:
-    """`slice_bound` where points and sags are in the working space already."""
+    """`slice_bound` where the body is in the working space already."""
     apart()
-    link, frame = pairs.link[pair], pairs.frame[pair]
-    root = pieces.root[pairs.obstacle[pair]]
+    root, frame = pieces.root[pairs.obstacle[pair]], pairs.frame[pair]
     first, last = pieces.node_range[root]
     if last - first == 1:
-        leaf_bound(pieces, rules, ends, space, root, link, frame, h, space.out)
+        leaf_bound(pieces, rules, space, root, frame, sighted, space.out)
     else:
-        _mesh_bound(pieces, rules, ends, space, root, link, frame, h)
+        _mesh_bound(pieces, rules, space, root, frame, sighted)
 
 
 @compiled
@@ -174,10 +245,10 @@ def slice_bound(
         ends: The slice.
         space: Working space; out[NORMAL:NEAR] is a guess of n on entry. On return `out`
             is the bracket: `lower` holds over the slice and the error box, `upper` is
-            the core distance of the hull of the four points.
+            the core distance of the hull of the four points, where it is known.
         pair: Number of the pair.
         h: Length of the slice; 0 for an instant, where `upper` is a true distance.
     """
     apart()
-    load_points(ends, space, pairs.link[pair], pairs.frame[pair], h)
-    loaded_bound(pieces, pairs, rules, ends, space, pair, h)
+    load_link(rules, ends, space.body, pairs.link[pair], pairs.frame[pair], h)
+    loaded_bound(pieces, pairs, rules, space, pair, h == 0.0)
