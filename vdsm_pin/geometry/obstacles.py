@@ -247,6 +247,24 @@ def _left_of(a: FloatArray, b: FloatArray, x: float, y: float) -> bool:
 
 
 @compiled
+def _passes(pieces: PackedPieces, p: int, x: float, y: float, z: float) -> bool:
+    """Whether the ray from a point along +z passes through a triangle."""
+    start = pieces.first_point[p]
+    a, b, c = (
+        pieces.points[start],
+        pieces.points[start + 1],
+        pieces.points[start + 2],
+    )
+    if not _left_of(a, b, x, y) ^ _left_of(b, c, x, y) ^ _left_of(c, a, x, y):
+        return False
+    u = (b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)
+    v = (c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)
+    w = (a[0] - x) * (b[1] - y) - (a[1] - y) * (b[0] - x)
+    whole = u + v + w
+    return bool(whole != 0.0 and (u * a[2] + v * b[2] + w * c[2]) / whole > z)
+
+
+@compiled
 def crossings(pieces: PackedPieces, obstacle: int, x: float, y: float, z: float) -> int:
     """Triangles of a mesh that the ray from a point along +z passes through.
 
@@ -254,22 +272,19 @@ def crossings(pieces: PackedPieces, obstacle: int, x: float, y: float, z: float)
     crosses once. Heights are rounded; `verification/inside.py` is exact.
     """
     apart()
-    count = 0
-    for p in range(pieces.first_piece[obstacle], pieces.first_piece[obstacle + 1]):
-        start = pieces.first_point[p]
-        a, b, c = (
-            pieces.points[start],
-            pieces.points[start + 1],
-            pieces.points[start + 2],
-        )
-        if max(a[2], b[2], c[2]) < z:
+    stack = np.zeros(STACK, np.int64)
+    stack[0] = pieces.root[obstacle]
+    waiting, count = 1, 0
+    while waiting > 0:
+        waiting -= 1
+        node = stack[waiting]
+        low, high = pieces.node_low[node], pieces.node_high[node]
+        if not (low[0] <= x <= high[0] and low[1] <= y <= high[1] and z <= high[2]):
             continue
-        if not _left_of(a, b, x, y) ^ _left_of(b, c, x, y) ^ _left_of(c, a, x, y):
-            continue
-        u = (b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)
-        v = (c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)
-        w = (a[0] - x) * (b[1] - y) - (a[1] - y) * (b[0] - x)
-        whole = u + v + w
-        if whole != 0.0 and (u * a[2] + v * b[2] + w * c[2]) / whole > z:
-            count += 1
+        first = pieces.node_range[node, 0]
+        if pieces.node_range[node, 1] - first > 1:
+            stack[waiting], stack[waiting + 1] = node + 1, pieces.node_right[node]
+            waiting += 2
+        else:
+            count += _passes(pieces, first, x, y, z)
     return count

@@ -1,9 +1,9 @@
 """A clearance function that leaves alone what is obviously far away.
 
 Most links are far from most obstacles. Axis-parallel boxes round the obstacles and
-round a few stretches of each link give a lower bound of the clearance at once, and
-capsules inside the obstacles tell of links that are too near. The function passed in is
-asked only where neither does.
+round a few stretches of each link give a lower bound of the clearance at once, capsules
+inside the obstacles tell of links that are too near, and points of a mesh's surface do
+both. The function passed in is asked only where they leave a doubt.
 """
 
 from dataclasses import dataclass, replace
@@ -15,9 +15,10 @@ from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Piece
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.planner.fewest.cores import blocked_by, cores_of
+from vdsm_pin.planner.fewest.surfaces import Surfaces, surfaces_of
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scene import Obstacle
+from vdsm_pin.scene import Mesh, Obstacle
 from vdsm_pin.tolerances import TOLERANCES
 
 FAR = 0.08
@@ -34,11 +35,14 @@ MOST_BOXES = 32
 class Nearby:
     """Lower bounds of the clearance, exact where it is small but enough.
 
+    Near meshes bounds may be less than a step of their surfaces below the clearance.
+
     Args:
         clearance: The clearance function.
         boxes: Low and high corners of boxes that cover the obstacles, (b, 2, 3); [m].
         planes: Outward normals and offsets of the half-spaces, shape (p, 4).
         cores: Capsules inside the obstacles, shape (c, 7); [m].
+        surfaces: Points of the meshes, which have no boxes.
         radius: Radius of the links; [m].
         floor: Clearance below which -inf will do; [m].
         far: A bound from boxes above this is left as it is; [m].
@@ -48,6 +52,7 @@ class Nearby:
     boxes: FloatArray
     planes: FloatArray
     cores: FloatArray
+    surfaces: Surfaces
     radius: float
     floor: float
     far: float = FAR
@@ -58,12 +63,19 @@ class Nearby:
         enough = self.far + self.radius
         room = _box_bounds(ends, self.boxes, self.planes, STRETCHES, enough)
         room -= self.radius
-        near = np.flatnonzero(room < self.far)
-        if near.size:
-            blocked = blocked_by(self.cores, ends[near], self.floor + self.radius)
-            room[near[blocked]] = -np.inf
-            near = near[~blocked]
-            room[near] = self.clearance(ends[near])[:, 0]
+        mesh = self.surfaces.least(ends, enough) - self.radius
+        # A step below the distance will do, but not where it decides.
+        step = self.surfaces.step
+        near = room < self.far
+        near |= mesh < min(self.far, self.floor + step)
+        np.minimum(room, mesh, out=room)
+        asked = np.flatnonzero(near)
+        if asked.size:
+            blocked = blocked_by(self.cores, ends[asked], self.floor + self.radius)
+            blocked |= mesh[asked] < self.floor - step
+            room[asked[blocked]] = -np.inf
+            asked = asked[~blocked]
+            room[asked] = self.clearance(ends[asked])[:, 0]
         return room.reshape(len(centres), centres.shape[1] - 1)
 
     def up_to(self, far: float) -> "Nearby":
@@ -73,10 +85,12 @@ class Nearby:
 
 def nearby(problem: PlanningProblem, clearance: LinkClearance) -> Nearby:
     """The clearance function of a problem with its boxes."""
-    covers = [_cover(obstacle) for obstacle in problem.scene.obstacles]
+    obstacles = problem.scene.obstacles
+    solid = tuple(one for one in obstacles if not isinstance(one, Mesh))
+    covers = [_cover(obstacle) for obstacle in solid]
     flat = [
         [*piece.normal, piece.offset]
-        for obstacle in problem.scene.obstacles
+        for obstacle in solid
         for piece in obstacle.pieces
         if isinstance(piece, HalfSpacePiece)
     ]
@@ -84,7 +98,8 @@ def nearby(problem: PlanningProblem, clearance: LinkClearance) -> Nearby:
         clearance,
         np.concatenate([np.zeros((0, 2, 3)), *covers]),
         np.array(flat).reshape(-1, 4),
-        cores_of(problem.scene.obstacles),
+        cores_of(solid),
+        surfaces_of(obstacles),
         problem.manipulator.link_radius,
         problem.required_clearance - TOLERANCES.planned_clearance,
     )
