@@ -76,7 +76,7 @@ OUTCOMES: Final[Mapping[str, Outcome]] = MappingProxyType(
             ),
             Outcome("error", "!", "red", False, "The input or the run was broken."),
             Outcome(
-                "timeout", "⧖", "yellow", False, "The time limit ended before a result."
+                "timeout", "…", "yellow", False, "The time limit ended before a result."
             ),
         )
     }

@@ -21,19 +21,19 @@ class LineModel(BaseModel):
 class ErrorLimits(LineModel):
     """The errors that every clearance is proved under."""
 
-    joint_rad: Annotated[FiniteFloat, Field(ge=0.0)]
-    base_m: Annotated[FiniteFloat, Field(ge=0.0)]
-    obstacle_m: Annotated[FiniteFloat, Field(ge=0.0)]
+    joint_rad: FiniteFloat = Field(ge=0.0, description="of every angle, either way")
+    base_m: FiniteFloat = Field(ge=0.0, description="of x0, either way")
+    obstacle_m: FiniteFloat = Field(ge=0.0, description="of every surface")
 
 
 class ClaimedLimits(LineModel):
     """Largest values over the motion, rounded outwards, and the range of x0."""
 
-    alpha_rad: FiniteFloat
-    theta_rad: FiniteFloat
-    psi_rad: FiniteFloat
-    x0_min_m: FiniteFloat
-    x0_max_m: FiniteFloat
+    alpha_rad: FiniteFloat = Field(description="largest absolute yaw angle")
+    theta_rad: FiniteFloat = Field(description="largest absolute pitch angle")
+    psi_rad: FiniteFloat = Field(description="largest link angle")
+    x0_min_m: FiniteFloat = Field(description="smallest base position")
+    x0_max_m: FiniteFloat = Field(description="largest base position")
 
 
 class HeaderLine(LineModel):
@@ -41,11 +41,11 @@ class HeaderLine(LineModel):
 
     vdsm_certificate: Literal[2] = Field(default=2, description="version of the format")
     problem_sha256: Sha256 = Field(description="problem file and the meshes it names")
-    trajectory_sha256: Sha256
+    trajectory_sha256: Sha256 = Field(description="trajectory.csv")
     urdf_sha256: Sha256 = Field(description="told, not proved")
     versions: dict[str, str] = Field(description="of the writer; told, not proved")
-    required_clearance_m: FiniteFloat
-    required_self_clearance_m: FiniteFloat
+    required_clearance_m: FiniteFloat = Field(description="from obstacles")
+    required_self_clearance_m: FiniteFloat = Field(description="between links")
     errors: ErrorLimits
     n_rows: int = Field(ge=1, description="rows of the trajectory")
     pairs: list[Pair] = Field(
@@ -57,14 +57,16 @@ class HeaderLine(LineModel):
         "the order in which planes count them"
     )
     limits: ClaimedLimits
-    tip_deviation_m: FiniteFloat = Field(ge=0.0)
-    coverage: Share
+    tip_deviation_m: FiniteFloat = Field(
+        ge=0.0, description="of the tip from the path between waypoints, at most"
+    )
+    coverage: Share = Field(description="of the desired path, at least")
 
 
 class IntervalLine(LineModel):
     """One line per interval."""
 
-    k: Number
+    k: Number = Field(description="the interval, from 0")
     proofs: list[Annotated[list[Slice], Field(min_length=1)]] = Field(
         description="per pair its slices [from, to, planes] of the interval; a plane "
         "is [first piece, one past the last, nx, ny, nz, clearance in m]"
@@ -74,7 +76,7 @@ class IntervalLine(LineModel):
 class LastLine(LineModel):
     """The seal."""
 
-    end: Literal[True]
+    end: Literal[True] = Field(description="this is the last line")
     sha256: Sha256 = Field(description="of all lines before")
 
 

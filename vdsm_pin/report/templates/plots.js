@@ -200,10 +200,12 @@ class Plot {
 
   legend(figure) {
     const list = figure.querySelector("[data-legend]");
-    list.classList.toggle("wide", this.series.some(({ name }) => name.length > 4));
+    const wide = this.chart.unit === " mm" || this.series.some(({ name }) => name.length > 4);
+    list.classList.toggle("wide", wide);
     list.classList.toggle("long", this.series.length > 24);
     if (this.series.length > MOST_CHIPS) {
-      list.textContent = `${this.series.length} curves; the nearest is named under the pointer`;
+      const note = list.appendChild(document.createElement("p"));
+      note.textContent = `${this.series.length} curves; the nearest is named under the pointer`;
       this.chips = [];
       return;
     }
