@@ -9,7 +9,8 @@
     │   ├── OutOfReach        step 1 says no
     │   ├── LinkTooShort      a projected gap exceeds its link
     │   ├── LimitExceeded     a joint limit would be broken
-    │   ├── PathBlocked       the tip's route meets the danger region
+    │   ├── PathBlocked       an obstacle is in the way of the tip
+    │   ├── CutOff            proved: no way for the tip is wide enough
     │   └── NoPlanFound       the search ended without a plan; not a proof
     │       └── OutOfTime     the time limit ended it
     └── VerificationFailed    exit 1: a check could not be carried out
@@ -69,15 +70,22 @@ class Infeasible(VdsmError):
 
 
 class OutOfReach(Infeasible):
-    """A tip position lies farther from the rail than the arm reaches."""
+    """A tip position lies farther from the rail than the arm reaches.
+
+    Args:
+        place: Which position, in words: there are no waypoints yet.
+        distance: From the rail; [m].
+        reach: How far the arm reaches; [m].
+        reason: What limits the reach.
+    """
 
     def __init__(
-        self, *, waypoint: int, distance: float, reach: float, reason: str
+        self, *, place: str, distance: float, reach: float, reason: str
     ) -> None:
-        self.waypoint, self.distance, self.reach = waypoint, distance, reach
+        self.place, self.distance, self.reach = place, distance, reach
         message = (
-            f"waypoint {waypoint}: the tip lies {distance:.6f} m from the rail, "
-            f"beyond the reach of {reach:.6f} m ({reason})"
+            f"{place} lies {distance:.6f} m from the rail, beyond the reach of "
+            f"{reach:.6f} m ({reason})"
         )
         super().__init__(message)
 

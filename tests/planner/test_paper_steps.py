@@ -68,7 +68,7 @@ def test_both_reaches_have_two_sides(factor_of, inside: bool) -> None:
             check_feasibility(HRM8, path)
         between = radius + excess <= curled_reach(HRM8)
         assert ("straight arm" in str(error.value)) is between
-        assert error.value.waypoint == 1
+        assert error.value.place == "point 1 of the desired path"
 
 
 def test_projection_drops_x() -> None:

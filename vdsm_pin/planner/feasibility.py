@@ -36,18 +36,17 @@ def check_feasibility(manipulator: Manipulator, path: DesiredPath) -> None:
         path: The desired path.
 
     Raises:
-        OutOfReach: With the reach it exceeds; waypoint 0 is the start, i is corner i.
+        OutOfReach: With the place that lies farthest out and the reach it exceeds.
     """
-    waypoints = np.vstack([path.start, path.points])
-    distances = np.hypot(waypoints[:, 1], waypoints[:, 2])
+    places = np.vstack([path.start, path.points])
+    distances = np.hypot(places[:, 1], places[:, 2])
     worst = int(np.argmax(distances))
+    place = f"point {worst} of the desired path" if worst else "the start"
     distance = float(distances[worst])
     curled, straight = curled_reach(manipulator), straight_reach(manipulator)
     if distance > curled:
         reason = "every joint at its limit, Eq. 4"
-        raise OutOfReach(waypoint=worst, distance=distance, reach=curled, reason=reason)
+        raise OutOfReach(place=place, distance=distance, reach=curled, reason=reason)
     if distance > straight:
         reason = f"straight arm; curled up it would reach {curled:.6f} m"
-        raise OutOfReach(
-            waypoint=worst, distance=distance, reach=straight, reason=reason
-        )
+        raise OutOfReach(place=place, distance=distance, reach=straight, reason=reason)

@@ -76,7 +76,7 @@ def _proved(problem: PlanningProblem, rows: PathRows, proof: TipProof) -> Infeas
         distance = np.hypot(rows.tips[:, 1], rows.tips[:, 2])
         worst = int(np.argmax(distance))
         return OutOfReach(
-            waypoint=worst,
+            place=f"the tip at {rows.stations[worst]:.4f} m along the path",
             distance=float(distance[worst]),
             reach=curled_reach(problem.manipulator),
             reason="every joint at its limit, Eq. 4",
@@ -148,7 +148,18 @@ def notes_of(
     trajectory: Trajectory,
     centres: FloatArray,
 ) -> tuple[str, ...]:
-    """Notes of a plan: what is not drawn, how sparse it is, what is proved."""
+    """Notes of a plan: what is not drawn, how sparse it is, what is proved.
+
+    Args:
+        problem: What was asked.
+        clearance: Clearance of links at given joint centres.
+        outcome: What the search came to.
+        trajectory: The plan's rows.
+        centres: Joint centres of every row, shape (r, N + 1, 3); [m].
+
+    Returns:
+        One sentence each.
+    """
     notes = [*_undrawn(problem, outcome), *_order(outcome)]
     on_path = trajectory.on_path
     if not on_path.any():
