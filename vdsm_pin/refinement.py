@@ -13,9 +13,9 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.errors import Infeasible, NoPlanFound
-from vdsm_pin.planner.budget import within_time
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.planner.strategies import strategy
+from vdsm_pin.planner.time_limit import within_time
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import RobotModel
 from vdsm_pin.tolerances import TOLERANCES

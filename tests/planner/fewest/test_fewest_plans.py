@@ -12,9 +12,9 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.kinematics import joint_centres, link_angles
 from vdsm_pin.manipulator import built_in
-from vdsm_pin.planner.budget import within_time
 from vdsm_pin.planner.fewest.strategy import plan_clearest, plan_fewest
 from vdsm_pin.planner.records import Plan
+from vdsm_pin.planner.time_limit import within_time
 from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.scene import Box, Cylinder, HalfSpace, Sphere
