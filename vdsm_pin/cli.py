@@ -77,7 +77,9 @@ def plan(
 
 @app.command(
     epilog=_examples(
-        "vdsm verify paper/obs1 --trajectory out/obs1/trajectory.csv --out out/obs1"
+        "vdsm verify paper/obs1 --trajectory out/obs1/trajectory.csv --out out/obs1",
+        "vdsm verify mine.yaml --trajectory mine.csv --out out/mine "
+        "--certificate mine.certificate",
     )
 )
 def verify(
@@ -109,11 +111,11 @@ def verify(
     from vdsm_pin.io.problem_file import read_problem
     from vdsm_pin.report.terminal import show_verification
     from vdsm_pin.report.words import outcome
-    from vdsm_pin.workflow import Order, error_box, verify_to_folder
+    from vdsm_pin.workflow import VerifyOrder, error_box, verify_to_folder
 
     errors = error_box(joint_error_deg, base_error_mm, obstacle_error_mm)
     verified = verify_to_folder(
-        Order(
+        VerifyOrder(
             source=read_problem(problem),
             trajectory=trajectory,
             folder=out,
@@ -275,9 +277,7 @@ def urdf(
 
 @app.command(
     "check-certificate",
-    epilog=_examples(
-        "vdsm check-certificate obs1.cert obs1.yaml out/obs1/trajectory.csv"
-    ),
+    epilog=_examples("vdsm check-certificate mine.certificate mine.yaml mine.csv"),
 )
 def check_certificate(
     certificate: Annotated[

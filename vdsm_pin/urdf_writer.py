@@ -16,7 +16,6 @@ collision shape. Nothing in this package uses them; simulators want them.
 
 import math
 import xml.etree.ElementTree as ET
-from pathlib import Path
 from typing import Final
 
 from vdsm_pin.manipulator import Manipulator
@@ -71,11 +70,6 @@ def urdf_text(manipulator: Manipulator) -> str:
     ET.indent(robot)
     body = ET.tostring(robot, encoding="unicode")
     return HEADER.format(density=DENSITY) + body + "\n"
-
-
-def write_urdf(manipulator: Manipulator, path: Path) -> None:
-    """Write the arm's URDF to a file."""
-    path.write_text(urdf_text(manipulator), encoding="utf-8")
 
 
 def _vector(*values: float) -> str:

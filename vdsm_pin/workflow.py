@@ -14,7 +14,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from vdsm_pin.errors import NoPlanFound, OutOfTime
+from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.compiled import is_compiling
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
@@ -44,7 +44,7 @@ only print it, such as at the end of a generator; [s]."""
 
 
 @dataclass(frozen=True)
-class Order:
+class VerifyOrder:
     """What to verify and what to write besides the folder.
 
     Args:
@@ -112,22 +112,16 @@ def error_box(joint_deg: float, base_mm: float, obstacle_mm: float) -> ErrorBox:
 def plan_to_folder(
     source: ProblemFile, strategy: str, folder: Path, command: str
 ) -> PlanFile:
-    """Plan, and write trajectory.csv and plan.json only if the plan is certified.
+    """Plan, and write trajectory.csv and plan.json: only a certified plan comes back.
 
     Raises:
-        Infeasible: If there is no certified plan.
+        UnknownName: If there is no such strategy.
+        Infeasible: If there is no certified plan; nothing is written.
         InvalidInput: If the folder cannot be written.
     """
     check_output_folder(folder)
     robot = load_robot(source.problem.manipulator)
     refinement = plan_and_verify(source.problem, strategy, robot)
-    if refinement.verification.verdict is not Verdict.CERTIFIED:
-        message = (
-            f"strategy {strategy!r} found a motion, but after "
-            f"{len(refinement.rounds)} rounds its verdict is "
-            f"{refinement.verification.verdict.value}"
-        )
-        raise NoPlanFound(message)
     with staged(folder) as aside:
         write_trajectory(aside / TRAJECTORY, refinement.plan.trajectory)
         record = RunRecord(
@@ -144,7 +138,7 @@ def plan_to_folder(
     return file
 
 
-def verify_to_folder(order: Order) -> Verified:
+def verify_to_folder(order: VerifyOrder) -> Verified:
     """Verify a trajectory file and write every result of it.
 
     Raises:
@@ -180,7 +174,7 @@ def verify_to_folder(order: Order) -> Verified:
     return Verified(file, verification)
 
 
-def _check_outputs(order: Order) -> None:
+def _check_outputs(order: VerifyOrder) -> None:
     """Refuse what cannot be written before any work is done."""
     check_output_folder(order.folder)
     for file in (order.certificate, order.pdf):
@@ -209,7 +203,7 @@ def _certified(record: RunRecord) -> Hashes:
     )
 
 
-def _record(order: Order, robot: RobotModel) -> RunRecord:
+def _record(order: VerifyOrder, robot: RobotModel) -> RunRecord:
     return RunRecord(
         command=order.command,
         problem_file=str(order.source.path),

@@ -305,12 +305,3 @@ def square(axes: Axes, view: View, low: FloatArray, high: FloatArray) -> None:
     axes.xaxis.set_major_locator(MultipleLocator(500))
     axes.yaxis.set_major_locator(MultipleLocator(500))
     axes.grid(visible=True)
-
-
-def scale_bar(axes: Axes, at: tuple[float, float], length_mm: float = 500.0) -> None:
-    """A bar of known length for a view without axes."""
-    x, y = at
-    axes.plot([x, x + length_mm], [y, y], color=style.INK, linewidth=1.2)
-    axes.text(
-        x + 0.5 * length_mm, y, f"{length_mm:g} mm", ha="center", va="bottom", size=6.5
-    )

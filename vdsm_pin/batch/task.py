@@ -17,7 +17,7 @@ from vdsm_pin.report.files import BatchRow, ManifestFile, TimingFile
 from vdsm_pin.report.picture import picture
 from vdsm_pin.report.run_record import sha256_of, versions
 from vdsm_pin.report.words import outcome
-from vdsm_pin.workflow import TRAJECTORY, Order, plan_to_folder, verify_to_folder
+from vdsm_pin.workflow import TRAJECTORY, VerifyOrder, plan_to_folder, verify_to_folder
 
 MANIFEST: Final = "manifest.json"
 TIMING: Final = "timing.json"
@@ -171,7 +171,7 @@ def _short_hash(problem: str) -> str:
 
 def _plan_and_verify(task: Task, source: ProblemFile) -> BatchRow:
     plan_to_folder(source, task.strategy, task.aside, task.command)
-    order = Order(source, task.aside / TRAJECTORY, task.aside, task.command)
+    order = VerifyOrder(source, task.aside / TRAJECTORY, task.aside, task.command)
     verified = verify_to_folder(order)
     drawing = picture(verified.records)
     (task.aside / "picture.svg").write_text(drawing, encoding="utf-8")
