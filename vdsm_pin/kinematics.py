@@ -1,4 +1,4 @@
-"""Closed-form kinematics of the arm (Eq. 1-3, 11-15), vectorised over samples.
+"""Closed-form kinematics of the arm (Eq. 1-3, 11-15), row by row of a motion.
 
 In its parent frame a link points along (cos a cos t, sin a cos t, -sin t). Link frames
 are R_i = R_{i-1} Rz(alpha_i) Ry(theta_i) and O_{i+1} = O_i + L_i R_i e_x.

@@ -138,7 +138,7 @@ class Manipulator:
 
     @cached_property
     def ratios(self) -> FloatArray:
-        """k_{i,N+1}: each joint centre's station over the tip's, (N + 1,) (Eq. 5)."""
+        """k_{i,N+1}: a joint centre's station over the tip's, (N + 1,); [-] (Eq. 5)."""
         return frozen(self.stations / self.stations[-1])
 
     def ratio(self, i: int, j: int) -> float:

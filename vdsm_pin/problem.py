@@ -50,7 +50,7 @@ class DesiredPath:
         start_joints: Joint values q = (x0, alpha1, theta1, ..) at the start, shape
             (1 + 2N,), with `start` their tip; None where the arm starts straight;
             [m] in the first entry, [rad] in the others.
-        order: Whether waypoints may be drawn in another order or direction.
+        order: Whether pieces of the path may be drawn in another order or direction.
 
     Raises:
         InvalidInput: If a value breaks its range.
@@ -138,8 +138,8 @@ class PlanningProblem:
         scene: The obstacles.
         path: What the tip shall draw.
         required_clearance: Least distance between surfaces; [m].
-        T_world_base: Pose of the base frame in the user's frame, shape (4, 4);
-            readers and writers apply it, nobody else needs it.
+        T_world_base: Pose of the base frame in the user's frame, shape (4, 4), [m] in
+            its last column; readers and writers apply it, nobody else needs it.
         required_self_clearance: Least distance between the surfaces of two links that
             are not neighbours; [m].
 

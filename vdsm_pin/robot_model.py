@@ -47,7 +47,8 @@ class RobotModel:
         model: pinocchio.Model.
         data: pinocchio.Data, overwritten by every call of `link_poses`.
         capsules: One coal.Capsule per link, along its own z axis.
-        T_link_capsule: Pose of each capsule in its link frame, shape (N, 4, 4).
+        T_link_capsule: Pose of each capsule in its link frame, shape (N, 4, 4); [m]
+            in its last column.
         p_link_tip: The tip in the frame of link N, shape (3,); [m].
     """
 
@@ -70,7 +71,7 @@ class RobotModel:
             theta: Pitch angles, shape (n_samples, N); [rad].
 
         Returns:
-            The poses of all links at all samples.
+            The poses of all links at all rows.
 
         Raises:
             InvalidInput: If the arrays do not fit this arm.

@@ -156,7 +156,8 @@ class TipPathModel(FileModel):
     )
     order: Literal["as_given", "free"] = Field(
         default="as_given",
-        description="Whether waypoints may be drawn in another order or direction.",
+        description="Whether pieces of the path may be drawn in another order or "
+        "direction.",
     )
 
 

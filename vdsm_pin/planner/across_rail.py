@@ -60,9 +60,9 @@ class AcrossRail:
         points = route.tip_path.points[:, [0, 1 + self.axis]]
         inside = self.region.contains(points)
         if inside.any():
-            sample = int(np.argmax(inside))
+            waypoint = int(np.argmax(inside))
             reason = (
-                f"the tip would be in its danger region at waypoint {sample}; this "
+                f"the tip would be in its danger region at waypoint {waypoint}; this "
                 "rule leads the arm round an obstacle across the rail, not the tip"
             )
             raise PathBlocked(obstacle=self.region.name, reason=reason)
@@ -101,10 +101,10 @@ class AcrossRail:
             HALVINGS,
         )
         if np.isnan(moves).any():
-            sample = int(np.argmax(np.isnan(moves)))
+            row = int(np.argmax(np.isnan(moves)))
             reason = (
                 f"joint {self.bend} cannot lead the arm round it within the limit of "
-                f"psi_1 with the tip at {reference[sample, -1].tolist()} m"
+                f"psi_1 with the tip at {reference[row, -1].tolist()} m"
             )
             raise PathBlocked(obstacle=self.region.name, reason=reason)
         return np.asarray(self.side * moves)

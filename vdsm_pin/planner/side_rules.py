@@ -74,7 +74,8 @@ def choose_rule(
         forbidden: What the links keep out of.
         shapes: The danger region with sharper to blunter corners.
         side: 1 or -1.
-        sequences: Projected tips wanted on this side, going into the shadow, (n, 2).
+        sequences: Projected tips wanted on this side, going into the shadow, shape
+            (n, 2) each; [m].
 
     Returns:
         The rule that brings the tip farthest; of several, the one that shortens the

@@ -19,10 +19,10 @@ Arm: TypeAlias = tuple[FloatArray, FloatArray, float]
 the largest link angle; [-], [m], [-]."""
 
 Core: TypeAlias = tuple[FloatArray, float]
-"""Corners of a region, shape (n, 2), and its radius."""
+"""Corners of a region, shape (n, 2), and its radius; [m]."""
 
 Region: TypeAlias = tuple[FloatArray, FloatArray, float, float]
-"""Corners, sides and radius of a region, and the bearing of its centre; [rad]."""
+"""Corners, sides and radius of a region, and the bearing of its centre; [m], [rad]."""
 
 
 @compiled
@@ -64,12 +64,14 @@ def slide_chains(
     """Joints from the tip to the base: in proportion, then out of the region.
 
     Args:
-        corners: Of the region.
-        radius: Of the region.
-        ratios: k_{i,i+1} for i = 1..N (Eq. 6), shape (N,).
+        corners: Of the region, shape (c, 2); [m].
+        radius: Of the region; [m].
+        ratios: k_{i,i+1} for i = 1..N (Eq. 6), shape (N,); [-].
         side: 1 or -1.
-        direction: Auxiliary line, a unit vector; zero for circles about the origin.
-        planar: P_1..P_{N+1}, shape (n, N + 1, 2); the tips are given, the rest is set.
+        direction: Auxiliary line, a unit vector, shape (2,); zero for circles about the
+            origin; [-].
+        planar: P_1..P_{N+1}, shape (n, N + 1, 2); the tips are given, the rest is set;
+            [m].
     """
     sides = sides_of(corners, radius)
     bearing = np.arctan2(corners[:, 1].mean(), corners[:, 0].mean())
@@ -88,15 +90,15 @@ def _extent(
     radius: float,
     links: FloatArray,
 ) -> float:
-    """Extent of one configuration along X; -1 where it cannot be taken.
+    """Extent of one configuration along X; -1 where it cannot be taken; [m].
 
     Args:
-        chain: P_1..P_{N+1}, shape (N + 1, 2).
-        lengths: Of the links, shape (N,).
-        least_cosine: Cosine of the largest link angle.
-        corners: Of the region the links keep out of.
-        radius: Of that region.
-        links: Set to the directions of the links, shape (N, 3).
+        chain: P_1..P_{N+1}, shape (N + 1, 2); [m].
+        lengths: Of the links, shape (N,); [m].
+        least_cosine: Cosine of the largest link angle; [-].
+        corners: Of the region the links keep out of, shape (c, 2); [m].
+        radius: Of that region; [m].
+        links: Set to the directions of the links, shape (N, 3); [-].
     """
     extent = 0.0
     for i in range(lengths.shape[0]):
@@ -157,7 +159,7 @@ def _reach(
     """How many tip positions in a row a rule brings the arm to, from the first on.
 
     Args:
-        tip: Shape (n, 2).
+        tip: Projected, shape (n, 2); [m].
         stride: Every so manieth is looked at.
         region: What the joints slide on.
         direction: As in `slide_chains`.
@@ -165,10 +167,11 @@ def _reach(
         arm: The arm.
         forbidden: What the links keep out of.
         largest_swing: As in `standing`.
-        most: Where the arm is shortened by as much or more, the rest is not looked at.
+        most: Where the arm is shortened by as much or more, the rest is not looked at;
+            [m].
 
     Returns:
-        The count, and the largest shortening of the arm along X among them.
+        The count, and the largest shortening of the arm along X among them; [m].
     """
     corners, sides, radius, bearing = region
     ratios, lengths, least_cosine = arm
@@ -258,13 +261,13 @@ def best_rule(
     The first of the cross that does all that is wanted is taken at once.
 
     Args:
-        tips: The sequences of tips wanted, one after the other, shape (n, 2).
+        tips: The sequences of tips wanted, one after the other, shape (n, 2); [m].
         firsts: Where each sequence begins, and n, shape (m + 1,).
         stride: Rules are compared on every so manieth tip, then confirmed on all.
-        lines: Directions as in `slide_chains`, shape (k, 2).
-        cores: Corners of the regions, shape (r, c, 2), filled up with anything.
+        lines: Directions as in `slide_chains`, shape (k, 2); [-].
+        cores: Corners of the regions, shape (r, c, 2), filled up with anything; [m].
         n_corners: How many each has, shape (r,).
-        radii: Of the regions, shape (r,).
+        radii: Of the regions, shape (r,); [m].
         trials: What is tried: line and region, shape (t, 2).
         n_cross: How many of the trials are the cross; they come first.
         side: As in `slide_chains`.

@@ -1,4 +1,7 @@
-"""Step 7: joint angles and cable lengths from the joint centres (paper, section 5)."""
+"""Step 7: joint angles from the joint centres, within every limit (paper, section 5).
+
+The step's cable lengths are `vdsm_pin.cables.cable_lengths`.
+"""
 
 import numpy as np
 

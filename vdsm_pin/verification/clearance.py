@@ -33,7 +33,7 @@ from vdsm_pin.verification.proof.narrowing import narrow
 from vdsm_pin.verification.proof.results import Dense, Results
 from vdsm_pin.verification.proof.rows import BLOCK
 from vdsm_pin.verification.proof.search import Witnesses
-from vdsm_pin.verification.proof.terms import BASE, LINKS, OBSTACLES
+from vdsm_pin.verification.proof.terms import BASE, CERTIFIED, LINKS, OBSTACLES
 from vdsm_pin.verification.proof.witnesses import place_best
 from vdsm_pin.verification.proving import (
     BUDGET,
@@ -65,8 +65,9 @@ class ClearanceProof:
 
     Args:
         pairs: Every pair.
-        counts: Intervals by verdict, shape (n_pairs, 3).
-        best: Least bounds of each pair, in the layout of `results`, (n_pairs, BEST).
+        counts: Intervals certified, refuted and undecided, shape (n_pairs, 3).
+        best: Least bounds of each pair, as `proof.layouts` lays them out,
+            shape (n_pairs, BEST); [m].
         profile: Brackets along the motion.
         slices: Slices tried beyond one per interval and pair.
     """
@@ -151,7 +152,7 @@ def _merge_far(
     """Bring what culling settled to the results of the pairs."""
     far, best, arm = proving.culling, proving.results.best, problem.manipulator
     size = far.settled.size
-    proving.results.counts[:size, 0] += far.settled.T.ravel()
+    proving.results.counts[:size, CERTIFIED] += far.settled.T.ravel()
     mine, lower, upper = best[:size], far.lower.T.ravel(), far.upper.T.ravel()
     better = lower < mine[:, LOW]
     mine[better, LOW] = lower[better]

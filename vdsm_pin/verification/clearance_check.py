@@ -9,6 +9,7 @@ from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.scene import Mesh
 from vdsm_pin.verification.clearance import ClearanceProof
 from vdsm_pin.verification.proof.layouts import AT_UPPER, LOW, TIME, UP
+from vdsm_pin.verification.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.verification.records import Check, Counterexample, Verdict
 
 
@@ -51,9 +52,9 @@ def check_clearance(
 def _row(proof: ClearanceProof, mine: IntArray, name: str, needed: float) -> Check:
     counts = proof.counts[mine].sum(axis=0)
     verdict = Verdict.CERTIFIED
-    if counts[1]:
+    if counts[REFUTED]:
         verdict = Verdict.REFUTED
-    elif counts[2]:
+    elif counts[UNDECIDED]:
         verdict = Verdict.UNDECIDED
     # A refuted motion is as bad as its witness, another one as good as its proof.
     column = UP if verdict is Verdict.REFUTED else LOW
@@ -61,7 +62,7 @@ def _row(proof: ClearanceProof, mine: IntArray, name: str, needed: float) -> Che
     row = proof.best[pair]
     where = f"link {proof.pairs[pair].link} and {proof.pairs[pair].label}"
     if verdict is Verdict.UNDECIDED:
-        where += f"; {int(counts[2])} of {int(counts.sum())} undecided"
+        where += f"; {int(counts[UNDECIDED])} of {int(counts.sum())} undecided"
     return Check(
         name=name,
         verdict=verdict,

@@ -46,7 +46,7 @@ INSIDE: Final = 1.0 - 1e-9
 
 @dataclass(frozen=True)
 class Moment:
-    """An instant of a motion: an interval and the share of it that has passed."""
+    """An instant of a motion: an interval and the share of it passed, 0 to 1; [-]."""
 
     interval: int
     share: float

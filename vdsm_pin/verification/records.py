@@ -157,10 +157,10 @@ class ClearanceChunk:
     """Brackets of consecutive intervals; long motions arrive in many chunks.
 
     Args:
-        first_interval: Number of the first row.
+        first_interval: Number of the interval that row 0 of the arrays is about.
         lower: Proved lower bounds, shape (m, n_pairs); [m].
         upper: Proved upper bounds at `time`, shape (m, n_pairs); [m].
-        time: Place of the upper bounds in their intervals, shape (m, n_pairs).
+        time: Place of the upper bounds in their intervals, 0 to 1, (m, n_pairs); [-].
         verdict: 0 certified, 1 refuted, 2 undecided, shape (m, n_pairs).
         link_point: Witnesses on the links, base frame, shape (m, n_pairs, 3); [m].
         other_point: Witnesses on the partners, shape (m, n_pairs, 3); [m].

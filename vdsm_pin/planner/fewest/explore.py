@@ -67,12 +67,18 @@ SEED: Final = 0
 """Seed of the growth of shapes; the same problem gives the same plan."""
 
 LEVELS: Final = (
-    Level(0.08, 0.026, 8, 20, 0.0, 1, ease=0.79, around=4),
-    Level(0.08, 0.026, 8, 40, 0.0, 2, around=4),
-    Level(0.08, 0.026, 8, 40, 1.0, 2),
-    Level(0.05, 0.016, 10, 60, 1.0, 3),
-    Level(0.05, 0.013, 10, 60, 1.0, 3, 3e-5, 5e-4),
-)
+    Level(
+        step=0.08, coarse=0.026, joints=8, rounds=20, back=0.0, grow=1,
+        ease=0.79, around=4,
+    ),
+    Level(step=0.08, coarse=0.026, joints=8, rounds=40, back=0.0, grow=2, around=4),
+    Level(step=0.08, coarse=0.026, joints=8, rounds=40, back=1.0, grow=2),
+    Level(step=0.05, coarse=0.016, joints=10, rounds=60, back=1.0, grow=3),
+    Level(
+        step=0.05, coarse=0.013, joints=10, rounds=60, back=1.0, grow=3,
+        slack=3e-5, finest=5e-4,
+    ),
+)  # fmt: skip
 
 QUICK: Final = LEVELS[:2]
 """Levels for plans that are only better than one there is already."""

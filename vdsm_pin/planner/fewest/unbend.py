@@ -106,7 +106,10 @@ def _within(arm: Manipulator, joints: FloatArray) -> bool:
 def unbend(
     problem: PlanningProblem, clearance: LinkClearance, margin: float
 ) -> FloatArray:
-    """Rows of joint values from the start to an arm that leans ahead, (r, 1 + 2N).
+    """Rows of joint values from the start to an arm that leans ahead.
+
+    Returns:
+        Shape (r, 1 + 2N); [m] in the first column, [rad] in the others.
 
     Raises:
         NoPlanFound: If neither a straight line in joint space nor two were clear.
@@ -140,13 +143,19 @@ def unbend(
 
 
 def from_there(problem: PlanningProblem, joints: FloatArray) -> PlanningProblem:
-    """The same problem from other joint values, shape (1 + 2N,)."""
+    """The same problem from other joint values, shape (1 + 2N,); [m], [rad]."""
     tip = _centres(problem.manipulator, joints[None])[0, -1]
     return replace(problem, path=replace(problem.path, start=tip, start_joints=joints))
 
 
 def with_unbending(problem: PlanningProblem, rows: FloatArray, plan: Plan) -> Plan:
-    """A plan that begins with more rows; the last one is the plan's first."""
+    """A plan that begins with more rows; the last one is the plan's first.
+
+    Args:
+        problem: What was asked, with the start that leans backwards.
+        rows: As `unbend` returns them, shape (r, 1 + 2N); [m], [rad].
+        plan: From the last of these rows on.
+    """
     first, arm = rows[:-1], problem.manipulator
     centres, told, count = _centres(arm, first), plan.trajectory, len(first)
     alpha, theta = first[:, 1::2], first[:, 2::2]
