@@ -73,6 +73,31 @@ def test_first_folder_that_can_be_written_and_any_that_can_be_read(
     assert kept.read("name") is None
 
 
+FULL = """
+import logging, resource, sys
+from pathlib import Path
+from vdsm_pin import kept
+logging.basicConfig(level=logging.DEBUG)
+resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+kept.folders = lambda: iter(map(Path, sys.argv[1:]))
+kept.keep("name", b"small")
+kept.keep("name", bytes(300_000))
+print(kept.read("name"))
+"""
+
+
+def test_a_full_disk_costs_time_only(tmp_path: Path) -> None:
+    folders = [str(tmp_path / name) for name in ("one", "other")]
+    ended = subprocess.run(
+        [sys.executable, "-c", FULL, *folders],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert ended.stdout == "b'small'\n"
+    assert ended.stderr.count("name is not kept in") == 2
+    assert [p.name for p in (tmp_path / "one").iterdir()] == ["name"]
+    assert not list((tmp_path / "other").iterdir())
+
+
 def test_damage_in_one_folder_does_not_hide_another(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -90,6 +115,12 @@ def test_user_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     assert list(kept.folders())[1] == tmp_path / "vdsm_pin"
     monkeypatch.delenv("XDG_CACHE_HOME")
     assert list(kept.folders())[1] == Path.home() / ".cache" / "vdsm_pin"
+
+    def homeless() -> Path:
+        raise RuntimeError
+
+    monkeypatch.setattr(Path, "home", homeless)
+    assert len(list(kept.folders())) == 1
 
 
 def test_writers_that_meet_and_are_killed_leave_it_whole(folder: Path) -> None:

@@ -7,6 +7,7 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -16,8 +17,9 @@ _DIGEST: Final = hashlib.sha256
 def folders() -> Iterator[Path]:
     """Where files are looked for, and written in the first that can be."""
     yield Path(__file__).parent / "__pycache__" / "kept"
-    home = os.environ.get("XDG_CACHE_HOME")
-    yield (Path(home) if home else Path.home() / ".cache") / "vdsm_pin"
+    cache = os.environ.get("XDG_CACHE_HOME")
+    with suppress(RuntimeError):  # a user without a home, as in many containers
+        yield (Path(cache) if cache else Path.home() / ".cache") / "vdsm_pin"
 
 
 def read(name: str) -> bytes | None:
@@ -37,15 +39,36 @@ def keep(name: str, content: bytes) -> None:
     """Keep something under a name, if there is a folder that can be written.
 
     The file appears whole or not at all, whoever else writes it or ends this process.
+    A folder that cannot be written or is full is passed over: nothing but time is lost.
     """
     for folder in folders():
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            number, aside = tempfile.mkstemp(dir=folder, prefix=name)
-        except OSError:  # a read-only installation
+            _write(folder, name, _DIGEST(content).digest() + content)
+        except OSError as error:
+            _say(f"{name} is not kept in {folder}: {error}")
             continue
+        return
+
+
+def _write(folder: Path, name: str, content: bytes) -> None:
+    """Write a file aside, then give it its name.
+
+    Raises:
+        OSError: If that cannot be done; nothing is left.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    number, aside = tempfile.mkstemp(dir=folder, prefix=name)
+    try:
         with os.fdopen(number, "wb") as file:
-            file.write(_DIGEST(content).digest() + content)
+            file.write(content)
         Path(aside).chmod(0o644)  # one user installs, others run
         Path(aside).replace(folder / name)
-        return
+    except OSError:
+        Path(aside).unlink(missing_ok=True)
+        raise
+
+
+def _say(message: str) -> None:
+    import logging  # seldom needed, and every process would wait for it
+
+    logging.getLogger(__name__).debug(message)

@@ -32,7 +32,7 @@ from vdsm_pin.verification.coal_bodies import (
 )
 from vdsm_pin.verification.records import Check, Verdict
 
-CHUNK_BOUNDS: Final = 1 << 20
+CHUNK_BOUNDS: Final = 1 << 17
 """Coarse bounds held in memory at a time: rows times links times obstacles."""
 
 
