@@ -28,7 +28,6 @@ from vdsm_pin.report.run_record import RunRecord, sha256_of
 from vdsm_pin.report.tables import ClearanceCsv, write_cables, write_link_angles
 from vdsm_pin.robot_model import RobotModel, load_robot
 from vdsm_pin.units import MM_PER_M
-from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
 from vdsm_pin.verification.records import ErrorBox, Verdict, Verification
 from vdsm_pin.verification.task import all_pairs
 from vdsm_pin.verification.verify import verify
@@ -168,7 +167,7 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
         write_report(aside / REPORT, verification, file, planned_by(order.trajectory))
         # Last inside: a certificate that cannot be written leaves no half of a result.
         if order.certificate is not None and verification.verdict is Verdict.CERTIFIED:
-            write_certificate(order.certificate, verification, _certified(record))
+            _certify(order.certificate, verification, record)
     if order.pdf is not None:
         print_page(order.folder / REPORT, order.pdf)
     return Verified(file, verification)
@@ -195,12 +194,17 @@ def planned_by(trajectory: Path) -> PlanFile | None:
     return plan if same else None
 
 
-def _certified(record: RunRecord) -> Hashes:
-    return Hashes(
+def _certify(file: Path, verification: Verification, record: RunRecord) -> None:
+    """Write the proof down."""
+    # Imported by those who ask for one: its schema takes a while to build.
+    from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
+
+    hashes = Hashes(
         problem=record.problem_sha256,
         trajectory=record.trajectory_sha256,
         urdf=record.urdf_sha256,
     )
+    write_certificate(file, verification, hashes)
 
 
 def _record(order: VerifyOrder, robot: RobotModel) -> RunRecord:

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from itertools import pairwise
 from pathlib import Path
 
 import junitparser
@@ -17,8 +18,9 @@ import pytest
 from batch_folders import tree
 from problem_files import NEAR, OUT_OF_REACH, write_problem
 
+from vdsm_pin.batch.progress import Progress
 from vdsm_pin.batch.run import Batch, expanded, run_batch
-from vdsm_pin.batch.task import folder_names
+from vdsm_pin.batch.task import Done, folder_names
 from vdsm_pin.errors import InvalidFile, InvalidInput, UnknownName
 from vdsm_pin.report.tables import read_summary
 
@@ -78,6 +80,24 @@ def test_jobs_and_order_change_no_byte(
     files = [str(problems / f"{name}.yaml") for name in NAMES]
     run_batch(Batch(tuple(reversed(files)), tmp_path / "out", "paper", jobs=2))
     assert tree(tmp_path / "out") == tree(reference)
+
+
+def test_rows_can_be_read_as_they_come(
+    problems: Path, reference: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, seen = tmp_path / "out", []
+
+    def look(_: Progress, done: Done) -> None:
+        rows = read_summary(out / "running.csv")
+        assert rows[-1] == done.row
+        seen.append([row.folder for row in rows])
+
+    monkeypatch.setattr(Progress, "show", look)
+    run_batch(Batch((str(problems),), out, "paper", jobs=2))
+    assert [len(rows) for rows in seen] == [1, 2, 3, 4]
+    assert all(later[:-1] == sooner for sooner, later in pairwise(seen))
+    assert tree(out) == tree(reference)
+    assert not (out / "running.csv").exists()
 
 
 def test_resuming_keeps_what_is_intact_and_mends_the_rest(

@@ -34,9 +34,12 @@ from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.folder import check_output_folder
 from vdsm_pin.report.html import write_index
 from vdsm_pin.report.junit import junit_text
-from vdsm_pin.report.tables import write_summary
+from vdsm_pin.report.tables import SummaryCsv, write_summary
 
 SUMMARY: Final = "summary.csv"
+RUNNING: Final = "running.csv"
+"""The same while the batch is at work: its rows as they come."""
+
 _ASIDE: Final = ".unfinished"
 _LOCK: Final = ".lock"
 
@@ -88,16 +91,19 @@ def run_batch(batch: Batch) -> tuple[BatchRow, ...]:
         shutil.rmtree(batch.folder / _ASIDE, ignore_errors=True)
         rows: list[BatchRow] = []
         stopped = False
-        with Progress(len(tasks)) as progress:
+        running = batch.folder / RUNNING
+        with Progress(len(tasks)) as progress, SummaryCsv(running) as so_far:
             try:
                 for ended in _all_ended(batch, tasks):
                     done = _settle(ended)
                     rows.append(done.row)
+                    so_far(done.row)
                     progress.show(done)
             except KeyboardInterrupt:
                 stopped = True
         shutil.rmtree(batch.folder / _ASIDE, ignore_errors=True)
         _write_summaries(batch, rows)
+        running.unlink()
     if stopped:
         message = f"stopped; {len(rows)} of {len(tasks)} problems are finished"
         raise Interrupted(message + ", --resume does the rest")

@@ -8,7 +8,6 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from vdsm_pin.errors import UnknownName
 from vdsm_pin.io.problem_file import SCHEMA_DIALECT, problem_schema
-from vdsm_pin.verification.certificate_file import certificate_schema
 
 Point = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 VerdictWord = Annotated[
@@ -262,6 +261,13 @@ class TimingFile(FileModel):
     seconds: FiniteFloat = Field(description="time spent on the problem")
 
 
+def _certificate_schema() -> dict[str, Any]:
+    # Its models take a while to build, and only this asks for them here.
+    from vdsm_pin.verification.certificate_file import certificate_schema
+
+    return certificate_schema()
+
+
 _MODELS: Final[dict[str, type[FileModel]]] = {
     "verification": VerificationFile,
     "plan": PlanFile,
@@ -270,7 +276,7 @@ _MODELS: Final[dict[str, type[FileModel]]] = {
 }
 _ELSEWHERE: Final[dict[str, Callable[[], dict[str, Any]]]] = {
     "problem": problem_schema,
-    "certificate": certificate_schema,
+    "certificate": _certificate_schema,
 }
 """Files that are described where they are read or written."""
 

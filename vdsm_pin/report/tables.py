@@ -114,12 +114,43 @@ def write_cables(path: Path, verification: Verification) -> None:
     _write_rows(path, header, 1, values, rows.n_samples)
 
 
+class SummaryCsv:
+    """A table of problems, written row by row; whoever reads it finds whole rows.
+
+    Args:
+        path: The file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        # Buffered by line: a row is there as soon as it is written.
+        self._file = path.open("w", encoding="utf-8", newline="", buffering=1)
+        columns = list(BatchRow.model_fields)
+        self._writer = csv.DictWriter(self._file, columns, lineterminator="\n")
+        self._writer.writeheader()
+
+    def __enter__(self) -> Self:
+        """Itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def __call__(self, row: BatchRow) -> None:
+        """Write one row."""
+        self._writer.writerow(row.model_dump())
+
+
 def write_summary(path: Path, rows: Iterable[BatchRow]) -> None:
     """summary.csv of a batch."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, list(BatchRow.model_fields), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(row.model_dump() for row in rows)
+    with SummaryCsv(path) as write:
+        for row in rows:
+            write(row)
 
 
 def read_summary(path: Path) -> tuple[BatchRow, ...]:

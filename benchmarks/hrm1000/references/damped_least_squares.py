@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from benchmarks.hrm1000.references.arm import Arm, Rows, wanted
+from benchmarks.hrm1000.references.arm import Arm, Rows, Wanted, wanted
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance
@@ -34,12 +34,23 @@ def reach(arm: Arm, q: FloatArray, tip: FloatArray) -> FloatArray | None:
 def follow(
     problem: PlanningProblem, robot: RobotModel, clearance: LinkClearance
 ) -> Trajectory:
-    """Row after row from the one before.
+    """Along the desired path, row after row from the one before.
 
     Raises:
         NoPlanFound: Where a row is not reached.
     """
-    arm, goal = Arm(problem, robot, clearance), wanted(problem)
+    return along(wanted(problem), problem, robot, clearance)
+
+
+def along(
+    goal: Wanted, problem: PlanningProblem, robot: RobotModel, clearance: LinkClearance
+) -> Trajectory:
+    """The same along any way of the tip.
+
+    Raises:
+        NoPlanFound: Where a row is not reached.
+    """
+    arm = Arm(problem, robot, clearance)
     rows = Rows(arm.start(), goal.stations[0])
     for tip, station, drawn in zip(goal.tips, goal.stations, goal.drawn, strict=True):
         q = reach(arm, rows.joints[-1], tip)
