@@ -45,7 +45,7 @@ def tip_positions(manipulator: Manipulator, trajectory: Trajectory) -> FloatArra
     return tips
 
 
-def bends(manipulator: Manipulator, trajectory: Trajectory) -> FloatArray:
+def second_derivatives(manipulator: Manipulator, trajectory: Trajectory) -> FloatArray:
     """Bound M of the tip's second derivative on each interval, shape (n - 1,); [m]."""
     result = np.zeros(max(0, trajectory.n_samples - 1))
     for first in range(0, result.size, CHUNK):
@@ -119,8 +119,8 @@ def _deviation(
     run, start = _runs(path, stations)[intervals], _wrapped(path, stations)[intervals]
     ends = np.maximum(rows[intervals], rows[intervals + 1])
     corners = _corner_deviation(path, tips, start, run, intervals)
-    bend = bends(problem.manipulator, trajectory)[intervals] / 8.0
-    bound = np.maximum(ends, corners) + bend + TOLERANCES.arithmetic
+    off_chord = second_derivatives(problem.manipulator, trajectory)[intervals] / 8.0
+    bound = np.maximum(ends, corners) + off_chord + TOLERANCES.arithmetic
     worst = int(np.argmax(bound))
     return float(bound[worst]), int(intervals[worst])
 

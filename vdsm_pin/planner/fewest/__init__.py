@@ -1,1 +1,16 @@
-"""Plans in any scene with few bent joints: one graph of sparse shapes."""
+"""Plans in any scene with few bent joints: one graph of sparse shapes.
+
+Words of these modules:
+
+* tip: a tip position at which arms are tried; layer: one of those on the desired path,
+  in drawing order; station: arc length along the desired path.
+* offset D_i: how far joint i's projection is from where the straight arm to the same
+  tip has it; chart: tip and offsets together, in which motions are straight lines.
+* knee: a joint whose link angle is not zero; shape: the offsets of an arm with few of
+  them, at any tip; node: a shape at a tip that keeps limits and clearance.
+* room: the clearance of a configuration; taste: what a strategy prefers among nodes.
+* home: the node the motion starts from; way: a motion off the path; leg: a run of nodes
+  that is drawn, or a way; sequence: all legs.
+* knot: a corner of the motion in the chart; row: a configuration of the trajectory.
+* closed: proved that nobody can draw it; skipped: not drawn, for whatever reason.
+"""

@@ -30,7 +30,7 @@ from vdsm_pin.planner.fewest.shapes import one_knee_shapes
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
-LOGGER = logging.getLogger(__name__)
+LOG: Final = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ def explore(
         )  # fmt: skip
         found = _look(judge, level, rows, proof, taste)
         now = Outcome(judge, found, rows, proof)
-        LOGGER.debug("%s: %.4f m missing", level, now.missing)
+        LOG.debug("%s: %.4f m missing", level, now.missing)
         if now.missing < best.missing:
             best = now
             yield best
@@ -182,7 +182,7 @@ def _look(
             break
         skipped = tuple(k for k in found.sequence.skipped if not route.closed[k])
         lengths, _ = Planner(found.roadmap, found.home).ways(found.home)
-        if back == 0.0 and _cut_off(found.roadmap, lengths, skipped):
+        if back == 0.0 and _unreached(found.roadmap, lengths, skipped):
             break
         more = fill(judge, found.roadmap, lengths, skipped, rng, taste)
         if more is None:
@@ -195,7 +195,7 @@ def _look(
     return found
 
 
-def _cut_off(roadmap: Roadmap, lengths: FloatArray, skipped: tuple[int, ...]) -> bool:
+def _unreached(roadmap: Roadmap, lengths: FloatArray, skipped: tuple[int, ...]) -> bool:
     """Whether there are nodes in the stretches not drawn that no way leads to."""
     for k in skipped:
         tip = roadmap.route.layers[k]

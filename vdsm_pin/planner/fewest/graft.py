@@ -88,7 +88,7 @@ def _ties(
 def fill(
     judge: Judge,
     roadmap: Roadmap,
-    home: FloatArray,
+    lengths: FloatArray,
     skipped: tuple[int, ...],
     rng: np.random.Generator,
     taste: Taste,
@@ -98,7 +98,7 @@ def fill(
     Args:
         judge: Says what is clear.
         roadmap: The graph before.
-        home: Length of the way to each node, inf if none, shape (v,); [m].
+        lengths: Of the way from home to each node, inf if none, shape (v,); [m].
         skipped: Layers k whose stretch from layer k - 1 is not drawn.
         rng: Source of chance.
         taste: What the strategy prefers.
@@ -118,7 +118,7 @@ def fill(
                 break
             tip = route.layers[first]
             nodes = np.arange(roadmap.tip_nodes[tip], roadmap.tip_nodes[tip + 1])
-            nodes = nodes[np.isfinite(home[nodes])]
+            nodes = nodes[np.isfinite(lengths[nodes])]
             if len(nodes) > POPULATION:
                 nodes = rng.choice(nodes, POPULATION, replace=False)
             if not len(nodes):

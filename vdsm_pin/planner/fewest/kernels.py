@@ -19,7 +19,7 @@ class Graph(NamedTuple):
     Args:
         n_shapes: Number of shapes n.
         n_lattice: Number of shapes that exist at many tips; the others come after.
-        place: Node of each (tip, shape) or -1, shape (k * n,).
+        place: `Roadmap.index`, a name that tuples have taken, shape (k * n,).
         node: tip * n + shape of each node, ascending, shape (v,).
         tip_nodes: Where each tip's nodes begin, shape (k + 1,).
         first: Neighbour rows of the shapes.

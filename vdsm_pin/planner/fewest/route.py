@@ -1,4 +1,4 @@
-"""The tip's stations: the way to the desired path, and the path in drawing order."""
+"""Where the tip is tried: on the way to the desired path, on it, behind and beside."""
 
 import itertools
 from dataclasses import dataclass

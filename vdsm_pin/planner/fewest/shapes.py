@@ -4,7 +4,8 @@ A shape fixes everything but the tip: the arm leaves the rail in direction w1 up
 joint i, goes on in direction w2 up to joint j and runs straight from there to the tip.
 Only psi_1, psi_i and psi_j can differ from zero. A direction is given by its (y, z)
 part, which is constant along a piece: the projection of joint i is s_i w1 with s_i the
-arc length from O_1. Shape 0 is the straight arm (i = j = 1).
+arc length from O_1. Shape 0 is the straight arm (i = j = 1); `one_knee_shapes` makes
+the others with i = j, one knee each.
 """
 
 import itertools
