@@ -15,6 +15,7 @@ from vdsm_pin.units import MM_PER_M
 
 NAME = "fig06"
 LOW, HIGH = np.array([0.0, -0.72, -0.38]), np.array([0.0, 1.44, 1.50])
+NEAR_CORNER = 0.75  # from here to 1 the label of a corner is close; [-]
 NEAR = 45.0  # labels of moments this near to each other are put side by side; [mm]
 
 
@@ -104,10 +105,17 @@ def _labels(axes: Axes, run: Run, tip: FloatArray) -> None:
         axes.annotate(
             ", ".join(names), at, sign * np.where(sign.all(), 3.0, 4.5),
             textcoords="offset points", size=6.8, zorder=7,
-            ha={-1.0: "right", 0.0: "center", 1.0: "left"}[float(sign[0])],
+            ha=_alignment(float(sign[0]), float(share[0])),
             va={-1.0: "top", 0.0: "center", 1.0: "bottom"}[float(sign[1])],
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.4},
         )  # fmt: skip
+
+
+def _alignment(sign: float, share: float) -> str:
+    """Side of a label that its point is on; beside a corner it gives way to it."""
+    if sign == 0.0 and abs(share) > NEAR_CORNER:
+        return "right" if share > 0.0 else "left"
+    return {-1.0: "right", 0.0: "center", 1.0: "left"}[sign]
 
 
 if __name__ == "__main__":

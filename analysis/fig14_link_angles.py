@@ -8,6 +8,7 @@ from paper_figures.curves import (
     draw_link_angles,
     draw_moments,
     shade_detours,
+    top_of,
 )
 from paper_figures.runs import SCENES, STRATEGIES, Runs
 from paper_figures.style import save
@@ -21,6 +22,7 @@ def draw(runs: Runs) -> dict[str, Figure]:
     pitch = HEIGHT + 0.50
     figure = style.sheet(len(SCENES) * pitch + 0.50)
     for r, scene in enumerate(SCENES):
+        top = top_of(runs(scene, strategy) for strategy in STRATEGIES)
         for k, strategy in enumerate(STRATEGIES):
             run = runs(scene, strategy)
             left = 0.42 + k * (WIDTH + 0.32)
@@ -29,6 +31,7 @@ def draw(runs: Runs) -> dict[str, Figure]:
             draw_link_angles(axes, run)
             shade_detours(axes, run)
             draw_moments(axes, run)
+            axes.set_ylim(top=top)
             base_axis(axes, labelled=k == 1)
             letter = "abcdefghij"[2 * r + k]
             axes.set_title(f"({letter}) {scene}, ‘{strategy}’", pad=11.0)

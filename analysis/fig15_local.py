@@ -8,6 +8,7 @@ from paper_figures.curves import (
     draw_link_angles,
     draw_moments,
     shade_detours,
+    top_of,
 )
 from paper_figures.runs import Run, Runs
 from paper_figures.style import save
@@ -35,6 +36,7 @@ def draw(runs: Runs) -> dict[str, Figure]:
             draw_link_angles(axes, run, window(run, stretch))
             shade_detours(axes, run)
             draw_moments(axes, run)
+            axes.set_ylim(top=top_of(first[scene]))
             title = f"({'abcd'[k]}) {scene}, {what}, ‘{run.strategy}’"
             axes.set_title(title, pad=11.0)
             if r == 0:

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from paper_figures import style
-from paper_figures.curves import MM_PER_DEG, TOP_DEG, base_axis, draw_limit
+from paper_figures.curves import MM_PER_DEG, base_axis, draw_limit, top_of
 from paper_figures.paper_says import MAX_PSI_DEG, X0_MAX_MM, X0_MIN_MM
 from paper_figures.runs import SCENES, STRATEGIES, Run, Runs, degrees
 from paper_figures.style import save
@@ -32,7 +32,7 @@ def draw(runs: Runs) -> dict[str, Figure]:
             _bars(axes, run, (j - 0.5) * BAR)
         _printed(axes, scene, both[0].problem.manipulator.n_links)
         draw_limit(axes, float(np.rad2deg(both[0].problem.manipulator.max_link_angle)))
-        axes.set_ylim(-12.0, TOP_DEG + 3.0)
+        axes.set_ylim(-12.0, top_of(both) + 3.0)
         axes.axhline(0.0, color=style.INK, linewidth=0.6)
         base_axis(axes, labelled=k % 2 == 1 or k == len(SCENES) - 1)
         axes.grid(visible=True, axis="y")
@@ -54,7 +54,7 @@ def _bars(axes: Axes, run: Run, shift: float) -> None:
     at = np.arange(len(low))
     colour = style.STRATEGY_COLOURS[run.strategy]
     axes.bar(at + shift, high - low, 0.94 * BAR, bottom=low, color=colour, zorder=3)
-    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.2}
+    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.9, "pad": 0.4}
     for x, top in enumerate(high[:-1]):
         axes.text(
             x + shift, top + 0.9, f"{top:.0f}", ha="center", va="bottom", size=4.8,

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MultipleLocator
+from matplotlib.ticker import MaxNLocator
 from paper_figures import style
 from paper_figures.curves import draw_limit, draw_moments, shade_detours
 from paper_figures.distances import AXES, axis_distance
@@ -19,6 +19,7 @@ SCENES = tuple(AXES)
 WIDTH, HEIGHT = 1.60, 1.30  # of one panel; [inch]
 TOP_AXIS = 900.0  # [mm]
 SURFACE = (1.0, 1_000.0)  # ends of the logarithmic axis; [mm]
+END = 0.9  # numbers farther right would touch the next panel's first; [-]
 DECADE = 150.0  # makes a decade as long as 150 waypoints, for thinning
 
 
@@ -38,7 +39,9 @@ def draw(runs: Runs) -> dict[str, Figure]:
             for axes, letter in zip((above, below), letters, strict=True):
                 axes.set_title(f"({letter}) {scene}, ‘{strategy}’", pad=11.0)
                 axes.grid(visible=True, axis="y")
-                axes.xaxis.set_major_locator(MultipleLocator(300))
+                last = axes.get_xlim()[1]
+                ticks = MaxNLocator(4).tick_values(0.0, last)
+                axes.set_xticks([tick for tick in ticks if 0.0 <= tick <= END * last])
                 if k > 0:
                     axes.tick_params(labelleft=False)
             if k == 0:

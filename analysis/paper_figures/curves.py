@@ -1,5 +1,6 @@
 """Curves against the waypoint number: link angles, base, moments, limits."""
 
+from collections.abc import Iterable
 from typing import Final
 
 import numpy as np
@@ -17,7 +18,10 @@ MM_PER_DEG: Final = 15.0
 """The paper's scale of x0 against psi in Fig. 14; [mm/deg]."""
 
 TOP_DEG: Final = 57.0
-"""Upper end of the axis of psi: above the cone, and 855 mm for x0; [deg]."""
+"""Least upper end of the axis of psi: above the cone, and 855 mm for x0; [deg]."""
+
+ROOM_DEG: Final = 3.0
+"""What the axis has above the largest value at least; [deg]."""
 
 LETTER: Final = 0.0075
 """Width of a letter of a moment's name over its size; [inch/pt]."""
@@ -50,12 +54,19 @@ def draw_link_angles(axes: Axes, run: Run, rows: slice = slice(None)) -> None:
     axes.grid(visible=True, axis="y")
 
 
+def top_of(runs: Iterable[Run]) -> float:
+    """Upper end of an axis that holds psi and x0 of some plans; [deg]."""
+    highest = max(float(run.trajectory.x0.max()) for run in runs)
+    return max(TOP_DEG, highest * MM_PER_M / MM_PER_DEG + ROOM_DEG)
+
+
 def base_axis(axes: Axes, labelled: bool = True) -> None:
     """The right-hand axis of x0, 15 mm to a degree."""
+    reach = axes.get_ylim()[1] * MM_PER_DEG
     second = axes.secondary_yaxis(
         "right", functions=(lambda v: v * MM_PER_DEG, lambda v: v / MM_PER_DEG)
     )
-    second.set_yticks([0, 300, 600])
+    second.set_yticks([tick for tick in (0, 300, 600, 900) if tick <= reach])
     second.spines["right"].set_visible(True)
     if labelled:
         second.set_ylabel("x₀ [mm]")
