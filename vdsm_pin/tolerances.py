@@ -73,6 +73,10 @@ class Tolerances:
     coal_gjk: float = _held(1e-8, "m")
     """Coal's gjk_tolerance: 1e-6 is 1.5e-6 m unsafe, 1e-12 returns NaN; [m]."""
 
+    coal_travel: float = _held(5e-4, "m")
+    """Of each stretch of a motion in which the joint centres move by this much, Coal
+    sees one row; it proves nothing, and rows that close add no evidence; [m]."""
+
     coal_agreement: float = _held(5e-6, "m")
     """Coal's distance against our bracket: beyond it the row is undecided; [m]."""
 

@@ -132,6 +132,32 @@ def test_culling_skips_only_what_is_far(shape: str) -> None:
     assert {i for _, i in seen} == set(range(8)), "every pair at least once"
 
 
+def test_rows_close_to_each_other_are_seen_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shift, travel = 0.02, 1e-3
+    n = 4001
+    still = np.zeros((n, 8))
+    along = np.concatenate([np.linspace(0.0, shift, n - 1000), np.full(1000, shift)])
+    motion = Trajectory(np.zeros(n), np.zeros(n), along, still, still)
+    problem = ball_near_link_4(0.03)
+    reach = reach_of(problem)
+
+    def rows() -> list[int]:
+        found = coal_distances(ROBOT, problem, motion, reach, travel)
+        near = np.concatenate([chunk.waypoint[chunk.link == 3] for chunk in found])
+        return near.tolist()
+
+    seen = rows()
+    assert len(seen) == pytest.approx(shift / travel + 1, abs=1)
+    assert seen[0] == 0
+    np.testing.assert_allclose(np.diff(along[seen]), travel, atol=2e-5)
+    monkeypatch.setattr("vdsm_pin.verification.coal_clearance.CHUNK_BOUNDS", 800)
+    assert rows() == seen, "in parts or at once"
+    everything = list(coal_distances(ROBOT, problem, motion, reach))
+    assert sum(int((chunk.link == 3).sum()) for chunk in everything) == n
+
+
 def test_verdict_and_count_of_an_honest_scene() -> None:
     rng = np.random.default_rng(3)
     problem = problem_with(*(obstacle_of(shape, rng) for shape in SHAPES))

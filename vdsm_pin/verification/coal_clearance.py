@@ -7,7 +7,8 @@ motion undecided.
 
 Pairs that are far apart add no evidence. A chain of balls along each link against the
 boxes of the obstacles bounds every distance from below at a hundredth of the price; a
-row is measured where that bound is within reach, and every pair at its nearest row.
+row is measured where that bound is within reach, and every pair at its nearest row. Nor
+does a row add any at which the arm has hardly moved since the row before.
 """
 
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.geometry.row_bounds import coarse_bounds, row_brackets
 from vdsm_pin.kinematics import joint_centres
@@ -101,7 +102,8 @@ def check_coal(
     if not scene.obstacles:
         return ()
     count, worst, where, moment = 0, -np.inf, "", float("nan")
-    for found in coal_distances(robot, problem, trajectory, reach_of(problem)):
+    reach, travel = reach_of(problem), TOLERANCES.coal_travel
+    for found in coal_distances(robot, problem, trajectory, reach, travel):
         excess = found.disagreement
         if proved is not None:
             excess = np.maximum(excess, _below_proof(found, proved, n_links))
@@ -140,7 +142,11 @@ def reach_of(problem: PlanningProblem) -> float:
 
 
 def coal_distances(
-    robot: RobotModel, problem: PlanningProblem, trajectory: Trajectory, reach: float
+    robot: RobotModel,
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    reach: float,
+    travel: float = 0.0,
 ) -> Iterator[CoalDistances]:
     """Measure the pairs within reach, chunk by chunk, then every pair not yet seen.
 
@@ -149,16 +155,20 @@ def coal_distances(
         problem: The scene.
         trajectory: The rows.
         reach: Measure where the coarse bound is at most this; inf for everything; [m].
+        travel: Look at one row of each stretch in which the joint centres move by this
+            much; 0 for every row; [m].
 
     Yields:
-        Distances in the order of the rows; last the pairs that never came within
-        reach, each at the row where its coarse bound is least.
+        Distances in the order of the rows; last the pairs that were not measured, each
+        at the row where its coarse bound is least.
     """
     arm, obstacles = problem.manipulator, problem.scene.obstacles
     pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
     bodies = [coal_bodies(obstacle) for obstacle in obstacles]
     least = np.full((arm.n_links, len(obstacles)), np.inf)
     nearest = np.zeros(least.shape, dtype=np.int64)
+    seen = np.zeros(least.shape, dtype=np.bool_)
+    moved = _Moved(travel)
     step = max(1, CHUNK_BOUNDS // least.size)
     for first in range(0, trajectory.n_samples, step):
         part = slice(first, first + step)
@@ -169,15 +179,46 @@ def coal_distances(
         value = np.take_along_axis(bounds, here[None], axis=0)[0]
         nearer = value < least
         least[nearer], nearest[nearer] = value[nearer], here[nearer] + first
-        close = np.argwhere(bounds <= reach)
+        within = (bounds <= reach) & moved(centres)[:, None, None]
+        seen |= within.any(axis=0)
+        close = np.argwhere(within)
         if close.size:
             close[:, 0] += first
             yield _measured(robot, trajectory, arm.link_radius, pieces, bodies, close)
-    unseen = np.argwhere(least > reach)
+    unseen = np.argwhere(~seen)
     if unseen.size:
         rows = nearest[unseen[:, 0], unseen[:, 1]]
         far = np.column_stack([rows, unseen])
         yield _measured(robot, trajectory, arm.link_radius, pieces, bodies, far)
+
+
+class _Moved:
+    """Picks the first row of each stretch of a motion, part after part.
+
+    Args:
+        travel: How far the joint centres move in a stretch; [m].
+    """
+
+    def __init__(self, travel: float) -> None:
+        self._travel = travel
+        self._way, self._last = 0.0, np.zeros((0, 0, 3))
+
+    def __call__(self, centres: FloatArray) -> BoolArray:
+        """Which rows of the next part to look at, shape (n,).
+
+        Args:
+            centres: Joint centres of the rows, shape (n, N + 1, 3); [m].
+        """
+        if self._travel == 0.0:
+            return np.ones(len(centres), dtype=np.bool_)
+        begin = self._last if len(self._last) else centres[:1]
+        steps = np.linalg.norm(np.diff(centres, axis=0, prepend=begin), axis=2)
+        ways = self._way + np.cumsum(steps.max(axis=1))
+        marks = np.floor(np.append(self._way, ways) / self._travel)
+        found = np.diff(marks) > 0.0
+        found[0] |= not len(self._last)
+        self._way, self._last = float(ways[-1]), centres[-1:]
+        return np.asarray(found)
 
 
 def _measured(
