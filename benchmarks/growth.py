@@ -20,13 +20,16 @@ import numpy as np
 from benchmarks.certify import ARM, NEAR, beside, certify_growth, problem_of, sway
 from benchmarks.common import MILLI, Results, command, timed
 from vdsm_pin.cables import angles_from_cables, cable_lengths
+from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.kinematics import joint_angles, joint_centres
 from vdsm_pin.manipulator import (
     CableLayout,
     paper_hole_angles,
 )
+from vdsm_pin.planner.pipeline import plan_paper
 from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.robust import largest_joint_error
 
@@ -47,7 +50,11 @@ def at_waypoints(n: int, folder: Path) -> Runs:
     def back() -> object:
         return joint_centres(ARM, joints[0], *angles_from_cables(ARM, lengths))
 
+    obs1 = read_problem("paper/obs1").problem
+    drawn = replace(obs1, path=replace(obs1.path, spacing=obs1.path.length / n))
+    clearance = link_clearance(drawn)
     return {
+        "plan paper/obs1": lambda: plan_paper(drawn, clearance, 0.0),
         "cables from centres": lambda: cable_lengths(ARM, *joint_angles(ARM, centres)),
         "centres from cables": back,
         "largest joint error": lambda: largest_joint_error(problem, motion, NOMINAL),
