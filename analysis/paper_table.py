@@ -126,7 +126,10 @@ def rows_of(scene: str, result: Refinement) -> list[Row]:
             f"{near * MM_PER_M:.3f}",
         )
         error = np.rad2deg(touching_error(result))
-        ours["error"] = ("largest proved joint error [deg]", f"{error:.3f}")
+        ours["error"] = (
+            "largest joint error proved without contact [deg]",
+            f"{error:.3f}",
+        )
     if scene == "obs1":
         for name, row in moments(trajectory, result.plan.tip_path.points).items():
             ours[name] = (
