@@ -12,7 +12,7 @@ from paper_figures.scenery import (
     draw_obstacles,
     square,
 )
-from paper_figures.style import save
+from paper_figures.style import save_all
 from paper_figures.views import OBLIQUE, SIDE, TOP
 
 from vdsm_pin.geometry.arrays import FloatArray
@@ -90,5 +90,4 @@ def _sentence(links: tuple[int, ...]) -> str:
 
 
 if __name__ == "__main__":
-    for name, figure in draw(Runs()).items():
-        save(figure, name)
+    save_all(draw(Runs()))

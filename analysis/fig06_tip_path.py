@@ -7,7 +7,7 @@ from paper_figures import style
 from paper_figures.marks import marks
 from paper_figures.runs import STRATEGIES, Run, Runs
 from paper_figures.scenery import draw_section, square, zone
-from paper_figures.style import save
+from paper_figures.style import save_all
 from paper_figures.views import SIDE, thin
 
 from vdsm_pin.geometry.arrays import FloatArray
@@ -119,5 +119,4 @@ def _alignment(sign: float, share: float) -> str:
 
 
 if __name__ == "__main__":
-    for name, figure in draw(Runs()).items():
-        save(figure, name)
+    save_all(draw(Runs()))

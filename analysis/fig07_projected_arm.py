@@ -5,7 +5,7 @@ from paper_figures import style
 from paper_figures.marks import row_of
 from paper_figures.projections import HIGH, LOW, draw_background, draw_chain
 from paper_figures.runs import Runs
-from paper_figures.style import save
+from paper_figures.style import save_all
 
 NAME = "fig07"
 
@@ -29,5 +29,4 @@ def draw(runs: Runs) -> dict[str, Figure]:
 
 
 if __name__ == "__main__":
-    for name, figure in draw(Runs()).items():
-        save(figure, name)
+    save_all(draw(Runs()))

@@ -10,7 +10,7 @@ from paper_figures.marks import row_of
 from paper_figures.projections import HIGH, LOW, draw_background
 from paper_figures.runs import Run, Runs
 from paper_figures.steps import Slide, slides, sliding_region
-from paper_figures.style import save
+from paper_figures.style import save_all
 from paper_figures.views import SIDE
 
 from vdsm_pin.geometry.arrays import FloatArray
@@ -94,5 +94,4 @@ def _draw_cross(axes: Axes, run: Run, row: int, at: FloatArray) -> list[FloatArr
 
 
 if __name__ == "__main__":
-    for name, figure in draw(Runs()).items():
-        save(figure, name)
+    save_all(draw(Runs()))

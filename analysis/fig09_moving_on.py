@@ -11,7 +11,7 @@ from paper_figures.projections import (
     draw_trails,
 )
 from paper_figures.runs import Runs
-from paper_figures.style import save
+from paper_figures.style import save_all
 
 NAME = "fig09"
 SHARES = (1.0 / 3.0, 2.0 / 3.0, 1.0)  # of the rows from A5 to A6
@@ -45,5 +45,4 @@ def draw(runs: Runs) -> dict[str, Figure]:
 
 
 if __name__ == "__main__":
-    for name, figure in draw(Runs()).items():
-        save(figure, name)
+    save_all(draw(Runs()))

@@ -3,7 +3,7 @@
 from matplotlib.figure import Figure
 from paper_figures.four_views import four_views
 from paper_figures.runs import Runs
-from paper_figures.style import save
+from paper_figures.style import save_all
 
 NAME = "fig13"
 
@@ -17,5 +17,4 @@ def draw(runs: Runs) -> dict[str, Figure]:
 
 
 if __name__ == "__main__":
-    for name, figure in draw(Runs()).items():
-        save(figure, name)
+    save_all(draw(Runs()))

@@ -11,7 +11,7 @@ from paper_figures.curves import (
     top_of,
 )
 from paper_figures.runs import SCENES, STRATEGIES, Runs
-from paper_figures.style import save
+from paper_figures.style import save_all
 
 NAME = "fig14"
 WIDTH, HEIGHT = 2.98, 1.22  # of one panel; [inch]
@@ -50,5 +50,4 @@ def draw(runs: Runs) -> dict[str, Figure]:
 
 
 if __name__ == "__main__":
-    for name, figure in draw(Runs()).items():
-        save(figure, name)
+    save_all(draw(Runs()))

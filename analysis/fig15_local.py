@@ -11,7 +11,7 @@ from paper_figures.curves import (
     top_of,
 )
 from paper_figures.runs import Run, Runs
-from paper_figures.style import save
+from paper_figures.style import save_all
 
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -66,5 +66,4 @@ def window(run: Run, stretch: int) -> slice:
 
 
 if __name__ == "__main__":
-    for name, figure in draw(Runs()).items():
-        save(figure, name)
+    save_all(draw(Runs()))

@@ -9,7 +9,7 @@ from paper_figures import style
 from paper_figures.curves import MM_PER_DEG, base_axis, draw_limit, top_of
 from paper_figures.paper_says import MAX_PSI_DEG, X0_MAX_MM, X0_MIN_MM
 from paper_figures.runs import SCENES, STRATEGIES, Run, Runs, degrees
-from paper_figures.style import save
+from paper_figures.style import save_all
 
 from vdsm_pin.units import MM_PER_M
 
@@ -98,5 +98,4 @@ def _legend(figure: Figure, height: float, pitch: float) -> None:
 
 
 if __name__ == "__main__":
-    for name, figure in draw(Runs()).items():
-        save(figure, name)
+    save_all(draw(Runs()))

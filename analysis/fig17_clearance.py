@@ -9,7 +9,7 @@ from paper_figures.curves import draw_limit, draw_moments, shade_detours
 from paper_figures.distances import AXES, axis_distance
 from paper_figures.paper_says import AXIS_DISTANCE_MM
 from paper_figures.runs import STRATEGIES, Run, Runs
-from paper_figures.style import save
+from paper_figures.style import save_all
 from paper_figures.views import thin
 
 from vdsm_pin.units import MM_PER_M
@@ -101,5 +101,4 @@ def _note(axes: Axes, text: str) -> None:
 
 
 if __name__ == "__main__":
-    for name, figure in draw(Runs()).items():
-        save(figure, name)
+    save_all(draw(Runs()))

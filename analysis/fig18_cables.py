@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from paper_figures import style
 from paper_figures.curves import draw_moments, shade_detours
 from paper_figures.runs import Run, Runs
-from paper_figures.style import save
+from paper_figures.style import save_all
 from paper_figures.views import thin
 
 from vdsm_pin.cables import cable_lengths
@@ -91,5 +91,4 @@ def _holes(axes: Axes, run: Run) -> None:
 
 
 if __name__ == "__main__":
-    for name, figure in draw(Runs()).items():
-        save(figure, name)
+    save_all(draw(Runs()))

@@ -3,15 +3,14 @@
 python analysis/figures.py --out reports/paper
 """
 
-import argparse
 import importlib
 import time
-from pathlib import Path
 from typing import Final
 
 from paper_figures import numbers, style
 from paper_figures.page import page
 from paper_figures.runs import Runs
+from result_files import output_folder
 
 SCRIPTS: Final = (
     "fig04_paths_free",
@@ -33,14 +32,10 @@ SCRIPTS: Final = (
 
 def main(runs: Runs | None = None) -> None:
     """Draw everything and write the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=style.REPORTS)
-    folder = parser.parse_args().out
-    runs = runs or Runs()
+    folder, runs = output_folder(__doc__), runs or Runs()
     for script in SCRIPTS:
         begin = time.perf_counter()
-        for name, figure in importlib.import_module(script).draw(runs).items():
-            style.save(figure, name, folder)
+        style.save_all(importlib.import_module(script).draw(runs), folder)
         print(f"{script}: {time.perf_counter() - begin:.1f} s", flush=True)
     found = numbers.numbers(runs)
     numbers.write(found, folder / "numbers.json")

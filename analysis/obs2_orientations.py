@@ -8,13 +8,11 @@ and not how it is turned. The triangle is taken as equilateral, turned from 0 to
 the clearance function; the proof between them is the verifier's.
 """
 
-import argparse
-import json
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from result_files import output_folder, write_table
 
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.io.problem_file import read_problem
@@ -101,15 +99,9 @@ def markdown(rows: list[Row]) -> str:
 
 def main() -> None:
     """Write both files and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("reports/paper"))
-    folder = parser.parse_args().out
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = output_folder(__doc__)
     rows = [row_of(circle, turn) for circle in READINGS for turn in TURNS_DEG]
-    text = json.dumps([asdict(row) for row in rows], indent=1) + "\n"
-    (folder / "obs2_orientations.json").write_text(text, encoding="utf-8")
-    (folder / "obs2_orientations.md").write_text(markdown(rows), encoding="utf-8")
-    print(markdown(rows))
+    write_table(folder, "obs2_orientations", rows, markdown(rows))
 
 
 if __name__ == "__main__":

@@ -6,13 +6,11 @@ Writes `table.json` and `table.md`. "Paper says" is quoted from the text, with i
 section; "we get" comes from the certified plan and its verification.
 """
 
-import argparse
-import json
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from result_files import output_folder, write_table
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
@@ -189,15 +187,9 @@ def markdown(rows: list[Row]) -> str:
 
 def main() -> None:
     """Write both files and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("reports/paper"))
-    folder = parser.parse_args().out
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = output_folder(__doc__)
     rows = table()
-    text = json.dumps([asdict(row) for row in rows], indent=1) + "\n"
-    (folder / "table.json").write_text(text, encoding="utf-8")
-    (folder / "table.md").write_text(markdown(rows), encoding="utf-8")
-    print(markdown(rows))
+    write_table(folder, "table", rows, markdown(rows))
 
 
 if __name__ == "__main__":

@@ -14,12 +14,11 @@ For each the smallest largest psi is told too. Every choice but the first change
 link angle more.
 """
 
-import argparse
-import json
 import tempfile
 from pathlib import Path
 
 import numpy as np
+from result_files import output_folder, write_table
 
 from benchmarks.hrm1000.generate import generate
 from vdsm_pin.geometry.arrays import FloatArray
@@ -31,6 +30,8 @@ from vdsm_pin.verification.link_clearance import link_clearance
 
 PAPER = ("obs1", "obs2", "obs2-small", "obs3")
 FAMILIES = ("prismatic_x", "crossing", "clutter", "wall", "narrow")
+PER_FAMILY = 3
+"""Problems of each family."""
 SPACING = 0.15
 """Distance of the tip positions; [m]."""
 LATTICE = 0.06
@@ -152,30 +153,20 @@ def table(rows: list[dict[str, object]]) -> str:
 
 def main() -> None:
     """Measure, print, save."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path)
-    parser.add_argument("--per-family", type=int, default=3)
-    options = parser.parse_args()
-    rows = []
+    folder, rows = output_folder(__doc__), []
     for name in PAPER:
-        rows.append(
-            row(f"paper/{name}", measured(read_problem(f"paper/{name}").problem))
-        )
+        problem = read_problem(f"paper/{name}").problem
+        rows.append(row(f"paper/{name}", measured(problem)))
         print(rows[-1], flush=True)
     for family in FAMILIES:
         found = []
-        for number in range(options.per_family):
-            with tempfile.TemporaryDirectory() as folder:
-                path = generate(Path(folder), family, number)
+        for number in range(PER_FAMILY):
+            with tempfile.TemporaryDirectory() as work:
+                path = generate(Path(work), family, number)
                 found.append(measured(read_problem(path).problem))
-        title = f"{options.per_family} of {family}"
-        rows.append(row(title, np.concatenate(found)))
+        rows.append(row(f"{PER_FAMILY} of {family}", np.concatenate(found)))
         print(rows[-1], flush=True)
-    print(table(rows))
-    if options.out:
-        text = json.dumps(rows, indent=1) + "\n"
-        (options.out / "scaling_choices.json").write_text(text, encoding="utf-8")
-        (options.out / "scaling_choices.md").write_text(table(rows), encoding="utf-8")
+    write_table(folder, "scaling_choices", rows, table(rows))
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ figures: orange for the first, pink for the long links, blue for the short ones,
 for the tip. Pink and blue run from light to dark so that neighbours can be told apart.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,12 +16,10 @@ mpl.use("Agg")
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
+from result_files import REPORTS
 
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.report.palette import oklch
-
-REPORTS: Final = Path(__file__).resolve().parents[2] / "reports" / "paper"
-"""Where the figures are committed."""
 
 WIDTH: Final = 7.2
 """Width of a printed figure; [inch]."""
@@ -123,6 +122,12 @@ def subscript(number: int) -> str:
 def panel_title(axes: Axes, letter: str, text: str) -> None:
     """The panel's letter and what it shows."""
     axes.set_title(f"({letter}) {text}")
+
+
+def save_all(figures: Mapping[str, Figure], folder: Path = REPORTS) -> None:
+    """Write every figure under its name."""
+    for name, figure in figures.items():
+        save(figure, name, folder)
 
 
 def save(figure: Figure, name: str, folder: Path = REPORTS) -> None:

@@ -15,22 +15,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from vdsm_pin import scene
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.manipulator import CableLayout, Manipulator, paper_hole_angles
 from vdsm_pin.problem import DesiredPath, PlanningProblem
 from vdsm_pin.robot_model import RobotModel, load_robot
-from vdsm_pin.scene import (
-    Box,
-    Capsule,
-    Cylinder,
-    HalfSpace,
-    Mesh,
-    Obstacle,
-    Prism,
-    Scene,
-    Sphere,
-)
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
@@ -79,37 +69,43 @@ def axis_of(rng: np.random.Generator) -> FloatArray:
     return unit(rng.normal(size=3))
 
 
-def obstacle_of(shape: str, rng: np.random.Generator) -> Obstacle:
+def obstacle_of(shape: str, rng: np.random.Generator) -> scene.Obstacle:
     """An obstacle within reach of the arm."""
     centre = rng.uniform([0.0, -0.6, -0.6], [1.4, 0.6, 0.6])
     turn = rotation_from_rpy(rng.uniform(-3.0, 3.0, 3) * rng.choice([0.0, 1.0]))
     size = 10.0 ** rng.uniform(-3.0, -0.7)
     match shape:
         case "sphere":
-            return Sphere(shape, centre, size)
+            return scene.Sphere(shape, centre, size)
         case "capsule":
-            return Capsule(shape, centre, axis_of(rng), rng.uniform(0.01, 1.0), size)
+            return scene.Capsule(
+                shape, centre, axis_of(rng), rng.uniform(0.01, 1.0), size
+            )
         case "cylinder":
-            return Cylinder(shape, centre, axis_of(rng), rng.uniform(0.01, 1.0), size)
+            return scene.Cylinder(
+                shape, centre, axis_of(rng), rng.uniform(0.01, 1.0), size
+            )
         case "box":
-            return Box(shape, centre, turn, 10.0 ** rng.uniform(-3.0, -0.5, 3))
+            return scene.Box(shape, centre, turn, 10.0 ** rng.uniform(-3.0, -0.5, 3))
         case "prism":
             corners = size * rng.uniform(-1.0, 1.0, (3, 2))
-            return Prism(shape, centre, turn, corners, (-0.3, 0.5))
+            return scene.Prism(shape, centre, turn, corners, (-0.3, 0.5))
         case "notched":
             corners = 0.3 * size * (np.array(NOTCHED) - 1.5)
-            return Prism(shape, centre, turn, corners, (-0.3, 0.2))
+            return scene.Prism(shape, centre, turn, corners, (-0.3, 0.2))
         case "wall":
             normal = axis_of(rng)
-            return HalfSpace(shape, np.array([0.6, 0, 0]) - normal, normal)
+            return scene.HalfSpace(shape, np.array([0.6, 0, 0]) - normal, normal)
     corners = centre + size * (1.0 + rng.normal(size=(4, 3)))
-    return Mesh(shape, corners, TETRAHEDRON, True)
+    return scene.Mesh(shape, corners, TETRAHEDRON, True)
 
 
-def problem_of(*obstacles: Obstacle, required: float = 0.0) -> PlanningProblem:
+def problem_of(*obstacles: scene.Obstacle, required: float = 0.0) -> PlanningProblem:
     tip = np.array([LENGTHS.sum(), 0.0, 0.0])
     path = DesiredPath(tip, tip[None])
-    return PlanningProblem("any", arm(), Scene(obstacles), path, required, np.eye(4))
+    return PlanningProblem(
+        "any", arm(), scene.Scene(obstacles), path, required, np.eye(4)
+    )
 
 
 def motion_of(rng: np.random.Generator, n_rows: int, step: float) -> Trajectory:
@@ -143,7 +139,7 @@ def shown(bounds: FloatArray) -> FloatArray:
     return np.maximum(bounds, -RADIUS)
 
 
-def by_coal(obstacle: Obstacle, q: FloatArray) -> FloatArray:
+def by_coal(obstacle: scene.Obstacle, q: FloatArray) -> FloatArray:
     """Coal's distance of every link at every row, shape (n_rows, N); [m]."""
     poses = robot().link_poses(q[:, 0], q[:, 1::2], q[:, 2::2])
     row, link = (a.ravel() for a in np.indices((len(q), N_LINKS)))
@@ -203,17 +199,17 @@ def test_refining_a_trajectory_never_worsens_the_verdict(shape: str, seed: int) 
     assert not ((found[2] == 0).all(axis=0) & refuted).any()
 
 
-def grown(obstacle: Obstacle, much: float) -> Obstacle:
+def grown(obstacle: scene.Obstacle, much: float) -> scene.Obstacle:
     """An obstacle that holds the given one."""
     match obstacle:
-        case Sphere() | Capsule() | Cylinder():
+        case scene.Sphere() | scene.Capsule() | scene.Cylinder():
             return replace(obstacle, radius=obstacle.radius + much)
-        case Box():
+        case scene.Box():
             return replace(obstacle, half_size=obstacle.half_size + much)
-        case Prism():
+        case scene.Prism():
             low, high = obstacle.span
             return replace(obstacle, span=(low - much, high + much))
-        case HalfSpace():
+        case scene.HalfSpace():
             return replace(obstacle, point=obstacle.point + much * obstacle.normal)
     middle = obstacle.vertices.mean(axis=0)
     away = obstacle.vertices - middle
@@ -265,15 +261,15 @@ def test_no_error_is_both_certified_and_refuted(shape: str, seed: int) -> None:
 # ---- rigid motion of everything ------------------------------------------------------
 
 
-def in_file(obstacle: Obstacle, folder: Path) -> dict[str, Any]:
+def in_file(obstacle: scene.Obstacle, folder: Path) -> dict[str, Any]:
     """An obstacle as a problem file has it, in metres; rotations as matrices."""
     name = {"name": obstacle.name}
     match obstacle:
-        case Sphere():
+        case scene.Sphere():
             return name | {
                 "shape": "sphere", "center": obstacle.centre, "radius": obstacle.radius
             }  # fmt: skip
-        case Capsule() | Cylinder():
+        case scene.Capsule() | scene.Cylinder():
             return name | {
                 "shape": type(obstacle).__name__.lower(),
                 "center": obstacle.centre,
@@ -281,20 +277,20 @@ def in_file(obstacle: Obstacle, folder: Path) -> dict[str, Any]:
                 "length": 2.0 * obstacle.half_length,
                 "radius": obstacle.radius,
             }
-        case Box():
+        case scene.Box():
             return name | {
                 "shape": "box",
                 "center": obstacle.centre,
                 "size": 2.0 * obstacle.half_size,
                 "rpy_deg": obstacle.rotation,
             }
-        case HalfSpace():
+        case scene.HalfSpace():
             return name | {
                 "shape": "half_space",
                 "point": obstacle.point,
                 "normal": obstacle.normal,
             }
-    assert isinstance(obstacle, Mesh)
+    assert isinstance(obstacle, scene.Mesh)
     corners = [f"v {x!r} {y!r} {z!r}" for x, y, z in obstacle.vertices.tolist()]
     faces = [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in obstacle.triangles]
     (folder / "part.obj").write_text("\n".join([*corners, *faces]))
@@ -375,7 +371,7 @@ def test_turning_everything_about_the_rail_changes_nothing_for_prisms(
     rng = np.random.default_rng(turns)
     obstacle, c, s = obstacle_of(shape, rng), *[(1, 0), (0, 1), (-1, 0), (0, -1)][turns]
     R = np.array([[1, 0, 0], [0, c, -s], [0, s, c]], float)
-    assert isinstance(obstacle, Prism)
+    assert isinstance(obstacle, scene.Prism)
     turned = replace(
         obstacle, origin=R @ obstacle.origin, rotation=R @ obstacle.rotation
     )

@@ -6,22 +6,12 @@ import numpy as np
 import pytest
 import trimesh
 
+from vdsm_pin import scene
 from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
 from vdsm_pin.problem import DesiredPath, PlanningProblem
 from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import (
-    Box,
-    Capsule,
-    Cylinder,
-    HalfSpace,
-    Mesh,
-    Obstacle,
-    Prism,
-    Scene,
-    Sphere,
-)
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification import coal_clearance
@@ -43,32 +33,32 @@ def unit(rng: np.random.Generator) -> np.ndarray:
     return np.asarray(vector / np.linalg.norm(vector))
 
 
-def obstacle_of(shape: str, rng: np.random.Generator) -> Obstacle:
+def obstacle_of(shape: str, rng: np.random.Generator) -> scene.Obstacle:
     """An obstacle within reach of the arm, anywhere, turned anyhow."""
     centre = rng.uniform([0.3, -1.0, -1.0], [3.0, 1.0, 1.0])
     turn = rotation_from_rpy(rng.uniform(-3.0, 3.0, 3))
     size = rng.uniform(0.05, 0.4)
     match shape:
         case "sphere":
-            return Sphere(shape, centre, size)
+            return scene.Sphere(shape, centre, size)
         case "capsule":
-            return Capsule(shape, centre, unit(rng), rng.uniform(0.1, 2.0), size)
+            return scene.Capsule(shape, centre, unit(rng), rng.uniform(0.1, 2.0), size)
         case "cylinder":
-            return Cylinder(shape, centre, unit(rng), rng.uniform(0.1, 4.0), size)
+            return scene.Cylinder(shape, centre, unit(rng), rng.uniform(0.1, 4.0), size)
         case "box":
-            return Box(shape, centre, turn, rng.uniform(0.05, 0.5, 3))
+            return scene.Box(shape, centre, turn, rng.uniform(0.05, 0.5, 3))
         case "half_space":
             normal = unit(rng)
-            return HalfSpace(shape, -normal * rng.uniform(0.3, 1.5), normal)
+            return scene.HalfSpace(shape, -normal * rng.uniform(0.3, 1.5), normal)
         case "prism":
             triangle = rng.uniform(-0.4, 0.4, (3, 2))
-            return Prism(shape, centre, turn, triangle, (-1.5, 2.0))
+            return scene.Prism(shape, centre, turn, triangle, (-1.5, 2.0))
         case "angle iron":
             corners = [[0, 0], [0.5, 0], [0.5, 0.1], [0.1, 0.1], [0.1, 0.4], [0, 0.4]]
-            return Prism(shape, centre, turn, np.array(corners), (-1.0, 1.0))
+            return scene.Prism(shape, centre, turn, np.array(corners), (-1.0, 1.0))
         case _:
             part = trimesh.creation.icosphere(subdivisions=2, radius=size)
-            return Mesh(shape, part.vertices + centre, part.faces, True)
+            return scene.Mesh(shape, part.vertices + centre, part.faces, True)
 
 
 SHAPES = [
@@ -83,10 +73,14 @@ SHAPES = [
 ]
 
 
-def problem_with(*obstacles: Obstacle, clearance: float = 0.0035) -> PlanningProblem:
+def problem_with(
+    *obstacles: scene.Obstacle, clearance: float = 0.0035
+) -> PlanningProblem:
     tip = np.array([HRM8.total_length, 0.0, 0.0])
     path = DesiredPath(tip, tip[None])
-    return PlanningProblem("any", HRM8, Scene(obstacles), path, clearance, np.eye(4))
+    return PlanningProblem(
+        "any", HRM8, scene.Scene(obstacles), path, clearance, np.eye(4)
+    )
 
 
 def trajectory_of(n: int, seed: int = 1, size: float = 0.3) -> Trajectory:
@@ -176,7 +170,7 @@ def ball_near_link_4(gap: float) -> PlanningProblem:
     """A ball beside the middle of link 4 of the straight arm."""
     middle = HRM8.stations[3] + HRM8.link_lengths[3] / 2.0
     centre = np.array([middle, 0.1 + HRM8.link_radius + gap, 0.0])
-    return problem_with(Sphere("ball", centre, 0.1))
+    return problem_with(scene.Sphere("ball", centre, 0.1))
 
 
 STRAIGHT = Trajectory(
@@ -268,7 +262,7 @@ def test_poses_come_from_pinocchio_and_match_the_centres() -> None:
     centres = joint_centres(HRM8, trajectory.x0, trajectory.alpha, trajectory.theta)
     for i in range(8):
         outward = centres[0, i] + np.array([0.0, 0.0, 5.0])
-        problem = problem_with(Sphere("far", outward, 0.1))
+        problem = problem_with(scene.Sphere("far", outward, 0.1))
         (chunk,) = coal_distances(ROBOT, problem, trajectory, np.inf)
         expected = np.linalg.norm(
             centres[0, :-1]

@@ -1,0 +1,36 @@
+"""What the scripts that write tables share: where to, and both forms of a table."""
+
+import argparse
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Final
+
+REPORTS: Final = Path(__file__).resolve().parents[1] / "reports" / "paper"
+"""Where the tables are committed."""
+
+
+def output_folder(description: str | None) -> Path:
+    """The folder of the option --out, made where it is missing."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--out", type=Path, default=REPORTS)
+    folder: Path = parser.parse_args().out
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def write_table(folder: Path, name: str, rows: Sequence[Any], text: str) -> None:
+    """Write name.json and name.md, and print the latter.
+
+    Args:
+        folder: Where to.
+        name: File name without its ending.
+        rows: Dataclasses or dicts.
+        text: The same for reading.
+    """
+    plain = [row if isinstance(row, dict) else asdict(row) for row in rows]
+    content = json.dumps(plain, indent=1) + "\n"
+    (folder / f"{name}.json").write_text(content, encoding="utf-8")
+    (folder / f"{name}.md").write_text(text, encoding="utf-8")
+    print(text)
