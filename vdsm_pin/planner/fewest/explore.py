@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.planner.fewest.bounds import TipProof, prove_tips
 from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.graft import fill
@@ -24,8 +24,7 @@ from vdsm_pin.planner.fewest.roadmap import (
     link_limit,
 )
 from vdsm_pin.planner.fewest.route import PathRows, path_rows, tip_route
-from vdsm_pin.planner.fewest.search import Found, search
-from vdsm_pin.planner.fewest.sequence import Planner
+from vdsm_pin.planner.fewest.search import Found, nothing_blocked, search
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
@@ -72,8 +71,10 @@ LEVELS: Final = (
         ease=0.79, around=4,
     ),
     Level(step=0.08, coarse=0.026, joints=8, rounds=40, back=0.0, grow=2, around=4),
+    Level(step=0.08, coarse=0.013, joints=8, rounds=40, back=0.0, grow=3, around=4),
+    Level(step=0.08, coarse=0.0065, joints=8, rounds=40, back=0.0, grow=4, around=8),
     Level(step=0.08, coarse=0.026, joints=8, rounds=40, back=1.0, grow=2),
-    Level(step=0.05, coarse=0.016, joints=10, rounds=60, back=1.0, grow=3),
+    Level(step=0.08, coarse=0.013, joints=8, rounds=40, back=1.0, grow=3),
     Level(
         step=0.05, coarse=0.013, joints=10, rounds=60, back=1.0, grow=3,
         slack=3e-5, finest=5e-4,
@@ -136,7 +137,10 @@ def explore(
     # The way out of a start that is bent more than is liked must be allowed.
     bent = largest_start_angle(problem) / link_limit(problem)
     least_ease = min(1.0, bent + TOLERANCES.joint_limit)
+    walled = False
     for number, level in enumerate(levels):
+        if walled and level.back == 0.0:
+            continue
         ease = max(level.ease, least_ease)
         worth = problem.required_clearance + margin + level.slack + taste.room
         judge = Judge(
@@ -151,6 +155,7 @@ def explore(
             yield best
         if not best.missing > 0.0:
             return
+        walled |= level.ease == 1.0 and (found is None or _walled(found))
         if number == 0 and len(levels) > len(QUICK):
             # Seldom needed, so only now: is there any way for the tip at all?
             proof = replace(proof, cut_off=cut_off(problem, rows.tips))
@@ -176,35 +181,39 @@ def _look(
     )  # fmt: skip
     roadmap, home = with_start(judge, roadmap, taste)
     rng = np.random.default_rng(SEED)
-    found = search(judge, roadmap, home, level.rounds)
+    found = search(judge, roadmap, home, level.rounds, nothing_blocked())
     for _ in range(level.grow):
         if found is None or not found.missing > 0.0:
             break
         skipped = tuple(k for k in found.sequence.skipped if not route.closed[k])
-        lengths, _ = Planner(found.roadmap, found.home).ways(found.home)
-        if back == 0.0 and _unreached(found.roadmap, lengths, skipped):
+        if back == 0.0 and _walled(found):
             break
-        more = fill(judge, found.roadmap, lengths, skipped, rng, taste)
+        more = fill(judge, found.roadmap, found.ways, skipped, rng, taste)
         if more is None:
             break
-        home = _same_node(found.roadmap, more, found.home)
-        again = search(judge, more, home, level.rounds)
+        home = int(_same_nodes(found.roadmap, more, np.array(found.home)))
+        blocked = _same_nodes(found.roadmap, more, found.blocked)
+        again = search(judge, more, home, level.rounds, blocked)
         if again is None or not again.missing < found.missing:
             break
         found = again
     return found
 
 
-def _unreached(roadmap: Roadmap, lengths: FloatArray, skipped: tuple[int, ...]) -> bool:
+def _walled(found: Found) -> bool:
     """Whether there are nodes in the stretches not drawn that no way leads to."""
-    for k in skipped:
+    roadmap = found.roadmap
+    for k in found.sequence.skipped:
+        if roadmap.route.closed[k]:
+            continue
         tip = roadmap.route.layers[k]
         nodes = slice(roadmap.tip_nodes[tip], roadmap.tip_nodes[tip + 1])
-        if not np.isfinite(lengths[nodes]).all():
+        if not np.isfinite(found.ways[nodes]).all():
             return True
     return False
 
 
-def _same_node(before: Roadmap, after: Roadmap, node: int) -> int:
-    """The number of a node in an extended roadmap."""
-    return int(after.index[before.tip(node) * after.shapes.size + before.shape(node)])
+def _same_nodes(before: Roadmap, after: Roadmap, nodes: IntArray) -> IntArray:
+    """The numbers of nodes in an extended roadmap."""
+    tip, shape = np.divmod(before.node[nodes], before.shapes.size)
+    return np.asarray(after.index[tip * after.shapes.size + shape])

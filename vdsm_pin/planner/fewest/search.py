@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.motion import Knots, knots_of
 from vdsm_pin.planner.fewest.order import reordered
@@ -21,15 +21,18 @@ class Found:
         roadmap: The graph searched.
         sequence: The sequence of nodes.
         knots: Its knots, every interval clear.
-        rounds: Sequences tried.
         home: The node the motion starts from.
+        ways: Length of the way from there to each node, inf if there is none known not
+            to be blocked, shape (v,); [m].
+        blocked: Pairs of nodes whose edges were found blocked, shape (n, 2).
     """
 
     roadmap: Roadmap
     sequence: Sequence
     knots: Knots
-    rounds: int
     home: int
+    ways: FloatArray
+    blocked: IntArray
 
     @property
     def missing(self) -> float:
@@ -40,7 +43,9 @@ class Found:
         return float(sum(gaps[k - 1] for k in skipped if not route.closed[k]))
 
 
-def search(judge: Judge, roadmap: Roadmap, home: int, rounds: int) -> Found | None:
+def search(
+    judge: Judge, roadmap: Roadmap, home: int, rounds: int, blocked: IntArray
+) -> Found | None:
     """The cheapest sequence whose every interval is clear.
 
     Args:
@@ -48,13 +53,16 @@ def search(judge: Judge, roadmap: Roadmap, home: int, rounds: int) -> Found | No
         roadmap: The graph.
         home: The node the motion starts from.
         rounds: Largest number of sequences tried.
+        blocked: Pairs of nodes whose edges are known to be blocked, shape (n, 2).
 
     Returns:
         None if the rounds end or nothing is drawn.
     """
     planner = Planner(roadmap, home)
+    if len(blocked):
+        planner.block(blocked, True)
     known: set[tuple[int, int]] = set()
-    for count in range(1, rounds + 1):
+    for _ in range(rounds):
         sequence = planner.sequence()
         if not any(leg.drawn for leg in sequence.legs):
             return None
@@ -65,8 +73,9 @@ def search(judge: Judge, roadmap: Roadmap, home: int, rounds: int) -> Found | No
         good = judge.clear(knots.pick(fresh)) if fresh.size else np.ones(0, bool)
         bad = fresh[~good]
         if not bad.size:
-            return Found(roadmap, sequence, knots, count, home)
+            return Found(roadmap, sequence, knots, home, planner.from_home, blocked)
         known.update(map(tuple, np.sort(knots.edges[fresh[good]], axis=1).tolist()))
+        blocked = np.concatenate([blocked, knots.edges[bad]])
         planner.block(knots.edges[bad], not knots.drawn[bad].all())
     return None
 
@@ -75,3 +84,8 @@ def _fresh(edges: IntArray, known: set[tuple[int, int]]) -> IntArray:
     """Intervals whose edge has not been looked at."""
     pairs = np.sort(edges, axis=1).tolist()
     return np.array([k for k, e in enumerate(pairs) if tuple(e) not in known], int)
+
+
+def nothing_blocked() -> IntArray:
+    """No edge is known to be blocked, shape (0, 2)."""
+    return np.zeros((0, 2), dtype=np.int64)
