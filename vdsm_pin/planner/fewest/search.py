@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.planner.fewest.alike import alike, lines_of
 from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.motion import Knots, knots_of
 from vdsm_pin.planner.fewest.order import reordered
@@ -74,16 +75,25 @@ def search(
         bad = fresh[~good]
         if not bad.size:
             return Found(roadmap, sequence, knots, home, planner.from_home, blocked)
-        known.update(map(tuple, np.sort(knots.edges[fresh[good]], axis=1).tolist()))
-        blocked = np.concatenate([blocked, knots.edges[bad]])
-        planner.block(knots.edges[bad], not knots.drawn[bad].all())
+        known.update(_keys(knots.edges[fresh]))
+        more = alike(roadmap, knots.edges[bad])
+        more = more[[key not in known for key in _keys(more)]]
+        known.update(_keys(more))
+        good = judge.clear(lines_of(judge.problem.manipulator, roadmap, more))
+        more = np.concatenate([knots.edges[bad], more[~good]])
+        blocked = np.concatenate([blocked, more])
+        planner.block(more, not knots.drawn[bad].all())
     return None
 
 
 def _fresh(edges: IntArray, known: set[tuple[int, int]]) -> IntArray:
     """Intervals whose edge has not been looked at."""
-    pairs = np.sort(edges, axis=1).tolist()
-    return np.array([k for k, e in enumerate(pairs) if tuple(e) not in known], int)
+    return np.array([k for k, e in enumerate(_keys(edges)) if e not in known], int)
+
+
+def _keys(edges: IntArray) -> list[tuple[int, int]]:
+    """Edges as pairs (low, high)."""
+    return [(a, b) for a, b in np.sort(edges, axis=1).tolist()]
 
 
 def nothing_blocked() -> IntArray:
