@@ -30,14 +30,13 @@ def demanded(problem: PlanningProblem) -> float:
     return 1.0 if path.blocked is Blocked.FAIL else path.required_coverage
 
 
-def refuse(problem: PlanningProblem, outcome: Outcome) -> None:
-    """Raise where too little of the path can be drawn.
+def refuse_proved(problem: PlanningProblem, outcome: Outcome) -> None:
+    """Raise where it is proved that too little of the path can be drawn.
 
     Raises:
-        OutOfReach: Proved: beyond the reach of the curled arm.
-        PathBlocked: Proved: too much of the path lies within an obstacle's margin.
-        CutOff: Proved: no way leads to too much of the path.
-        NoPlanFound: Not proved: the search did not get that far.
+        OutOfReach: Beyond the reach of the curled arm.
+        PathBlocked: Too much of the path lies within an obstacle's margin.
+        CutOff: No way leads to too much of the path.
     """
     rows, proof = outcome.rows, outcome.proof
     length = problem.path.length
@@ -45,6 +44,15 @@ def refuse(problem: PlanningProblem, outcome: Outcome) -> None:
     none_open = bool(proof.closed.all())
     if none_open or (length > 0.0 and 1.0 - shut / length < demanded(problem)):
         raise _proved(problem, rows, proof)
+
+
+def refuse(problem: PlanningProblem, outcome: Outcome) -> None:
+    """Raise where too little of the path was found to be drawn; no proof.
+
+    Raises:
+        NoPlanFound: The search did not get that far.
+    """
+    length = problem.path.length
     if outcome.found is None:
         raise NoPlanFound(how_far(problem, outcome))
     share = 1.0 if not length > 0.0 else _drawn(problem, outcome) / length

@@ -232,7 +232,7 @@ def narrowest(problem: PlanningProblem, tip: FloatArray) -> FloatArray | None:
         # Clear centres tell little of a cell that is larger than what it must keep.
         large = (cells.sizes() > -cells.inside) & (cells.state == DOUBTFUL)
         large |= (cells.sizes() > FINE) & (cells.middle < 0.0)
-        if not large[on_way].any():
+        if not large[on_way].any() or cells.codes.size > MOST_CELLS:
             break
         cells.split(cells.closest(on_way[large[on_way]]))
     return cells.centre(place) if cells.middle[place] < 0.0 else None

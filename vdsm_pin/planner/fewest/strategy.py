@@ -9,7 +9,12 @@ from vdsm_pin.cables import cable_lengths
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.kinematics import joint_angles
-from vdsm_pin.planner.fewest.explain import how_far, notes_of, refuse
+from vdsm_pin.planner.fewest.explain import (
+    how_far,
+    notes_of,
+    refuse,
+    refuse_proved,
+)
 from vdsm_pin.planner.fewest.explore import LEVELS, QUICK, Level, Outcome, explore
 from vdsm_pin.planner.fewest.motion import Knots, Rows, dense_rows
 from vdsm_pin.planner.fewest.nearby import Nearby, nearby
@@ -126,6 +131,7 @@ def _plan(
     try:
         for outcome in explore(problem, quick, margin, taste, levels):
             best = outcome
+            refuse_proved(problem, best)
         assert best is not None
         refuse(problem, best)
         return _written(problem, quick, name, taste, best)
