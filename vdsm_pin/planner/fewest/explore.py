@@ -137,9 +137,9 @@ def explore(
     # The way out of a start that is bent more than is liked must be allowed.
     bent = largest_start_angle(problem) / link_limit(problem)
     least_ease = min(1.0, bent + TOLERANCES.joint_limit)
-    walled = False
+    unreached = False
     for number, level in enumerate(levels):
-        if walled and level.back == 0.0:
+        if unreached and level.back == 0.0:
             continue
         ease = max(level.ease, least_ease)
         worth = problem.required_clearance + margin + level.slack + taste.room
@@ -155,7 +155,7 @@ def explore(
             yield best
         if not best.missing > 0.0:
             return
-        walled |= level.ease == 1.0 and (found is None or _walled(found))
+        unreached |= level.ease == 1.0 and (found is None or _unreached(found))
         if number == 0 and len(levels) > len(QUICK):
             # Seldom needed, so only now: is there any way for the tip at all?
             proof = replace(proof, cut_off=cut_off(problem, rows.tips))
@@ -186,7 +186,7 @@ def _look(
         if found is None or not found.missing > 0.0:
             break
         skipped = tuple(k for k in found.sequence.skipped if not route.closed[k])
-        if back == 0.0 and _walled(found):
+        if back == 0.0 and _unreached(found):
             break
         more = fill(judge, found.roadmap, found.ways, skipped, rng, taste)
         if more is None:
@@ -200,7 +200,7 @@ def _look(
     return found
 
 
-def _walled(found: Found) -> bool:
+def _unreached(found: Found) -> bool:
     """Whether there are nodes in the stretches not drawn that no way leads to."""
     roadmap = found.roadmap
     for k in found.sequence.skipped:
