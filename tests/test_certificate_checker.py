@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from oracles.certificate_cases import (
     CUBE,
+    NOTCHED,
     SHAPES,
     Case,
     random_case,
@@ -118,6 +119,37 @@ def test_slices_and_pieces_are_accepted(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("damage", ["turned", "gone", "another", "no number"])
+def test_pieces_that_do_not_cover_a_prism_are_rejected(
+    damage: str, tmp_path: Path
+) -> None:
+    bar = {"name": "bar", "shape": "prism", "axis": "x", "polygon": NOTCHED}
+    data = with_obstacles(bar | {"from": 3.0, "to": 4.0})
+    case = Case(tmp_path, data, straight_rows([0.0, 0.1]), NO_ERRORS)
+    assert judge(case).accepted
+
+    def change(lines: Any) -> None:
+        loops = lines[0]["pieces"]["bar"]
+        if damage == "turned":
+            loops[0] = loops[0][::-1]
+        elif damage == "gone":
+            loops.pop()
+        elif damage == "another":
+            loops[0] = [0, 1, 2] if sorted(loops[0]) != [0, 1, 2] else [0, 1, 3]
+        else:
+            loops[0] = ["a", "b", "c"]
+
+    reason = refused(case, sealed(edited(case, change)))
+    assert "make up the whole" in reason or "invalid literal" in reason
+
+
+def test_a_half_space_is_known_by_any_of_its_points(tmp_path: Path) -> None:
+    """The foot of the plane counts, not where the file has its point."""
+    floor = {"name": "floor", "shape": "half_space", "normal": [0, 0, 1]}
+    data = with_obstacles(floor | {"point": [3e7, -2e7, -0.2]})
+    assert judge(Case(tmp_path, data, straight_rows([0, 0.1]), NO_ERRORS)).accepted
+
+
 def planes_of(lines: Any) -> Any:
     return lines[1]["proofs"][2][0][2]
 
@@ -177,6 +209,18 @@ def test_a_tip_off_the_path_is_rejected(tmp_path: Path) -> None:
     assert "off the path" in refused(off)
 
 
+def test_a_tip_that_strays_between_rows_is_rejected(tmp_path: Path) -> None:
+    """The arm swings out and back to the path, farther than one spacing."""
+    q = straight_rows([0.0, 0.1])
+    q[0, 1], q[1, 1] = -0.4, 0.4
+    tips = [frames_and_centres([0.4, 0.3, 0.3], row)[1][-1].tolist() for row in q]
+    path = {"start": [1, 0, 0], "points": tips}
+    length = float(np.linalg.norm(np.subtract(*tips)))
+    drawn = {"on_path": [1, 1], "path_m": [0.0, length]}
+    case = Case(tmp_path, STRAIGHT | {"tip_path": path}, q, NO_ERRORS, **drawn)
+    assert "tip_deviation_m" in refused(case)
+
+
 # ---- meshes and their inside ---------------------------------------------------------
 
 
@@ -231,6 +275,8 @@ def test_pieces_of_a_mesh_are_a_permutation(tmp_path: Path) -> None:
                     flipped = [[12 - p[1], 12 - p[0], *p[2:]] for p in entry[2]]
                     entry[2][:] = flipped[::-1]
 
+    assert judge(case, sealed(edited(case, reverse))).accepted
+    order[-2:] = [True, False]  # numbers still, not a mask
     assert judge(case, sealed(edited(case, reverse))).accepted
     order[0] = 3
     assert "pieces of shell" in refused(case, sealed(edited(case, reverse)))
