@@ -14,9 +14,12 @@ from vdsm_pin.planner.pipeline import plan_paper
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.planner.tip_path import nearest_station
 from vdsm_pin.problem import Approach, Blocked, PlanningProblem
+from vdsm_pin.robot_model import load_robot
 from vdsm_pin.scene import Box, Capsule, Cylinder, Obstacle, Prism, Scene, Sphere
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.verify import verify
 
 ALL = ["free", "obs1", "obs2", "obs2-small", "obs3"]
 X = np.array([1.0, 0.0, 0.0])
@@ -75,12 +78,16 @@ def check_between_waypoints(plan: Plan) -> None:
     arm, path, rows = plan.problem.manipulator, plan.problem.path, plan.trajectory
     drawn = np.flatnonzero(rows.on_path[:-1] & rows.on_path[1:])
     joints, tip = rows.joints, plan.tip_path.points
+    # The rule may jump by less than a row may turn: rows in vain, for the tip's sake.
+    moved = np.linalg.norm(tip[drawn + 1] - tip[drawn], axis=1)
+    jump = (moved > 0.0) & (moved < 1e-2 * path.spacing)
+    most = np.where(jump, path.spacing, TOLERANCES.planned_stray)
     for part in (0.25, 0.5, 0.75):
         between = joints[drawn] + part * (joints[drawn + 1] - joints[drawn])
         reached = joint_centres(arm, between[:, 0], between[:, 1::2], between[:, 2::2])
         chord = tip[drawn] + part * (tip[drawn + 1] - tip[drawn])
         strayed = np.linalg.norm(reached[:, -1] - chord, axis=1)
-        assert strayed.max(initial=0.0) <= TOLERANCES.planned_stray
+        assert (strayed <= most).all()
     turn = max(path.length, path.spacing)
     run = np.mod(np.diff(rows.path_m)[drawn], turn)
     for station in path.corner_stations:
@@ -305,17 +312,30 @@ def test_an_open_path_is_drawn_from_its_first_corner_and_not_left() -> None:
     assert nearest_station(path) == 0.0
 
 
-def test_a_path_of_one_point_is_approached() -> None:
-    problem = with_obstacles(pillar(0.7, 0.6, 0.2))
-    points = np.array([[3.126, 1.0, 0.9]])
-    for closed in (False, True):
-        path = replace(problem.path, points=points, closed=closed)
-        plan = planned(replace(problem, path=path))
-        check_plan(plan)
-        assert plan.trajectory.on_path.sum() == 1
-
-
 def test_plans_are_the_same_every_time() -> None:
     once, again = planned(paper("obs2-small")), plan_of("obs2-small")
     np.testing.assert_array_equal(once.trajectory.joints, again.trajectory.joints)
     assert TOLERANCES.planned_clearance < 1e-5
+
+
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parametrize(
+    "obstacles",
+    [
+        (),
+        (pillar(0.0, 0.35, 0.15),),
+        (Cylinder("post", np.array([1.6, 0.3, 0.0]), Z, 6.0, 0.1),),
+    ],
+)
+def test_a_single_point_is_drawn_by_resting_there(
+    obstacles: tuple[Obstacle, ...], closed: bool
+) -> None:
+    task = with_obstacles(*obstacles)
+    path = replace(task.path, points=np.array([[3.126, 0.6, 0.6]]), closed=closed)
+    task = replace(task, path=path)
+    plan = planned(task)
+    on_path = plan.trajectory.on_path
+    assert on_path.sum() == 2
+    np.testing.assert_array_equal(np.ptp(plan.trajectory.joints[on_path], axis=0), 0.0)
+    verified = verify(task, plan.trajectory, load_robot(task.manipulator))
+    assert verified.verdict is Verdict.CERTIFIED

@@ -84,8 +84,11 @@ def drawn_rows(path: DesiredPath, first: float) -> Rows:
 
     Returns:
         Waypoints; stations run from `first` to `first` + length, so a closed path
-        passes its own length on the way.
+        passes its own length on the way. A single point is drawn by resting there:
+        two waypoints at one place.
     """
+    if not path.length > 0.0:
+        return rows_at(path, np.array([first, first]))
     corners = path.corner_stations
     if path.closed:
         corners = np.concatenate([corners, corners[1:] + path.length])
