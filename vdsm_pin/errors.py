@@ -9,6 +9,7 @@
     │   ├── OutOfReach        step 1 says no
     │   ├── LinkTooShort      a projected gap exceeds its link
     │   ├── LimitExceeded     a joint limit would be broken
+    │   ├── StartBlocked      the arm as it starts is too close to an obstacle
     │   ├── PathBlocked       an obstacle is in the way of the tip
     │   ├── CutOff            proved: no way for the tip is wide enough
     │   └── NoPlanFound       the search ended without a plan; not a proof
@@ -114,6 +115,38 @@ class LimitExceeded(Infeasible):
             f"waypoint {waypoint}: {quantity} is {value:.4f} {unit}, "
             f"the limit is {limit:.4f} {unit}"
         )
+        super().__init__(message)
+
+
+class StartBlocked(Infeasible):
+    """The arm as it starts is too close to an obstacle.
+
+    Args:
+        link: Number of the link, from 1.
+        obstacle: Name of the obstacle.
+        clearance: Between the two; [m].
+        required: What it must be; [m].
+        bent: Whether the problem states the joints, not the tip of a straight arm.
+    """
+
+    def __init__(
+        self,
+        *,
+        link: int,
+        obstacle: str,
+        clearance: float,
+        required: float,
+        bent: bool,
+    ) -> None:
+        self.link, self.obstacle = link, obstacle
+        self.clearance, self.required = clearance, required
+        message = (
+            f"at its start link {link} of the {'' if bent else 'straight '}arm has "
+            f"{clearance * 1e3:.3f} mm to obstacle {obstacle!r}, required are "
+            f"{required * 1e3:.3f} mm"
+        )
+        if not bent:
+            message += "; `start: {joints: ...}` states a start that is bent"
         super().__init__(message)
 
 

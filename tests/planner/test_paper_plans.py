@@ -6,7 +6,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfReach, PathBlocked
+from vdsm_pin.errors import (
+    Infeasible,
+    NoPlanFound,
+    OutOfReach,
+    PathBlocked,
+    StartBlocked,
+)
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.kinematics import joint_centres, link_angles
@@ -260,12 +266,12 @@ def test_many_random_prismatic_obstacles(axis: str) -> None:
     assert sum(solved) >= 300
 
 
-def test_start_in_the_danger_region_is_refused() -> None:
-    with pytest.raises(PathBlocked, match="rail lies in its danger region"):
+def test_a_start_in_an_obstacle_is_refused() -> None:
+    with pytest.raises(StartBlocked, match="pillar"):
         planned(with_obstacles(pillar(0.1, 0.0, 0.1)))
     problem = with_obstacles(pillar(0.4, 0.4, 0.1))
     start = replace(problem.path, start=np.array([3.126, 0.45, 0.4]))
-    with pytest.raises(PathBlocked, match="start lies in its danger region"):
+    with pytest.raises(StartBlocked, match="pillar"):
         planned(replace(problem, path=start))
 
 

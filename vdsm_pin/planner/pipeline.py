@@ -16,6 +16,7 @@ from vdsm_pin.planner.records import LinkClearance, Plan
 from vdsm_pin.planner.scale import scale
 from vdsm_pin.planner.solve import solve
 from vdsm_pin.planner.spacing import row_steps
+from vdsm_pin.planner.start import check_start
 from vdsm_pin.planner.tip_path import Route, subdivided
 from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
@@ -60,8 +61,9 @@ def plan_paper(
     Raises:
         Infeasible: With the reason, where the paper's rule has no plan.
     """
-    _check_start(problem)
+    _check_straight(problem)
     check_feasibility(problem.manipulator, problem.path)
+    check_start(problem, clearance)
     motion = _best_motion(problem, clearance, margin)
     trajectory = motion.trajectory
     cables = cable_lengths(problem.manipulator, trajectory.alpha, trajectory.theta)
@@ -76,7 +78,7 @@ def plan_paper(
     )
 
 
-def _check_start(problem: PlanningProblem) -> None:
+def _check_straight(problem: PlanningProblem) -> None:
     """Refuse a start with a bend past joint 1: the paper's arm starts straight.
 
     Raises:

@@ -17,7 +17,7 @@ from vdsm_pin.planner.records import Plan
 from vdsm_pin.planner.time_limit import within_time
 from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Box, Cylinder, HalfSpace, Sphere
+from vdsm_pin.scene import Box, HalfSpace, Sphere
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.hasty import is_certified
 from vdsm_pin.verification.link_clearance import link_clearance
@@ -202,12 +202,6 @@ def test_a_path_behind_a_wall_is_not_found_and_says_what_stands_in_the_way() -> 
     points = np.array([[3.126, 0.6, 0.0], [3.126, 0.9, 0.0]])
     with pytest.raises(NoPlanFound, match="plate"):
         planned(problem(plate, points=points, closed=False))
-
-
-def test_an_arm_that_starts_in_an_obstacle_is_refused_with_link_and_name() -> None:
-    post = Cylinder("post", np.array([1.0, 0.1, 0]), np.array([0, 0, 1.0]), 1.0, 0.05)
-    with pytest.raises(PathBlocked, match="post"):
-        planned(problem(post))
 
 
 def test_an_arm_that_starts_bent_starts_there() -> None:

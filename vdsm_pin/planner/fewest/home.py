@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from vdsm_pin.errors import LimitExceeded, NoPlanFound, PathBlocked
+from vdsm_pin.errors import LimitExceeded, NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres, link_angles
-from vdsm_pin.planner.fewest.bounds import culprit
 from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste, extended
@@ -41,7 +40,6 @@ def with_start(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, i
     """The roadmap with the start as a node, tied to what can be reached from it.
 
     Raises:
-        PathBlocked: If the arm at the start is not clear.
         LimitExceeded: If it breaks a limit.
         NoPlanFound: If no node can be reached from it.
     """
@@ -49,7 +47,7 @@ def with_start(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, i
         return roadmap, int(roadmap.index[0])
     offsets = start_offsets(judge.problem)[None]
     tip = roadmap.route.tips[:1]
-    _check_start(judge, tip, offsets)
+    _check_limits(judge, tip, offsets)
     room, _, _ = judge.look(tip, offsets)
     shapes = roadmap.shapes
     nodes = np.arange(roadmap.tip_nodes[0], roadmap.tip_nodes[1])
@@ -88,18 +86,8 @@ def largest_start_angle(problem: PlanningProblem) -> float:
     return float(link_angles(alpha, theta).max())
 
 
-def _check_start(judge: Judge, tip: FloatArray, offsets: FloatArray) -> None:
+def _check_limits(judge: Judge, tip: FloatArray, offsets: FloatArray) -> None:
     problem = judge.problem
-    still = Intervals(tip, tip, offsets, offsets)
-    place, share = np.zeros(1, dtype=np.int64), np.zeros(1)
-    centres = still.centres(problem.manipulator, place, share)
-    if not judge.clearance(centres).min() >= problem.required_clearance:
-        link, obstacle, gap = culprit(problem, centres[0])
-        reason = (
-            f"the arm at its start has {gap * 1e3:.3f} mm from link {link} to it, "
-            f"required are {problem.required_clearance * 1e3:.3f} mm"
-        )
-        raise PathBlocked(obstacle=obstacle, reason=reason)
     bend = float(judge.bends(tip, offsets).max())
     if not bend <= problem.manipulator.max_link_angle + TOLERANCES.joint_limit:
         limit = float(np.rad2deg(problem.manipulator.max_link_angle))

@@ -28,6 +28,7 @@ from vdsm_pin.planner.fewest.unbend import (
 )
 from vdsm_pin.planner.fewest.widest import widest
 from vdsm_pin.planner.records import LinkClearance, Plan, TipPath
+from vdsm_pin.planner.start import check_start
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
@@ -121,6 +122,7 @@ def _plan(
     taste: Taste,
     levels: tuple[Level, ...] = LEVELS,
 ) -> Plan:
+    check_start(problem, clearance)
     if not leans_ahead(problem):
         rows = unbend(problem, clearance, margin)
         there = from_there(problem, rows[-1])

@@ -1,0 +1,50 @@
+"""Whether the arm may stand where the problem says that it starts."""
+
+import numpy as np
+
+from vdsm_pin.errors import StartBlocked
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.planner.fewest.bounds import culprit
+from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.problem import PlanningProblem
+
+
+def start_centres(problem: PlanningProblem) -> FloatArray:
+    """Joint centres of the arm as it starts, shape (N + 1, 3); [m].
+
+    NaN along the rail where the start is farther from it than the arm is long.
+    """
+    arm, path = problem.manipulator, problem.path
+    if path.start_joints is not None:
+        joints = path.start_joints[None]
+        centres = joint_centres(arm, joints[:, 0], joints[:, 1::2], joints[:, 2::2])
+        return np.asarray(centres[0])
+    across = arm.ratios[:, None] * path.start[1:]
+    square = arm.total_length**2 - path.start[1:] @ path.start[1:]
+    rise = np.sqrt(square) if square >= 0.0 else np.nan
+    along = path.start[0] - rise * (1.0 - arm.ratios)
+    return np.column_stack([along, across])
+
+
+def check_start(problem: PlanningProblem, clearance: LinkClearance) -> None:
+    """Refuse a start that is too close to an obstacle.
+
+    The start is a pose that the problem states: no strategy takes another one. One out
+    of reach is not judged here.
+
+    Args:
+        problem: What is asked.
+        clearance: Clearance of links at given joint centres.
+
+    Raises:
+        StartBlocked: With the link, the obstacle and the clearance between them.
+    """
+    centres = start_centres(problem)
+    required = problem.required_clearance
+    if np.isfinite(centres).all() and not clearance(centres[None]).min() >= required:
+        link, obstacle, room = culprit(problem, centres)
+        bent = problem.path.start_joints is not None
+        raise StartBlocked(
+            link=link, obstacle=obstacle, clearance=room, required=required, bent=bent
+        )
