@@ -21,7 +21,8 @@ PAGE = """\
 # Performance
 
 Processor time on one thread, median after a warm-up, unless a row says otherwise;
-rebuilt by `python -m benchmarks.report --save reports/performance`.
+rebuilt by `python -m benchmarks.report --save reports/performance` with
+`--most {most:g} --problems {problems}`.
 
 {around}
 
@@ -97,7 +98,9 @@ def main() -> None:
     }
     tables = {name: table(results) for name, results in parts.items()}
     tables["growth"] = growth.growth_table(parts["growth"])
-    text = PAGE.format(around=described(), **tables)
+    text = PAGE.format(
+        around=described(), most=asked.most, problems=asked.problems, **tables
+    )
     print(text)
     if asked.save:
         save(asked.save / "performance.json", {k: v for p in parts.values()
