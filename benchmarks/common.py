@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -31,7 +32,7 @@ def cpu_model() -> str:
     return names[0] if names else platform.machine()
 
 
-def surroundings() -> dict[str, object]:
+def surroundings() -> dict[str, Any]:
     """Processor, cores, load and versions."""
     known = {}
     for name in LIBRARIES:
@@ -48,14 +49,21 @@ def surroundings() -> dict[str, object]:
     }
 
 
-def described() -> str:
-    """The surroundings as a sentence."""
-    around = surroundings()
+def described(around: dict[str, Any]) -> str:
+    """Surroundings as a sentence, but for the load, which changes."""
     versions = ", ".join(f"{k} {v}" for k, v in around["versions"].items())
     return (
-        f"{around['processor']}, {around['cores']} cores, load {around['load']}; "
+        f"{around['processor']}, {around['cores']} cores; "
         f"Python {around['python']}, {versions}."
     )
+
+
+def saved_on(file: Path) -> dict[str, Any]:
+    """The surroundings in which saved results were measured."""
+    around: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))[
+        "surroundings"
+    ]
+    return around
 
 
 def timed(

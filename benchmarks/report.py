@@ -1,28 +1,38 @@
 """Everything the user waits for in one page: plan, certify, cables, batch, cold start.
 
-    python -m benchmarks.report --save reports/performance [--most 1e6] [--problems 200]
-    python -m benchmarks.report --compare OLD.json NEW.json
+    python -m benchmarks.report --save reports/performance [--only PART ...]
+    python -m benchmarks.report --compare OLD NEW
 
-Times are processor time on one thread unless they say otherwise, so that other work on
-the machine hardly shows.
+Each part is a file beside the page, so that one can be measured again alone. Times are
+processor time on one thread unless they say otherwise, so that other work on the
+machine shows little.
 """
 
 import argparse
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from benchmarks import batch, cold, growth, kinematics, memory, plan
 from benchmarks.certify import headline
-from benchmarks.common import Results, compare, described, save, table
+from benchmarks.common import (
+    Results,
+    compare,
+    described,
+    load,
+    save,
+    saved_on,
+    table,
+)
 
 PAGE = """\
 # Performance
 
 Processor time on one thread, median after a warm-up, unless a row says otherwise;
-rebuilt by `python -m benchmarks.report --save reports/performance` with
-`--most {most:g} --problems {problems}`.
+rebuilt by `python -m benchmarks.report --save reports/performance`, one part of it with
+`--only`. How busy the machine was stands with each part.
 
 {around}
 
@@ -67,11 +77,53 @@ to the byte. See `docs/scaling.md` for many machines.
 {cold}"""
 
 
+PARTS = ("plan", "kinematics", "certify", "growth", "memory", "batch", "cold")
+
+
 def certifying() -> Results:
     """The headline of `benchmarks/certify.py`."""
     row = headline()
     name = f"10,000 intervals x {row.pairs} pairs [ms]"
     return {name: {"median": row.cpu_ms, "p95": row.p95_ms}}
+
+
+def measured(part: str, most: int, problems: int) -> Results:
+    """One part of the page, measured.
+
+    Args:
+        part: Its name.
+        most: Largest size that anything grows to.
+        problems: Of the batch.
+    """
+    known: dict[str, Callable[[], Results]] = {
+        "plan": lambda: plan.measure(20),
+        "kinematics": kinematics.measure,
+        "certify": certifying,
+        "growth": lambda: growth.measure(most),
+        "memory": lambda: memory.measure(most),
+        "batch": lambda: batch.measure(problems, 1, "none"),
+        "cold": cold.measure,
+    }
+    return known[part]()
+
+
+def page(folder: Path) -> str:
+    """The page of what was measured, and growth.svg beside it."""
+    files = {part: folder / f"{part}.json" for part in PARTS}
+    missing = [part for part, file in files.items() if not file.exists()]
+    if missing:
+        return f"Not measured yet: {' '.join(missing)}; no page without them.\n"
+    parts = {part: load(file) for part, file in files.items()}
+    tables = {part: table(results) for part, results in parts.items()}
+    tables["growth"] = growth.growth_table(parts["growth"])
+    growth.plot(parts["growth"], folder / "growth.svg")
+    tables = {
+        part: f"Load of the machine: {saved_on(files[part])['load']}.\n\n{text}"
+        for part, text in tables.items()
+    }
+    text = PAGE.format(around=described(saved_on(files["plan"])), **tables)
+    (folder / "README.md").write_text(text, encoding="utf-8")
+    return text
 
 
 def main() -> None:
@@ -80,33 +132,24 @@ def main() -> None:
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("--save", type=Path, metavar="FOLDER")
     parser.add_argument("--compare", type=Path, nargs=2, metavar=("OLD", "NEW"))
+    parser.add_argument("--only", nargs="*", choices=PARTS, default=PARTS)
     parser.add_argument("--most", type=float, default=1e6, help="largest size")
     parser.add_argument("--problems", type=int, default=200, help="of the batch")
     asked = parser.parse_args()
     if asked.compare:
-        for name, ratio in compare(*asked.compare).items():
-            print(f"{ratio:6.2f} times  {name}")
+        old, new = asked.compare
+        both = [p.name for p in old.glob("*.json") if (new / p.name).exists()]
+        for file in sorted(both):
+            for name, ratio in compare(old / file, new / file).items():
+                print(f"{ratio:6.2f} times  {name}")
         return
-    parts = {
-        "cold": cold.measure(),
-        "plan": plan.measure(20),
-        "kinematics": kinematics.measure(),
-        "certify": certifying(),
-        "growth": growth.measure(int(asked.most)),
-        "memory": memory.measure(int(asked.most)),
-        "batch": batch.measure(asked.problems, 1, "none"),
-    }
-    tables = {name: table(results) for name, results in parts.items()}
-    tables["growth"] = growth.growth_table(parts["growth"])
-    text = PAGE.format(
-        around=described(), most=asked.most, problems=asked.problems, **tables
-    )
-    print(text)
+    for part in asked.only:
+        results = measured(part, int(asked.most), asked.problems)
+        print(table(results))
+        if asked.save:
+            save(asked.save / f"{part}.json", results)
     if asked.save:
-        save(asked.save / "performance.json", {k: v for p in parts.values()
-                                               for k, v in p.items()})  # fmt: skip
-        growth.plot(parts["growth"], asked.save / "growth.svg")
-        (asked.save / "README.md").write_text(text, encoding="utf-8")
+        print(page(asked.save))
 
 
 if __name__ == "__main__":

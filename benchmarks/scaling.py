@@ -25,7 +25,7 @@ import numpy as np
 from distributed import Client, as_completed
 
 from benchmarks.batch import write_problems
-from benchmarks.common import Results, described, save, table
+from benchmarks.common import Results, described, save, surroundings, table
 from vdsm_pin.batch.cluster import LONGEST_ERRAND
 from vdsm_pin.batch.pool import Ended
 from vdsm_pin.batch.task import Done, Task, keeps_files, perform
@@ -186,7 +186,8 @@ def page(results: Results, cores: int) -> str:
     errands = rate / LONGEST_ERRAND
     busy = errands * errand_ms / 1e3
     return PAGE.format(
-        around=described(), measured=table(results), problems=PROBLEMS, cores=cores,
+        around=described(surroundings()), measured=table(results),
+        problems=PROBLEMS, cores=cores,
         rate=rate, hours=PROBLEMS / rate / 3600.0, errands=errands,
         errand=LONGEST_ERRAND, busy=busy, most=cores / busy,
         stream=rate * keep_all["median"] / 1e3,
