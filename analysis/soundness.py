@@ -7,8 +7,10 @@ A false `certified` is a pair proved clear that is not; a false `refuted` the re
 
 Each query goes to the compiled sweep as the one pair it asks about. One scene in a
 hundred also goes through `prove_clearance` as a whole, culling included, which must
-not contradict the truth either. The same seed gives the same queries on any number of
-processes.
+not contradict the truth either. Queries about error boxes are certified falsely where a
+motion within the box is known, or found, to come too near; they are far from the limit
+where a known plane proves the whole box with 1 um to spare. The same seed gives the
+same queries on any number of processes.
 """
 
 import argparse
@@ -37,6 +39,7 @@ from oracles.adversarial import (
     make_link_batch,
 )
 from oracles.adversarial_bodies import pack
+from oracles.adversarial_boxes import Boxed, attacked, make_boxed
 from oracles.adversarial_truth import exact_bracket
 
 from vdsm_pin.geometry.convex import Hull
@@ -60,20 +63,24 @@ FAR: Final = 1e-6
 UNDECIDED_LIMIT: Final = 1e-3
 """Largest share of undecided queries among those far from the limit; [-]."""
 
+BOXES: Final = "boxes"
+"""Not a motion: error boxes around any of them."""
+
 SHARES: Final = {
-    "none": 0.42,
-    "still": 0.18,
-    "rail": 0.14,
-    "away": 0.14,
+    "none": 0.40,
+    "still": 0.16,
+    "rail": 0.13,
+    "away": 0.13,
     "base_turn": 0.02,
     "pierce": 0.04,
     "links_none": 0.02,
     "links_still": 0.02,
     "links_swing": 0.02,
+    BOXES: 0.06,
 }
 """Share of each kind of motion; turns near the limit take many slices each."""
 
-SIZES: Final = {"links_swing": 32, "links_none": 253, "links_still": 253}
+SIZES: Final = {"links_swing": 32, "links_none": 253, "links_still": 253, BOXES: 200}
 """Queries about one motion where they are not as many as asked for."""
 
 LEAST: Final = {"base_turn": 1e-8, "links_swing": 1e-8}
@@ -89,6 +96,7 @@ WHOLE: Final = 100
 """One scene in so many is judged as a whole too, with at most so many obstacles."""
 
 CERTIFIED, REFUTED, UNDECIDED = 0, 1, 2
+NOMINAL: Final = ErrorBox()
 
 
 def _pack(batch: Batch) -> PackedPieces:
@@ -104,7 +112,7 @@ def _pack(batch: Batch) -> PackedPieces:
     )
 
 
-def verdicts(batch: Batch) -> Any:
+def verdicts(batch: Batch, errors: ErrorBox = NOMINAL) -> Any:
     """The verifier's verdict on each query; 0, 1 or 2, shape (n,)."""
     arm, pieces, n = batch.arm, _pack(batch), batch.size
     values = (pieces.points, pieces.centre, pieces.extent, pieces.radius)
@@ -113,9 +121,9 @@ def verdicts(batch: Batch) -> Any:
     rules = Rules(
         lengths=np.array(arm.link_lengths),
         radius=float(arm.link_radius),
-        joint_error=0.0,
-        base_error=0.0,
-        obstacle_error=0.0,
+        joint_error=errors.joint,
+        base_error=errors.base,
+        obstacle_error=errors.obstacle,
         pad=TOLERANCES.arithmetic * max(1.0, extent / TOLERANCES.scene_extent),
         goal=TOLERANCES.bracket_gap,
         gap=TOLERANCES.least_bracket,
@@ -202,22 +210,53 @@ def recheck(batch: Batch, rng: np.random.Generator) -> int:
 def count(batch: Batch, asked: Any, found: Any, tally: Counter[str]) -> None:
     """Add verdicts on some queries of a batch to a tally, by motion and shape."""
     excess = batch.excess[asked]
-    clear, far = excess > 0.0, np.abs(excess) >= FAR
+    truth = Truth(excess < 0.0, excess > 0.0, np.abs(excess) >= FAR)
+    _count(batch.motion, batch.shape[asked], truth, found, tally)
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is known of some queries.
+
+    Args:
+        lost: Whether certifying one would be wrong, shape (n,).
+        kept: Whether refuting one would be, shape (n,).
+        far: Whether one must be decided, shape (n,).
+    """
+
+    lost: Any
+    kept: Any
+    far: Any
+
+
+def _count(
+    motion: str, shapes: Any, truth: Truth, found: Any, tally: Counter[str]
+) -> None:
     kinds = {
         "queries": found >= 0,
-        "false certified": (found == CERTIFIED) & ~clear,
-        "false refuted": (found == REFUTED) & clear,
+        "false certified": (found == CERTIFIED) & truth.lost,
+        "false refuted": (found == REFUTED) & truth.kept,
         "undecided": found == UNDECIDED,
-        "far": far,
-        "undecided far": (found == UNDECIDED) & far,
+        "far": truth.far,
+        "undecided far": (found == UNDECIDED) & truth.far,
     }
-    shapes = batch.shape[asked]
     for name, which in kinds.items():
         tally[name] += int(which.sum())
         for shape, number in zip(
             *np.unique(shapes[which], return_counts=True), strict=True
         ):
-            tally[f"{name}|{batch.motion}|{shape}"] += int(number)
+            tally[f"{name}|{motion}|{shape}"] += int(number)
+
+
+def judge_boxed(boxed: Boxed, rng: np.random.Generator, tally: Counter[str]) -> None:
+    """Judge queries about an error box, attack what is certified, and count."""
+    batch = boxed.batch
+    found = verdicts(batch, boxed.errors)
+    certified, lost = np.flatnonzero(found == CERTIFIED), boxed.lost.copy()
+    lost[certified] |= attacked(boxed, _pack(batch), certified, rng)
+    truth = Truth(lost, boxed.kept, boxed.proved >= FAR)
+    _count(f"box_{batch.motion}", batch.shape, truth, found, tally)
+    tally["certified boxes attacked"] += len(certified)
 
 
 def judge(batch: Batch, rng: np.random.Generator, tally: Counter[str]) -> None:
@@ -239,6 +278,12 @@ def run_block(seed: np.random.SeedSequence, queries: int, size: int) -> Counter[
         done = 0
         while done < wanted:
             part = min(SIZES.get(motion, size), wanted - done)
+            if motion == BOXES:
+                boxed = make_boxed(rng, part, 1e-12)
+                if boxed.batch.size:
+                    judge_boxed(boxed, rng, tally)
+                done += boxed.batch.size
+                continue
             make = make_link_batch if motion in LINK_MOTIONS else make_batch
             batch = make(rng, motion, part, LEAST.get(motion, 1e-12))
             if batch.size:
@@ -328,10 +373,13 @@ def report(tally: Counter[str], command: str) -> str:
         f"from the limit {tally['undecided far']:,} ({share:.5%}, allowed 0.1 %)",
         f"* truth recomputed in ball arithmetic for {tally['rechecked']:,}; "
         f"{tally['scenes judged whole']:,} scenes judged through `prove_clearance` too",
+        f"* {tally['certified boxes attacked']:,} queries certified for an error box, "
+        "each attacked from corners of it",
         f"* {versions}, Python {platform.python_version()}, {platform.machine()}",
         "",
-        "What the motions and shapes are: `tests/oracles/adversarial.py` and",
-        "`adversarial_bodies.py`. `far`: at least 1 um from the limit.",
+        "What the motions and shapes are: `tests/oracles/adversarial.py`,",
+        "`adversarial_bodies.py` and `adversarial_boxes.py`. `far`: at least 1 um from",
+        "the limit; of a box, proved by a known plane with as much to spare.",
         "",
         *_table(tally, 1, "motion"),
         "",

@@ -2,6 +2,8 @@
 
 import json
 import sys
+from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,7 @@ from oracles.adversarial import (
     make_link_batch,
 )
 from oracles.adversarial_bodies import SHAPES, pack
+from oracles.adversarial_boxes import make_boxed
 from oracles.adversarial_truth import as_data, exact_bracket, from_data, sample
 
 from vdsm_pin.geometry.pieces import pack_pieces
@@ -22,6 +25,7 @@ ROOT = Path(__file__).parents[2]
 SAMPLE = ROOT / "tests" / "oracles" / "adversarial_sample.json"
 sys.path.insert(0, str(ROOT / "analysis"))
 
+import soundness  # noqa: E402
 from soundness import (  # noqa: E402
     CERTIFIED,
     REFUTED,
@@ -58,7 +62,7 @@ def test_the_corpus_knows_its_truth(motion: str) -> None:
 def test_the_sample_is_the_generators() -> None:
     """Another numpy may draw other numbers; the sample then stands for itself."""
     stored = json.loads(SAMPLE.read_text())
-    assert {data["motion"] for data in stored} == set(SHARES)
+    assert {data["motion"] for data in stored} == set(SHARES) - {soundness.BOXES}
     assert {data["shape"] for data in stored} == {*SHAPES, "links"}
     for k in (0, 7, -1):
         assert as_data(from_data(stored[k]), 0) == stored[k]
@@ -115,13 +119,55 @@ def test_no_query_of_the_sample_is_misjudged() -> None:
 
 def test_an_error_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     """A verifier that lies is found out, whichever way it lies."""
-    import soundness
-
     for lie, name in ((CERTIFIED, "false certified"), (REFUTED, "false refuted")):
         monkeypatch.setattr(
-            soundness, "verdicts", lambda batch, lie=lie: np.full(batch.size, lie)
+            soundness, "verdicts", lambda batch, *_, lie=lie: np.full(batch.size, lie)
         )
         assert run(300, 1, 50)[name] > 100
+
+
+def boxes_judged(seed: int) -> Counter[str]:
+    """The tally of some error boxes."""
+    tally: Counter[str] = Counter()
+    rng = np.random.default_rng(seed)
+    for _ in range(12):
+        boxed = make_boxed(rng, 100, 1e-12)
+        if boxed.batch.size:
+            soundness.judge_boxed(boxed, rng, tally)
+    return tally
+
+
+def test_error_boxes_are_judged_rightly() -> None:
+    tally = boxes_judged(3)
+    assert tally["false certified"] == tally["false refuted"] == 0
+    assert tally["undecided far"] == 0
+    assert tally["far"] > 50
+    assert tally["certified boxes attacked"] > 100
+
+
+def test_a_verifier_that_forgets_the_errors_is_found_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    nominal = soundness.verdicts
+    monkeypatch.setattr(soundness, "verdicts", lambda batch, errors: nominal(batch))
+    assert boxes_judged(3)["false certified"] > 20
+
+
+def test_attacks_alone_find_that_verifier_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without being told which motion of the box misses the clearance."""
+    nominal = soundness.verdicts
+    monkeypatch.setattr(soundness, "verdicts", lambda batch, errors: nominal(batch))
+    lost = 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        boxed = make_boxed(rng, 100, 1e-12)
+        if not boxed.batch.size:
+            continue
+        blind = replace(boxed, lost=np.zeros(boxed.batch.size, bool))
+        tally: Counter[str] = Counter()
+        soundness.judge_boxed(blind, rng, tally)
+        lost += tally["false certified"]
+    assert lost > 20
 
 
 def no_errors(queries: int, seed: int, processes: int = 1) -> None:

@@ -176,7 +176,6 @@ def facing(pieces: PackedPieces, node: int, points: FloatArray, n: FloatArray) -
     Returns:
         Whether there is such a direction; there is none where they seem to meet.
     """
-    apart()
     low, high = pieces.node_low[node], pieces.node_high[node]
     span = along = 0.0
     for c in range(3):
@@ -221,7 +220,6 @@ def push_children(
     waiting: int,
 ) -> int:
     """Push both children, the nearer one last so that it is seen first."""
-    apart()
     left, right = node + 1, pieces.node_right[node]
     left_gap = box_distance(pieces, left, low, high)
     right_gap = box_distance(pieces, right, low, high)

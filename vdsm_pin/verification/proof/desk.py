@@ -7,7 +7,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.verification.proof.coasting import Runs, new_runs
-from vdsm_pin.verification.proof.layouts import PLANE, SLICE, SUPPORT
+from vdsm_pin.verification.proof.layouts import HELD_CLEARANCE, PLANE, SLICE, SUPPORT
 from vdsm_pin.verification.proof.rows import BLOCK, Rows, new_rows
 from vdsm_pin.verification.proof.slices import Space, new_space
 from vdsm_pin.verification.proof.swept_links import Ends, load_errors, new_ends
@@ -39,7 +39,7 @@ def forget(planes: FloatArray) -> None:
     """No pair remembers a plane any more, shape (n_pairs, PLANE)."""
     planes[:] = 0.0
     planes[:, 0] = 1.0
-    planes[:, SUPPORT] = -np.inf
+    planes[:, SUPPORT] = planes[:, HELD_CLEARANCE] = -np.inf
 
 
 @compiled

@@ -5,9 +5,12 @@ from typing import Final
 SUPPORT: Final = 3
 POINT: Final = 4
 WIDTH: Final = 7
-PLANE: Final = 8
+HELD_CLEARANCE: Final = 8
+HELD_AT: Final = 9
+PLANE: Final = 15
 """Layout of what a pair remembers: n (3), support in n, witness on the partner (3),
-width of the bracket when they were found."""
+width of the bracket when they were found; of a partner of many pieces the clearance
+proved at one configuration, else -inf, and both ends of the link there (6)."""
 
 KEY: Final = 0
 INTERVAL: Final = 1

@@ -18,6 +18,8 @@ from vdsm_pin.verification.proof.desk import Desk, load_rows, take_rows
 from vdsm_pin.verification.proof.layouts import (
     AT_UPPER,
     END,
+    HELD_AT,
+    HELD_CLEARANCE,
     INSTANT,
     INTERVAL,
     KEY,
@@ -56,9 +58,24 @@ ROUGH: Final = 0.1
 
 @compiled
 def _renew(
-    task: Task, desk: Desk, results: Results, local: int, pair: int, goal: float
+    task: Task,
+    desk: Desk,
+    results: Results,
+    local: int,
+    pair: int,
+    goal: float,
+    bar: float,
 ) -> float:
     """A new plane and witness for a pair, from one interval of the block.
+
+    Args:
+        task: The scene, pairs and rules.
+        desk: Working space, its rows filled.
+        results: For the tally.
+        local: The interval.
+        pair: The pair.
+        goal: Width of a distance bracket at which to stop; [m].
+        bar: Clearances below it are to be as good as they can be; [m].
 
     Returns:
         The clearance proved for that interval, where the partner is of many pieces and
@@ -73,8 +90,10 @@ def _renew(
     if last - p == 1:
         leaf_bracket(pieces, space, p, goal, True, space.out)
     else:
-        loaded_bound(pieces, task.pairs, task.rules, space, pair, True)
-        proved = space.out[LOWER]
+        loaded_bound(pieces, task.pairs, task.rules, space, pair, True, bar)
+        proved = plane[HELD_CLEARANCE] = space.out[LOWER]
+        for k in range(6):
+            plane[HELD_AT + k] = space.body.points[2 + k // 3, k % 3]
     plane[:3], plane[POINT:WIDTH] = space.out[NORMAL:NEAR], space.out[FAR:BRACKET]
     n, stack, point = plane[:3], space.stack, space.scratch[0]
     plane[SUPPORT] = node_support(pieces, root, n, stack, point)
@@ -91,7 +110,7 @@ def _look_at_row(
     load_rows(task, desk, pair, local, local)
     rules, space, pieces = task.rules, desk.space, task.pieces
     space.out[NORMAL:NEAR] = desk.planes[pair, :3]
-    loaded_bound(pieces, task.pairs, rules, space, pair, False)
+    loaded_bound(pieces, task.pairs, rules, space, pair, False, np.inf)
     group = group_of(task.pairs.frame[pair])
     results.limit[group] = min(results.limit[group], space.out[LOWER])
 
@@ -150,7 +169,7 @@ def _subdivide(
         row[START] = row[END] = time
         bound_between(task, motion, desk.ends, desk.space, row)
         _dense_row(task, desk, results, m, local, pair, verdict, time, point)
-    desk.planes[pair, SUPPORT] = -np.inf
+    desk.planes[pair, SUPPORT] = desk.planes[pair, HELD_CLEARANCE] = -np.inf
     return verdict
 
 
@@ -217,11 +236,21 @@ def sweep_pair(
         if closely:
             bar = max(bar, limit[group] - rules.gap)
         done = coast(
-            rules, rows, runs, plane, link, frame, local, last, bar, slack, fresh
+            rules,
+            rows,
+            runs,
+            plane,
+            link,
+            frame,
+            local,
+            last,
+            bar,
+            slack,
+            fresh,
+            proved,
         )
         if fresh and done == local:
             # This interval allows no more, and may be proved nevertheless.
-            runs.lower[local] = max(runs.lower[local], proved)
             done += runs.lower[local] >= required
         if done > local:
             counts[CERTIFIED] += done - local
@@ -245,7 +274,7 @@ def sweep_pair(
         if done == last:
             stretch *= 2
             continue
-        proved = _renew(task, desk, results, local, pair, goal)
+        proved = _renew(task, desk, results, local, pair, goal, bar)
         if not (nominal or hasty):
             _look_at_row(task, desk, results, local, pair)
         fresh, stretch = True, STRETCH

@@ -1,6 +1,6 @@
 """Bounds over one slice of an interval for one pair, in compiled code."""
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from vdsm_pin.geometry.obstacles import (
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.verification.proof.swept_links import Ends, load_link, room_of
 from vdsm_pin.verification.proof.terms import Pairs, Rules, losses
+
+EASE: Final = 0.5
+"""Part of the slack that the pieces of a partner need not be told apart by."""
 
 
 class Space(NamedTuple):
@@ -106,7 +109,6 @@ def node_bound(
     n: FloatArray,
 ) -> float:
     """The same of a plane that faces the node's box, written to n, by that box; [m]."""
-    apart()
     if not facing(pieces, node, space.body.points, n):
         return -np.inf
     support = box_support(pieces, node, n[0], n[1], n[2])
@@ -183,9 +185,11 @@ def _mesh_bound(
     root: int,
     frame: int,
     sighted: bool,
+    enough: float,
 ) -> None:
     """`loaded_bound` for an obstacle of many pieces, by its hierarchy."""
     apart()
+    left_out, part = np.inf, 1.0 - EASE * rules.slack
     low, high = space.scratch[SCRATCH_ROWS], space.scratch[SCRATCH_ROWS + 1]
     box_of(space.body.points, low, high)
     nodes, trial, out = space.nodes, space.trial, space.out
@@ -197,7 +201,9 @@ def _mesh_bound(
         waiting -= 1
         node = nodes[waiting]
         n = trial[BRACKET : BRACKET + 3]
-        if node_bound(pieces, rules, space, node, frame, n) >= out[LOWER]:
+        bound = node_bound(pieces, rules, space, node, frame, n)
+        if bound >= min(out[LOWER], max(enough, part * out[LOWER])):
+            left_out = min(left_out, bound)
             continue
         first, last = pieces.node_range[node]
         if last - first > 1:
@@ -205,6 +211,7 @@ def _mesh_bound(
             continue
         leaf_bound(pieces, rules, space, node, frame, sighted, trial)
         keep_least(trial, out)
+    out[LOWER] = min(out[LOWER], left_out)
 
 
 @compiled
@@ -215,15 +222,27 @@ def loaded_bound(
     space: Space,
     pair: int,
     sighted: bool,
+    enough: float,
 ) -> None:
-    """`slice_bound` where the body is in the working space already."""
+    """`slice_bound` where the body is in the working space already.
+
+    Args:
+        pieces: The scene.
+        pairs: All pairs.
+        rules: What the planes lose.
+        space: Its `body` is loaded; otherwise as for `slice_bound`.
+        pair: Number of the pair.
+        sighted: As for `leaf_bracket`.
+        enough: From here on the bound may be below the best one by a part of it, where
+            the partner is of many pieces; [m].
+    """
     apart()
     root, frame = pieces.root[pairs.obstacle[pair]], pairs.frame[pair]
     first, last = pieces.node_range[root]
     if last - first == 1:
         leaf_bound(pieces, rules, space, root, frame, sighted, space.out)
     else:
-        _mesh_bound(pieces, rules, space, root, frame, sighted)
+        _mesh_bound(pieces, rules, space, root, frame, sighted, enough)
 
 
 @compiled
@@ -251,4 +270,4 @@ def slice_bound(
     """
     apart()
     load_link(rules, ends, space.body, pairs.link[pair], pairs.frame[pair], h)
-    loaded_bound(pieces, pairs, rules, space, pair, h == 0.0)
+    loaded_bound(pieces, pairs, rules, space, pair, h == 0.0, np.inf)
