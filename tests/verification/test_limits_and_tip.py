@@ -7,12 +7,13 @@ import pytest
 
 from vdsm_pin.kinematics import joint_angles, joint_centres
 from vdsm_pin.manipulator import built_in
-from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem import DesiredPath, Order, PlanningProblem
 from vdsm_pin.scene import Scene
 from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.drawing import check_order, coverage
 from vdsm_pin.verification.limits import check_limits, extremes
 from vdsm_pin.verification.records import Check, Verdict
-from vdsm_pin.verification.tip import check_tip, coverage
+from vdsm_pin.verification.tip import check_tip
 
 ARM = built_in("hrm8")
 SQUARE = np.array([[3.1, 0, 0], [3.1, 0.4, 0], [3.1, 0.4, 0.4], [3.1, 0, 0.4]])
@@ -168,3 +169,71 @@ def test_base_and_steps_are_judged() -> None:
     assert step.verdict is Verdict.REFUTED
     assert (step.moment, step.where) == (3.0, "joint 1")
     assert extremes(motion).x0_min == motion.x0.min()
+
+
+def parts(motion: Trajectory, *ranges: tuple[int, int]) -> Trajectory:
+    """Ranges of rows one after the other, a row off the path between them."""
+    rows, off = [], []
+    for first, last in ranges:
+        step = 1 if last > first else -1
+        rows += [first, *range(first, last, step)]
+        off.append(len(rows) - abs(last - first) - 1)
+    on = np.ones(len(rows), bool)
+    on[off] = False
+    return Trajectory(
+        on, *(getattr(motion, n)[rows] for n in ("path_m", "x0", "alpha", "theta"))
+    )
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_pieces_in_another_order_are_refuted_unless_free(closed: bool) -> None:
+    problem, motion = drawing()
+    problem = replace(problem, path=replace(problem.path, closed=closed))
+    if not closed:
+        motion = motion.part(0, 120)
+    given = parts(motion, (0, 40), (50, 70), (80, 110))
+    swapped = parts(motion, (0, 40), (80, 110), (50, 70))
+    turned = parts(motion, (0, 40), (70, 50), (80, 110))
+    begun = parts(motion, (50, 70), (80, 110), (0, 40))
+    for rows, right in (
+        (motion, True), (given, True), (swapped, False), (turned, False),
+        (begun, closed),
+    ):  # fmt: skip
+        (row,) = check_order(problem, rows)
+        assert row.verdict is (Verdict.CERTIFIED if right else Verdict.REFUTED)
+        free = replace(problem, path=replace(problem.path, order=Order.FREE))
+        assert check_order(free, rows) == ()
+
+
+def test_the_place_where_the_order_breaks_is_named() -> None:
+    problem, motion = drawing()
+    path_m = motion.path_m.copy()
+    path_m[60] -= 0.02
+    (row,) = check_order(problem, replace(motion, path_m=path_m))
+    assert (row.verdict, row.moment) == (Verdict.REFUTED, 60.0)
+    assert row.worst == pytest.approx(0.01, abs=1e-9)
+    (row,) = check_order(problem, parts(motion, (0, 40), (80, 110), (50, 70)))
+    assert row.moment == 73.0  # the last piece: a row before each is off
+    nothing = replace(motion, on_path=np.zeros(motion.n_samples, bool))
+    (row,) = check_order(problem, nothing)
+    assert row.verdict is Verdict.UNDECIDED
+
+
+def test_laps_in_one_go_and_rounding_are_in_order() -> None:
+    problem, motion = drawing(401, 2.5)
+    (row,) = check_order(problem, motion)
+    assert row.verdict is Verdict.CERTIFIED
+    path_m = np.random.default_rng(0).normal(motion.path_m, 1e-12)
+    (row,) = check_order(problem, replace(motion, path_m=path_m))
+    assert row.verdict is Verdict.CERTIFIED
+    wrapped = np.mod(motion.path_m, problem.path.length)
+    (row,) = check_order(problem, replace(motion, path_m=wrapped))
+    assert row.verdict is Verdict.CERTIFIED
+
+
+def test_coverage_that_nobody_asks_for_is_no_check() -> None:
+    problem, motion = drawing(201, 0.5)
+    asked = replace(problem, path=replace(problem.path, required_coverage=0.0))
+    report = check_tip(asked, motion)
+    assert not [check for check in report.checks if "coverage" in check.name]
+    assert report.coverage == pytest.approx(0.5, abs=1e-9)

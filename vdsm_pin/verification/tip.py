@@ -1,16 +1,24 @@
-"""The tip against the desired path: rows, deviation in between, coverage."""
+"""The tip against the desired path: at its start, at rows, in between."""
 
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.problem import DesiredPath, PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.drawing import (
+    check_coverage,
+    check_order,
+    coverage,
+    drawn_intervals,
+    runs,
+    wrapped,
+)
 from vdsm_pin.verification.records import Check, Verdict
 
 CHUNK: Final = 16_384
@@ -57,28 +65,6 @@ def second_derivatives(manipulator: Manipulator, trajectory: Trajectory) -> Floa
     return result
 
 
-def _wrapped(path: DesiredPath, stations: FloatArray) -> FloatArray:
-    """Stations modulo the length where the path is closed, clamped elsewhere."""
-    if path.closed and path.length > 0.0:
-        return np.mod(stations, path.length)
-    return np.minimum(np.maximum(stations, 0.0), path.length)
-
-
-def _runs(path: DesiredPath, stations: FloatArray) -> FloatArray:
-    """How far each interval advances along the path, shape (n - 1,); [m]."""
-    run = np.diff(stations)
-    if path.closed and path.length > 0.0:
-        return np.asarray(run - path.length * np.round(run / path.length))
-    return np.asarray(np.diff(_wrapped(path, stations)))
-
-
-def _drawn_intervals(trajectory: Trajectory) -> IntArray:
-    """Intervals whose two rows are on the path; the one interval of a single row."""
-    on = trajectory.on_path
-    both = on if trajectory.n_samples == 1 else on[:-1] & on[1:]
-    return np.flatnonzero(both)
-
-
 def _corner_deviation(
     path: DesiredPath,
     tips: FloatArray,
@@ -100,7 +86,7 @@ def _corner_deviation(
         share = ((corners - start[at]) / run[at])[:, None]
         k = intervals[at]
         chord = tips[k] + share * (tips[k + 1] - tips[k])
-        gap = np.linalg.norm(chord - path.at(_wrapped(path, corners)), axis=1)
+        gap = np.linalg.norm(chord - path.at(wrapped(path, corners)), axis=1)
         result[at] = gap.max()
     return result
 
@@ -109,14 +95,14 @@ def _deviation(
     problem: PlanningProblem, trajectory: Trajectory, tips: FloatArray
 ) -> tuple[float, int]:
     """Bound of the deviation over the intervals on the path, and where it is met."""
-    intervals = _drawn_intervals(trajectory)
+    intervals = drawn_intervals(trajectory)
     if not intervals.size:
         return 0.0, 0
     path, stations = problem.path, trajectory.path_m
-    rows = np.linalg.norm(tips - path.at(_wrapped(path, stations)), axis=1)
+    rows = np.linalg.norm(tips - path.at(wrapped(path, stations)), axis=1)
     if trajectory.n_samples == 1:
         return float(rows[0]) + TOLERANCES.arithmetic, 0
-    run, start = _runs(path, stations)[intervals], _wrapped(path, stations)[intervals]
+    run, start = runs(path, stations)[intervals], wrapped(path, stations)[intervals]
     ends = np.maximum(rows[intervals], rows[intervals + 1])
     corners = _corner_deviation(path, tips, start, run, intervals)
     off_chord = second_derivatives(problem.manipulator, trajectory)[intervals] / 8.0
@@ -125,59 +111,13 @@ def _deviation(
     return float(bound[worst]), int(intervals[worst])
 
 
-def _stretches(path: DesiredPath, trajectory: Trajectory) -> FloatArray:
-    """The drawn stretches in order, inside [0, length], disjoint, shape (k, 2); [m]."""
-    intervals = _drawn_intervals(trajectory)
-    if not intervals.size or trajectory.n_samples == 1:
-        return np.zeros((0, 2))
-    start = _wrapped(path, trajectory.path_m)[intervals]
-    end = start + _runs(path, trajectory.path_m)[intervals]
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    parts = [np.column_stack([low, high])]
-    if path.closed:
-        turn = path.length
-        parts += [np.column_stack([low + t, high + t]) for t in (-turn, turn)]
-    spans: FloatArray = np.clip(np.concatenate(parts), 0.0, path.length)
-    spans = spans[spans[:, 1] > spans[:, 0]]
-    spans = spans[np.argsort(spans[:, 0], kind="stable")]
-    if not spans.size:
-        return spans
-    reach = np.maximum.accumulate(spans[:, 1])
-    fresh = np.concatenate([[True], spans[1:, 0] > reach[:-1]])
-    last = np.concatenate([np.flatnonzero(fresh)[1:] - 1, [len(spans) - 1]])
-    return np.asarray(np.column_stack([spans[fresh, 0], reach[last]]))
-
-
-def coverage(path: DesiredPath, trajectory: Trajectory) -> tuple[float, FloatArray]:
-    """Proved part of the path that is drawn, and the stretches that are not.
-
-    Args:
-        path: The desired path.
-        trajectory: Whose intervals with both rows on the path draw it.
-
-    Returns:
-        Coverage in [0, 1], rounded downwards, and gaps longer than
-        `TOLERANCES.on_path_length`, from and to, shape (k, 2); [m].
-    """
-    if not path.length > 0.0:
-        drawn = bool(_drawn_intervals(trajectory).size)
-        return float(drawn), frozen(np.zeros((0, 2)))
-    spans = _stretches(path, trajectory)
-    edges = np.concatenate([[0.0], spans.ravel(), [path.length]]).reshape(-1, 2)
-    gaps = edges[edges[:, 1] - edges[:, 0] > TOLERANCES.on_path_length]
-    share = float(np.sum(spans[:, 1] - spans[:, 0])) / path.length
-    # A sum of n terms below the length is off by less than n ulp of it.
-    ulps = 4.0 * (len(spans) + 1) * float(np.finfo(float).eps)
-    return min(1.0, max(0.0, share - ulps)), frozen(gaps)
-
-
 def _row_check(
     problem: PlanningProblem, trajectory: Trajectory, tips: FloatArray
 ) -> Check:
     on, path = np.flatnonzero(trajectory.on_path), problem.path
     worst, moment, kept = float("nan"), float("nan"), False
     if on.size:
-        goal = path.at(_wrapped(path, trajectory.path_m[on]))
+        goal = path.at(wrapped(path, trajectory.path_m[on]))
         gap = np.linalg.norm(tips[on] - goal, axis=1)
         at = int(np.argmax(gap))
         worst, moment = float(gap[at]), float(on[at])
@@ -229,7 +169,7 @@ def _start_checks(
 
 
 def check_tip(problem: PlanningProblem, trajectory: Trajectory) -> TipReport:
-    """Tip on the path at rows and in between, at its start, and what is covered.
+    """Tip on the path at rows and in between, at its start, and what is drawn.
 
     Args:
         problem: Arm and desired path.
@@ -243,9 +183,7 @@ def check_tip(problem: PlanningProblem, trajectory: Trajectory) -> TipReport:
     tips = tip_positions(problem.manipulator, trajectory)
     deviation, interval = _deviation(problem, trajectory, tips)
     share, undrawn = coverage(problem.path, trajectory)
-    drawn = int(_drawn_intervals(trajectory).size)
-    needed = problem.path.required_coverage
-    enough = share >= needed - TOLERANCES.coverage
+    drawn = int(drawn_intervals(trajectory).size)
     near = drawn > 0 and deviation <= problem.path.spacing
     between = Check(
         name="tip near the desired path between the waypoints",
@@ -257,14 +195,12 @@ def check_tip(problem: PlanningProblem, trajectory: Trajectory) -> TipReport:
         where="from here to the next waypoint" if drawn else "",
         moment=interval if drawn else float("nan"),
     )
-    covered = Check(
-        name="coverage of the desired path",
-        verdict=Verdict.CERTIFIED if enough else Verdict.REFUTED,
-        count=1,
-        worst=share,
-        limit=needed,
-        unit="share",
-    )
     start = _start_checks(problem, trajectory, tips)
-    checks = (*start, _row_check(problem, trajectory, tips), between, covered)
+    checks = (
+        *start,
+        _row_check(problem, trajectory, tips),
+        between,
+        *check_order(problem, trajectory),
+        *check_coverage(problem, share),
+    )
     return TipReport(checks, deviation, share, undrawn)

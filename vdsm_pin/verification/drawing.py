@@ -1,0 +1,175 @@
+"""What is drawn of the desired path, how much of it, and in which order."""
+
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.problem import DesiredPath, Order, PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.records import Check, Verdict
+
+SAME_PLACE: Final = TOLERANCES.tip_on_path
+"""Stations so near each other are the same place: no nearer is the tip known; [m]."""
+
+
+def wrapped(path: DesiredPath, stations: FloatArray) -> FloatArray:
+    """Stations modulo the length where the path is closed, clamped elsewhere."""
+    if path.closed and path.length > 0.0:
+        return np.mod(stations, path.length)
+    return np.minimum(np.maximum(stations, 0.0), path.length)
+
+
+def runs(path: DesiredPath, stations: FloatArray) -> FloatArray:
+    """How far each interval advances along the path, shape (n - 1,); [m]."""
+    run = np.diff(stations)
+    if path.closed and path.length > 0.0:
+        return np.asarray(run - path.length * np.round(run / path.length))
+    return np.asarray(np.diff(wrapped(path, stations)))
+
+
+def drawn_intervals(trajectory: Trajectory) -> IntArray:
+    """Intervals whose two rows are on the path; the one interval of a single row."""
+    on = trajectory.on_path
+    both = on if trajectory.n_samples == 1 else on[:-1] & on[1:]
+    return np.flatnonzero(both)
+
+
+def _stretches(path: DesiredPath, trajectory: Trajectory) -> FloatArray:
+    """The drawn stretches in order, inside [0, length], disjoint, shape (k, 2); [m]."""
+    intervals = drawn_intervals(trajectory)
+    if not intervals.size or trajectory.n_samples == 1:
+        return np.zeros((0, 2))
+    start = wrapped(path, trajectory.path_m)[intervals]
+    end = start + runs(path, trajectory.path_m)[intervals]
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    parts = [np.column_stack([low, high])]
+    if path.closed:
+        turn = path.length
+        parts += [np.column_stack([low + t, high + t]) for t in (-turn, turn)]
+    spans: FloatArray = np.clip(np.concatenate(parts), 0.0, path.length)
+    spans = spans[spans[:, 1] > spans[:, 0]]
+    spans = spans[np.argsort(spans[:, 0], kind="stable")]
+    if not spans.size:
+        return spans
+    reach = np.maximum.accumulate(spans[:, 1])
+    fresh = np.concatenate([[True], spans[1:, 0] > reach[:-1]])
+    last = np.concatenate([np.flatnonzero(fresh)[1:] - 1, [len(spans) - 1]])
+    return np.asarray(np.column_stack([spans[fresh, 0], reach[last]]))
+
+
+def coverage(path: DesiredPath, trajectory: Trajectory) -> tuple[float, FloatArray]:
+    """Proved part of the path that is drawn, and the stretches that are not.
+
+    Args:
+        path: The desired path.
+        trajectory: Whose intervals with both rows on the path draw it.
+
+    Returns:
+        Coverage in [0, 1], rounded downwards, and gaps longer than
+        `TOLERANCES.on_path_length`, from and to, shape (k, 2); [m].
+    """
+    if not path.length > 0.0:
+        drawn = bool(drawn_intervals(trajectory).size)
+        return float(drawn), frozen(np.zeros((0, 2)))
+    spans = _stretches(path, trajectory)
+    edges = np.concatenate([[0.0], spans.ravel(), [path.length]]).reshape(-1, 2)
+    gaps = edges[edges[:, 1] - edges[:, 0] > TOLERANCES.on_path_length]
+    share = float(np.sum(spans[:, 1] - spans[:, 0])) / path.length
+    # A sum of n terms below the length is off by less than n ulp of it.
+    ulps = 4.0 * (len(spans) + 1) * float(np.finfo(float).eps)
+    return min(1.0, max(0.0, share - ulps)), frozen(gaps)
+
+
+def progress(path: DesiredPath, trajectory: Trajectory) -> FloatArray:
+    """How far each waypoint on the path lies beyond the one before it; [m].
+
+    Between neighbours as the interval runs; where the tip has left the path in between,
+    on a closed one the way forward.
+
+    Args:
+        path: The desired path.
+        trajectory: With the waypoints.
+
+    Returns:
+        Shape (m - 1,), for the m waypoints on the path.
+    """
+    on = np.flatnonzero(trajectory.on_path)
+    steps = np.diff(wrapped(path, trajectory.path_m[on]))
+    if path.closed and path.length > 0.0:
+        ahead = np.mod(steps, path.length)
+        # A hair backwards is not once round.
+        steps = np.where(path.length - ahead <= SAME_PLACE, ahead - path.length, ahead)
+    neighbours = np.diff(on) == 1
+    run = runs(path, trajectory.path_m)[on[:-1][neighbours]]
+    steps[neighbours] = run
+    return np.asarray(steps)
+
+
+def check_order(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Check, ...]:
+    """Whether the path is drawn from its start to its end, nowhere backwards.
+
+    A closed path may be begun anywhere. Whoever leaves it must come back within one
+    turn of where it was begun: a piece drawn later than one behind it is out of order.
+
+    Args:
+        problem: With the desired path.
+        trajectory: What is judged.
+
+    Returns:
+        One row; none where any order will do.
+    """
+    path, on = problem.path, np.flatnonzero(trajectory.on_path)
+    if path.order is Order.FREE:
+        return ()
+    steps = progress(path, trajectory)
+    back, moment = max(0.0, float(-steps.min(initial=0.0))), 0
+    if steps.size:
+        moment = int(on[int(np.argmin(steps)) + 1])
+    left = bool((np.diff(on) > 1).any())
+    if path.closed and left and back <= SAME_PLACE:
+        total = np.cumsum(steps)
+        back = max(back, float(total[-1]) - path.length)
+        beyond = np.flatnonzero(total > path.length + SAME_PLACE)
+        moment = int(on[beyond[0] + 1]) if beyond.size else moment
+    kept = back <= SAME_PLACE
+    verdict = Verdict.CERTIFIED if kept else Verdict.REFUTED
+    return (
+        Check(
+            name="desired path drawn in the order given",
+            verdict=verdict if on.size else Verdict.UNDECIDED,
+            count=int(on.size),
+            worst=back if on.size else float("nan"),
+            limit=SAME_PLACE,
+            unit="m",
+            where="" if kept else "drawn backwards or again from here",
+            moment=float("nan") if kept else float(moment),
+        ),
+    )
+
+
+def check_coverage(problem: PlanningProblem, share: float) -> tuple[Check, ...]:
+    """Whether as much is drawn as the problem asks for.
+
+    Args:
+        problem: With the required coverage.
+        share: Proved coverage; [-].
+
+    Returns:
+        One row; none where the problem asks for nothing: it could not fail.
+    """
+    needed = problem.path.required_coverage
+    if not needed > 0.0:
+        return ()
+    enough = share >= needed - TOLERANCES.coverage
+    return (
+        Check(
+            name="coverage of the desired path",
+            verdict=Verdict.CERTIFIED if enough else Verdict.REFUTED,
+            count=1,
+            worst=share,
+            limit=needed,
+            unit="share",
+        ),
+    )
