@@ -43,14 +43,6 @@ def new_body(n_points: int, room: int) -> Body:
 
 
 @compiled
-def is_grown(body: Body) -> bool:
-    """Whether zonotopes or balls grow the points."""
-    return bool(
-        body.sizes[0] + body.sizes[1] > 0 or body.balls[0] + body.balls[1] > 0.0
-    )
-
-
-@compiled
 def _growth(body: Body, end: int, nx: float, ny: float, nz: float) -> float:
     """Largest n.x over the zonotope and ball of an end, n of unit length; [m]."""
     g, total = body.swings, body.balls[end]

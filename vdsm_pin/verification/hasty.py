@@ -46,7 +46,8 @@ class HastyProof:
         task = task._replace(pairs=asked)
         # Pairs that remember nothing: the answer depends on the question alone.
         forget(known.desk.planes)
-        known.results.limit[:] = np.inf
+        # No least clearance is asked for: whatever is proved may be culled.
+        known.results.limit[:] = -np.inf
         args = task, known.motion, known.desk, known.results, known.culling
         return bool(sweep(*args, first, last, True))
 

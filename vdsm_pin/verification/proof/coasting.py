@@ -11,8 +11,8 @@ import numpy as np
 from vdsm_pin.geometry.arm import second_order
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import apart, compiled
+from vdsm_pin.verification.proof.holding import raise_to_held
 from vdsm_pin.verification.proof.layouts import (
-    HELD_AT,
     HELD_CLEARANCE,
     POINT,
     SUPPORT,
@@ -154,47 +154,6 @@ def glide(
 
 
 @compiled
-def _drift_along(
-    centres: FloatArray,
-    sags: FloatArray,
-    plane: FloatArray,
-    link: int,
-    first: int,
-    last: int,
-    lower: FloatArray,
-) -> None:
-    """Raise lower bounds to the clearance held, less what the link has moved since.
-
-    No point of a link moves farther than one of its ends. What errors add must not
-    depend on the configuration.
-
-    Args:
-        centres: Joint centres in the partner's frame, shape (N + 1, 3, BLOCK + 1); [m].
-        sags: Of that frame, shape (N + 1, BLOCK); [m].
-        plane: What the pair remembers, shape (PLANE,).
-        link: The link.
-        first: First interval of the block to look at.
-        last: One past the last.
-        lower: Updated, shape (BLOCK,); [m].
-    """
-    apart()
-    before = 0.0
-    for row in range(first, last + 1):
-        moved = 0.0
-        for end in range(2):
-            squared = 0.0
-            for c in range(3):
-                d = centres[link + end, c, row] - plane[HELD_AT + 3 * end + c]
-                squared += d * d
-            moved = max(moved, sqrt(squared))
-        if row > first:
-            sag = max(sags[link, row - 1], sags[link + 1, row - 1])
-            held = plane[HELD_CLEARANCE] - max(before, moved) - sag
-            lower[row - 1] = max(lower[row - 1], held)
-        before = moved
-
-
-@compiled
 def served(
     lower: FloatArray, upper: FloatArray, bar: float, slack: float, width: float
 ) -> int:
@@ -322,7 +281,7 @@ def coast(
         )
         if rules.joint_error == 0.0 and plane[HELD_CLEARANCE] > -np.inf:
             held = rows.centres[f], rows.sags[f]
-            _drift_along(*held, plane, link, first, last, runs.lower)
+            raise_to_held(*held, plane, link, first, last, runs.lower)
         if fresh:
             lower[0] = max(lower[0], proved)
             plane[WIDTH] = upper[0] - lower[0]

@@ -15,10 +15,10 @@ from vdsm_pin.geometry.kernels import BRACKET, FAR, LOWER, NEAR, NORMAL
 from vdsm_pin.geometry.obstacles import node_support
 from vdsm_pin.verification.proof.coasting import coast
 from vdsm_pin.verification.proof.desk import Desk, load_rows, take_rows
+from vdsm_pin.verification.proof.holding import hold
 from vdsm_pin.verification.proof.layouts import (
     AT_UPPER,
     END,
-    HELD_AT,
     HELD_CLEARANCE,
     INSTANT,
     INTERVAL,
@@ -91,9 +91,8 @@ def _renew(
         leaf_bracket(pieces, space, p, goal, True, space.out)
     else:
         loaded_bound(pieces, task.pairs, task.rules, space, pair, True, bar)
-        proved = plane[HELD_CLEARANCE] = space.out[LOWER]
-        for k in range(6):
-            plane[HELD_AT + k] = space.body.points[2 + k // 3, k % 3]
+        proved = space.out[LOWER]
+        hold(plane, proved, space.body)
     plane[:3], plane[POINT:WIDTH] = space.out[NORMAL:NEAR], space.out[FAR:BRACKET]
     n, stack, point = plane[:3], space.stack, space.scratch[0]
     plane[SUPPORT] = node_support(pieces, root, n, stack, point)
