@@ -137,7 +137,7 @@ def check_order(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Check
     verdict = Verdict.CERTIFIED if kept else Verdict.REFUTED
     return (
         Check(
-            name="desired path drawn in the order given",
+            name="tip draws the path in the order given",
             verdict=verdict if on.size else Verdict.UNDECIDED,
             count=int(on.size),
             worst=back if on.size else float("nan"),
