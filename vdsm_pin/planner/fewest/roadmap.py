@@ -1,6 +1,7 @@
 """The graph of sparse configurations: shapes at tips, with clearance and cost."""
 
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
@@ -11,6 +12,11 @@ from vdsm_pin.planner.fewest.shapes import Shapes
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
+
+KNEES: Final = slice(1, None)
+"""Columns of bends past psi_1, the bend at the base."""
+ONE_KNEE: Final = [0, 1, 3]
+"""Ends of the straight pieces where both knees are one: base, knee and tip."""
 
 
 @dataclass(frozen=True)
@@ -113,8 +119,8 @@ def build_roadmap(
             route.tips, whole, shapes.knees, shapes.slopes, arm.stations, limit,
             *arm.base_range,
         )  # fmt: skip
-        single = bool((shapes.knees[:, 0] == shapes.knees[:, 1]).all())
-        room = _least(clearance, ends[:, [0, 1, 3]] if single else ends, required)
+        corners = ends[:, ONE_KNEE] if shapes.one_knee else ends
+        room = _least(clearance, corners, required)
         keep = room >= required
         return _assemble(
             route, shapes, node[keep], bends[keep], room[keep], required, taste, limit
@@ -172,7 +178,7 @@ def _assemble(
     bent = (over / max(limit - taste.easy_bend, 0.02)) ** 2
     cost = taste.angle * changed + taste.room_cost * lack**2 + taste.bend_cost * bent
     strain = 0.02 * taste.room_cost * lack**2 + 0.1 * taste.bend_cost * bent
-    lean = bends[:, 1:].sum(axis=1)
+    lean = bends[:, KNEES].sum(axis=1)
     lean[node % shapes.size == 0] = 0.0
     return _indexed(
         Roadmap(route, shapes, node, node, node, lean, changed, cost, strain, room)

@@ -50,6 +50,12 @@ class Shapes:
         """Number of sparse shapes."""
         return len(self.knees)
 
+    @property
+    def one_knee(self) -> bool:
+        """Whether no shape has two knees."""
+        first, second = self.knees.T
+        return bool((first == second).all())
+
     def offsets(
         self, manipulator: Manipulator, tips: FloatArray, shape: IntArray
     ) -> FloatArray:
@@ -185,7 +191,8 @@ def _offsets(
         slopes: Rows of `Shapes`, shape (n, 4); [-].
     """
     stations = manipulator.stations
-    s1, s2 = stations[knees[:, 0]], stations[knees[:, 1]]
+    first, second = knees.T
+    s1, s2 = stations[first], stations[second]
     line = tips[:, None, 1:] * manipulator.ratios[:, None]
     p1 = s1[:, None] * slopes[:, :2]
     p2 = p1 + (s2 - s1)[:, None] * slopes[:, 2:]
@@ -200,6 +207,6 @@ def _offsets(
         piece = pa[:, None] + share[..., None] * (pb - pa)[:, None]
         planar = np.where(on[..., None], piece, planar)
     offsets = planar - line
-    offsets[knees[:, 1] == 0] = 0.0
+    offsets[second == 0] = 0.0
     offsets[:, [0, -1]] = 0.0
     return np.asarray(offsets)

@@ -58,13 +58,7 @@ def plan_clearest(
 ) -> Plan:
     """The plan with the largest clearance found, at the price of straight joints.
 
-    Args:
-        problem: What is asked.
-        clearance: Clearance of links at given joint centres.
-        margin: Kept beyond the required clearance; [m].
-
-    Raises:
-        Infeasible: With the proof where there is one, else `NoPlanFound`.
+    Arguments and errors are those of `plan_fewest`.
     """
     search = _Search(problem, clearance, margin, "clearest", CLEAREST)
     plan, reserve = _clearest(search)
