@@ -1,6 +1,7 @@
 """Random damage to problem files, trajectories and meshes."""
 
 import math
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -52,7 +53,8 @@ def _change(holder: Any, step: Any, rng: np.random.Generator) -> None:
         case 0:
             del holder[step]
         case 1 | 2:
-            holder[step] = GARBAGE[int(rng.integers(len(GARBAGE)))]
+            # A copy: what is changed next may be inside, and others get it too.
+            holder[step] = deepcopy(GARBAGE[int(rng.integers(len(GARBAGE)))])
         case 3 if isinstance(holder, list):
             holder.insert(int(rng.integers(len(holder) + 1)), value)
         case 3:
