@@ -16,8 +16,8 @@ from paper_figures.style import save_all
 from paper_figures.views import OBLIQUE, SIDE, TOP
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.planner.lift import lift
-from vdsm_pin.planner.scale import scale
+from vdsm_pin.planner.paper.lift import lift
+from vdsm_pin.planner.paper.scale import scale
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.verification.link_clearance import link_clearance
 

@@ -27,7 +27,7 @@ from vdsm_pin.manipulator import (
     CableLayout,
     paper_hole_angles,
 )
-from vdsm_pin.planner.pipeline import plan_paper
+from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import ErrorBox

@@ -8,7 +8,7 @@ import pytest
 import vdsm_pin.refinement as refinement
 from vdsm_pin.errors import Infeasible, NoPlanFound
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.planner.pipeline import plan_paper
+from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Plan
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import load_robot

@@ -15,7 +15,7 @@ from paper_figures import style
 from paper_figures.views import View, thin
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.planner.sections import VIEWS, section_along
+from vdsm_pin.planner.paper.sections import VIEWS, section_along
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.solids import surface
 from vdsm_pin.scene import HalfSpace, Obstacle

@@ -22,7 +22,7 @@ STRATEGIES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "fewest": "vdsm_pin.planner.fewest.strategy:plan_fewest",
         "clearest": "vdsm_pin.planner.fewest.strategy:plan_clearest",
-        "paper": "vdsm_pin.planner.pipeline:plan_paper",
+        "paper": "vdsm_pin.planner.paper.pipeline:plan_paper",
     }
 )
 """Module and function of every strategy a user may name; the first is the default."""

@@ -16,7 +16,7 @@ from vdsm_pin.kinematics import joint_centres, link_angles
 from vdsm_pin.manipulator import CableLayout, Manipulator, paper_hole_angles
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.unbend import leans_ahead, unbend
-from vdsm_pin.planner.pipeline import plan_paper
+from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.scene import Obstacle, Sphere

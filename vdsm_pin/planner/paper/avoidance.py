@@ -12,11 +12,11 @@ import numpy as np
 
 from vdsm_pin.errors import Infeasible, NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.planner.across_rail import across_rail
-from vdsm_pin.planner.along_rail import along_rail
+from vdsm_pin.planner.paper.across_rail import across_rail
+from vdsm_pin.planner.paper.along_rail import along_rail
+from vdsm_pin.planner.paper.sections import section_along
+from vdsm_pin.planner.paper.tip_path import Route, straight_route
 from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.planner.sections import section_along
-from vdsm_pin.planner.tip_path import Route, straight_route
 from vdsm_pin.problem import PlanningProblem
 
 SPARSE: Final = 16

@@ -9,10 +9,10 @@ import pytest
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.feasibility import curled_reach, straight_reach
-from vdsm_pin.planner.pipeline import plan_paper
+from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.verification.link_clearance import link_clearance
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 ROWS = json.loads((ROOT / "reports/paper/table.json").read_text(encoding="utf-8"))
 
 

@@ -8,16 +8,16 @@ import numpy as np
 from vdsm_pin.cables import cable_lengths
 from vdsm_pin.errors import Infeasible, NoPlanFound, PathBlocked
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.planner.avoidance import Avoidance, Straight, avoidances
 from vdsm_pin.planner.feasibility import check_feasibility
-from vdsm_pin.planner.lift import lift
-from vdsm_pin.planner.project import project
+from vdsm_pin.planner.paper.avoidance import Avoidance, Straight, avoidances
+from vdsm_pin.planner.paper.lift import lift
+from vdsm_pin.planner.paper.project import project
+from vdsm_pin.planner.paper.scale import scale
+from vdsm_pin.planner.paper.solve import solve
+from vdsm_pin.planner.paper.tip_path import Route, subdivided
 from vdsm_pin.planner.records import LinkClearance, Plan
-from vdsm_pin.planner.scale import scale
-from vdsm_pin.planner.solve import solve
 from vdsm_pin.planner.spacing import row_steps
 from vdsm_pin.planner.start import check_start
-from vdsm_pin.planner.tip_path import Route, subdivided
 from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory

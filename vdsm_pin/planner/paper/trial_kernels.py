@@ -6,8 +6,8 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import compiled
-from vdsm_pin.planner.region_kernels import sides_of
-from vdsm_pin.planner.sliding_kernels import extent_of, slide_chain
+from vdsm_pin.planner.paper.region_kernels import sides_of
+from vdsm_pin.planner.paper.sliding_kernels import extent_of, slide_chain
 
 Arm: TypeAlias = tuple[FloatArray, FloatArray, float]
 """k_{i,i+1} for i = 1..N (Eq. 6) and the links' lengths, (N,) each, and the cosine of

@@ -17,10 +17,10 @@ import numpy as np
 
 from vdsm_pin.errors import PathBlocked
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.danger_region import DangerRegion
-from vdsm_pin.planner.project import project
-from vdsm_pin.planner.shadow import Shadow, Visit
-from vdsm_pin.planner.tip_path import (
+from vdsm_pin.planner.paper.danger_region import DangerRegion
+from vdsm_pin.planner.paper.project import project
+from vdsm_pin.planner.paper.shadow import Shadow, Visit
+from vdsm_pin.planner.paper.tip_path import (
     Route,
     Rows,
     drawn_rows,

@@ -16,9 +16,9 @@ from vdsm_pin.errors import (
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.kinematics import joint_centres, link_angles
-from vdsm_pin.planner.pipeline import plan_paper
+from vdsm_pin.planner.paper.pipeline import plan_paper
+from vdsm_pin.planner.paper.tip_path import nearest_station
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.planner.tip_path import nearest_station
 from vdsm_pin.problem import Approach, Blocked, PlanningProblem
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.scene import Box, Capsule, Cylinder, Obstacle, Prism, Scene, Sphere

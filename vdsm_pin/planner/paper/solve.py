@@ -9,7 +9,7 @@ from vdsm_pin.errors import LimitExceeded
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_angles, link_angles
 from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.planner.tip_path import Route
+from vdsm_pin.planner.paper.tip_path import Route
 from vdsm_pin.trajectory import Trajectory
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 import shapely
 
-from vdsm_pin.planner.danger_region import DangerRegion
-from vdsm_pin.planner.region_kernels import leave_along, reach_along_circle
-from vdsm_pin.planner.sections import Section
-from vdsm_pin.planner.shadow import Shadow
+from vdsm_pin.planner.paper.danger_region import DangerRegion
+from vdsm_pin.planner.paper.region_kernels import leave_along, reach_along_circle
+from vdsm_pin.planner.paper.sections import Section
+from vdsm_pin.planner.paper.shadow import Shadow
 
 SHAPES = {
     "disc": [[0.7, 0.6]],

@@ -13,14 +13,20 @@ import numpy as np
 
 from vdsm_pin.errors import PathBlocked
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.planner.danger_region import DangerRegion
-from vdsm_pin.planner.detours import detour_route, first_station, path_rows
-from vdsm_pin.planner.project import project
-from vdsm_pin.planner.region_kernels import core_gaps
-from vdsm_pin.planner.sections import Section, grown_by, planned_gap
-from vdsm_pin.planner.shadow import Shadow
-from vdsm_pin.planner.side_rules import SideRule, anchors, choose_rule, slid, stands
-from vdsm_pin.planner.tip_path import Route
+from vdsm_pin.planner.paper.danger_region import DangerRegion
+from vdsm_pin.planner.paper.detours import detour_route, first_station, path_rows
+from vdsm_pin.planner.paper.project import project
+from vdsm_pin.planner.paper.region_kernels import core_gaps
+from vdsm_pin.planner.paper.sections import Section, grown_by, planned_gap
+from vdsm_pin.planner.paper.shadow import Shadow
+from vdsm_pin.planner.paper.side_rules import (
+    SideRule,
+    anchors,
+    choose_rule,
+    slid,
+    stands,
+)
+from vdsm_pin.planner.paper.tip_path import Route
 from vdsm_pin.problem import PlanningProblem
 
 ROUNDINGS: Final = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.75, 1.0)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.danger_region import DangerRegion
+from vdsm_pin.planner.paper.danger_region import DangerRegion
 
 
 @dataclass(frozen=True)

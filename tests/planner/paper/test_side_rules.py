@@ -7,9 +7,9 @@ import pytest
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.planner.danger_region import DangerRegion
-from vdsm_pin.planner.region_kernels import keeps_out
-from vdsm_pin.planner.side_rules import (
+from vdsm_pin.planner.paper.danger_region import DangerRegion
+from vdsm_pin.planner.paper.region_kernels import keeps_out
+from vdsm_pin.planner.paper.side_rules import (
     COARSE,
     CROSS,
     LARGEST_SWING,
@@ -20,7 +20,7 @@ from vdsm_pin.planner.side_rules import (
     least_cosine,
     slid,
 )
-from vdsm_pin.planner.sliding_kernels import standing
+from vdsm_pin.planner.paper.sliding_kernels import standing
 from vdsm_pin.problem import PlanningProblem
 
 CORES = {

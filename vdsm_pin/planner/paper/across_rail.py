@@ -17,12 +17,12 @@ import shapely
 
 from vdsm_pin.errors import PathBlocked
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.planner.bend_kernels import clear_bends, least_moves
-from vdsm_pin.planner.danger_region import DangerRegion
-from vdsm_pin.planner.project import project
-from vdsm_pin.planner.scale import scale
-from vdsm_pin.planner.sections import VIEWS, Section, grown_by, planned_gap
-from vdsm_pin.planner.tip_path import Route, drawn_rows, straight_route
+from vdsm_pin.planner.paper.bend_kernels import clear_bends, least_moves
+from vdsm_pin.planner.paper.danger_region import DangerRegion
+from vdsm_pin.planner.paper.project import project
+from vdsm_pin.planner.paper.scale import scale
+from vdsm_pin.planner.paper.sections import VIEWS, Section, grown_by, planned_gap
+from vdsm_pin.planner.paper.tip_path import Route, drawn_rows, straight_route
 from vdsm_pin.problem import PlanningProblem
 
 SCAN: Final = 12

@@ -9,17 +9,17 @@ from hypothesis import strategies as st
 from vdsm_pin.errors import LimitExceeded, LinkTooShort, OutOfReach
 from vdsm_pin.kinematics import joint_angles, link_angles
 from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
-from vdsm_pin.planner.danger_region import DangerRegion
 from vdsm_pin.planner.feasibility import (
     check_feasibility,
     curled_reach,
     straight_reach,
 )
-from vdsm_pin.planner.joint_paths import slide_joints
-from vdsm_pin.planner.lift import lift
-from vdsm_pin.planner.project import project
-from vdsm_pin.planner.scale import scale
-from vdsm_pin.planner.solve import check_limits
+from vdsm_pin.planner.paper.danger_region import DangerRegion
+from vdsm_pin.planner.paper.joint_paths import slide_joints
+from vdsm_pin.planner.paper.lift import lift
+from vdsm_pin.planner.paper.project import project
+from vdsm_pin.planner.paper.scale import scale
+from vdsm_pin.planner.paper.solve import check_limits
 from vdsm_pin.problem import DesiredPath
 from vdsm_pin.tolerances import TOLERANCES
 

@@ -13,8 +13,8 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen, read_only
-from vdsm_pin.planner.region_kernels import core_distances, core_gaps, sides_of
-from vdsm_pin.planner.way_kernels import covered, walk_round
+from vdsm_pin.planner.paper.region_kernels import core_distances, core_gaps, sides_of
+from vdsm_pin.planner.paper.way_kernels import covered, walk_round
 from vdsm_pin.tolerances import TOLERANCES
 
 ARC_STEP: Final = float(np.deg2rad(0.25))

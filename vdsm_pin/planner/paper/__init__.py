@@ -1,0 +1,1 @@
+"""The paper's rule: seven steps, one file each, in the order of `pipeline`."""
