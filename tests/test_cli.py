@@ -232,7 +232,12 @@ def bad_inputs(folder: Path, planned: Path) -> dict[str, list[object]]:
         "none.cert: does not exist": [
             *("check-certificate", folder / "none.cert", good, rows),
         ],
-        "text.yaml: header: Expecting value": ["check-certificate", text, good, rows],
+        "text.yaml: header: cannot be read as a certificate: Expecting value": [
+            "check-certificate",
+            text,
+            good,
+            rows,
+        ],
         "'': is a folder": ["plan", "", "--out", out],
     }
 

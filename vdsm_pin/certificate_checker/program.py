@@ -103,6 +103,7 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
             reason = f"{check.place}: {error}"
         except DAMAGE as error:
             text, at = " ".join(str(error).split()) or type(error).__name__, check.place
+            text = f"cannot be read as a certificate: {text}"
             raise InvalidFile(file=certificate, where=at, problem=text) from None
     meshes = [mesh for mesh in check.solids if isinstance(mesh, Mesh)]
     surfaces = tuple(mesh.name for mesh in meshes if not mesh.has_inside)
@@ -121,7 +122,7 @@ def main(arguments: Sequence[str]) -> int:
     try:
         outcome = check_certificate(*map(Path, arguments))
     except InvalidInput as error:
-        sys.stderr.write(f"{error}\n")
+        sys.stderr.write(f"vdsm: {error}\n")
         return 2
     found = f"{outcome.n_intervals} intervals, {outcome.n_claims} clearances"
     verdict = "accepted" if outcome.accepted else f"rejected: {outcome.reason}"
