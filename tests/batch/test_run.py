@@ -3,6 +3,7 @@
 Timing files are the only ones that may differ.
 """
 
+import contextlib
 import fcntl
 import random
 import shutil
@@ -19,7 +20,7 @@ from batch_folders import tree
 from problem_files import NEAR, OUT_OF_REACH, write_problem
 
 from vdsm_pin.batch.progress import Progress
-from vdsm_pin.batch.run import Batch, expanded, run_batch
+from vdsm_pin.batch.run import Batch, Interrupted, expanded, run_batch
 from vdsm_pin.batch.task import Done, folder_names
 from vdsm_pin.errors import InvalidFile, InvalidInput, UnknownName
 from vdsm_pin.report.tables import read_summary
@@ -172,6 +173,22 @@ def test_ctrl_c_ends_with_what_is_done(tmp_path: Path) -> None:
     assert "Traceback" not in said
     assert 1 <= len(read_summary(out / "summary.csv")) < 40
     assert not (out / ".unfinished").exists()
+
+
+def test_ctrl_c_is_heard_even_where_python_loses_it(
+    problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    show = Progress.show
+
+    def lose(self: Progress, done: Done) -> None:
+        show(self, done)
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(Progress, "show", lose)
+    with pytest.raises(Interrupted, match="1 of 4 problems"):
+        run_batch(Batch((str(problems),), tmp_path / "out", "paper"))
+    assert len(read_summary(tmp_path / "out" / "summary.csv")) == 1
 
 
 def test_a_time_limit_makes_a_row(problems: Path, tmp_path: Path) -> None:

@@ -182,6 +182,22 @@ def test_time_limit_waits_for_the_compiler(
         signal.raise_signal(signal.SIGALRM)
 
 
+def test_what_a_signal_raises_where_numba_hides_it_comes_out(
+    kernels: Callable[..., ModuleType], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def hiding(*arguments: Any) -> Any:
+        try:
+            raise OutOfTime(1.0)
+        except OutOfTime as error:
+            message = "returned a result with an exception set"
+            raise SystemError(message) from error
+
+    module = kernels()
+    monkeypatch.setattr(module.twice, "_entry", lambda kind, arguments: hiding)
+    with pytest.raises(OutOfTime):
+        module.twice(np.ones(2))
+
+
 def test_changed_source_is_compiled_again(
     folder: Path, kernels: Callable[..., ModuleType]
 ) -> None:

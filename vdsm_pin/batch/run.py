@@ -87,10 +87,9 @@ def run_batch(batch: Batch) -> tuple[BatchRow, ...]:
     check_output_folder(batch.folder)
     tasks = _tasks(batch)
     batch.folder.mkdir(parents=True, exist_ok=True)
-    with _locked(batch.folder), _terminable():
+    with _locked(batch.folder), _stoppable() as stop:
         shutil.rmtree(batch.folder / _ASIDE, ignore_errors=True)
         rows: list[BatchRow] = []
-        stopped = False
         running = batch.folder / RUNNING
         with Progress(len(tasks)) as progress, SummaryCsv(running) as so_far:
             try:
@@ -99,12 +98,14 @@ def run_batch(batch: Batch) -> tuple[BatchRow, ...]:
                     rows.append(done.row)
                     so_far(done.row)
                     progress.show(done)
+                    if stop.asked:
+                        break
             except KeyboardInterrupt:
-                stopped = True
+                stop.asked = True
         shutil.rmtree(batch.folder / _ASIDE, ignore_errors=True)
         _write_summaries(batch, rows)
         running.unlink()
-    if stopped:
+    if stop.asked and len(rows) < len(tasks):
         message = f"stopped; {len(rows)} of {len(tasks)} problems are finished"
         raise Interrupted(message + ", --resume does the rest")
     return tuple(rows)
@@ -214,15 +215,30 @@ def _locked(folder: Path) -> Iterator[None]:
         yield
 
 
-@contextmanager
-def _terminable() -> Iterator[None]:
-    """SIGTERM ends a batch the way Ctrl-C does."""
+@dataclass
+class _Stop:
+    """Whether the user asked for an end."""
 
-    def stop(number: int, frame: FrameType | None) -> None:
+    asked: bool = False
+
+
+@contextmanager
+def _stoppable() -> Iterator[_Stop]:
+    """Ctrl-C and SIGTERM end a batch.
+
+    They interrupt what is under way, and are noted besides: Python loses an exception
+    that comes at the end of a generator or in a callback.
+    """
+    stop = _Stop()
+
+    def ask(number: int, frame: FrameType | None) -> None:
+        stop.asked = True
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, stop)
+    signals = signal.SIGINT, signal.SIGTERM
+    before = {number: signal.signal(number, ask) for number in signals}
     try:
-        yield
+        yield stop
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -111,6 +111,12 @@ def _file_name(function: Callable[..., Any], kind: Any) -> str:
     return f"{function.__module__}.{function.__qualname__}-{digest.hexdigest()[:32]}"
 
 
+def _first_cause(error: BaseException) -> BaseException:
+    while error.__cause__ is not None:
+        error = error.__cause__
+    return error
+
+
 class _Compiled:
     """A function as Python calls it."""
 
@@ -125,7 +131,11 @@ class _Compiled:
         if entry is None:
             with _one_at_a_time:
                 entry = self._entries[kind] = self._entry(kind, arguments)
-        return entry(*arguments)
+        try:
+            return entry(*arguments)
+        except SystemError as error:
+            # What a signal raised while numba's half in Python made a result.
+            raise _first_cause(error) from None
 
     def _entry(self, kind: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
         """The machine code for a kind of arguments, made if it is not there."""
