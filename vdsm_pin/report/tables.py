@@ -4,7 +4,7 @@ import csv
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Final, Self
+from typing import IO, Any, Final, Self
 
 import numpy as np
 
@@ -29,7 +29,26 @@ _CHUNK: Final = 8192  # rows held at one time
 _HOLES: Final = ("a", "b", "c")
 
 
-class ClearanceCsv:
+class _OwnFile:
+    """Closes its file when the `with` that made it ends."""
+
+    _file: IO[Any]
+
+    def __enter__(self) -> Self:
+        """Itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+class ClearanceCsv(_OwnFile):
     """clearance.csv, one row per interval and pair, written while it is proved.
 
     Args:
@@ -51,19 +70,6 @@ class ClearanceCsv:
                           (*_VERDICTS, *partners))  # fmt: skip
         self._file = path.open("wb")
         self._file.write(_CLEARANCE_HEADER.encode())
-
-    def __enter__(self) -> Self:
-        """Itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Close the file."""
-        self._file.close()
 
     def __call__(self, chunk: ClearanceChunk) -> None:
         """Write one chunk."""
@@ -114,7 +120,7 @@ def write_cables(path: Path, verification: Verification) -> None:
     _write_rows(path, header, 1, values, rows.n_samples)
 
 
-class SummaryCsv:
+class SummaryCsv(_OwnFile):
     """A table of problems, written row by row; whoever reads it finds whole rows.
 
     Args:
@@ -127,19 +133,6 @@ class SummaryCsv:
         columns = list(BatchRow.model_fields)
         self._writer = csv.DictWriter(self._file, columns, lineterminator="\n")
         self._writer.writeheader()
-
-    def __enter__(self) -> Self:
-        """Itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Close the file."""
-        self._file.close()
 
     def __call__(self, row: BatchRow) -> None:
         """Write one row."""
