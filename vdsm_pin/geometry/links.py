@@ -1,10 +1,12 @@
 """Clearance of every link at given configurations, in compiled code."""
 
+from typing import NamedTuple
+
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.bodies import new_body
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.bodies import Body, new_body
+from vdsm_pin.geometry.compiled import apart, borrowed, compiled
 from vdsm_pin.geometry.kernels import BRACKET, LOWER, NORMAL, SCRATCH_ROWS
 from vdsm_pin.geometry.obstacles import (
     STACK,
@@ -14,6 +16,18 @@ from vdsm_pin.geometry.obstacles import (
     obstacle_bracket,
 )
 from vdsm_pin.geometry.pieces import PackedPieces
+
+
+class _Desk(NamedTuple):
+    """Working space of `obstacle_bracket`, and the last n of each obstacle and link."""
+
+    body: Body
+    box: FloatArray
+    scratch: FloatArray
+    stack: IntArray
+    trial: FloatArray
+    out: FloatArray
+    normals: FloatArray
 
 
 @compiled
@@ -48,27 +62,45 @@ def link_clearances(
         Distance to the nearest obstacle, shape (n_samples, N); [m].
     """
     n_samples, n_links = centres.shape[0], centres.shape[1] - 1
-    n_obstacles = pieces.root.size
     result = np.full((n_samples, n_links), np.inf)
-    scratch = np.zeros((SCRATCH_ROWS + 2, 3))
-    box, body = np.zeros((2, 3)), new_body(2, 0)
-    stack = np.zeros(STACK, np.int64)
-    trial, out = np.zeros(BRACKET + 4), np.zeros(BRACKET + 4)
-    normals = np.ones((n_obstacles, n_links, 3))
-    for link in range(n_links):
-        for sample in range(n_samples):
+    desk = _Desk(
+        new_body(2, 0), np.zeros((2, 3)), np.zeros((SCRATCH_ROWS + 2, 3)),
+        np.zeros(STACK, np.int64), np.zeros(BRACKET + 4), np.zeros(BRACKET + 4),
+        np.ones((pieces.root.size, n_links, 3)),
+    )  # fmt: skip
+    _measure(pieces, closed, centres, radius + pad, goal, desk, result)
+    return result
+
+
+@compiled
+def _measure(
+    pieces: PackedPieces,
+    closed: FloatArray,
+    centres: FloatArray,
+    off: float,
+    goal: float,
+    desk: _Desk,
+    result: FloatArray,
+) -> None:
+    """Write what is left of each distance where `off` is taken off it; [m]."""
+    apart()
+    pieces, desk = borrowed(pieces), borrowed(desk)
+    body, box, out = desk.body, desk.box, desk.out
+    for link in range(result.shape[1]):
+        for sample in range(result.shape[0]):
             body.points[:] = centres[sample, link : link + 2]
             box_of(body.points, box[0], box[1])
             best = np.inf
-            for o in range(n_obstacles):
+            for o in range(pieces.root.size):
                 if box_distance(pieces, pieces.root[o], box[0], box[1]) >= best:
                     continue
-                out[NORMAL : NORMAL + 3] = normals[o, link]
-                obstacle_bracket(pieces, o, body, goal, scratch, stack, trial, out)
-                normals[o, link] = out[NORMAL : NORMAL + 3]
+                out[NORMAL : NORMAL + 3] = desk.normals[o, link]
+                obstacle_bracket(
+                    pieces, o, body, goal, desk.scratch, desk.stack, desk.trial, out
+                )
+                desk.normals[o, link] = out[NORMAL : NORMAL + 3]
                 gap = out[LOWER]
                 if closed[o] > 0.0 and gap > 0.0 and _inside(pieces, o, body.points[0]):
                     gap = -gap
                 best = min(best, gap)
-            result[sample, link] = best - radius - pad
-    return result
+            result[sample, link] = best - off

@@ -1,4 +1,5 @@
 import itertools
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -11,13 +12,15 @@ from vdsm_pin.manipulator import built_in
 from vdsm_pin.planner.fewest.bounds import prove_tips
 from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.cores import blocked_by, cores_of
-from vdsm_pin.planner.fewest.growth import vary
+from vdsm_pin.planner.fewest.growth import Garden, Grown, vary
 from vdsm_pin.planner.fewest.kernels import pose_shapes
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.nearby import FAR, nearby
+from vdsm_pin.planner.fewest.poses import bends_of, room_along
 from vdsm_pin.planner.fewest.roadmap import Taste, build_roadmap
 from vdsm_pin.planner.fewest.route import path_rows, tip_route
 from vdsm_pin.planner.fewest.shapes import Shapes, one_knee_shapes
+from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.scene import Box, Capsule, Cylinder, HalfSpace, Obstacle, Prism, Sphere
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance
@@ -203,6 +206,102 @@ def test_a_motion_through_a_thin_plate_is_refused_though_both_ends_are_clear() -
     free = problem()
     judge = Judge(free, link_clearance(free), 0.0, 0.0, 2e-3)
     assert judge.clear(Intervals(a, b, zero, zero))[0]
+
+
+def wandering(task: PlanningProblem, seed: int, count: int) -> Intervals:
+    """A chain in which knees turn and slide while the tip goes along the path."""
+    rng = np.random.default_rng(seed)
+    shapes = one_knee_shapes(ARM, ARM.max_link_angle, 0.08, 8)
+    tips = task.path.at(np.linspace(0.0, task.path.length, count))
+    shape = [int(rng.integers(1, shapes.size))]
+    while len(shape) < count:
+        near = shapes.neighbours[shapes.first[shape[-1]] : shapes.first[shape[-1] + 1]]
+        shape.append(int(rng.choice(near)))
+    offsets = shapes.offsets(ARM, tips, np.array(shape))
+    return Intervals(tips[:-1], tips[1:], offsets[:-1], offsets[1:])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_interval_is_clear_exactly_where_dense_samples_are(seed: int) -> None:
+    task = problem(PILLAR, Sphere("ball", np.array([2.0, -0.2, 0.3]), 0.15))
+    chain, clearance, finest = wandering(task, seed, 400), link_clearance(task), 2e-3
+    mixed = np.random.default_rng(seed).permutation(399)
+    alone = Intervals(*(getattr(chain, f.name)[mixed] for f in fields(chain)))
+    judge = Judge(task, clearance, 0.0, 0.0, finest)
+    for intervals in (chain, alone):
+        clear, begin = judge.measured(intervals)
+        rows, places = (
+            np.repeat(np.arange(399), 65),
+            np.tile(np.linspace(0, 1, 65), 399),
+        )
+        centres = intervals.centres(ARM, rows, places)
+        room = clearance(centres).min(axis=1)
+        room[~(bends_of(centres).max(axis=1) <= judge.limit)] = -np.inf
+        room = room.reshape(399, 65)
+        assert 0.03 < clear.mean() < 0.9
+        # What is clear may lose half of the finest way between two looks.
+        assert room[clear].min() >= task.required_clearance - finest / 2.0
+        assert (room[~clear].min(axis=1) < task.required_clearance + finest).all()
+        # Below zero the clearance function promises the sign alone.
+        kept, first = begin >= 0.0, room[:, 0]
+        np.testing.assert_array_equal(kept, first >= 0.0)
+        np.testing.assert_allclose(begin[kept], first[kept], atol=1e-8)
+
+
+def test_pieces_cut_at_other_knees_have_the_least_room_of_what_they_share() -> None:
+    rng = np.random.default_rng(3)
+    knees, others = rng.random((2, 400, 9)) < 0.4
+    knees[:, [0, -1]] = others[:, [0, -1]] = True
+    room = np.where(knees[:, 1:], rng.uniform(size=(400, 8)), np.inf)
+    found = room_along(room, knees, others)
+    for row in range(400):
+        cuts, ends = np.flatnonzero(others[row]), np.flatnonzero(knees[row])
+        expected = np.full(8, np.inf)
+        for a, b in itertools.pairwise(cuts):
+            shared = [room[row, d - 1] for c, d in itertools.pairwise(ends)
+                      if c < b and a < d]  # fmt: skip
+            expected[b - 1] = min(shared)
+        np.testing.assert_array_equal(found[row], expected)
+
+
+def grown(task: PlanningProblem, tips: np.ndarray) -> tuple[Judge, Garden, Grown]:
+    judge = Judge(task, link_clearance(task), 0.0, 0.0, 2e-3)
+    garden = Garden(judge, tips, np.random.default_rng(0))
+    return judge, garden, garden.grow(np.zeros((1, 9, 2)), 0, len(tips) - 1)
+
+
+def lines(tips: np.ndarray, tree: Grown) -> Intervals:
+    """The ways from parents to children; the root is the straight arm at layer 0."""
+    offsets = np.concatenate([tree.offsets, np.zeros((1, 9, 2))])
+    layer = np.append(tree.layer, 0)
+    return Intervals(
+        tips[layer[tree.parent]], tips[tree.layer], offsets[tree.parent], tree.offsets
+    )
+
+
+def test_what_is_grown_passes_an_obstacle_by_ways_that_are_clear() -> None:
+    tips = np.linspace([3.126, 0.0, 0.0], [3.126, 0.9, 0.0], 12)
+    task = problem(Sphere("ball", np.array([2.0, 0.5, 0.1]), 0.15))
+    judge, _, tree = grown(task, tips)
+    assert tree.layer[-1] == 11
+    assert judge.clear(lines(tips, tree)).all()
+    assert (np.diff(tree.layer) >= 0).all()
+    assert (tree.parent < np.arange(len(tree.layer))).all()
+
+
+def test_nothing_grows_through_a_rod_though_children_stand_behind_it() -> None:
+    along = np.array([0.0, 0.0, 1.0])
+    task = problem(Cylinder("rod", np.array([2.0, 0.3, 0.0]), along, 3.0, 0.002))
+    tips = np.linspace([3.126, 0.0, 0.0], [3.126, 0.9, 0.0], 6)
+    judge, garden, tree = grown(task, tips)
+    assert tree.layer[-1] == 5
+    assert judge.clear(lines(tips, tree)).all()
+    # Where no way is looked at, some children are beyond the rod at one bound.
+    root = np.zeros((1, 9, 2))
+    jumped, _ = garden._grown(root, 0, 5, every_way=False)
+    clear = judge.clear(lines(tips, jumped))
+    assert 0.5 < clear.mean() < 1.0
+    assert len(garden._reached(jumped, root, 0).layer) < clear.sum()
 
 
 def test_a_motion_past_a_limit_is_refused() -> None:

@@ -1,8 +1,9 @@
 """Whether a motion in the chart keeps clearance and limits, asked as rarely as can be.
 
-Clearance changes no faster than the body moves: an interval whose ends are clear by
-more than half the way between them needs no further look. The rest is halved. This is a
-planner's check; the proof over continuous time is the verifier's.
+Clearance changes no faster than the body moves: a straight piece of the arm that is
+clear at both ends of an interval by more than half its way in between needs no further
+look. For the other pieces the interval is cut into as many parts as that seems to take.
+This is a planner's check; the proof over continuous time is the verifier's.
 """
 
 from dataclasses import dataclass, fields
@@ -14,19 +15,22 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.poses import (
     bends_of,
-    farthest_moved,
-    least_of,
+    parts_of_pieces,
     pieces_of,
+    room_along,
 )
 from vdsm_pin.planner.fewest.roadmap import link_limit
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
-HALVINGS: Final = 16
-"""Halvings of an interval; the body moves 65,536 times less in what is left then."""
+CUTS: Final = 16
+"""Times an interval is cut; the body moves 65,536 times less in what is left then."""
+MOST_PARTS: Final = 8
+"""Parts of one cut. More at once takes fewer turns, but looks at more where the first
+would have shown that the way is blocked."""
 LONG_WAY: Final = 0.2
-"""Way of the body above which the middle is looked at whatever the clearance; [m]."""
+"""Way of a piece above which the middle is looked at whatever the clearance; [m]."""
 
 
 class Judge:
@@ -76,10 +80,12 @@ class Judge:
         knees = still.knees(self.problem.manipulator)
         number, share = np.arange(len(tips)), np.zeros(len(tips))
         most = np.full(len(tips), self.limit)
-        centres, room = self._states(still, knees, number, share, most, self.rough)
+        centres, room = self._states(
+            still, number, share, most, self.rough, knees, knees[:, 1:]
+        )
         angles = bends_of(centres)
         changed = (angles > TOLERANCES.changed_angle).sum(axis=1)
-        return room, changed, angles.max(axis=1)
+        return room.min(axis=1), changed, angles.max(axis=1)
 
     def bends(self, tips: FloatArray, offsets: FloatArray) -> FloatArray:
         """Link angles of configurations, shape (n, N); [rad]."""
@@ -90,15 +96,29 @@ class Judge:
     def _states(
         self,
         intervals: Intervals,
-        knees: BoolArray,
         interval: IntArray,
         share: FloatArray,
         most: FloatArray,
         clearance: LinkClearance,
+        knees: BoolArray,
+        asked: BoolArray,
     ) -> tuple[FloatArray, FloatArray]:
-        """Joint centres and clearance, -inf where a limit is broken.
+        """Joint centres and the clearance of straight pieces.
 
-        Links in line between two knees are measured as one.
+        Links in line between two knees are one piece; it goes by the joint it ends at.
+
+        Args:
+            intervals: Straight lines in the chart.
+            interval: Interval of each place, shape (r,).
+            share: Where in its interval, 0 to 1, shape (r,).
+            most: Largest link angle at each place, shape (r,); [rad].
+            clearance: The clearance function.
+            knees: Of each interval, shape (n, N + 1).
+            asked: Which pieces of each place are asked for, shape (r, N).
+
+        Returns:
+            Shape (r, N + 1, 3) [m]; clearance, inf where none is asked for, -inf in
+            rows where a limit is broken, shape (r, N) [m].
         """
         manipulator = self.problem.manipulator
         centres = intervals.centres(manipulator, interval, share)
@@ -106,9 +126,12 @@ class Judge:
         base = centres[:, 0, 0]
         low, high = manipulator.base_range
         fine = (peak <= most) & (base >= low) & (base <= high)
-        pieces, first = pieces_of(centres, knees, interval, fine)
-        room = clearance(pieces)[:, 0] if len(pieces) else np.zeros(0)
-        return centres, least_of(room, first, -np.inf)
+        room = np.full(asked.shape, np.inf)
+        room[~fine] = -np.inf
+        pieces, place = pieces_of(centres, knees, interval, asked & fine[:, None])
+        if len(pieces):
+            room.ravel()[place] = clearance(pieces)[:, 0]
+        return centres, room
 
     def clear(
         self,
@@ -143,31 +166,51 @@ class Judge:
             most = np.minimum(most, bend + tol)
         knees = intervals.knees(self.problem.manipulator)
         number, low, high = np.arange(count), np.zeros(count), np.ones(count)
-        c0, begin = self._states(intervals, knees, number, low, most, ask)
-        c1, r1 = np.roll(c0, -1, axis=0), np.roll(begin, -1)
+        every = knees[:, 1:]
+        c0, r0 = self._states(intervals, number, low, most, ask, knees, every)
+        # Most intervals end where the next one begins.
+        c1 = np.roll(c0, -1, axis=0)
+        r1 = room_along(np.roll(r0, -1, axis=0), np.roll(knees, -1, axis=0), knees)
         ends = np.flatnonzero(~intervals.continued())
         c1[ends], r1[ends] = self._states(
-            intervals, knees, ends, high[ends], most[ends], ask
+            intervals, ends, high[ends], most[ends], ask, knees, every[ends]
         )
-        good = (begin >= need - tol) & (r1 >= need - tol)
-        halves = _Halves(number, low, high, c0, c1, begin, r1)
-        for _ in range(HALVINGS):
-            halves = halves.take(good[halves.interval])
-            halves = halves.take(halves.open(need, self.finest))
-            if not len(halves.interval):
+        begin = r0.min(axis=1)
+        good = (begin >= need - tol) & (r1.min(axis=1) >= need - tol)
+        parts = _Parts(number, low, high, c0, c1, r0, r1)
+        for _ in range(CUTS):
+            counts = parts.counts(knees, need, self.finest)
+            doubtful = (counts > 0).any(axis=1) & good[parts.interval]
+            if not doubtful.any():
                 return good, begin
-            where, middle = halves.interval, (halves.low + halves.high) / 2.0
-            cm, rm = self._states(intervals, knees, where, middle, most[where], ask)
-            good[where[~(rm >= need[where] - tol)]] = False
-            halves = halves.cut(middle, cm, rm)
-        # What is not settled after all halvings is not known to be clear.
-        good[halves.interval] = False
+            parts, counts = parts.take(doubtful), counts[doubtful]
+            inner = parts.inner(counts.max(axis=1))
+            where = parts.interval[inner.part]
+            centres, room = self._states(
+                intervals, where, inner.share, most[where], ask,
+                knees, counts[inner.part] > 0,
+            )  # fmt: skip
+            good[where[~(room.min(axis=1) >= need[where] - tol)]] = False
+            parts = parts.cut(inner, centres, room)
+        # What is not settled after all cuts is not known to be clear.
+        good[parts.interval] = False
         return good, begin
 
 
 @dataclass(frozen=True)
-class _Halves:
-    """Parts of intervals with both ends looked at: where, joint centres, clearance."""
+class _Inner:
+    """Places within parts, in order: the part of each, where it is in the interval."""
+
+    part: IntArray
+    share: FloatArray
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """Parts of intervals with both ends looked at: where, joint centres, clearance.
+
+    A piece that is settled has no clearance where its interval was cut (inf).
+    """
 
     interval: IntArray
     low: FloatArray
@@ -177,28 +220,40 @@ class _Halves:
     room: FloatArray
     next_room: FloatArray
 
-    def open(self, need: FloatArray, finest: float) -> BoolArray:
-        """Which parts may not be clear between their ends."""
-        way = farthest_moved(self.centres, self.next_centres)
-        least = (self.room + self.next_room - way) / 2.0
-        doubtful = (least < need[self.interval]) & (way > finest)
-        # A long part may hide a bend or a curve: look at its middle anyway.
-        return np.asarray(doubtful | (way > LONG_WAY))
+    def counts(self, knees: BoolArray, need: FloatArray, finest: float) -> IntArray:
+        """Into how many parts to cut for each piece, 0 where it is clear, shape (n, N).
 
-    def take(self, kept: BoolArray) -> "_Halves":
+        A long part may hide a bend or a curve: it is cut anyway.
+        """
+        return parts_of_pieces(
+            self.centres, self.next_centres, self.room, self.next_room,
+            knees, self.interval, need, finest, LONG_WAY, MOST_PARTS,
+        )  # fmt: skip
+
+    def inner(self, counts: IntArray) -> _Inner:
+        """The places that cut every part evenly, shape (n,) counts of 2 and more."""
+        part = np.repeat(np.arange(len(counts)), counts - 1)
+        first = np.cumsum(counts - 1) - (counts - 1)
+        step = (np.arange(len(part)) - first[part] + 1) / counts[part]
+        low, high = self.low[part], self.high[part]
+        return _Inner(part, low + step * (high - low))
+
+    def take(self, kept: BoolArray) -> "_Parts":
         """Some of the parts."""
-        return _Halves(*(getattr(self, one.name)[kept] for one in fields(self)))
+        return _Parts(*(getattr(self, one.name)[kept] for one in fields(self)))
 
-    def cut(
-        self, middle: FloatArray, centres: FloatArray, room: FloatArray
-    ) -> "_Halves":
-        """Every part in two."""
-        return _Halves(
-            np.concatenate([self.interval, self.interval]),
-            np.concatenate([self.low, middle]),
-            np.concatenate([middle, self.high]),
-            np.concatenate([self.centres, centres]),
-            np.concatenate([centres, self.next_centres]),
-            np.concatenate([self.room, room]),
-            np.concatenate([room, self.next_room]),
+    def cut(self, inner: _Inner, centres: FloatArray, room: FloatArray) -> "_Parts":
+        """The parts between the places, every place of each part in order."""
+        number = np.arange(len(self.interval))
+        # Part by part: its begin, then its places; its places, then its end.
+        begins = np.argsort(np.append(number, inner.part), kind="stable")
+        ends = np.argsort(np.append(inner.part, number), kind="stable")
+        return _Parts(
+            np.append(self.interval, self.interval[inner.part])[begins],
+            np.append(self.low, inner.share)[begins],
+            np.append(inner.share, self.high)[ends],
+            np.concatenate([self.centres, centres])[begins],
+            np.concatenate([centres, self.next_centres])[ends],
+            np.concatenate([self.room, room])[begins],
+            np.concatenate([room, self.next_room])[ends],
         )

@@ -10,7 +10,7 @@ from math import sqrt
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.compiled import borrowed, compiled
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
 from vdsm_pin.scene import Obstacle
 from vdsm_pin.tolerances import TOLERANCES
@@ -111,6 +111,7 @@ def blocked_by(cores: FloatArray, ends: FloatArray, reach: float) -> BoolArray:
     Returns:
         Shape (s,).
     """
+    cores, ends = borrowed(cores), borrowed(ends)
     blocked = np.zeros(ends.shape[0], dtype=np.bool_)
     for s in range(ends.shape[0]):
         for n in range(cores.shape[0]):

@@ -4,6 +4,10 @@ A population of configurations follows the tip from layer to layer. Each child b
 joint of its parent a little, adds a knee or takes one away; children that are clear and
 can be reached from their parent live on. Only the ancestors of the few best that came
 farthest enter the graph.
+
+Nearly every child can be reached from its parent. So the ways from parents to children
+are first taken for clear and looked at only among those ancestors; where none of the
+best comes through, it is grown again with every way looked at.
 """
 
 from dataclasses import dataclass
@@ -34,7 +38,7 @@ SCALES = (0.008, 0.025, 0.06)
 
 @dataclass(frozen=True)
 class Grown:
-    """A tree of configurations.
+    """A tree of configurations, parents before their children.
 
     Args:
         layer: Layer of each, shape (g,).
@@ -45,6 +49,32 @@ class Grown:
     layer: IntArray
     offsets: FloatArray
     parent: IntArray
+
+    def with_more(self, layer: int, offsets: FloatArray, parent: IntArray) -> "Grown":
+        """The tree with another generation at its end."""
+        return Grown(
+            np.append(self.layer, np.full(len(offsets), layer)),
+            np.concatenate([self.offsets, offsets]),
+            np.append(self.parent, parent),
+        )
+
+    def take(self, kept: IntArray) -> "Grown":
+        """Some configurations, in order, whose parents are among them."""
+        rank = np.full(len(self.layer), -1)
+        rank[kept] = np.arange(len(kept))
+        up = self.parent[kept]
+        up = np.where(up < 0, up, rank[np.maximum(up, 0)])
+        return Grown(self.layer[kept], self.offsets[kept], up)
+
+    def with_ancestors(self, numbers: IntArray) -> "Grown":
+        """Only these configurations and all their ancestors."""
+        kept: set[int] = set()
+        for start in numbers.tolist():
+            at = start
+            while at >= 0 and at not in kept:
+                kept.add(at)
+                at = int(self.parent[at])
+        return self.take(np.array(sorted(kept), dtype=np.int64))
 
 
 @compiled
@@ -148,21 +178,9 @@ class Garden:
         self, judge: Judge, tips: FloatArray, rng: np.random.Generator
     ) -> None:
         self.judge, self.tips, self.rng = judge, tips, rng
-        self.layer: list[IntArray] = []
-        self.offsets: list[FloatArray] = []
-        self.parent: list[IntArray] = []
-        self.size = 0
-
-    def _sow(self, layer: int, offsets: FloatArray, parent: IntArray) -> IntArray:
-        self.layer.append(np.full(len(offsets), layer))
-        self.offsets.append(offsets)
-        self.parent.append(parent)
-        numbers = np.arange(self.size, self.size + len(offsets))
-        self.size += len(offsets)
-        return numbers
 
     def _children(
-        self, offsets: FloatArray, layer: int, to: int
+        self, offsets: FloatArray, layer: int, to: int, every_way: bool
     ) -> tuple[FloatArray, IntArray]:
         """Living children at layer `to` and the row of each one's parent."""
         arm = self.judge.problem.manipulator
@@ -180,6 +198,8 @@ class Garden:
         alive = np.flatnonzero(room >= self.judge.required)
         order = self._choice(room[alive], changed[alive])
         picked = alive[order]
+        if not every_way:
+            return born[picked], rows[picked]
         lines = Intervals(
             np.broadcast_to(self.tips[layer], (len(picked), 3)),
             tips[picked],
@@ -208,17 +228,33 @@ class Garden:
             offsets: Roots at layer `first`, shape (n, N + 1, 2); [m].
             first: Layer of the roots.
             last: Layer to reach, before or after.
+
+        Returns:
+            The few best of those that came farthest, with their ancestors.
         """
+        tree = self._best(*self._grown(offsets, first, last, every_way=False))
+        reached = self._reached(tree, offsets, first)
+        # Those that came farthest stand last.
+        if np.array_equal(reached.layer[-1:], tree.layer[-1:]):
+            return reached
+        return self._best(*self._grown(offsets, first, last, every_way=True))
+
+    def _grown(
+        self, offsets: FloatArray, first: int, last: int, every_way: bool
+    ) -> tuple[Grown, IntArray]:
+        """All that grew, and the numbers of those that came farthest."""
+        none = np.zeros(0, dtype=np.int64)
+        tree, front = Grown(none, offsets[:0], none), none
         step = 1 if last > first else -1
         at, layer, retries = offsets, first, 0
         numbers = -1 - np.arange(len(offsets))
-        front = numbers
         while layer != last and len(at):
-            born, rows = self._children(at, layer, layer + step)
+            born, rows = self._children(at, layer, layer + step, every_way)
             if len(born) < POPULATION // 10 and retries < RETRIES:
                 retries += 1
-                side, side_rows = self._children(at, layer, layer)
-                ids = self._sow(layer, side, numbers[side_rows])
+                side, side_rows = self._children(at, layer, layer, every_way)
+                ids = len(tree.layer) + np.arange(len(side))
+                tree = tree.with_more(layer, side, numbers[side_rows])
                 at = np.concatenate([at, side])
                 numbers = np.concatenate([numbers, ids])
                 if len(at) > 2 * POPULATION:
@@ -229,33 +265,34 @@ class Garden:
                 break
             retries = 0
             layer += step
-            numbers = self._sow(layer, born, numbers[rows])
-            at, front = born, numbers
-        return self._ancestry(front)
+            front = len(tree.layer) + np.arange(len(born))
+            tree = tree.with_more(layer, born, numbers[rows])
+            at, numbers = born, front
+        return tree, front
 
-    def _ancestry(self, front: IntArray) -> Grown:
+    def _best(self, tree: Grown, front: IntArray) -> Grown:
         """The few best of the front with all their ancestors."""
-        shape = (0, *self.judge.problem.manipulator.stations.shape, 2)
-        if not self.size or front[0] < 0:
-            none = np.zeros(0, dtype=np.int64)
-            return Grown(none, np.zeros(shape), none)
-        layer, parent = np.concatenate(self.layer), np.concatenate(self.parent)
-        offsets = np.concatenate(self.offsets)
-        place = int(layer[front[0]])
-        tips = np.broadcast_to(self.tips[place], (len(front), 3))
-        room, changed, _ = self.judge.look(tips, offsets[front])
+        if not len(front):
+            return tree.take(front)
+        tips = self.tips[tree.layer[front]]
+        room, changed, _ = self.judge.look(tips, tree.offsets[front])
         lack = np.maximum(0.0, 1.0 - (room - self.judge.required) / 0.03)
-        best = front[np.argsort(changed + lack, kind="stable")[:KEPT]]
-        kept: set[int] = set()
-        for start in best.tolist():
-            at = start
-            while at >= 0 and at not in kept:
-                kept.add(at)
-                at = int(parent[at])
-        order = np.array(sorted(kept))
-        rank = np.full(self.size, -1)
-        rank[order] = np.arange(len(order))
-        up = parent[order]
-        return Grown(
-            layer[order], offsets[order], np.where(up < 0, up, rank[np.maximum(up, 0)])
-        )
+        best = np.argsort(changed + lack, kind="stable")[:KEPT]
+        return tree.with_ancestors(front[best])
+
+    def _reached(self, tree: Grown, roots: FloatArray, first: int) -> Grown:
+        """What of a tree can be reached from its roots, which are at layer `first`."""
+        if not len(tree.layer):
+            return tree
+        # Roots stand at the end, the first one last, where their numbers -1, -2, ...
+        # find them.
+        offsets = np.concatenate([tree.offsets, roots[::-1]])
+        layer = np.append(tree.layer, np.full(len(roots), first))
+        lines = Intervals(
+            self.tips[layer[tree.parent]], self.tips[tree.layer],
+            offsets[tree.parent], tree.offsets,
+        )  # fmt: skip
+        reached = self.judge.clear(lines)
+        for number, parent in enumerate(tree.parent.tolist()):
+            reached[number] &= parent < 0 or reached[parent]
+        return tree.take(np.flatnonzero(reached))

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.compiled import apart, borrowed, compiled
 from vdsm_pin.tolerances import TOLERANCES
 
 NEAR = 0.26
@@ -107,11 +107,27 @@ def pose_shapes(
         node numbers tip * n + shape, ascending, shape (v,); the ends of the three
         straight pieces, shape (v, 4, 3) [m]; psi at the three bends, (v, 3) [rad].
     """
-    n_shapes = knees.shape[0]
-    room = tips.shape[0] + whole.sum() * (n_shapes - 1)
+    room = tips.shape[0] + whole.sum() * (knees.shape[0] - 1)
     node = np.zeros(room, dtype=np.int64)
     ends, bends = np.zeros((room, 4, 3)), np.zeros((room, 3))
-    count = 0
+    tried = (tips, whole, knees, slopes, stations)
+    count = _pose_all(tried, limit, base_low, base_high, (node, ends, bends))
+    return node[:count], ends[:count], bends[:count]
+
+
+@compiled
+def _pose_all(
+    tried: tuple[FloatArray, BoolArray, IntArray, FloatArray, FloatArray],
+    limit: float,
+    base_low: float,
+    base_high: float,
+    out: tuple[IntArray, FloatArray, FloatArray],
+) -> int:
+    """Write what `pose_shapes` returns; its number of rows is returned."""
+    apart()
+    tips, whole, knees, slopes, stations = borrowed(tried)
+    node, ends, bends = borrowed(out)
+    n_shapes, count = knees.shape[0], 0
     for k in range(tips.shape[0]):
         for c in range(n_shapes if whole[k] else 1):
             fits = _pose(
@@ -120,7 +136,7 @@ def pose_shapes(
             if fits and base_low <= ends[count, 0, 0] <= base_high:
                 node[count] = k * n_shapes + c
                 count += 1
-    return node[:count], ends[:count], bends[:count]
+    return count
 
 
 @compiled
@@ -282,6 +298,7 @@ def stage_programme(
         cost and parent of every node; cost of being at home after each layer and the
         node left from (-1: was at home already), shape (l,).
     """
+    graph, barred = borrowed(graph), borrowed(barred)
     count = graph.node.size
     labels = Labels(np.full(count, np.inf), np.full(count, -1))
     home_cost, home_from = np.full(layers.size, np.inf), np.full(layers.size, -1)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.compiled import borrowed, compiled
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Piece
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.planner.fewest.cores import blocked_by, cores_of
@@ -173,6 +173,7 @@ def _box_bounds(
         stretches: Number of stretches of each segment.
         enough: A distance from which on the box of the whole segment will do; [m].
     """
+    ends, boxes = borrowed(ends), borrowed(boxes)
     result = np.full(ends.shape[0], np.inf)
     for n in range(ends.shape[0]):
         a, z = ends[n]

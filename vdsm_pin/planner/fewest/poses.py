@@ -3,7 +3,7 @@
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.compiled import borrowed, compiled
 
 
 @compiled
@@ -92,6 +92,7 @@ def knees_between(
     Returns:
         Shape (n, N + 1).
     """
+    offsets, next_offsets = borrowed(offsets), borrowed(next_offsets)
     n_links = lengths.size
     bent = np.ones((offsets.shape[0], n_links + 1), dtype=np.bool_)
     for r in range(offsets.shape[0]):
@@ -116,58 +117,113 @@ def pieces_of(
         centres: Joint centres, shape (r, N + 1, 3); [m].
         knees: Of each interval, shape (n, N + 1).
         interval: Interval of each configuration, shape (r,).
-        wanted: Which configurations are wanted, shape (r,).
+        wanted: Which pieces are wanted, by the joint they end at, shape (r, N).
 
     Returns:
-        Ends of the pieces, shape (p, 2, 3) [m], and where each configuration's pieces
-        begin, shape (r + 1,).
+        Ends of the pieces, shape (p, 2, 3) [m], and where each stands in `wanted`, row
+        after row, shape (p,).
     """
-    n_rows, n_links = centres.shape[0], centres.shape[1] - 1
-    first = np.zeros(n_rows + 1, dtype=np.int64)
+    n_rows, n_links = wanted.shape
+    pieces, place = np.zeros((wanted.sum(), 2, 3)), np.zeros(wanted.sum(), np.int64)
+    count = 0
     for r in range(n_rows):
-        count = 0
-        if wanted[r]:
-            for i in range(1, n_links + 1):
-                count += knees[interval[r], i]
-        first[r + 1] = first[r] + count
-    pieces = np.zeros((first[n_rows], 2, 3))
-    for r in range(n_rows):
-        begin, place = 0, first[r]
-        for i in range(1, n_links + 1):
-            if wanted[r] and knees[interval[r], i]:
-                pieces[place, 0], pieces[place, 1] = centres[r, begin], centres[r, i]
-                begin, place = i, place + 1
-    return pieces, first
+        begin = 0
+        for i in range(n_links):
+            if not knees[interval[r], i + 1]:
+                continue
+            if wanted[r, i]:
+                for c in range(3):
+                    pieces[count, 0, c] = centres[r, begin, c]
+                    pieces[count, 1, c] = centres[r, i + 1, c]
+                place[count] = r * n_links + i
+                count += 1
+            begin = i + 1
+    return pieces, place
 
 
 @compiled
-def least_of(values: FloatArray, first: IntArray, none: float) -> FloatArray:
-    """The least value of each group, `none` where a group is empty, shape (r,)."""
-    least = np.full(first.size - 1, none)
-    for r in range(first.size - 1):
-        if first[r + 1] > first[r]:
-            least[r] = values[first[r] : first[r + 1]].min()
-    return least
-
-
-@compiled
-def farthest_moved(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Longest way of a joint centre between configurations, shape (r,); [m].
+def room_along(room: FloatArray, knees: BoolArray, others: BoolArray) -> FloatArray:
+    """Clearance of an arm's pieces where it is cut at other knees.
 
     Args:
-        one: Joint centres, shape (r, N + 1, 3); [m].
-        other: The same; [m].
+        room: Clearance of the pieces, shape (n, N); [m].
+        knees: Where they are cut, shape (n, N + 1).
+        others: Where the others are cut, shape (n, N + 1).
+
+    Returns:
+        The least of the pieces that each of the others shares, inf where none ends,
+        shape (n, N); [m].
     """
-    longest = np.zeros(one.shape[0])
-    for r in range(one.shape[0]):
-        square = 0.0
-        for i in range(one.shape[1]):
-            x = one[r, i, 0] - other[r, i, 0]
-            y = one[r, i, 1] - other[r, i, 1]
-            z = one[r, i, 2] - other[r, i, 2]
-            square = max(square, x * x + y * y + z * z)
-        longest[r] = np.sqrt(square)
-    return longest
+    n_rows, n_links = room.shape
+    result = np.full((n_rows, n_links), np.inf)
+    for r in range(n_rows):
+        begin = 0
+        for i in range(n_links):
+            if not others[r, i + 1]:
+                continue
+            for k in range(begin, n_links):
+                result[r, i] = min(result[r, i], room[r, k])
+                if k >= i and knees[r, k + 1]:
+                    break
+            begin = i + 1
+    return result
+
+
+@compiled
+def parts_of_pieces(
+    centres: FloatArray,
+    next_centres: FloatArray,
+    room: FloatArray,
+    next_room: FloatArray,
+    knees: BoolArray,
+    interval: IntArray,
+    need: FloatArray,
+    finest: float,
+    long_way: float,
+    most: int,
+) -> IntArray:
+    """Into how many parts to cut the way of a piece to see that it is clear.
+
+    No point of a straight piece moves farther than both its ends. The number is what
+    it takes if there is as much clearance on the way as at its ends, as a power of 2.
+
+    Args:
+        centres: Joint centres, shape (r, N + 1, 3); [m].
+        next_centres: The same at the other end; [m].
+        room: Clearance of the pieces, inf where none ends, shape (r, N); [m].
+        next_room: The same at the other end; [m].
+        knees: Of each interval, shape (n, N + 1).
+        interval: Interval of both configurations, shape (r,).
+        need: Clearance to keep in each interval, shape (n,); [m].
+        finest: A way that is too short to matter; [m].
+        long_way: A way that is cut whatever the clearance; [m].
+        most: Largest number of parts.
+
+    Returns:
+        Shape (r, N), 0 where a piece is clear all the way.
+    """
+    n_rows, n_links = room.shape
+    parts = np.zeros((n_rows, n_links), dtype=np.int64)
+    for r in range(n_rows):
+        before = 0.0
+        for i in range(n_links + 1):
+            if not knees[interval[r], i]:
+                continue
+            square = 0.0
+            for c in range(3):
+                square += (next_centres[r, i, c] - centres[r, i, c]) ** 2
+            here = np.sqrt(square)
+            way, before = max(before, here), here
+            if i == 0 or not way > finest:
+                continue
+            spare = room[r, i - 1] + next_room[r, i - 1] - 2.0 * need[interval[r]]
+            if spare >= way and way <= long_way:
+                continue
+            parts[r, i - 1] = 2
+            step = max(spare, finest)
+            while 2 * parts[r, i - 1] <= most and parts[r, i - 1] * step < way:
+                parts[r, i - 1] *= 2
+    return parts
 
 
 @compiled

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.compiled import borrowed, compiled
 from vdsm_pin.geometry.obstacles import STACK, crossings
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
@@ -155,6 +155,7 @@ def nearest_points(
     Returns:
         Shape (n,); [m].
     """
+    points, balls, ends = borrowed(points), borrowed(balls), borrowed(ends)
     result = np.zeros(ends.shape[0])
     stack, gaps = np.zeros(STACK, np.int64), np.zeros(STACK)
     for n in range(ends.shape[0]):
@@ -191,6 +192,7 @@ def buried(solids: PackedPieces, ends: FloatArray, asked: BoolArray) -> BoolArra
         ends: Shape (n, 2, 3); [m].
         asked: Shape (n,).
     """
+    solids = borrowed(solids)
     inside = np.zeros(ends.shape[0], dtype=np.bool_)
     for n in range(ends.shape[0]):
         if not asked[n]:

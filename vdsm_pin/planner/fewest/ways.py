@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.compiled import borrowed, compiled
 from vdsm_pin.planner.fewest.kernels import NEAR, Barred, Graph, Labels, is_blocked
 
 
@@ -98,6 +98,7 @@ def shortest_ways(
     Returns:
         Length of the way to each node (inf: none) [m], and the node before.
     """
+    graph, tips, barred = borrowed(graph), borrowed(tips), borrowed(barred)
     count = graph.node.size
     labels = Labels(np.full(count, np.inf), np.full(count, -1))
     done = np.zeros(count, dtype=np.bool_)
