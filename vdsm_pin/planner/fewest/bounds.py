@@ -15,7 +15,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.bodies import new_body
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.compiled import borrowed, compiled
 from vdsm_pin.geometry.kernels import BRACKET, NORMAL, SCRATCH_ROWS, UPPER
 from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
@@ -61,6 +61,7 @@ def upper_bounds(pieces: PackedPieces, segments: FloatArray) -> FloatArray:
     Returns:
         Shape (n, n_obstacles); [m].
     """
+    pieces = borrowed(pieces)
     count = pieces.root.size
     result = np.full((segments.shape[0], count), np.inf)
     scratch = np.zeros((SCRATCH_ROWS + 2, 3))

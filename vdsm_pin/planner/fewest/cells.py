@@ -110,7 +110,7 @@ def adjoining(
     place = first[:-1].copy()
     neighbours = np.zeros(2 * found, np.int64)
     for e in range(found):
-        a, b = pairs[e]
+        a, b = pairs[e, 0], pairs[e, 1]
         neighbours[place[a]], neighbours[place[b]] = b, a
         place[a] += 1
         place[b] += 1
