@@ -11,7 +11,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.bodies import new_body
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.compiled import borrowed, compiled
 from vdsm_pin.geometry.kernels import BRACKET, LOWER, NORMAL, SCRATCH_ROWS, UPPER
 from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
 from vdsm_pin.geometry.pieces import HALF_SPACE, PackedPieces
@@ -48,6 +48,7 @@ def coarse_bounds(
     Returns:
         Shape (n_samples, N, n_obstacles); [m].
     """
+    pieces, centres = borrowed(pieces), borrowed(centres)
     n_samples, n_links, n_obstacles = (
         centres.shape[0],
         centres.shape[1] - 1,
@@ -84,6 +85,7 @@ def row_brackets(
         Lower and upper bounds, shape (m, 2); of a mesh's surface, inside or out; below
         zero only the sign is meant; [m].
     """
+    pieces = borrowed(pieces)
     bounds = np.zeros((obstacle.size, 2))
     scratch = np.zeros((SCRATCH_ROWS + 2, 3))
     stack = np.zeros(STACK, np.int64)
@@ -148,6 +150,7 @@ def link_gaps(centres: FloatArray, radius: float) -> FloatArray:
         Shape (n_samples, N, N), for links i and k >= i + 2 counted from 0; the others
         are inf; negative where they meet; [m].
     """
+    centres = borrowed(centres)
     n_samples, n_links = centres.shape[0], centres.shape[1] - 1
     gaps = np.full((n_samples, n_links, n_links), np.inf)
     for m in range(n_samples):
