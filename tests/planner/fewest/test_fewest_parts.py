@@ -55,12 +55,12 @@ def test_a_shape_reaches_its_tip_with_links_of_their_length_and_one_knee() -> No
     np.testing.assert_array_equal(centres[:, -1], at)
     np.testing.assert_allclose(centres[:, 0, 1:], 0.0, atol=1e-15)
     angles = link_angles(*joint_angles(ARM, centres))
-    knee = shapes.knees[node % shapes.size, 0]
+    knee = shapes.knees[node % shapes.size]
     for joint in range(1, ARM.n_links):
         assert angles[knee != joint, joint].max() < 1e-7
     rows = np.arange(len(at))
     np.testing.assert_allclose(angles[rows, knee], bends.max(axis=1, where=np.stack(
-        [knee == 0, np.zeros_like(knee, bool), knee > 0], axis=1), initial=0.0),
+        [knee == 0, knee > 0], axis=1), initial=0.0),
         atol=1e-7)  # fmt: skip
     np.testing.assert_allclose(ends[rows, 1], centres[rows, knee], atol=1e-12)
 

@@ -141,14 +141,14 @@ def least_changed(
         return least
     reserve = float(np.nanmax(slack.body, initial=0.0))
     low, high = arm.base_range
-    knees = np.repeat(np.arange(n_links)[:, None], 2, axis=1)
-    everywhere, straight = np.ones(len(tips), dtype=np.bool_), np.zeros((n_links, 4))
+    knees = np.arange(n_links)
+    everywhere, straight = np.ones(len(tips), dtype=np.bool_), np.zeros((n_links, 2))
     node, ends, bends = pose_shapes(
         np.ascontiguousarray(tips), everywhere, knees, straight, arm.stations,
         float(slack.bend.max()), low - reserve, high + reserve,
     )  # fmt: skip
     possible = bends.max(axis=1, initial=0.0) <= slack.bend[node % n_links]
-    node, ends = node[possible], np.ascontiguousarray(ends[possible][:, [0, 1, 3]])
+    node, ends = node[possible], ends[possible]
     tip, joint = node // n_links, node % n_links
     required = problem.required_clearance - TOLERANCES.bracket_gap
     free = np.zeros(len(tips), dtype=np.bool_)

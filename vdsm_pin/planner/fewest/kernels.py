@@ -96,20 +96,20 @@ def pose_shapes(
     Args:
         tips: Shape (k, 3); [m].
         whole: Tips where all shapes are wanted; elsewhere it is shape 0, shape (k,).
-        knees: Shape (n, 2), joints counted from 0.
-        slopes: Shape (n, 4); [-].
+        knees: Of `Shapes`, shape (n,).
+        slopes: Of `Shapes`, shape (n, 2); [-].
         stations: Arc length of each joint centre, shape (N + 1,); [m].
         limit: Largest link angle; [rad].
         base_low: Smallest x0; [m].
         base_high: Largest x0; [m].
 
     Returns:
-        node numbers tip * n + shape, ascending, shape (v,); the ends of the three
-        straight pieces, shape (v, 4, 3) [m]; psi at the three bends, (v, 3) [rad].
+        node numbers tip * n + shape, ascending, shape (v,); the ends of both straight
+        pieces, shape (v, 3, 3) [m]; psi of joint 1 and of the knee, (v, 2) [rad].
     """
     room = tips.shape[0] + whole.sum() * (knees.shape[0] - 1)
     node = np.zeros(room, dtype=np.int64)
-    ends, bends = np.zeros((room, 4, 3)), np.zeros((room, 3))
+    ends, bends = np.zeros((room, 3, 3)), np.zeros((room, 2))
     tried = (tips, whole, knees, slopes, stations)
     count = _pose_all(tried, limit, base_low, base_high, (node, ends, bends))
     return node[:count], ends[:count], bends[:count]
@@ -142,7 +142,7 @@ def _pose_all(
 @compiled
 def _pose(
     tip: FloatArray,
-    knees: IntArray,
+    knee: int,
     slopes: FloatArray,
     stations: FloatArray,
     limit: float,
@@ -150,39 +150,29 @@ def _pose(
     bends: FloatArray,
 ) -> bool:
     """One shape at one tip, back from the tip; False where it breaks the limit."""
-    total = stations[-1]
-    s1, s2 = stations[knees[0]], stations[knees[1]]
-    y1, z1 = s1 * slopes[0], s1 * slopes[1]
-    y2, z2 = y1 + (s2 - s1) * slopes[2], z1 + (s2 - s1) * slopes[3]
-    v3y, v3z = (tip[1] - y2) / (total - s2), (tip[2] - z2) / (total - s2)
-    across = v3y * v3y + v3z * v3z
+    before, after = stations[knee], stations[-1] - stations[knee]
+    y, z = before * slopes[0], before * slopes[1]
+    vy, vz = (tip[1] - y) / after, (tip[2] - z) / after
+    across = vy * vy + vz * vz
     if across >= 1.0:
         return False
-    v3x = np.sqrt(1.0 - across)
-    v1y, v1z, v2y, v2z = slopes
-    if knees[0] == 0:
-        v1y, v1z = v3y, v3z
-    if knees[1] == knees[0]:
-        v2y, v2z = v1y, v1z
-    v1x = np.sqrt(1.0 - v1y * v1y - v1z * v1z)
-    v2x = np.sqrt(1.0 - v2y * v2y - v2z * v2z)
+    vx = np.sqrt(1.0 - across)
+    wy, wz = slopes
+    if knee == 0:
+        wy, wz = vy, vz
+    wx = np.sqrt(1.0 - wy * wy - wz * wz)
     # Most poses break the limit; cosines tell so without an arctan.
     least = np.cos(limit) - GAIN
-    if v1x < least or v1x * v2x + v1y * v2y + v1z * v2z < least:
+    if wx < least or wx * vx + wy * vy + wz * vz < least:
         return False
-    if v2x * v3x + v2y * v3y + v2z * v3z < least:
+    bends[0] = np.arctan2(np.sqrt(wy * wy + wz * wz), wx)
+    bends[1] = _angle(wx, wy, wz, vx, vy, vz)
+    if not (bends[0] <= limit and bends[1] <= limit):
         return False
-    bends[0] = np.arctan2(np.sqrt(v1y * v1y + v1z * v1z), v1x)
-    bends[1] = _angle(v1x, v1y, v1z, v2x, v2y, v2z)
-    bends[2] = _angle(v2x, v2y, v2z, v3x, v3y, v3z)
-    if not (bends[0] <= limit and bends[1] <= limit and bends[2] <= limit):
-        return False
-    x2 = tip[0] - (total - s2) * v3x
-    x1 = x2 - (s2 - s1) * v2x
-    ends[0, 0], ends[0, 1], ends[0, 2] = x1 - s1 * v1x, 0.0, 0.0
-    ends[1, 0], ends[1, 1], ends[1, 2] = x1, y1, z1
-    ends[2, 0], ends[2, 1], ends[2, 2] = x2, y2, z2
-    ends[3, 0], ends[3, 1], ends[3, 2] = tip
+    x = tip[0] - after * vx
+    ends[0, 0], ends[0, 1], ends[0, 2] = x - before * wx, 0.0, 0.0
+    ends[1, 0], ends[1, 1], ends[1, 2] = x, y, z
+    ends[2, 0], ends[2, 1], ends[2, 2] = tip
     return True
 
 

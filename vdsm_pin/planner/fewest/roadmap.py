@@ -15,8 +15,6 @@ from vdsm_pin.tolerances import TOLERANCES
 
 KNEES: Final = slice(1, None)
 """Columns of bends past psi_1, the bend at the base."""
-ONE_KNEE: Final = [0, 1, 3]
-"""Ends of the straight pieces where both knees are one: base, knee and tip."""
 
 
 @dataclass(frozen=True)
@@ -119,8 +117,7 @@ def build_roadmap(
             route.tips, whole, shapes.knees, shapes.slopes, arm.stations, limit,
             *arm.base_range,
         )  # fmt: skip
-        corners = ends[:, ONE_KNEE] if shapes.one_knee else ends
-        room = _least(clearance, corners, required)
+        room = _least(clearance, ends, required)
         keep = room >= required
         return _assemble(
             route, shapes, node[keep], bends[keep], room[keep], required, taste, limit

@@ -1,14 +1,12 @@
-"""Sparse shapes: the arm as two or three straight pieces, and which shapes adjoin.
+"""Sparse shapes: the arm as one or two straight pieces, and which shapes adjoin.
 
-A shape fixes everything but the tip: the arm leaves the rail in direction w1 up to
-joint i, goes on in direction w2 up to joint j and runs straight from there to the tip.
-Only psi_1, psi_i and psi_j can differ from zero. A direction is given by its (y, z)
-part, which is constant along a piece: the projection of joint i is s_i w1 with s_i the
-arc length from O_1. Shape 0 is the straight arm (i = j = 1); `one_knee_shapes` makes
-the others with i = j, one knee each.
+A shape fixes everything but the tip: the arm leaves the rail in direction w up to joint
+m and runs straight from there to the tip. Only psi_1 and psi_m can differ from zero. A
+direction is given by its (y, z) part, which is constant along a piece: the projection
+of joint m is s_m w with s_m the arc length from O_1. Shape 0 is the straight arm
+(m = 1).
 """
 
-import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,8 +20,8 @@ class Shapes:
     """A set of shapes and its neighbourhood graph in compressed rows.
 
     Args:
-        knees: Rows (i, j) counted from 0, i <= j, shape (n, 2).
-        slopes: Rows (w1_y, w1_z, w2_y, w2_z), shape (n, 4); [-].
+        knees: Joint m of each, counted from 0, shape (n,).
+        slopes: Rows (w_y, w_z), shape (n, 2); [-].
         first: Where each shape's neighbours begin in `neighbours`, shape (n + 1,).
         neighbours: Shape numbers, shape (m,).
         change: How far the shape turns along each entry of `neighbours`, (m,); [rad].
@@ -49,12 +47,6 @@ class Shapes:
     def n_lattice(self) -> int:
         """Number of sparse shapes."""
         return len(self.knees)
-
-    @property
-    def one_knee(self) -> bool:
-        """Whether no shape has two knees."""
-        first, second = self.knees.T
-        return bool((first == second).all())
 
     def offsets(
         self, manipulator: Manipulator, tips: FloatArray, shape: IntArray
@@ -169,11 +161,7 @@ def _shapes(
     knees: IntArray, slopes: FloatArray, links: FloatArray, step: float
 ) -> Shapes:
     count = 1 + len(knees)
-    all_knees = np.zeros((count, 2), dtype=np.int64)
-    all_knees[1:] = knees[:, None]
-    all_slopes = np.zeros((count, 4))
-    all_slopes[1:, :2] = slopes
-    all_slopes[1:, 2:] = slopes
+    all_knees, all_slopes = np.append(0, knees), np.vstack([np.zeros(2), slopes])
     first, neighbours, change = _compressed(links, count)
     none = np.zeros((0, 0, 2))
     return Shapes(all_knees, all_slopes, first, neighbours, change, step, none)
@@ -187,26 +175,13 @@ def _offsets(
     Args:
         manipulator: The arm.
         tips: Shape (n, 3); [m].
-        knees: Rows (i, j) of `Shapes`, shape (n, 2).
-        slopes: Rows of `Shapes`, shape (n, 4); [-].
+        knees: Of `Shapes`, shape (n,).
+        slopes: Of `Shapes`, shape (n, 2); [-].
     """
-    stations = manipulator.stations
-    first, second = knees.T
-    s1, s2 = stations[first], stations[second]
-    line = tips[:, None, 1:] * manipulator.ratios[:, None]
-    p1 = s1[:, None] * slopes[:, :2]
-    p2 = p1 + (s2 - s1)[:, None] * slopes[:, 2:]
-    end = tips[:, 1:]
-    bends = [(np.zeros(len(tips)), np.zeros_like(end)), (s1, p1), (s2, p2)]
-    bends.append((np.full(len(tips), stations[-1]), end))
-    planar = np.zeros_like(line)
-    for (sa, pa), (sb, pb) in itertools.pairwise(bends):
-        span = np.where(sb > sa, sb - sa, 1.0)
-        share = (stations[None, :] - sa[:, None]) / span[:, None]
-        on = (share >= 0.0) & (share <= 1.0) & (sb > sa)[:, None]
-        piece = pa[:, None] + share[..., None] * (pb - pa)[:, None]
-        planar = np.where(on[..., None], piece, planar)
-    offsets = planar - line
-    offsets[second == 0] = 0.0
-    offsets[:, [0, -1]] = 0.0
-    return np.asarray(offsets)
+    ratios, at, bent = manipulator.ratios, manipulator.ratios[knees], knees > 0
+    corner = manipulator.stations[knees][:, None] * slopes - at[:, None] * tips[:, 1:]
+    # The knee's offset falls in proportion towards the base and towards the tip.
+    rising = ratios / np.where(bent, at, 1.0)[:, None]
+    falling = (1.0 - ratios) / (1.0 - at)[:, None]
+    hat = np.where(bent[:, None], np.minimum(rising, falling), 0.0)
+    return np.asarray(hat[..., None] * corner[:, None])
