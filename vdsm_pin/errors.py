@@ -12,6 +12,7 @@
     │   ├── StartBlocked      the arm as it starts is too close to an obstacle
     │   ├── PathBlocked       an obstacle is in the way of the tip
     │   ├── CutOff            proved: no way for the tip is wide enough
+    │   ├── HemmedIn          proved: the last link has no room at the tip
     │   └── NoPlanFound       the search ended without a plan; not a proof
     │       └── OutOfTime     the time limit ended it
     └── VerificationFailed    exit 1: a check could not be carried out
@@ -173,6 +174,21 @@ class CutOff(Infeasible):
             "narrower than the body and its clearance"
         )
         super().__init__(f"{message}; {narrowest}" if narrowest else message)
+
+
+class HemmedIn(Infeasible):
+    """At a place of the tip the last link is too close to obstacles however it lies.
+
+    Args:
+        station: Arc length of that place along the desired path; [m].
+    """
+
+    def __init__(self, *, station: float) -> None:
+        self.station = station
+        super().__init__(
+            f"proved: with the tip at {station:.4f} m along the path the last link is "
+            "too close to an obstacle in every direction the joint limits leave it"
+        )
 
 
 class NoPlanFound(Infeasible):

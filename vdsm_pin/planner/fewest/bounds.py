@@ -1,11 +1,11 @@
 """What can be proved about a problem: tips no arm reaches, angles no plan can spare.
 
 Every proof here rests on a necessary condition. A tip beyond the curled reach or within
-an obstacle's margin cannot be drawn (`passage.py` finds those no way leads to). An arm
-without a changed link angle lies along the rail, and an arm with one lies along it up
-to that joint, but for a sway that is bounded
-(`sway.py`): N postures for each tip, and where none of them comes near being clear a
-second angle must change.
+an obstacle's margin cannot be drawn (`passage.py` finds those no way leads to,
+`last_link.py` those where the last link has no room). An arm without a changed link
+angle lies along the rail, and an arm with one lies along it up to that joint, but for a
+sway that is bounded (`sway.py`): N postures for each tip, and where none of them comes
+near being clear a second angle must change.
 """
 
 from dataclasses import dataclass
@@ -38,16 +38,18 @@ class TipProof:
         far: Beyond the reach of the curled arm, shape (n,).
         buried: Within the margin of an obstacle, shape (n,).
         cut_off: No way leads there from the start, shape (n,).
+        hemmed_in: The last link has no room there, shape (n,).
     """
 
     far: BoolArray
     buried: BoolArray
     cut_off: BoolArray
+    hemmed_in: BoolArray
 
     @property
     def closed(self) -> BoolArray:
         """Any of them, shape (n,)."""
-        return self.far | self.buried | self.cut_off
+        return self.far | self.buried | self.cut_off | self.hemmed_in
 
 
 @compiled
@@ -114,7 +116,8 @@ def prove_tips(
     near = np.flatnonzero(buried)
     upper = upper_clearance(problem, points[near]).min(axis=1, initial=np.inf)
     buried[near] = upper < problem.required_clearance - TOLERANCES.bracket_gap
-    return TipProof(far, buried, np.zeros(len(tips), dtype=np.bool_))
+    none = np.zeros(len(tips), dtype=np.bool_)
+    return TipProof(far, buried, none, none)
 
 
 def least_changed(

@@ -4,7 +4,14 @@ import itertools
 
 import numpy as np
 
-from vdsm_pin.errors import CutOff, Infeasible, NoPlanFound, OutOfReach, PathBlocked
+from vdsm_pin.errors import (
+    CutOff,
+    HemmedIn,
+    Infeasible,
+    NoPlanFound,
+    OutOfReach,
+    PathBlocked,
+)
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.feasibility import curled_reach
 from vdsm_pin.planner.fewest.bounds import (
@@ -36,6 +43,7 @@ def refuse_proved(problem: PlanningProblem, outcome: Outcome) -> None:
     Raises:
         OutOfReach: Beyond the reach of the curled arm.
         PathBlocked: Too much of the path lies within an obstacle's margin.
+        HemmedIn: The last link has no room at too much of the path.
         CutOff: No way leads to too much of the path.
     """
     rows, proof = outcome.rows, outcome.proof
@@ -89,6 +97,9 @@ def _proved(problem: PlanningProblem, rows: PathRows, proof: TipProof) -> Infeas
             reach=curled_reach(problem.manipulator),
             reason="every joint at its limit, Eq. 4",
         )
+    if not proof.buried.any() and proof.hemmed_in.any():
+        first = int(np.flatnonzero(proof.hemmed_in)[0])
+        return HemmedIn(station=float(rows.stations[first]))
     if not proof.buried.any():
         return _cut_off(problem, rows, proof)
     first = int(np.flatnonzero(proof.buried)[0])
@@ -268,6 +279,8 @@ def _closed_by(
         near = np.flatnonzero(room < problem.required_clearance)
         names = [repr(problem.scene.obstacles[int(o)].name) for o in near]
         reasons.append(f"within the margin of {', '.join(names)}")
+    if (proof.hemmed_in & here).any():
+        reasons.append("the last link has no room there")
     if (proof.cut_off & here).any():
         reasons.append("no way wide enough leads there")
     return " and ".join(reasons)

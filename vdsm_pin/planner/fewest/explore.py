@@ -10,11 +10,12 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import IntArray
+from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.planner.fewest.bounds import TipProof, prove_tips
 from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.graft import fill
 from vdsm_pin.planner.fewest.home import largest_start_angle, with_start
+from vdsm_pin.planner.fewest.last_link import hemmed_in
 from vdsm_pin.planner.fewest.nearby import Nearby
 from vdsm_pin.planner.fewest.passage import cut_off
 from vdsm_pin.planner.fewest.roadmap import (
@@ -106,6 +107,19 @@ class Outcome:
         """Length not drawn and not proved impossible; [m]."""
         return np.inf if self.found is None else self.found.missing
 
+    @property
+    def drawn(self) -> BoolArray:
+        """Rows of the desired path that are drawn, shape (r,)."""
+        drawn = np.full(len(self.rows.tips), self.found is not None)
+        if self.found is not None:
+            stations = self.found.roadmap.route.stations
+            for k in self.found.sequence.skipped:
+                first, last = np.searchsorted(
+                    self.rows.stations, stations[k - 1 : k + 1]
+                )
+                drawn[first : last + 1] = False
+        return drawn
+
 
 def explore(
     problem: PlanningProblem,
@@ -157,12 +171,26 @@ def explore(
             return
         unreached |= level.ease == 1.0 and (found is None or _unreached(found))
         if number == 0 and len(levels) > len(QUICK):
-            # Seldom needed, so only now: is there any way for the tip at all?
-            proof = replace(proof, cut_off=cut_off(problem, rows.tips))
-            best = replace(best, proof=proof)
-            yield best
+            # Seldom needed, so only now: can it be done at all?
+            for proof in _proofs(problem, clearance, best):
+                best = replace(best, proof=proof)
+                yield best
             if proof.closed.all():
                 return
+
+
+def _proofs(
+    problem: PlanningProblem, clearance: Nearby, outcome: Outcome
+) -> Iterator[TipProof]:
+    """More and more that is proved about what is not drawn."""
+    tips, proof = outcome.rows.tips, outcome.proof
+    open_ = np.flatnonzero(~(outcome.drawn | proof.closed))
+    hemmed = np.zeros(len(tips), dtype=np.bool_)
+    enough = clearance.up_to(problem.required_clearance)
+    hemmed[open_] = hemmed_in(problem, enough, tips[open_])
+    proof = replace(proof, hemmed_in=hemmed)
+    yield proof
+    yield replace(proof, cut_off=cut_off(problem, tips))
 
 
 def _look(
