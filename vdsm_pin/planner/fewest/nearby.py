@@ -2,8 +2,8 @@
 
 Most links are far from most obstacles. Axis-parallel boxes round the obstacles and
 round a few stretches of each link give a lower bound of the clearance at once, capsules
-inside the obstacles tell of links that are too near, and points of a mesh's surface do
-both. The function passed in is asked only where they leave a doubt.
+inside the obstacles tell of links that are too near, and the distance from a mesh is
+known but for rounding. The function passed in is asked only where they leave a doubt.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from vdsm_pin.geometry.compiled import borrowed, compiled
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Piece
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.planner.fewest.cores import blocked_by, cores_of
-from vdsm_pin.planner.fewest.surfaces import Surfaces, surfaces_of
+from vdsm_pin.planner.fewest.surfaces import STEP, Surfaces, surfaces_of
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.scene import Mesh, Obstacle
@@ -35,14 +35,14 @@ MOST_BOXES = 32
 class Nearby:
     """Lower bounds of the clearance, exact where it is small but enough.
 
-    Near meshes bounds may be less than a step of their surfaces below the clearance.
+    Near meshes bounds may be up to two steps of `surfaces` below the clearance.
 
     Args:
         clearance: The clearance function.
         boxes: Low and high corners of boxes that cover the obstacles, (b, 2, 3); [m].
         planes: Outward normals and offsets of the half-spaces, shape (p, 4).
         cores: Capsules inside the obstacles, shape (c, 7); [m].
-        surfaces: Points of the meshes, which have no boxes.
+        surfaces: The meshes, which have no boxes.
         radius: Radius of the links; [m].
         floor: Clearance below which -inf will do; [m].
         far: A bound from boxes above this is left as it is; [m].
@@ -65,14 +65,13 @@ class Nearby:
         room -= self.radius
         mesh = self.surfaces.least(ends, enough) - self.radius
         # A step below the distance will do, but not where it decides.
-        step = self.surfaces.step
         near = room < self.far
-        near |= mesh < min(self.far, self.floor + step)
+        near |= mesh < min(self.far, self.floor + STEP)
         np.minimum(room, mesh, out=room)
         asked = np.flatnonzero(near)
         if asked.size:
             blocked = blocked_by(self.cores, ends[asked], self.floor + self.radius)
-            blocked |= mesh[asked] < self.floor - step
+            blocked |= mesh[asked] < self.floor - STEP
             room[asked[blocked]] = -np.inf
             asked = asked[~blocked]
             room[asked] = self.clearance(ends[asked])[:, 0]

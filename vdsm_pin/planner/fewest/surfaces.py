@@ -1,8 +1,9 @@
-"""Points all over the surfaces of meshes: how far a link is from them, but for a step.
+"""How far links are from the surfaces of meshes, in closed form.
 
-A distance to a mesh takes a walk through its triangles. A point of its surface tells
-from above how far the mesh is, and as no place of the surface is farther than a step
-from a point, the nearest of them tells it from below too.
+A proved distance to a mesh takes a bracket for every triangle that is near. A planner
+asks far too often for that, and needs no proof: here a segment is held against each
+triangle in plain arithmetic, and balls round ever smaller groups of triangles spare
+most of them.
 """
 
 from dataclasses import dataclass
@@ -18,49 +19,45 @@ from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.scene import Mesh, Obstacle
 
-STEP: Final = 0.01
-"""No place of a surface is farther from a point, if that takes few enough; [m]."""
-MOST: Final = 40_000
-"""Points at which the step is doubled."""
-CROWD: Final = 12
-"""At most so many points are looked at one by one."""
+STEP: Final = 1e-6
+"""More than rounding takes from a distance, also beside nearly parallel edges; [m]."""
+CROWD: Final = 4
+"""At most so many triangles are looked at one by one."""
 
 
 @dataclass(frozen=True)
 class Surfaces:
-    """Points on surfaces, and balls round ever smaller groups of them.
+    """Triangles of surfaces, and balls round ever smaller groups of them.
 
-    Ball 1 holds all points, and balls 2 k and 2 k + 1 hold the halves of those of
+    Ball 1 holds all triangles, and balls 2 k and 2 k + 1 hold the halves of those of
     ball k.
 
     Args:
-        points: Shape (n, 3); [m].
-        first: Where the points of each ball begin, and where they end, shape (b, 2).
+        corners: Shape (t, 3, 3); [m].
+        first: Where the triangles of each ball begin, and where they end, shape (b, 2).
         balls: Centres and radii, shape (b, 4); [m].
-        step: No place of a surface is farther from the nearest point; [m].
         solids: The meshes that have an inside.
     """
 
-    points: FloatArray
+    corners: FloatArray
     first: IntArray
     balls: FloatArray
-    step: float
     solids: PackedPieces
 
     def least(self, ends: FloatArray, enough: float) -> FloatArray:
         """Lower bounds of the distance of segments to the meshes, shape (n,); [m].
 
-        Each is less than a step below the distance; -inf within a solid.
+        Each is less than two steps below the distance; -inf within a solid.
 
         Args:
             ends: Shape (n, 2, 3); [m].
             enough: A bound from which on more need not be known; [m].
         """
-        if not len(self.points):
+        if not len(self.corners):
             return np.full(len(ends), np.inf)
-        reach = enough + self.step
-        bound = nearest_points(self.points, self.first, self.balls, ends, reach)
-        bound -= self.step
+        reach = enough + STEP
+        bound = nearest_triangles(self.corners, self.first, self.balls, ends, reach)
+        bound -= STEP
         bound[buried(self.solids, ends, bound > 0.0)] = -np.inf
         return bound
 
@@ -69,48 +66,25 @@ def surfaces_of(obstacles: tuple[Obstacle, ...]) -> Surfaces:
     """The surfaces of all meshes."""
     meshes = [obstacle for obstacle in obstacles if isinstance(obstacle, Mesh)]
     corners = np.concatenate([np.zeros((0, 3, 3)), *(m.pieces.corners for m in meshes)])
-    points, step = _spread(corners)
-    points = points[coherent_order(points)]
+    corners = corners[coherent_order(corners.mean(axis=1))]
     solids = pack_pieces([mesh.pieces for mesh in meshes if mesh.watertight])
-    return Surfaces(points, *_balls(points), step, solids)
+    return Surfaces(corners, *_balls(corners), solids)
 
 
-def _spread(corners: FloatArray) -> tuple[FloatArray, float]:
-    """Points of triangles, shape (n, 3), and the step they keep; [m].
-
-    Args:
-        corners: Shape (t, 3, 3); [m].
-    """
-    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    longest = sides.max(axis=1, initial=0.0)
-    step = STEP
-    while True:
-        # No point of a triangle is farther from a corner than its longest side by
-        # sqrt(3): so it is in the small ones that n parts of each side make.
-        parts = np.maximum(1, np.ceil(longest / (step * sqrt(3.0)))).astype(np.int64)
-        if ((parts + 1) * (parts + 2)).sum() // 2 <= max(MOST, 3 * len(corners)):
-            break
-        step *= 2.0
-    points = [np.zeros((0, 3))]
-    for count in np.unique(parts).tolist():
-        a, b = np.triu_indices(count + 1)
-        shares = np.column_stack([a, b - a, count - b]) / count
-        points.append((shares @ corners[parts == count]).reshape(-1, 3))
-    return np.unique(np.concatenate(points), axis=0), step
-
-
-def _balls(points: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Points and balls as `Surfaces` has them, shape (b, 2) and (b, 4); [m]."""
+def _balls(corners: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Triangles and balls as `Surfaces` has them, shape (b, 2) and (b, 4); [m]."""
     ranges, balls = [np.zeros((1, 2), np.int64)], [np.zeros((1, 4))]
     count = 1
-    while len(points):
-        marks = np.arange(count + 1) * len(points) // count
+    while len(corners):
+        marks = np.arange(count + 1) * len(corners) // count
         sizes = np.diff(marks)
-        low = np.minimum.reduceat(points, marks[:-1])
-        high = np.maximum.reduceat(points, marks[:-1])
+        low = np.minimum.reduceat(corners.min(axis=1), marks[:-1])
+        high = np.maximum.reduceat(corners.max(axis=1), marks[:-1])
         centre = (low + high) / 2.0
-        off = np.linalg.norm(points - np.repeat(centre, sizes, axis=0), axis=1)
-        radius = np.maximum.reduceat(off, marks[:-1])
+        off = np.linalg.norm(
+            corners - np.repeat(centre, sizes, axis=0)[:, None], axis=2
+        )
+        radius = np.maximum.reduceat(off.max(axis=1), marks[:-1])
         ranges.append(np.column_stack([marks[:-1], marks[1:]]))
         balls.append(np.column_stack([centre, radius]))
         if sizes.max() <= CROWD:
@@ -120,33 +94,109 @@ def _balls(points: FloatArray) -> tuple[IntArray, FloatArray]:
 
 
 @compiled
-def _gap(point: FloatArray, a: FloatArray, b: FloatArray) -> float:
-    """Distance of a point from a segment; [m]."""
+def _from_ball(ball: FloatArray, a: FloatArray, b: FloatArray) -> float:
+    """Distance of a segment from a ball, negative within it; [m]."""
     along = span = 0.0
     for c in range(3):
         d = b[c] - a[c]
-        along += (point[c] - a[c]) * d
+        along += (ball[c] - a[c]) * d
         span += d * d
     t = min(1.0, max(0.0, along / span)) if span > 0.0 else 0.0
     square = 0.0
     for c in range(3):
-        gap = point[c] - a[c] - t * (b[c] - a[c])
+        gap = ball[c] - a[c] - t * (b[c] - a[c])
         square += gap * gap
-    return sqrt(square)
+    return float(sqrt(square) - ball[3])
 
 
 @compiled
-def nearest_points(
-    points: FloatArray,
+def _from_segment(a: FloatArray, b: FloatArray, p: FloatArray, q: FloatArray) -> float:
+    """Squared distance of two segments a-b and p-q; [m^2]."""
+    uu = vv = uv = uw = vw = 0.0
+    for c in range(3):
+        u, v, w = b[c] - a[c], q[c] - p[c], a[c] - p[c]
+        uu += u * u
+        vv += v * v
+        uv += u * v
+        uw += u * w
+        vw += v * w
+    # The place s on a-b that is nearest to the line of the other, then the place t
+    # nearest to that one, and s again where t had to be moved to an end.
+    room = uu * vv - uv * uv
+    s = min(1.0, max(0.0, (uv * vw - vv * uw) / room)) if room > 0.0 else 0.0
+    t = (uv * s + vw) / vv if vv > 0.0 else 0.0
+    if not 0.0 < t < 1.0:
+        t = min(1.0, max(0.0, t))
+        s = min(1.0, max(0.0, (uv * t - uw) / uu)) if uu > 0.0 else 0.0
+    square = 0.0
+    for c in range(3):
+        gap = a[c] + s * (b[c] - a[c]) - p[c] - t * (q[c] - p[c])
+        square += gap * gap
+    return square
+
+
+@compiled
+def _from_triangle(corners: FloatArray, a: FloatArray, b: FloatArray) -> float:
+    """Squared distance of a segment from a triangle; [m^2].
+
+    Nearest are an edge and the segment, or one of its ends and the triangle's inside,
+    or the segment passes through it.
+    """
+    p, q, r = corners
+    square = min(_from_segment(a, b, p, q), _from_segment(a, b, q, r))
+    square = min(square, _from_segment(a, b, r, p))
+    nx = (q[1] - p[1]) * (r[2] - p[2]) - (q[2] - p[2]) * (r[1] - p[1])
+    ny = (q[2] - p[2]) * (r[0] - p[0]) - (q[0] - p[0]) * (r[2] - p[2])
+    nz = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+    size = nx * nx + ny * ny + nz * nz
+    if not size > 0.0:
+        return square
+    above = nx * (a[0] - p[0]) + ny * (a[1] - p[1]) + nz * (a[2] - p[2])
+    below = nx * (b[0] - p[0]) + ny * (b[1] - p[1]) + nz * (b[2] - p[2])
+    normal = (nx, ny, nz)
+    if above * below < 0.0 and _over(corners, normal, a, b, above / (above - below)):
+        return 0.0
+    if above * above < square * size and _over(corners, normal, a, b, 0.0):
+        square = above * above / size
+    if below * below < square * size and _over(corners, normal, a, b, 1.0):
+        square = below * below / size
+    return square
+
+
+@compiled
+def _over(
+    corners: FloatArray,
+    normal: tuple[float, float, float],
+    a: FloatArray,
+    b: FloatArray,
+    t: float,
+) -> bool:
+    """Whether the place t from a to b is above or below a triangle, not beside it."""
+    for k in range(3):
+        p, q = corners[k], corners[(k + 1) % 3]
+        side = 0.0
+        for c in range(3):
+            d, e = (c + 1) % 3, (c + 2) % 3
+            x = a[d] + t * (b[d] - a[d]) - p[d]
+            y = a[e] + t * (b[e] - a[e]) - p[e]
+            side += normal[c] * ((q[d] - p[d]) * y - (q[e] - p[e]) * x)
+        if side < 0.0:
+            return False
+    return True
+
+
+@compiled
+def nearest_triangles(
+    corners: FloatArray,
     first: IntArray,
     balls: FloatArray,
     ends: FloatArray,
     enough: float,
 ) -> FloatArray:
-    """Distance of segments to the nearest of some points, or `enough` if it is less.
+    """Distance of segments to the nearest of some triangles, or `enough` if it is less.
 
     Args:
-        points: See `Surfaces`.
+        corners: See `Surfaces`.
         first: See `Surfaces`.
         balls: See `Surfaces`.
         ends: Shape (n, 2, 3); [m].
@@ -169,11 +219,10 @@ def nearest_points(
                 continue
             if 2 * ball >= balls.shape[0]:
                 for k in range(first[ball, 0], first[ball, 1]):
-                    best = min(best, _gap(points[k], a, b))
+                    best = min(best, sqrt(_from_triangle(corners[k], a, b)))
                 continue
             near, far = 2 * ball, 2 * ball + 1
-            gap = _gap(balls[near, :3], a, b) - balls[near, 3]
-            other = _gap(balls[far, :3], a, b) - balls[far, 3]
+            gap, other = _from_ball(balls[near], a, b), _from_ball(balls[far], a, b)
             if gap > other:
                 near, far, gap, other = far, near, other, gap
             stack[waiting], gaps[waiting] = far, other
