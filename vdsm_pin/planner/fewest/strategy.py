@@ -17,7 +17,7 @@ from vdsm_pin.planner.fewest.explain import (
 )
 from vdsm_pin.planner.fewest.explore import LEVELS, QUICK, Level, Outcome, explore
 from vdsm_pin.planner.fewest.motion import Knots, Rows, dense_rows
-from vdsm_pin.planner.fewest.nearby import Nearby, nearby
+from vdsm_pin.planner.fewest.nearby import FAR, Nearby, nearby
 from vdsm_pin.planner.fewest.roadmap import Taste
 from vdsm_pin.planner.fewest.smooth import lifted, smooth, straightened
 from vdsm_pin.planner.fewest.unbend import (
@@ -122,7 +122,8 @@ def _plan(
         there = from_there(problem, rows[-1])
         rest = _plan(there, clearance, margin, name, taste, levels)
         return with_unbending(problem, rows, rest)
-    quick = nearby(problem, clearance)
+    # What is kept is judged exactly, however much it is.
+    quick = nearby(problem, clearance).up_to(FAR + margin)
     best: Outcome | None = None
     try:
         for outcome in explore(problem, quick, margin, taste, levels):
