@@ -20,7 +20,12 @@ from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import RobotModel
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance
-from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.records import ErrorBox, Verdict, Verification
+from vdsm_pin.verification.robust import (
+    largest_joint_error,
+    refuted_joint_error,
+    sturdiest,
+)
 from vdsm_pin.verification.verify import verify
 
 MAX_ROUNDS: Final = 6
@@ -95,7 +100,7 @@ def plan_and_verify(
     margin = 0.0
     while True:
         try:
-            plan = plan_with(problem, clearance, margin)
+            plan = _chosen(plan_with(problem, clearance, margin))
         except Infeasible as error:
             if rounds:
                 error.args = (f"{error}; before that {_story(rounds)}",)
@@ -110,6 +115,26 @@ def plan_and_verify(
         if not missing > 0.0 or len(rounds) == MAX_ROUNDS:
             raise NoPlanFound(_story(rounds))
         margin += OVERSHOOT * missing + TOLERANCES.planned_clearance
+
+
+def _chosen(plan: Plan) -> Plan:
+    """Of a plan and its rivals the one that is proved to survive the most."""
+    if not plan.rivals:
+        return plan
+    plans, problem, none = (*plan.rivals, plan), plan.problem, ErrorBox()
+    best, error = sturdiest(problem, [one.trajectory for one in plans])
+    note = (
+        f"every joint may be off by {np.rad2deg(error):.3f} deg at once (proved); of "
+        f"{len(plans)} plans that draw as much none was proved to survive more"
+    )
+    start = plan.trajectory.part(0, 1)
+    survived = largest_joint_error(problem, start, none)
+    lost = refuted_joint_error(problem, start, none, survived)
+    if np.isfinite(lost):
+        note += (
+            f"; the start itself does not survive {np.rad2deg(lost):.3f} deg (proved)"
+        )
+    return replace(plans[best], notes=(*plans[best].notes, note), rivals=())
 
 
 def _round(margin: float, verification: Verification) -> Round:

@@ -42,6 +42,8 @@ class Plan:
         cable_lengths: l_ja, l_jb, l_jc, shape (n_samples, N, 3); [m].
         notes: What the user should know, one sentence each: stretches not drawn,
             rounds of refinement and their reasons, lower bounds proved.
+        rivals: Further plans of the same, where what joint error a motion is proved to
+            survive shall decide between them and this one; the earlier wins a draw.
     """
 
     problem: PlanningProblem
@@ -51,6 +53,7 @@ class Plan:
     trajectory: Trajectory
     cable_lengths: FloatArray
     notes: tuple[str, ...] = ()
+    rivals: tuple["Plan", ...] = ()
 
 
 LinkClearance: TypeAlias = Callable[[FloatArray], FloatArray]

@@ -22,6 +22,7 @@ STRATEGIES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "fewest": "vdsm_pin.planner.fewest.strategy:plan_fewest",
         "clearest": "vdsm_pin.planner.fewest.strategy:plan_clearest",
+        "sturdiest": "vdsm_pin.planner.fewest.strategy:plan_sturdiest",
         "paper": "vdsm_pin.planner.paper.pipeline:plan_paper",
     }
 )

@@ -5,7 +5,7 @@ that do not survive what the ones before did, and the whole is asked about the r
 In the stretch that survives no more, an error is sought that loses the clearance.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from math import nan
@@ -18,7 +18,7 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.counterexample import Search, moments_of
-from vdsm_pin.verification.hasty import HastyProof
+from vdsm_pin.verification.hasty import HastyProof, is_certified
 from vdsm_pin.verification.proof.layouts import LOW
 from vdsm_pin.verification.proof.terms import UNDECIDED
 from vdsm_pin.verification.records import ErrorBox
@@ -57,6 +57,29 @@ def largest_joint_error(
         last = min(first + STRETCH, end)
         largest = _largest(partial(_holds, proof, errors, first, last), largest)
     return _largest(partial(_holds, proof, errors, 0, end), largest)
+
+
+def sturdiest(
+    problem: PlanningProblem, motions: Sequence[Trajectory]
+) -> tuple[int, float]:
+    """Which of several motions survives the largest joint error.
+
+    Args:
+        problem: Arm, scene, required clearances.
+        motions: At least one; of equals the first is taken.
+
+    Returns:
+        Its number, and its largest certified joint error; [rad].
+    """
+    none = ErrorBox()
+    best, largest = 0, largest_joint_error(problem, motions[0], none)
+    for number, motion in enumerate(motions[1:], start=1):
+        # Most are told apart by the first gap in the proof of what the best survives.
+        if is_certified(problem, motion, ErrorBox(joint=largest)):
+            error = largest_joint_error(problem, motion, none)
+            if error > largest:
+                best, largest = number, error
+    return best, largest
 
 
 def _holds(

@@ -45,6 +45,7 @@ class Judge:
             configurations counts as clear; [m].
         ease: Part of the largest link angle that may be used; [-].
         rough: For single configurations, where less exactness will do; None: the same.
+        kept: What each link keeps besides, shape (N,); None for nothing; [m].
     """
 
     def __init__(
@@ -56,8 +57,9 @@ class Judge:
         finest: float,
         ease: float = 1.0,
         rough: LinkClearance | None = None,
+        kept: FloatArray | None = None,
     ) -> None:
-        self.problem, self.clearance = problem, clearance
+        self.problem, self.clearance, self.kept = problem, clearance, kept
         self.rough = clearance if rough is None else rough
         self.required = problem.required_clearance + margin + slack
         self.slack, self.finest = slack, finest
@@ -73,11 +75,12 @@ class Judge:
             offsets: Shape (n, N + 1, 2); [m].
 
         Returns:
-            Least clearance, -inf where a limit is broken, shape (n,) [m]; number of
-            changed link angles, (n,); largest link angle, (n,) [rad].
+            Least clearance beyond what links keep, -inf where a limit is broken, shape
+            (n,) [m]; number of changed link angles, (n,); largest link angle, (n,)
+            [rad].
         """
         still = Intervals(tips, tips, offsets, offsets)
-        knees = still.knees(self.problem.manipulator)
+        knees = self._cuts(still)
         number, share = np.arange(len(tips)), np.zeros(len(tips))
         most = np.full(len(tips), self.limit)
         centres, room = self._states(
@@ -93,6 +96,14 @@ class Judge:
         number, share = np.arange(len(tips)), np.zeros(len(tips))
         return bends_of(still.centres(self.problem.manipulator, number, share))
 
+    def _cuts(self, intervals: Intervals) -> BoolArray:
+        """Joints at which arms are cut into straight pieces, shape (n, N + 1).
+
+        Links in line between two knees are one piece, unless each keeps its own.
+        """
+        knees = intervals.knees(self.problem.manipulator)
+        return knees if self.kept is None else np.ones_like(knees)
+
     def _states(
         self,
         intervals: Intervals,
@@ -103,9 +114,7 @@ class Judge:
         knees: BoolArray,
         asked: BoolArray,
     ) -> tuple[FloatArray, FloatArray]:
-        """Joint centres and the clearance of straight pieces.
-
-        Links in line between two knees are one piece; it goes by the joint it ends at.
+        """Joint centres and the clearance of pieces, each by the joint it ends at.
 
         Args:
             intervals: Straight lines in the chart.
@@ -117,8 +126,8 @@ class Judge:
             asked: Which pieces of each place are asked for, shape (r, N).
 
         Returns:
-            Shape (r, N + 1, 3) [m]; clearance, inf where none is asked for, -inf in
-            rows where a limit is broken, shape (r, N) [m].
+            Shape (r, N + 1, 3) [m]; clearance beyond what links keep, inf where none is
+            asked for, -inf in rows where a limit is broken, shape (r, N) [m].
         """
         manipulator = self.problem.manipulator
         centres = intervals.centres(manipulator, interval, share)
@@ -131,6 +140,8 @@ class Judge:
         pieces, place = pieces_of(centres, knees, interval, asked & fine[:, None])
         if len(pieces):
             room.ravel()[place] = clearance(pieces)[:, 0]
+        if self.kept is not None:
+            room -= self.kept
         return centres, room
 
     def clear(
@@ -164,7 +175,7 @@ class Judge:
         most = np.full(count, self.limit)
         if bend is not None:
             most = np.minimum(most, bend + tol)
-        knees = intervals.knees(self.problem.manipulator)
+        knees = self._cuts(intervals)
         number, low, high = np.arange(count), np.zeros(count), np.ones(count)
         every = knees[:, 1:]
         c0, r0 = self._states(intervals, number, low, most, ask, knees, every)

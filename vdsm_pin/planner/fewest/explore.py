@@ -27,6 +27,7 @@ from vdsm_pin.planner.fewest.roadmap import (
 from vdsm_pin.planner.fewest.route import PathRows, path_rows, tip_route
 from vdsm_pin.planner.fewest.search import Found, nothing_blocked, search
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes
+from vdsm_pin.planner.fewest.taper import kept_by_links
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -151,15 +152,16 @@ def explore(
     # The way out of a start that is bent more than is liked must be allowed.
     bent = largest_start_angle(problem) / link_limit(problem)
     least_ease = min(1.0, bent + TOLERANCES.joint_limit)
-    unreached = False
+    unreached, kept = False, kept_by_links(problem.manipulator, taste.taper)
     for number, level in enumerate(levels):
         if unreached and level.back == 0.0:
             continue
         ease = max(level.ease, least_ease)
         worth = problem.required_clearance + margin + level.slack + taste.room
+        worth += 0.0 if kept is None else float(kept[-1])
         judge = Judge(
             problem, clearance, margin, level.slack, level.finest, ease,
-            clearance.up_to(worth),
+            clearance.up_to(worth), kept,
         )  # fmt: skip
         found = _look(judge, level, rows, proof, taste)
         now = Outcome(judge, found, rows, proof)

@@ -9,6 +9,7 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.kernels import Barred, Graph, pose_shapes
 from vdsm_pin.planner.fewest.route import TipRoute
 from vdsm_pin.planner.fewest.shapes import Shapes
+from vdsm_pin.planner.fewest.taper import kept_by_links, link_by_link
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
@@ -27,6 +28,7 @@ class Taste:
         room_cost: Cost of having none of it along a metre.
         easy_bend: Link angles up to this cost nothing more; [rad].
         bend_cost: Cost of bending to the limit along a metre.
+        taper: Error of all joints that what each link keeps shall make up for; [rad].
     """
 
     angle: float = 1.0
@@ -34,6 +36,7 @@ class Taste:
     room_cost: float = 0.5
     easy_bend: float = float(np.deg2rad(30.0))
     bend_cost: float = 4.0
+    taper: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -110,14 +113,16 @@ def build_roadmap(
         around: Only the straight arm is tried at tips farther than this many tips from
             where the straight arm does not do; None: every shape at every tip.
     """
-    arm = problem.manipulator
+    arm, kept = problem.manipulator, kept_by_links(problem.manipulator, taste.taper)
 
     def tried(whole: BoolArray) -> Roadmap:
         node, ends, bends = pose_shapes(
             route.tips, whole, shapes.knees, shapes.slopes, arm.stations, limit,
             *arm.base_range,
         )  # fmt: skip
-        room = _least(clearance, ends, required)
+        if kept is not None:
+            ends = link_by_link(ends, arm.stations)
+        room = _least(clearance, ends, required, kept)
         keep = room >= required
         return _assemble(
             route, shapes, node[keep], bends[keep], room[keep], required, taste, limit
@@ -132,18 +137,25 @@ def build_roadmap(
     return tried(_spread(route, poor, around)) if poor.any() else straight
 
 
-def _least(clearance: LinkClearance, ends: FloatArray, required: float) -> FloatArray:
+def _least(
+    clearance: LinkClearance,
+    ends: FloatArray,
+    required: float,
+    kept: FloatArray | None,
+) -> FloatArray:
     """Least clearance of the pieces, from the tip back to the first that lacks it.
 
     Args:
         clearance: The clearance function.
         ends: Ends of the pieces, shape (v, p + 1, 3); [m].
         required: Clearance below which a piece lacks it; [m].
+        kept: What each piece keeps besides, shape (p,); None for nothing; [m].
     """
     room = np.full(len(ends), np.inf)
     rows = np.arange(len(ends))
     for piece in range(ends.shape[1] - 2, -1, -1):
         values = clearance(ends[rows, piece : piece + 2])[:, 0]
+        values = values if kept is None else values - kept[piece]
         room[rows] = np.minimum(room[rows], values)
         rows = rows[values >= required]
     return room

@@ -1,12 +1,13 @@
-"""The strategies `fewest` and `clearest`: search, smooth, write down, explain."""
+"""The strategies `fewest`, `clearest`, `sturdiest`: search, smooth, write, explain."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.cables import cable_lengths
-from vdsm_pin.errors import OutOfTime
+from vdsm_pin.errors import Infeasible, OutOfTime
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.kinematics import joint_angles
 from vdsm_pin.planner.fewest.explain import (
@@ -20,13 +21,14 @@ from vdsm_pin.planner.fewest.motion import Knots, Rows, dense_rows
 from vdsm_pin.planner.fewest.nearby import FAR, Nearby, nearby
 from vdsm_pin.planner.fewest.roadmap import Taste
 from vdsm_pin.planner.fewest.smooth import lifted, smooth, straightened
+from vdsm_pin.planner.fewest.taper import levers
 from vdsm_pin.planner.fewest.unbend import (
     from_there,
     leans_ahead,
     unbend,
     with_unbending,
 )
-from vdsm_pin.planner.fewest.widest import widest
+from vdsm_pin.planner.fewest.widest import drawn_length, widest
 from vdsm_pin.planner.records import LinkClearance, Plan, TipPath
 from vdsm_pin.planner.start import check_start
 from vdsm_pin.problem import PlanningProblem
@@ -61,7 +63,8 @@ def plan_clearest(
     Arguments and errors are those of `plan_fewest`.
     """
     search = _Search(problem, clearance, margin, "clearest", CLEAREST)
-    plan, reserve = _clearest(search)
+    plans, reserve = search.clearer(search.plan())
+    plan = plans[-1]
     if not problem.scene.obstacles:
         return plan
     most = problem.required_clearance + margin + reserve
@@ -72,20 +75,46 @@ def plan_clearest(
     return replace(plan, notes=(*plan.notes, note))
 
 
-def _clearest(search: "_Search") -> tuple[Plan, float]:
-    """The plan with the largest clearance found, and what it has in reserve; [m]."""
-    first, clearance = search.plan(), search.clearance
-    kept = search.problem.required_clearance + search.margin
-    low = float(clearance(first.centres).min()) - kept
-    start = float(clearance(first.centres[:1]).min())
-    high = min(_room_at_tips(clearance, first), start) - kept
-    return widest(search.with_reserve, first, low, high)
+def plan_sturdiest(
+    problem: PlanningProblem, clearance: LinkClearance, margin: float
+) -> Plan:
+    """The plan thought to survive the largest error of all joints, and its rivals.
+
+    Among them are the plans of `fewest` and `clearest`, but for those that draw less:
+    who can prove what a motion survives has the choice. Arguments and errors are those
+    of `plan_fewest`.
+    """
+    lean = _Search(problem, clearance, margin, "sturdiest", FEWEST)
+    wide = replace(lean, taste=CLEAREST)
+    found = _if_found(wide.plan)
+    if not found:
+        return lean.plan()
+    clearer, _ = wide.clearer(found[0])
+    plans = [*_if_found(lean.plan), *clearer, *wide.sturdier(found[0])[1:]]
+    whole = max(map(drawn_length, plans)) - TOLERANCES.joint_centre
+    plans = _different([plan for plan in plans if drawn_length(plan) >= whole])
+    best = max(plans, key=lambda plan: wide.survived(plan.centres))
+    return replace(best, rivals=tuple(plan for plan in plans if plan is not best))
 
 
-def _room_at_tips(clearance: LinkClearance, plan: Plan) -> float:
-    """Least clearance of the tip alone where it draws: no plan has more; [m]."""
-    tips = plan.tip_path.points[plan.tip_path.on_path]
-    return float(clearance(np.stack([tips, tips], axis=1)).min(initial=np.inf))
+def _different(plans: list[Plan]) -> list[Plan]:
+    """The plans without those that move as one before them does."""
+    moves = [plan.trajectory.joints for plan in plans]
+    return [
+        plan
+        for k, plan in enumerate(plans)
+        if not any(np.array_equal(moves[k], before) for before in moves[:k])
+    ]
+
+
+def _if_found(plan: Callable[[], Plan]) -> list[Plan]:
+    """The plan, nothing where there is none."""
+    try:
+        return [plan()]
+    except OutOfTime:
+        raise
+    except Infeasible:
+        return []
 
 
 @dataclass(frozen=True)
@@ -98,6 +127,11 @@ class _Search:
     name: str
     taste: Taste
 
+    @property
+    def kept(self) -> float:
+        """Clearance that every plan keeps; [m]."""
+        return self.problem.required_clearance + self.margin
+
     def plan(self) -> Plan:
         return _plan(self.problem, self.clearance, self.margin, self.name, self.taste)
 
@@ -106,6 +140,39 @@ class _Search:
             self.problem, self.clearance, self.margin + reserve, self.name,
             self.taste, levels=QUICK,
         )  # fmt: skip
+
+    def with_taper(self, error: float) -> Plan:
+        taste = replace(self.taste, taper=error)
+        return _plan(
+            self.problem, self.clearance, self.margin, self.name, taste, levels=QUICK
+        )
+
+    def clearer(self, first: Plan) -> tuple[list[Plan], float]:
+        """Plans with more and more clearance, and what the last has in reserve; [m]."""
+        low = float(self.clearance(first.centres).min()) - self.kept
+        start = float(self.clearance(first.centres[:1]).min())
+        high = min(self._room_at_tips(first), start) - self.kept
+        return widest(self.with_reserve, first, low, high)
+
+    def sturdier(self, first: Plan) -> list[Plan]:
+        """Plans whose links keep what larger and larger joint errors use up."""
+        reach = float(levers(self.problem.manipulator)[-1])
+        high = min(
+            (self._room_at_tips(first) - self.kept) / reach,
+            self.survived(first.centres[:1]),
+        )
+        return widest(self.with_taper, first, self.survived(first.centres), high)[0]
+
+    def survived(self, centres: FloatArray) -> float:
+        """Error of all joints that configurations have room for, roughly; [rad]."""
+        room = self.clearance(centres) - self.kept
+        return float((room / levers(self.problem.manipulator)).min())
+
+    def _room_at_tips(self, plan: Plan) -> float:
+        """Least clearance of the tip alone where it draws: no plan has more; [m]."""
+        tips = plan.tip_path.points[plan.tip_path.on_path]
+        room = self.clearance(np.stack([tips, tips], axis=1))
+        return float(room.min(initial=np.inf))
 
 
 def _plan(
@@ -123,7 +190,8 @@ def _plan(
         rest = _plan(there, clearance, margin, name, taste, levels)
         return with_unbending(problem, rows, rest)
     # What is kept is judged exactly, however much it is.
-    quick = nearby(problem, clearance).up_to(FAR + margin)
+    most = margin + taste.taper * float(levers(problem.manipulator)[-1])
+    quick = nearby(problem, clearance).up_to(FAR + most)
     best: Outcome | None = None
     try:
         for outcome in explore(problem, quick, margin, taste, levels):

@@ -205,7 +205,7 @@ def nearest_triangles(
     Returns:
         Shape (n,); [m].
     """
-    points, balls, ends = borrowed(points), borrowed(balls), borrowed(ends)
+    corners, balls, ends = borrowed(corners), borrowed(balls), borrowed(ends)
     result = np.zeros(ends.shape[0])
     stack, gaps = np.zeros(STACK, np.int64), np.zeros(STACK)
     for n in range(ends.shape[0]):

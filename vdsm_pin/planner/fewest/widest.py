@@ -22,8 +22,8 @@ def drawn_length(plan: Plan) -> float:
 
 def widest(
     plan_with: Callable[[float], Plan], first: Plan, low: float, high: float
-) -> tuple[Plan, float]:
-    """The plan with the largest reserve found that draws as much as the first one.
+) -> tuple[list[Plan], float]:
+    """Plans with more and more in reserve that draw as much as the first one.
 
     Args:
         plan_with: A plan that keeps a reserve; raises `Infeasible` where it has none.
@@ -32,9 +32,9 @@ def widest(
         high: A reserve that nothing has.
 
     Returns:
-        The plan and its reserve.
+        The plans, the first one included, and the reserve of the last.
     """
-    best, whole = first, drawn_length(first) - TOLERANCES.joint_centre
+    plans, whole = [first], drawn_length(first) - TOLERANCES.joint_centre
     for _ in range(ROUNDS):
         if not low < high < np.inf:
             break
@@ -49,5 +49,6 @@ def widest(
         if drawn_length(plan) < whole:
             high = middle
         else:
-            best, low = plan, middle
-    return best, low
+            plans.append(plan)
+            low = middle
+    return plans, low
