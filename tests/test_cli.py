@@ -4,6 +4,7 @@ Commands run in this process through `main`; one runs as a real process.
 """
 
 import json
+import math
 import re
 import subprocess
 import sys
@@ -354,3 +355,26 @@ def test_a_certificate_is_written_and_accepted(
     assert vdsm("check-certificate", proof, planned / "near.yaml", rows).status == 0
     other = write_problem(tmp_path / "other.yaml", NEAR.replace("3.5", "3.6"))
     assert vdsm("check-certificate", proof, other, rows).status == 1
+
+
+def test_the_joint_error_that_the_sturdiest_plan_claims_is_the_one_verified(
+    vdsm: Shell, tmp_path: Path
+) -> None:
+    problem, out = write_problem(tmp_path / "near.yaml", NEAR), tmp_path / "out"
+    words = ("batch", problem, "--out", out, "--strategy", "sturdiest")
+    assert vdsm(*words).status == 0
+    (folder,) = (file.parent for file in out.glob("*/plan.json"))
+    plan = json.loads((folder / "plan.json").read_text(encoding="utf-8"))
+    jsonschema.validate(plan, schema("plan"))
+    assert plan["strategy"] == "sturdiest"
+    told = re.search(r"off by (\S+) deg at once \(proved\)", " ".join(plan["notes"]))
+    assert told is not None
+    verified = (folder / "verification.json").read_text(encoding="utf-8")
+    proved = math.degrees(json.loads(verified)["max_joint_error_rad"])
+    assert float(told[1]) == pytest.approx(proved, abs=6e-4)
+    before = (folder / "manifest.json").stat().st_mtime_ns
+    assert vdsm(*words, "--resume").status == 0
+    assert (folder / "manifest.json").stat().st_mtime_ns == before
+    assert vdsm(*words[:-1], "clearest", "--resume").status == 0
+    again = json.loads((folder / "plan.json").read_text(encoding="utf-8"))
+    assert again["strategy"] == "clearest"

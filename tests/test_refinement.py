@@ -8,12 +8,15 @@ import pytest
 import vdsm_pin.refinement as refinement
 from vdsm_pin.errors import Infeasible, NoPlanFound
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Plan
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.records import ErrorBox, Verdict
+from vdsm_pin.verification.robust import largest_joint_error
 
 
 def short(name: str) -> PlanningProblem:
@@ -72,3 +75,32 @@ def test_reasons_of_the_planner_pass_through() -> None:
     problem = replace(problem, path=start)
     with pytest.raises(Infeasible, match="beyond the reach"):
         refinement.plan_and_verify(problem, "paper", load_robot(problem.manipulator))
+
+
+def test_of_rivals_the_one_that_is_proved_to_survive_most_is_taken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Whatever the planner thinks: here it puts a plan through the obstacle first."""
+    task = short("obs3")
+    free = replace(task, scene=read_problem("paper/free").problem.scene)
+
+    def boasting(
+        problem: PlanningProblem, clearance: LinkClearance, margin: float
+    ) -> Plan:
+        lean, wide = (plan_fewest(problem, clearance, m) for m in (0.0, 0.03))
+        blind = replace(plan_fewest(free, clearance, margin), problem=problem)
+        return replace(blind, rivals=(lean, wide))
+
+    monkeypatch.setattr(refinement, "strategy", lambda name: boasting)
+    result = refinement.plan_and_verify(task, "any", load_robot(task.manipulator))
+    errors = []
+    for m in (0.0, 0.03):
+        motion = plan_fewest(task, link_clearance(task), m).trajectory
+        errors.append(largest_joint_error(task, motion, ErrorBox()))
+    assert errors[1] > errors[0] > 0.0
+    kept = largest_joint_error(task, result.plan.trajectory, ErrorBox())
+    assert kept == errors[1]
+    assert f"{np.rad2deg(kept):.3f} deg at once" in result.plan.notes[-1]
+    assert "of 3 plans" in result.plan.notes[-1]
+    assert not result.plan.rivals
+    assert result.verification.verdict is Verdict.CERTIFIED
