@@ -10,9 +10,9 @@ from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.kinematics import joint_angles, link_angles
 from vdsm_pin.manipulator import built_in
 from vdsm_pin.planner.fewest.bounds import prove_tips
-from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.cores import blocked_by, cores_of
 from vdsm_pin.planner.fewest.growth import Garden, Grown, vary
+from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.kernels import pose_shapes
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.nearby import FAR, nearby

@@ -10,7 +10,7 @@ from scenes_for_fewest import problem, random_problem, straight_arm
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
-from vdsm_pin.planner.fewest.clear import Judge
+from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import Taste, build_roadmap
 from vdsm_pin.planner.fewest.route import path_rows, tip_route

@@ -12,9 +12,9 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.planner.fewest.bounds import TipProof, prove_tips
-from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.graft import fill
 from vdsm_pin.planner.fewest.home import largest_start_angle, with_start
+from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.last_link import hemmed_in
 from vdsm_pin.planner.fewest.nearby import Nearby
 from vdsm_pin.planner.fewest.passage import cut_off

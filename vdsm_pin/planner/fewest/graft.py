@@ -3,8 +3,8 @@
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.planner.fewest.clear import Judge
 from vdsm_pin.planner.fewest.growth import POPULATION, Garden, Grown
+from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste, extended
 

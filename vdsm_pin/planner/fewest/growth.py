@@ -16,7 +16,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.compiled import compiled
-from vdsm_pin.planner.fewest.clear import Judge
+from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.tolerances import TOLERANCES
 

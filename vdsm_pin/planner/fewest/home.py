@@ -5,7 +5,7 @@ import numpy as np
 from vdsm_pin.errors import LimitExceeded, NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres, link_angles
-from vdsm_pin.planner.fewest.clear import Judge
+from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste, extended
 from vdsm_pin.problem import PlanningProblem

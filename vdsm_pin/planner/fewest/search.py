@@ -6,7 +6,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.planner.fewest.alike import alike, lines_of
-from vdsm_pin.planner.fewest.clear import Judge
+from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Knots, knots_of
 from vdsm_pin.planner.fewest.order import reordered
 from vdsm_pin.planner.fewest.roadmap import Roadmap

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.clear import Judge
+from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Knots
 from vdsm_pin.planner.fewest.poses import farthest_apart, on_line
 from vdsm_pin.planner.fewest.roadmap import Taste
