@@ -17,6 +17,7 @@ LAYERS = {
     "tolerances": 0,
     "units": 0,
     "kept": 0,
+    "startup": 0,
     "geometry": 1,
     "manipulator": 2,
     "kinematics": 3,

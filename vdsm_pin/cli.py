@@ -14,6 +14,7 @@ import typer
 
 from vdsm_pin.errors import InvalidInput, NoPlanFound, OutOfTime, VdsmError
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY, STRATEGIES
+from vdsm_pin.startup import live_briefly
 
 PASSED: Final = 0
 NOT_PASSED: Final = 1
@@ -320,6 +321,7 @@ def diff(
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command; every error raised on purpose becomes one message."""
+    live_briefly()
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         app(given, prog_name="vdsm", obj=shlex.join(["vdsm", *given]))

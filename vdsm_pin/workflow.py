@@ -22,7 +22,6 @@ from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.report.facts import plan_file, verification_file
 from vdsm_pin.report.files import PlanFile, VerificationFile
 from vdsm_pin.report.folder import check_output_file, check_output_folder, staged
-from vdsm_pin.report.html import write_report
 from vdsm_pin.report.pdf import find_browser, print_page
 from vdsm_pin.report.run_record import RunRecord, sha256_of
 from vdsm_pin.report.tables import ClearanceCsv, write_cables, write_link_angles
@@ -144,6 +143,9 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
         InvalidInput: If a file is bad or the folder cannot be written.
         VerificationFailed: If a check could not be carried out.
     """
+    # Pages are written by jinja2, which nobody else waits for.
+    from vdsm_pin.report.html import write_report
+
     _check_outputs(order)
     problem = order.source.problem
     robot = load_robot(problem.manipulator)
