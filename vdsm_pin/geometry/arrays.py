@@ -25,6 +25,15 @@ def read_only(values: FloatArray) -> FloatArray:
     return view
 
 
+def distinct(values: npt.NDArray[Any], axis: int | None = None) -> npt.NDArray[Any]:
+    """Every value, or every row along an axis, once, sorted.
+
+    As `np.unique`, which asks for masked arrays first unless it is asked for more: the
+    module for them takes longer to import than it takes to plan a simple motion.
+    """
+    return np.unique(values, return_index=True, axis=axis)[0]
+
+
 def rotation_from_rpy(rpy: FloatArray) -> FloatArray:
     """Rotation matrix Rz(yaw) @ Ry(pitch) @ Rx(roll), the URDF order.
 

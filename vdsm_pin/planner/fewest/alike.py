@@ -6,7 +6,7 @@ right beside. Looking at what is alike at once spares most of those sequences.
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import IntArray
+from vdsm_pin.geometry.arrays import IntArray, distinct
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import Roadmap
@@ -37,7 +37,7 @@ def alike(roadmap: Roadmap, edges: IntArray) -> IntArray:
             pairs.append(_layers_about(roadmap, tips, shapes))
     found = np.concatenate(pairs)
     found = found[(found >= 0).all(axis=1)]
-    return np.unique(np.sort(found, axis=1), axis=0)
+    return distinct(np.sort(found, axis=1), axis=0)
 
 
 def _every_shape(roadmap: Roadmap, tips: IntArray) -> IntArray:

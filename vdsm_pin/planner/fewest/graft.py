@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct
 from vdsm_pin.planner.fewest.growth import POPULATION, Garden, Grown
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
@@ -60,7 +60,7 @@ def _ties(
     """Clear links from grown configurations to the nearest ones at the same tip."""
     arm, shapes = judge.problem.manipulator, roadmap.shapes
     rows, tips, here, there = [], [], [], []
-    for tip in np.unique(places):
+    for tip in distinct(places):
         own = np.flatnonzero(places == tip)
         nodes = np.arange(roadmap.tip_nodes[tip], roadmap.tip_nodes[tip + 1])
         shape = np.concatenate([roadmap.node[nodes] % shapes.size, shapes.size + own])

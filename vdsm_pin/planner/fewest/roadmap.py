@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
 from vdsm_pin.planner.fewest.kernels import Barred, Graph, pose_shapes
 from vdsm_pin.planner.fewest.route import TipRoute
 from vdsm_pin.planner.fewest.shapes import Shapes
@@ -265,4 +265,4 @@ def with_barred(barred: Barred, edges: IntArray) -> Barred:
     flagged = barred.flagged.copy()
     flagged[edges.ravel()] = True
     keys = edges.min(axis=1) * flagged.size + edges.max(axis=1)
-    return Barred(flagged, np.union1d(barred.keys, keys))
+    return Barred(flagged, distinct(np.concatenate([barred.keys, keys])))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Knots
 from vdsm_pin.planner.fewest.poses import farthest_apart, on_line
@@ -184,10 +184,12 @@ def _stepped_back(knots: Knots, begin: int, end: int, depth: float) -> Knots:
     if not total > 0.0:
         return knots
     ramp = min(depth, total / 2.0)
-    marks = np.union1d(length, [ramp, total - ramp])
+    marks = distinct(np.array([ramp, total - ramp]))
+    new = (marks[:, None] != length).all(axis=1)
     # Knots where only the shape changes share a length: keep every one of them.
-    order = np.argsort(np.concatenate([length, np.setdiff1d(marks, length)]))
-    values = np.concatenate([length, np.setdiff1d(marks, length)])[order]
+    values = np.concatenate([length, marks[new]])
+    order = np.argsort(values)
+    values = values[order]
     own = order < len(length)
     upper = np.clip(np.searchsorted(length, values, side="right"), 1, len(length) - 1)
     low = upper - 1
