@@ -89,13 +89,16 @@ def _words(kind: Any) -> str:
 
 
 @cache
-def _sources(path: Path) -> dict[Path, bytes]:
-    """A module and all of the package that it imports, with their content."""
-    content = path.read_bytes()
-    found = {path: content}
+def _sources(path: str) -> dict[str, bytes]:
+    """A module and all of the package that it imports, with digests of their content.
+
+    Paths are text: hundreds of them are compared and joined.
+    """
+    content = Path(path).read_bytes()
+    found = {path: hashlib.sha256(content).digest()}
     for name in IMPORT.findall(content):
-        other = PACKAGE.joinpath(*name.decode().split(".")).with_suffix(".py")
-        if other.is_file():
+        other = f"{PACKAGE}/{name.decode().replace('.', '/')}.py"
+        if Path(other).is_file():
             found |= _sources(other)
     return found
 
@@ -105,7 +108,7 @@ def _file_name(function: Callable[..., Any], kind: Any) -> str:
     from vdsm_pin.geometry.machine_code import platform
 
     digest = hashlib.sha256(platform())
-    for _, content in sorted(_sources(Path(function.__code__.co_filename)).items()):
+    for _, content in sorted(_sources(function.__code__.co_filename).items()):
         digest.update(content)
     digest.update(_words(kind).encode())
     return f"{function.__module__}.{function.__qualname__}-{digest.hexdigest()[:32]}"
@@ -141,10 +144,11 @@ class _Compiled:
         """The machine code for a kind of arguments, made if it is not there."""
         from vdsm_pin.geometry.machine_code import Unusable, load, read, write
 
-        inspect.signature(self._function).bind(*arguments)
         name = _file_name(self._function, kind)
         with suppress(Unusable):
             return load(read(name), self._function)
+        # Only now: there is no code for too few or too many arguments.
+        inspect.signature(self._function).bind(*arguments)
         with _making(name):
             from vdsm_pin.geometry.compiling import machine_code
 

@@ -105,11 +105,7 @@ def load(code: MachineCode, function: Callable[..., Any]) -> Callable[..., Any]:
         Unusable: If a name from outside is unknown; LLVM would end the process.
     """
     dynamic = _runtime()
-    # An engine for each: names from different files never meet.
-    machine = llvm.Target.from_default_triple().create_target_machine()
-    module = llvm.parse_assembly("")
-    engine = llvm.create_mcjit_compiler(module, machine)
-    engine.remove_module(module)  # two milliseconds to translate, empty as it is
+    engine = _empty_engine()  # the first one makes Python's names known
     unknown = [name for name in code.needs if llvm.address_of_symbol(name) is None]
     if unknown:
         raise Unusable(", ".join(unknown))
@@ -129,6 +125,26 @@ def load(code: MachineCode, function: Callable[..., Any]) -> Callable[..., Any]:
         None,
     )
     return entry
+
+
+def _empty_engine() -> Any:
+    """An engine for each: names from different files never meet."""
+    machine = _target().create_target_machine()
+    module = _no_module()
+    engine = llvm.create_mcjit_compiler(module, machine)
+    engine.remove_module(module)  # two milliseconds to translate, empty as it is
+    return engine
+
+
+@cache
+def _target() -> Any:
+    return llvm.Target.from_default_triple()
+
+
+@cache
+def _no_module() -> Any:
+    """What every engine is made from and does not keep."""
+    return llvm.parse_assembly("")
 
 
 @cache
