@@ -32,10 +32,10 @@ from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
-LEANS: Final = 8
-TURNS: Final = 16
+LEANS: Final = 4
+TURNS: Final = 8
 """Cells of lean and of turn begun with."""
-HALVINGS: Final = 12
+HALVINGS: Final = 14
 """Halvings of a cell at which a tip is given up."""
 MOST: Final = 1000
 """Cells of one tip at which it is given up."""

@@ -59,9 +59,7 @@ def search(
     Returns:
         None if the rounds end or nothing is drawn.
     """
-    planner = Planner(roadmap, home)
-    if len(blocked):
-        planner.block(blocked, True)
+    planner = Planner(roadmap, home, blocked)
     known: set[tuple[int, int]] = set()
     for _ in range(rounds):
         sequence = planner.sequence()

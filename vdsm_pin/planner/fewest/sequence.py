@@ -50,9 +50,15 @@ class Sequence:
 
 
 class Planner:
-    """Sequences over one roadmap while edges get blocked."""
+    """Sequences over one roadmap while edges get blocked.
 
-    def __init__(self, roadmap: Roadmap, home: int) -> None:
+    Args:
+        roadmap: The graph.
+        home: The node the motion starts from.
+        blocked: Pairs of nodes whose edges are known to be blocked, shape (n, 2).
+    """
+
+    def __init__(self, roadmap: Roadmap, home: int, blocked: IntArray) -> None:
         self.roadmap, self.home, self.graph = roadmap, home, roadmap.graph()
         self.barred = nothing_barred(len(roadmap.node))
         route = roadmap.route
@@ -60,6 +66,7 @@ class Planner:
         # Resting at a single point costs like a stretch, or it would be left out.
         self.gap[1:][self.gap[1:] == 0.0] = REST
         self.way_gaps = route.gaps.copy()
+        self._bar(blocked)
         self.from_home, self.before = self.ways(home)
 
     def block(self, edges: IntArray, on_ways: bool) -> None:
@@ -71,6 +78,14 @@ class Planner:
             edges: Pairs of nodes, shape (n, 2).
             on_ways: Whether one of them was part of a way, so that ways change.
         """
+        self._bar(edges)
+        # Blocked on the path, an edge may be part of a way from home all the same.
+        here, there = edges.T
+        on_tree = (self.before[here] == there) | (self.before[there] == here)
+        if on_ways or on_tree.any():
+            self.from_home, self.before = self.ways(self.home)
+
+    def _bar(self, edges: IntArray) -> None:
         self.barred = with_barred(self.barred, edges)
         route = self.roadmap.route
         for a, b in self.roadmap.node[edges] // self.roadmap.shapes.size:
@@ -78,11 +93,6 @@ class Planner:
                 row = slice(route.first[u], route.first[u + 1])
                 link = route.links[row] == v
                 self.way_gaps[row] += link * (route.gaps[row] + DISTRUST)
-        # Blocked on the path, an edge may be part of a way from home all the same.
-        here, there = edges.T
-        on_tree = (self.before[here] == there) | (self.before[there] == here)
-        if on_ways or on_tree.any():
-            self.from_home, self.before = self.ways(self.home)
 
     def ways(self, source: int, target: int = -1) -> tuple[FloatArray, IntArray]:
         """Shortest ways from a node, off the path; see `shortest_ways`."""
