@@ -17,7 +17,9 @@ NOT_FOR_OBS1 = {
     *("vdsm_pin.verification.certificate_writer", "vdsm_pin.certificate_checker"),
 }
 NOT_FOR_A_PLAN = {"jinja2", "markupsafe", "vdsm_pin.report.html"}
-NOT_FOR_A_PROOF = {"vdsm_pin.planner.fewest", "vdsm_pin.planner.paper"}
+NOT_FOR_A_PROOF = {
+    *("vdsm_pin.planner.fewest", "vdsm_pin.planner.paper", "vdsm_pin.refinement"),
+}
 PROGRAM = """
 import sys
 from vdsm_pin.cli import main

@@ -18,7 +18,6 @@ from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.compiled import is_compiling
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
-from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.report.facts import plan_file, verification_file
 from vdsm_pin.report.files import PlanFile, VerificationFile
 from vdsm_pin.report.folder import check_output_file, check_output_folder, staged
@@ -117,6 +116,9 @@ def plan_to_folder(
         Infeasible: If there is no certified plan; nothing is written.
         InvalidInput: If the folder cannot be written.
     """
+    # Whoever has a trajectory verified needs no planner.
+    from vdsm_pin.refinement import plan_and_verify
+
     check_output_folder(folder)
     robot = load_robot(source.problem.manipulator)
     refinement = plan_and_verify(source.problem, strategy, robot)
