@@ -11,8 +11,8 @@ is set to miss or exceed the distance: at rest, or while a link swings past anot
 (its end on a circle about its start, so its distance from the other is least where it
 points at it).
 
-The truth is exact up to the rounding of the numbers that describe the query, below
-1e-13 m; `adversarial_truth` recomputes it in ball arithmetic from those numbers.
+The truth is exact up to the rounding of the numbers that describe the query;
+`adversarial_truth` recomputes it in ball arithmetic from those numbers.
 """
 
 from dataclasses import dataclass

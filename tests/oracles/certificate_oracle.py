@@ -87,8 +87,9 @@ def least(piece: Any, n: Any) -> tuple[float, Any]:
     if isinstance(piece, Hull):
         heights = piece.points @ n
         k = int(np.argmin(heights))
-        size = np.linalg.norm(n)
-        where = piece.points[k] - (piece.radius / size) * n
+        size, where = np.linalg.norm(n), piece.points[k]
+        if size > 0.0:
+            where = where - (piece.radius / size) * n
         return float(heights[k] - piece.radius * size), where
     assert isinstance(piece, FlatCylinder)
     along = piece.axis @ n
