@@ -14,6 +14,7 @@
     │   ├── CutOff            proved: no way for the tip is wide enough
     │   ├── HemmedIn          proved: the last link has no room at the tip
     │   └── NoPlanFound       the search ended without a plan; not a proof
+    │       ├── NoWayOut      of the start, as finely as it was looked for
     │       └── OutOfTime     the time limit ended it
     └── VerificationFailed    exit 1: a check could not be carried out
 
@@ -193,6 +194,13 @@ class HemmedIn(Infeasible):
 
 class NoPlanFound(Infeasible):
     """The search ended without a plan; this proves nothing about the problem."""
+
+
+class NoWayOut(NoPlanFound):
+    """No way out of the start was found."""
+
+    def __init__(self) -> None:
+        super().__init__("no way out of the start was found")
 
 
 class OutOfTime(NoPlanFound):

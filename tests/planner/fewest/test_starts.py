@@ -9,11 +9,15 @@ import pytest
 import yaml
 from scenes_for_fewest import problem
 
-from vdsm_pin.errors import Infeasible, NoPlanFound
+from vdsm_pin.errors import Infeasible, NoPlanFound, NoWayOut
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io.problem_file import built_in_text, read_problem
 from vdsm_pin.kinematics import joint_centres, link_angles
 from vdsm_pin.manipulator import CableLayout, Manipulator, paper_hole_angles
+from vdsm_pin.planner.fewest import explore
+from vdsm_pin.planner.fewest.home import with_start
+from vdsm_pin.planner.fewest.judge import Judge
+from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.unbend import leans_ahead, unbend
 from vdsm_pin.planner.paper.pipeline import plan_paper
@@ -141,6 +145,27 @@ def test_a_problem_moved_as_a_whole_has_the_same_plan(tmp_path: Path) -> None:
     result = verify(there, other, load_robot(there.manipulator))
     assert result.verdict is Verdict.CERTIFIED
     assert result.coverage == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_start_that_is_left_by_a_finer_search_alone_is_left(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tried: list[Judge] = []
+
+    def seldom(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, int]:
+        tried.append(judge)
+        if len(tried) < needed:
+            raise NoWayOut
+        return with_start(judge, roadmap, taste)
+
+    monkeypatch.setattr(explore, "with_start", seldom)
+    task, needed = problem(), 2
+    plan = plan_fewest(task, link_clearance(task), 0.0)
+    assert plan.trajectory.on_path.any()
+    assert len(tried) == 2
+    needed = 1000
+    with pytest.raises(NoWayOut, match="out of the start"):
+        plan_fewest(task, link_clearance(task), 0.0)
 
 
 def test_the_papers_rule_starts_with_a_straight_arm_only() -> None:

@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.errors import NoWayOut
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.planner.fewest.bounds import TipProof, prove_tips
 from vdsm_pin.planner.fewest.graft import fill
@@ -139,8 +140,11 @@ def explore(
         levels: How finely to look, in this order.
 
     Yields:
-        Outcomes, each better than the one before; the first is what is known before
-        any search.
+        Outcomes, of which each draws more or has more proved than the one before; the
+        first is what is known before any search.
+
+    Raises:
+        NoWayOut: If the start is left at no level.
     """
     rows = path_rows(problem.path)
     proof = prove_tips(problem, clearance, rows.tips)
@@ -153,6 +157,7 @@ def explore(
     bent = largest_start_angle(problem) / link_limit(problem)
     least_ease = min(1.0, bent + TOLERANCES.joint_limit)
     unreached, kept = False, kept_by_links(problem.manipulator, taste.taper)
+    stuck: NoWayOut | None = None
     for number, level in enumerate(levels):
         if unreached and level.back == 0.0:
             continue
@@ -163,7 +168,10 @@ def explore(
             problem, clearance, margin, level.slack, level.finest, ease,
             clearance.up_to(worth), kept,
         )  # fmt: skip
-        found = _look(judge, level, rows, proof, taste)
+        try:
+            found = _look(judge, level, rows, proof, taste)
+        except NoWayOut as error:
+            found, stuck = None, error
         now = Outcome(judge, found, rows, proof)
         LOG.debug("%s: %.4f m missing", level, now.missing)
         if now.missing < best.missing:
@@ -179,6 +187,8 @@ def explore(
                 yield best
             if proof.closed.all():
                 return
+    if best.found is None and stuck is not None:
+        raise stuck
 
 
 def _proofs(

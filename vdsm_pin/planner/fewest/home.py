@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vdsm_pin.errors import LimitExceeded, NoPlanFound
+from vdsm_pin.errors import LimitExceeded, NoPlanFound, NoWayOut
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres, link_angles
 from vdsm_pin.planner.fewest.judge import Judge
@@ -41,7 +41,7 @@ def with_start(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, i
 
     Raises:
         LimitExceeded: If it breaks a limit.
-        NoPlanFound: If no node can be reached from it.
+        NoWayOut: If no node can be reached from it.
     """
     if judge.problem.path.start_joints is None and roadmap.index[0] >= 0:
         return roadmap, int(roadmap.index[0])
@@ -65,8 +65,7 @@ def with_start(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, i
     need = np.minimum(judge.required, float(room[0])) * np.ones(len(near))
     good = judge.clear(lines, need) if len(near) else np.zeros(0, bool)
     if not good.any():
-        message = "no way out of the start was found"
-        raise NoPlanFound(message)
+        raise NoWayOut
     ids = np.full(int(good.sum()), shapes.size)
     links = np.column_stack([ids, shape[near[good]], gap[near[good]]])
     more = extended(
