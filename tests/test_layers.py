@@ -2,6 +2,7 @@
 
 import ast
 import io
+import re
 import subprocess
 import sys
 import tokenize
@@ -166,3 +167,11 @@ def test_only_the_command_line_knows_the_certificate_checker() -> None:
         if CHECKER in path.parents or path.stem == "cli":
             continue
         assert not any(owner(n) == "certificate_checker" for n in imported(path)), path
+
+
+@pytest.mark.parametrize("folder", [".", "planner/fewest", "verification/proof"])
+def test_architecture_names_every_module(folder: str) -> None:
+    text = (PACKAGE.parent / "ARCHITECTURE.md").read_text(encoding="utf-8")
+    modules = {path.stem for path in (PACKAGE / folder).glob("[!_]*.py")}
+    assert modules
+    assert not modules - set(re.findall(r"\w+", text))

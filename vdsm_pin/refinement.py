@@ -1,6 +1,6 @@
 """Plan, verify, plan again with a larger margin, until the proof goes through.
 
-The planner keeps the clearance at waypoints; between them the arm swings, and only the
+The planner looks at places of the motion; between them the arm swings, and only the
 verification (proved brackets over continuous time, with Coal as second opinion) knows
 by how much. What is missing is added to the margin of the next round. A motion that was
 not certified is never handed out as a plan.

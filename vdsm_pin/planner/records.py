@@ -1,4 +1,4 @@
-"""What the seven steps hand to each other; arrays with named axes."""
+"""What every strategy returns, and the clearance function it is given."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from vdsm_pin.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class TipPath:
-    """The route of the tip, waypoint by waypoint (step 4).
+    """The route of the tip, waypoint by waypoint (step 4 of the paper).
 
     Args:
         points: Tip positions O_{N+1}, shape (n_samples, 3); [m].
@@ -36,14 +36,15 @@ class Plan:
     Args:
         problem: What was asked.
         strategy: Name of the strategy.
-        tip_path: Step 4's route.
+        tip_path: The route of the tip.
         centres: Joint centres O_1..O_{N+1}, shape (n_samples, N + 1, 3); [m].
         trajectory: Joint values, the plan proper.
         cable_lengths: l_ja, l_jb, l_jc, shape (n_samples, N, 3); [m].
         notes: What the user should know, one sentence each: stretches not drawn,
             rounds of refinement and their reasons, lower bounds proved.
-        rivals: Further plans of the same, where what joint error a motion is proved to
-            survive shall decide between them and this one; the earlier wins a draw.
+        rivals: Further plans of the same, none where the strategy has decided: the
+            largest joint error that is proved to be survived decides between them and
+            this one, which loses a draw.
     """
 
     problem: PlanningProblem
@@ -57,6 +58,7 @@ class Plan:
 
 
 LinkClearance: TypeAlias = Callable[[FloatArray], FloatArray]
-"""Joint centres (n, N + 1, 3) to proved lower bounds of the clearance between each link
-and the nearest obstacle surface (n, N); [m]. Passed in, so that the planner does not
-import what will judge it."""
+"""Joint centres (n, m + 1, 3) to proved lower bounds of the clearance between each of m
+links in a row and the nearest obstacle surface (n, m); [m]. Links may be any straight
+pieces, also of no length. Passed in, so that the planner does not import what will
+judge it."""

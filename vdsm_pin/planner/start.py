@@ -5,8 +5,8 @@ import numpy as np
 from vdsm_pin.errors import StartBlocked
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.planner.fewest.bounds import culprit
 from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.planner.upper_clearance import culprit
 from vdsm_pin.problem import PlanningProblem
 
 

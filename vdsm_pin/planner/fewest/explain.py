@@ -16,9 +16,7 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.feasibility import curled_reach
 from vdsm_pin.planner.fewest.bounds import (
     TipProof,
-    culprit,
     least_changed,
-    upper_clearance,
 )
 from vdsm_pin.planner.fewest.explore import Outcome
 from vdsm_pin.planner.fewest.motion import Intervals
@@ -26,6 +24,7 @@ from vdsm_pin.planner.fewest.passage import narrowest
 from vdsm_pin.planner.fewest.poses import bends_of
 from vdsm_pin.planner.fewest.route import PathRows
 from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.planner.upper_clearance import culprit, upper_clearance
 from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory

@@ -42,7 +42,7 @@ class Level:
     Args:
         step: Lattice step of the directions; [-].
         coarse: Distance of the tips over the arm's length; [-].
-        joints: Largest number of knee joints.
+        places: Largest number of joints at which a knee is tried.
         rounds: Sequences to try.
         back: How far tips are tried behind the path, over the arm's length; [-].
         grow: Rounds of growing shapes into what is not drawn.
@@ -55,7 +55,7 @@ class Level:
 
     step: float
     coarse: float
-    joints: int
+    places: int
     rounds: int
     back: float
     grow: int
@@ -70,16 +70,16 @@ SEED: Final = 0
 
 LEVELS: Final = (
     Level(
-        step=0.08, coarse=0.026, joints=8, rounds=20, back=0.0, grow=1,
+        step=0.08, coarse=0.026, places=8, rounds=20, back=0.0, grow=1,
         ease=0.79, around=4,
     ),
-    Level(step=0.08, coarse=0.026, joints=8, rounds=40, back=0.0, grow=2, around=4),
-    Level(step=0.08, coarse=0.013, joints=8, rounds=40, back=0.0, grow=3, around=4),
-    Level(step=0.08, coarse=0.0065, joints=8, rounds=40, back=0.0, grow=4, around=8),
-    Level(step=0.08, coarse=0.026, joints=8, rounds=40, back=1.0, grow=2),
-    Level(step=0.08, coarse=0.013, joints=8, rounds=40, back=1.0, grow=3),
+    Level(step=0.08, coarse=0.026, places=8, rounds=40, back=0.0, grow=2, around=4),
+    Level(step=0.08, coarse=0.013, places=8, rounds=40, back=0.0, grow=3, around=4),
+    Level(step=0.08, coarse=0.0065, places=8, rounds=40, back=0.0, grow=4, around=8),
+    Level(step=0.08, coarse=0.026, places=8, rounds=40, back=1.0, grow=2),
+    Level(step=0.08, coarse=0.013, places=8, rounds=40, back=1.0, grow=3),
     Level(
-        step=0.05, coarse=0.013, joints=10, rounds=60, back=1.0, grow=3,
+        step=0.05, coarse=0.013, places=10, rounds=60, back=1.0, grow=3,
         slack=3e-5, finest=5e-4,
     ),
 )  # fmt: skip
@@ -213,7 +213,7 @@ def _look(
     arm = problem.manipulator
     length = arm.total_length
     coarse, back = level.coarse * length, level.back * length
-    shapes = one_knee_shapes(arm, judge.limit, level.step, level.joints)
+    shapes = one_knee_shapes(arm, judge.limit, level.step, level.places)
     route = tip_route(problem, rows, proof.closed, coarse, back)
     roadmap = build_roadmap(
         problem, judge.rough, judge.required, route, shapes, taste, judge.limit,

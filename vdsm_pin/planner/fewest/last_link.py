@@ -27,8 +27,8 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.planner.fewest.bounds import upper_clearance
 from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.planner.upper_clearance import upper_clearance
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 

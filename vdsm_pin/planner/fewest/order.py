@@ -50,7 +50,7 @@ def reordered(planner: Planner, sequence: Sequence) -> Sequence:
     if not gain > 0.0:
         return sequence
     chosen = [backwards(runs[k]) if back else runs[k] for k, back in order]
-    return planner.joined(chosen, sequence.skipped, sequence.cost)
+    return planner.joined(chosen, sequence.skipped)
 
 
 def tour_length(

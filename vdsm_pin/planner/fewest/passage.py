@@ -15,7 +15,6 @@ import numpy as np
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.planner.feasibility import curled_reach
-from vdsm_pin.planner.fewest.bounds import upper_bounds
 from vdsm_pin.planner.fewest.cells import (
     DEPTH,
     DOUBTFUL,
@@ -26,6 +25,7 @@ from vdsm_pin.planner.fewest.cells import (
     holders,
     places,
 )
+from vdsm_pin.planner.upper_clearance import upper_bounds
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 

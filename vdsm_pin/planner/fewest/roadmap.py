@@ -50,10 +50,8 @@ class Roadmap:
         index: Node of each (tip, shape) or -1, shape (k * n_shapes,).
         tip_nodes: Where each tip's nodes begin, shape (k + 1,).
         lean: Sum of the knees' angles without joint 1, shape (v,); [rad].
-        changed: Number of changed link angles, shape (v,).
         cost: Cost of a metre drawn, shape (v,).
         strain: What entering a node adds to the length of a way, shape (v,); [m].
-        clearance: Least clearance, shape (v,); [m].
     """
 
     route: TipRoute
@@ -62,10 +60,8 @@ class Roadmap:
     index: IntArray
     tip_nodes: IntArray
     lean: FloatArray
-    changed: IntArray
     cost: FloatArray
     strain: FloatArray
-    clearance: FloatArray
 
     def graph(self) -> Graph:
         """What the compiled loops read."""
@@ -189,9 +185,7 @@ def _assemble(
     strain = 0.02 * taste.room_cost * lack**2 + 0.1 * taste.bend_cost * bent
     lean = bends[:, KNEES].sum(axis=1)
     lean[node % shapes.size == 0] = 0.0
-    return _indexed(
-        Roadmap(route, shapes, node, node, node, lean, changed, cost, strain, room)
-    )
+    return _indexed(Roadmap(route, shapes, node, node, node, lean, cost, strain))
 
 
 def _indexed(roadmap: Roadmap) -> Roadmap:
@@ -208,10 +202,8 @@ def _indexed(roadmap: Roadmap) -> Roadmap:
         index=index,
         tip_nodes=tip_nodes,
         lean=roadmap.lean[order],
-        changed=roadmap.changed[order],
         cost=roadmap.cost[order],
         strain=roadmap.strain[order],
-        clearance=roadmap.clearance[order],
     )
 
 
@@ -247,10 +239,8 @@ def extended(
             shapes=shapes,
             node=np.concatenate([tip * shapes.size + shape, more.node]),
             lean=np.concatenate([roadmap.lean, more.lean]),
-            changed=np.concatenate([roadmap.changed, more.changed]),
             cost=np.concatenate([roadmap.cost, more.cost]),
             strain=np.concatenate([roadmap.strain, more.strain]),
-            clearance=np.concatenate([roadmap.clearance, more.clearance]),
         )
     )
 

@@ -26,7 +26,7 @@ class Leg:
     Args:
         drawn: Whether the tip draws.
         nodes: Node after node.
-        layer: For drawn legs, the layer of each node; for ways, the layer left.
+        layers: Of each node; along a way the layer left, at its end the layer come to.
     """
 
     drawn: bool
@@ -41,12 +41,10 @@ class Sequence:
     Args:
         legs: Drawn legs and ways, each beginning where the one before ends.
         skipped: Layers k whose stretch from layer k - 1 is not drawn.
-        cost: Cost of the whole.
     """
 
     legs: tuple[Leg, ...]
     skipped: tuple[int, ...]
-    cost: float
 
 
 class Planner:
@@ -129,10 +127,10 @@ class Planner:
         k = len(home_cost) - 1
         tip = roadmap.route.layers[k]
         begin, end = roadmap.tip_nodes[tip], roadmap.tip_nodes[tip + 1]
-        node, total = -1, float(home_cost[k])
         last = labels.cost[begin:end]
-        if not total < last.min(initial=np.inf) and end > begin:
-            node, total = int(begin + np.argmin(last)), float(last.min())
+        node = -1
+        if not home_cost[k] < last.min(initial=np.inf) and end > begin:
+            node = int(begin + np.argmin(last))
         runs: list[Leg] = []
         skipped: list[int] = []
         while True:
@@ -146,7 +144,7 @@ class Planner:
             if k < 0:
                 break
             node = int(home_from[k])
-        return self.joined(runs[::-1], tuple(sorted(skipped)), total)
+        return self.joined(runs[::-1], tuple(sorted(skipped)))
 
     def _run(self, parent: IntArray, node: int, k: int) -> tuple[Leg, int]:
         """The drawn leg that ends in a node at layer k, and the layer it begins at."""
@@ -160,9 +158,7 @@ class Planner:
             marks.append(k)
         return Leg(True, tuple(nodes[::-1]), tuple(marks[::-1])), k
 
-    def joined(
-        self, runs: list[Leg], skipped: tuple[int, ...], cost: float
-    ) -> Sequence:
+    def joined(self, runs: list[Leg], skipped: tuple[int, ...]) -> Sequence:
         """Drawn legs with the shortest ways between them."""
         legs: list[Leg] = []
         at, left = self.home, runs[0].layers[0] if runs else 0
@@ -173,4 +169,4 @@ class Planner:
                 legs.append(Leg(False, way, marks))
             legs.append(run)
             at, left = run.nodes[-1], run.layers[-1]
-        return Sequence(tuple(legs), skipped, cost)
+        return Sequence(tuple(legs), skipped)
