@@ -89,7 +89,7 @@ def numbers(data: Any) -> Iterator[float]:
     if isinstance(data, list):
         for part in data:
             yield from numbers(part)
-    elif not isinstance(data, str):
+    elif isinstance(data, float | int):
         yield float(data)
 
 

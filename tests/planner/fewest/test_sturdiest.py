@@ -83,23 +83,20 @@ def test_each_link_keeps_its_own() -> None:
     route = tip_route(task, rows, np.zeros(len(rows.tips), dtype=np.bool_), 0.2, 0.0)
     shapes = one_knee_shapes(ARM, ARM.max_link_angle, 0.2, 8)
     judge = Judge(task, clearance, 0.0, 0.0, 2e-3, kept=kept)
-    made = build_roadmap(
-        task, clearance, judge.required, route, shapes, taste, judge.limit
+    made, free = (
+        build_roadmap(task, clearance, judge.required, route, shapes, one, judge.limit)
+        for one in (taste, Taste())
     )
-    tip, shape = np.divmod(made.node, shapes.size)
+    tip, shape = np.divmod(free.node, shapes.size)
     tips = route.tips[tip]
     offsets = shapes.offsets(ARM, tips, shape)
     place, share = np.arange(len(tips)), np.zeros(len(tips))
     centres = Intervals(tips, tips, offsets, offsets).centres(ARM, place, share)
     expected = (clearance(centres) - kept).min(axis=1)
-    assert len(tips) > 1000
-    np.testing.assert_allclose(made.clearance, expected, rtol=0, atol=1e-9)
     np.testing.assert_allclose(judge.look(tips, offsets)[0], expected, atol=1e-9)
-    # The other side: arms that have the clearance required but not that in reserve.
-    free = build_roadmap(
-        task, clearance, judge.required, route, shapes, Taste(), judge.limit
-    )
-    assert set(made.node.tolist()) < set(free.node.tolist())
+    enough = expected >= judge.required
+    assert 0.1 < enough.mean() < 0.9
+    np.testing.assert_array_equal(made.node, free.node[enough])
 
 
 @pytest.mark.parametrize(("seed", "clutter"), [(0, False), (0, True), (1, False)])
