@@ -10,6 +10,7 @@ from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.scene import Scene
+from vdsm_pin.tolerances import TOLERANCES
 
 
 class Approach(StrEnum):
@@ -116,6 +117,23 @@ class DesiredPath:
     def length(self) -> float:
         """Arc length of the whole path; [m]."""
         return float(self.corner_stations[-1])
+
+    @cached_property
+    def entry(self) -> float:
+        """Arc length where the drawing begins by the "shortest distance" scheme; [m].
+
+        On a closed path that is the point nearest to the start, of equals the first;
+        an open one is drawn from its first corner.
+        """
+        if not self.closed or self.length == 0.0:
+            return 0.0
+        begins, sides = self.corners[:-1], np.diff(self.corners, axis=0)
+        squared = np.einsum("ij,ij->i", sides, sides)
+        towards = np.einsum("ij,ij->i", self.start - begins, sides)
+        part = np.clip(towards / np.where(squared > 0.0, squared, 1.0), 0.0, 1.0)
+        gaps = np.linalg.norm(begins + part[:, None] * sides - self.start, axis=1)
+        k = int(np.argmax(gaps <= gaps.min() + TOLERANCES.on_path_length))
+        return float(self.corner_stations[k] + part[k] * np.sqrt(squared[k]))
 
     def at(self, stations: FloatArray) -> FloatArray:
         """Points of the path at arc lengths, shape (k,) to (k, 3); [m].

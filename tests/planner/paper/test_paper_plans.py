@@ -17,7 +17,6 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.kinematics import joint_centres, link_angles
 from vdsm_pin.planner.paper.pipeline import plan_paper
-from vdsm_pin.planner.paper.tip_path import nearest_station
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem import Approach, Blocked, PlanningProblem
 from vdsm_pin.robot_model import load_robot
@@ -315,7 +314,7 @@ def test_an_open_path_is_drawn_from_its_first_corner_and_not_left() -> None:
     check_plan(plan)
     tip = plan.tip_path.points
     np.testing.assert_allclose(tip[-1], points[-1], atol=1e-12)
-    assert nearest_station(path) == 0.0
+    assert path.entry == 0.0
 
 
 def test_plans_are_the_same_every_time() -> None:

@@ -30,7 +30,7 @@ def alike(roadmap: Roadmap, edges: IntArray) -> IntArray:
     """
     pairs = [np.zeros((0, 2), dtype=np.int64)]
     for edge in edges:
-        tips, shapes = np.divmod(roadmap.node[edge], roadmap.shapes.size)
+        tips, shapes = roadmap.tips_of(edge), roadmap.shapes_of(edge)
         if shapes[0] == shapes[1]:
             pairs.append(_every_shape(roadmap, tips))
         elif (shapes < roadmap.shapes.n_lattice).all():
@@ -42,10 +42,9 @@ def alike(roadmap: Roadmap, edges: IntArray) -> IntArray:
 
 def _every_shape(roadmap: Roadmap, tips: IntArray) -> IntArray:
     """The moves between two tips, shape (m, 2)."""
-    here = np.arange(roadmap.tip_nodes[tips[0]], roadmap.tip_nodes[tips[0] + 1])
-    size = roadmap.shapes.size
-    shape = roadmap.node[here] % size
-    return np.stack([here, roadmap.index[tips[1] * size + shape]], axis=1)
+    here = roadmap.nodes_at(tips[0])
+    there = roadmap.nodes_of(tips[1], roadmap.shapes_of(here))
+    return np.stack([here, there], axis=1)
 
 
 def _layers_about(roadmap: Roadmap, tips: IntArray, shapes: IntArray) -> IntArray:
@@ -56,7 +55,7 @@ def _layers_about(roadmap: Roadmap, tips: IntArray, shapes: IntArray) -> IntArra
         return np.zeros((0, 2), dtype=np.int64)
     first, last = max(0, int(at[0]) - AROUND), int(at[-1]) + AROUND + 1
     layers = route.layers[first:last]
-    one, other = (roadmap.index[layers * roadmap.shapes.size + s] for s in shapes)
+    one, other = (roadmap.nodes_of(layers, shape) for shape in shapes)
     rests = np.stack([one, other], axis=1)
     ahead = np.stack([one[:-1], other[1:]], axis=1)
     behind = np.stack([other[:-1], one[1:]], axis=1)
@@ -65,8 +64,5 @@ def _layers_about(roadmap: Roadmap, tips: IntArray, shapes: IntArray) -> IntArra
 
 def lines_of(manipulator: Manipulator, roadmap: Roadmap, edges: IntArray) -> Intervals:
     """Edges, shape (n, 2), as straight lines in the chart."""
-    node = roadmap.node[edges.ravel()]
-    tips = roadmap.route.tips[node // roadmap.shapes.size]
-    shape = node % roadmap.shapes.size
-    offsets = roadmap.shapes.offsets(manipulator, tips, shape)
+    tips, offsets = roadmap.poses_of(manipulator, edges.ravel())
     return Intervals(tips[::2], tips[1::2], offsets[::2], offsets[1::2])

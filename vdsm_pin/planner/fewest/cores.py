@@ -12,6 +12,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.geometry.compiled import borrowed, compiled
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
+from vdsm_pin.geometry.segments import segments_apart
 from vdsm_pin.scene import Obstacle
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -116,31 +117,8 @@ def blocked_by(cores: FloatArray, ends: FloatArray, reach: float) -> BoolArray:
     for s in range(ends.shape[0]):
         for n in range(cores.shape[0]):
             least = reach + cores[n, 6]
-            if _gap(cores[n, :3], cores[n, 3:6], ends[s, 0], ends[s, 1]) < least:
+            a, b = cores[n, :3], cores[n, 3:6]
+            if sqrt(segments_apart(a, b, ends[s, 0], ends[s, 1])) < least:
                 blocked[s] = True
                 break
     return blocked
-
-
-@compiled
-def _gap(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> float:
-    """Distance of two points, one of each segment, as near as rounding lets them be.
-
-    Whatever the rounding, it is never less than the distance of the segments by more
-    than the rounding of its last line.
-    """
-    uu = vv = uv = uw = vw = 0.0
-    for k in range(3):
-        u, v, w = b[k] - a[k], d[k] - c[k], a[k] - c[k]
-        uu, vv, uv, uw, vw = uu + u * u, vv + v * v, uv + u * v, uw + u * w, vw + v * w
-    cross = uu * vv - uv * uv
-    s = min(1.0, max(0.0, (uv * vw - vv * uw) / cross)) if cross > 0.0 else 0.0
-    t = (uv * s + vw) / vv if vv > 0.0 else 0.0
-    if not 0.0 <= t <= 1.0:
-        t = min(1.0, max(0.0, t))
-        s = min(1.0, max(0.0, (uv * t - uw) / uu)) if uu > 0.0 else 0.0
-    square = 0.0
-    for k in range(3):
-        gap = a[k] + s * (b[k] - a[k]) - c[k] - t * (d[k] - c[k])
-        square += gap * gap
-    return sqrt(square)

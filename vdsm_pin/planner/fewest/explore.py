@@ -68,7 +68,7 @@ class Level:
 SEED: Final = 0
 """Seed of the growth of shapes; the same problem gives the same plan."""
 
-LEVELS: Final = (
+THOROUGH: Final = (
     Level(
         step=0.08, coarse=0.026, places=8, rounds=20, back=0.0, grow=1,
         ease=0.79, around=4,
@@ -84,8 +84,24 @@ LEVELS: Final = (
     ),
 )  # fmt: skip
 
-QUICK: Final = LEVELS[:2]
-"""Levels for plans that are only better than one there is already."""
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is done for a plan.
+
+    Args:
+        levels: How finely to look, in this order.
+        proves: Whether what the first level leaves is looked at for a proof that it
+            cannot be done.
+    """
+
+    levels: tuple[Level, ...]
+    proves: bool
+
+
+FULL: Final = Effort(THOROUGH, proves=True)
+QUICK: Final = Effort(THOROUGH[:2], proves=False)
+"""For plans that are only better than one there is already."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +144,7 @@ def explore(
     clearance: Nearby,
     margin: float,
     taste: Taste,
-    levels: tuple[Level, ...] = LEVELS,
+    effort: Effort = FULL,
 ) -> Iterator[Outcome]:
     """Search level by level until all that can be drawn is drawn.
 
@@ -137,7 +153,7 @@ def explore(
         clearance: The clearance function.
         margin: Kept beyond the required clearance; [m].
         taste: What the strategy prefers.
-        levels: How finely to look, in this order.
+        effort: How much is done before giving up.
 
     Yields:
         Outcomes, of which each draws more or has more proved than the one before; the
@@ -147,18 +163,18 @@ def explore(
         NoWayOut: If the start is left at no level.
     """
     rows = path_rows(problem.path)
-    proof = prove_tips(problem, clearance, rows.tips)
-    judge = Judge(problem, clearance, margin, LEVELS[0].slack, LEVELS[0].finest)
-    best = Outcome(judge, None, rows, proof)
+    first = effort.levels[0]
+    judge = Judge(problem, clearance, margin, first.slack, first.finest)
+    best = Outcome(judge, None, rows, prove_tips(problem, clearance, rows.tips))
     yield best
-    if proof.closed.all():
+    if best.proof.closed.all():
         return
     # The way out of a start that is bent more than is liked must be allowed.
     bent = largest_start_angle(problem) / link_limit(problem)
     least_ease = min(1.0, bent + TOLERANCES.joint_limit)
     unreached, kept = False, kept_by_links(problem.manipulator, taste.taper)
     stuck: NoWayOut | None = None
-    for number, level in enumerate(levels):
+    for level in effort.levels:
         if unreached and level.back == 0.0:
             continue
         ease = max(level.ease, least_ease)
@@ -169,10 +185,10 @@ def explore(
             clearance.up_to(worth), kept,
         )  # fmt: skip
         try:
-            found = _look(judge, level, rows, proof, taste)
+            found = _look(judge, level, rows, best.proof, taste)
         except NoWayOut as error:
             found, stuck = None, error
-        now = Outcome(judge, found, rows, proof)
+        now = Outcome(judge, found, rows, best.proof)
         LOG.debug("%s: %.4f m missing", level, now.missing)
         if now.missing < best.missing:
             best = now
@@ -180,12 +196,12 @@ def explore(
         if not best.missing > 0.0:
             return
         unreached |= level.ease == 1.0 and (found is None or _unreached(found))
-        if number == 0 and len(levels) > len(QUICK):
+        if level is first and effort.proves:
             # Seldom needed, so only now: can it be done at all?
             for proof in _proofs(problem, clearance, best):
                 best = replace(best, proof=proof)
                 yield best
-            if proof.closed.all():
+            if best.proof.closed.all():
                 return
     if best.found is None and stuck is not None:
         raise stuck
@@ -247,13 +263,11 @@ def _unreached(found: Found) -> bool:
         if roadmap.route.closed[k]:
             continue
         tip = roadmap.route.layers[k]
-        nodes = slice(roadmap.tip_nodes[tip], roadmap.tip_nodes[tip + 1])
-        if not np.isfinite(found.ways[nodes]).all():
+        if not np.isfinite(found.ways[roadmap.nodes_at(tip)]).all():
             return True
     return False
 
 
 def _same_nodes(before: Roadmap, after: Roadmap, nodes: IntArray) -> IntArray:
     """The numbers of nodes in an extended roadmap."""
-    tip, shape = np.divmod(before.node[nodes], before.shapes.size)
-    return np.asarray(after.index[tip * after.shapes.size + shape])
+    return after.nodes_of(before.tips_of(nodes), before.shapes_of(nodes))

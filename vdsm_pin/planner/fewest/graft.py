@@ -30,7 +30,7 @@ def graft(
     first = shapes.size
     for tree, nodes in zip(grown, roots, strict=True):
         ids = first + np.arange(len(tree.layer))
-        root = roadmap.node[nodes[np.maximum(-1 - tree.parent, 0)]] % shapes.size
+        root = roadmap.shapes_of(nodes[np.maximum(-1 - tree.parent, 0)])
         up = np.where(tree.parent >= 0, first + tree.parent, root)
         links.append(np.column_stack([ids, up, np.full(len(ids), shapes.step)]))
         tip = route.layers[tree.layer]
@@ -62,11 +62,9 @@ def _ties(
     rows, tips, here, there = [], [], [], []
     for tip in distinct(places):
         own = np.flatnonzero(places == tip)
-        nodes = np.arange(roadmap.tip_nodes[tip], roadmap.tip_nodes[tip + 1])
-        shape = np.concatenate([roadmap.node[nodes] % shapes.size, shapes.size + own])
-        position = np.broadcast_to(roadmap.route.tips[tip], (len(nodes), 3))
-        around = shapes.offsets(arm, position, shape[: len(nodes)])
-        around = np.concatenate([around, grown[own]])
+        nodes = roadmap.nodes_at(tip)
+        shape = np.concatenate([roadmap.shapes_of(nodes), shapes.size + own])
+        around = np.concatenate([roadmap.poses_of(arm, nodes)[1], grown[own]])
         gap = np.abs(grown[own][:, None] - around[None]).max(axis=(2, 3))
         gap[np.arange(len(own)), len(nodes) + np.arange(len(own))] = np.inf
         near = np.argsort(gap, axis=1, kind="stable")[:, :TIES]
@@ -116,16 +114,13 @@ def fill(
         for first, last in (ends, ends[::-1]):
             if crossed:
                 break
-            tip = route.layers[first]
-            nodes = np.arange(roadmap.tip_nodes[tip], roadmap.tip_nodes[tip + 1])
+            nodes = roadmap.nodes_at(route.layers[first])
             nodes = nodes[np.isfinite(lengths[nodes])]
             if len(nodes) > POPULATION:
                 nodes = rng.choice(nodes, POPULATION, replace=False)
             if not len(nodes):
                 continue
-            position = np.broadcast_to(route.tips[tip], (len(nodes), 3))
-            shape = roadmap.node[nodes] % roadmap.shapes.size
-            offsets = roadmap.shapes.offsets(arm, position, shape)
+            _, offsets = roadmap.poses_of(arm, nodes)
             garden = Garden(judge, route.tips[route.layers], rng)
             tree = garden.grow(offsets, first, last)
             if len(tree.layer):

@@ -50,16 +50,13 @@ def with_start(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, i
     _check_limits(judge, tip, offsets)
     room, _, _ = judge.look(tip, offsets)
     shapes = roadmap.shapes
-    nodes = np.arange(roadmap.tip_nodes[0], roadmap.tip_nodes[1])
-    shape = roadmap.node[nodes] % shapes.size
-    there = shapes.offsets(
-        judge.problem.manipulator, np.broadcast_to(tip, (len(nodes), 3)), shape
-    )
-    gap = np.abs(there - offsets).max(axis=(1, 2))
+    nodes = roadmap.nodes_at(0)
+    _, around = roadmap.poses_of(judge.problem.manipulator, nodes)
+    gap = np.abs(around - offsets).max(axis=(1, 2))
     near = np.argsort(gap, kind="stable")[:EXITS]
     every = np.broadcast_to(tip, (len(near), 3))
     lines = Intervals(
-        every, every, np.broadcast_to(offsets, there[near].shape), there[near]
+        every, every, np.broadcast_to(offsets, around[near].shape), around[near]
     )
     # The start may be closer than the margin asks for; the way out only gets better.
     need = np.minimum(judge.required, float(room[0])) * np.ones(len(near))
@@ -67,7 +64,8 @@ def with_start(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, i
     if not good.any():
         raise NoWayOut
     ids = np.full(int(good.sum()), shapes.size)
-    links = np.column_stack([ids, shape[near[good]], gap[near[good]]])
+    there = roadmap.shapes_of(nodes[near[good]])
+    links = np.column_stack([ids, there, gap[near[good]]])
     more = extended(
         roadmap, np.zeros(1, dtype=np.int64), judge.bends(tip, offsets), room,
         shapes.with_grown(offsets, links), judge.required, taste, judge.limit,

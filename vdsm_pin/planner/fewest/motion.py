@@ -140,10 +140,7 @@ def knots_of(manipulator: Manipulator, roadmap: Roadmap, sequence: Sequence) -> 
         stations += [roadmap.route.stations[k] for k in leg.layers[again:]]
         drawn += [leg.drawn] * (len(leg.nodes) - 1)
     number = np.array(nodes)
-    node = roadmap.node[number]
-    tips = roadmap.route.tips[node // roadmap.shapes.size]
-    shape = node % roadmap.shapes.size
-    offsets = roadmap.shapes.offsets(manipulator, tips, shape)
+    tips, offsets = roadmap.poses_of(manipulator, number)
     edges = np.stack([number[:-1], number[1:]], axis=1)
     return Knots(
         tips, offsets, np.array(stations), np.array(drawn, dtype=np.bool_), edges

@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
+from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.fewest.kernels import Barred, Graph, pose_shapes
 from vdsm_pin.planner.fewest.route import TipRoute
 from vdsm_pin.planner.fewest.shapes import Shapes
@@ -71,13 +72,28 @@ class Roadmap:
             shapes.first, shapes.neighbours, shapes.change, self.lean,
         )  # fmt: skip
 
-    def tip(self, node: int) -> int:
-        """Tip number of a node."""
-        return int(self.node[node] // self.shapes.size)
+    def tips_of(self, nodes: IntArray) -> IntArray:
+        """Tip number of each node."""
+        return np.asarray(self.node[nodes] // self.shapes.size)
 
-    def shape(self, node: int) -> int:
-        """Shape number of a node."""
-        return int(self.node[node] % self.shapes.size)
+    def shapes_of(self, nodes: IntArray) -> IntArray:
+        """Shape number of each node."""
+        return np.asarray(self.node[nodes] % self.shapes.size)
+
+    def nodes_of(self, tips: IntArray, shapes: IntArray) -> IntArray:
+        """The node of each tip and shape, -1 where there is none."""
+        return np.asarray(self.index[tips * self.shapes.size + shapes])
+
+    def nodes_at(self, tip: int) -> IntArray:
+        """All nodes of a tip, in order."""
+        return np.arange(self.tip_nodes[tip], self.tip_nodes[tip + 1])
+
+    def poses_of(
+        self, manipulator: Manipulator, nodes: IntArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Tips (n, 3) and offsets D_1..D_{N+1} (n, N + 1, 2) of nodes; [m]."""
+        tips = self.route.tips[self.tips_of(nodes)]
+        return tips, self.shapes.offsets(manipulator, tips, self.shapes_of(nodes))
 
 
 def link_limit(problem: PlanningProblem) -> float:
@@ -129,7 +145,7 @@ def build_roadmap(
         return tried(np.ones(count, dtype=np.bool_))
     straight = tried(np.zeros(count, dtype=np.bool_))
     poor = np.ones(count, dtype=np.bool_)
-    poor[straight.node[straight.cost <= 2.0 * taste.angle] // shapes.size] = False
+    poor[straight.tips_of(np.flatnonzero(straight.cost <= 2.0 * taste.angle))] = False
     return tried(_spread(route, poor, around)) if poor.any() else straight
 
 
@@ -229,15 +245,15 @@ def extended(
         taste: What the strategy prefers.
         limit: Largest link angle; [rad].
     """
-    old = roadmap.shapes.size
-    tip, shape = roadmap.node // old, roadmap.node % old
+    old, every = roadmap.shapes.size, np.arange(len(roadmap.node))
+    same = roadmap.tips_of(every) * shapes.size + roadmap.shapes_of(every)
     fresh = tips * shapes.size + old + np.arange(len(tips))
     more = _assemble(roadmap.route, shapes, fresh, bends, room, required, taste, limit)
     return _indexed(
         replace(
             roadmap,
             shapes=shapes,
-            node=np.concatenate([tip * shapes.size + shape, more.node]),
+            node=np.concatenate([same, more.node]),
             lean=np.concatenate([roadmap.lean, more.lean]),
             cost=np.concatenate([roadmap.cost, more.cost]),
             strain=np.concatenate([roadmap.strain, more.strain]),

@@ -8,7 +8,6 @@ import numpy as np
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.spacing import count_of
 from vdsm_pin.problem import DesiredPath, Order, PlanningProblem
-from vdsm_pin.tolerances import TOLERANCES
 
 
 @dataclass(frozen=True)
@@ -51,20 +50,6 @@ class TipRoute:
     gaps: FloatArray
 
 
-def nearest_station(path: DesiredPath, point: FloatArray) -> float:
-    """Arc length of the path's point nearest to a point, the first of equals; [m]."""
-    corners, stations = path.corners, path.corner_stations
-    best, where = np.inf, 0.0
-    for a, b, station in zip(corners[:-1], corners[1:], stations[:-1], strict=True):
-        side = b - a
-        square = float(side @ side)
-        t = min(max(float((point - a) @ side) / square, 0.0), 1.0) if square else 0.0
-        distance = float(np.linalg.norm(a + t * side - point))
-        if distance < best - TOLERANCES.on_path_length:
-            best, where = distance, station + t * float(np.sqrt(square))
-    return where
-
-
 def path_rows(path: DesiredPath) -> PathRows:
     """Rows at most `spacing` apart; every corner is a row.
 
@@ -72,9 +57,7 @@ def path_rows(path: DesiredPath) -> PathRows:
     first point.
     """
     corners = path.corner_stations
-    begin = 0.0
-    if path.closed and len(path.points) > 1:
-        begin = nearest_station(path, path.start)
+    begin = path.entry
     if begin > 0.0:
         later, sooner = corners[corners > begin], corners[1:][corners[1:] < begin]
         end = [begin + path.length]

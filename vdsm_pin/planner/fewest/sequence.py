@@ -86,7 +86,7 @@ class Planner:
     def _bar(self, edges: IntArray) -> None:
         self.barred = with_barred(self.barred, edges)
         route = self.roadmap.route
-        for a, b in self.roadmap.node[edges] // self.roadmap.shapes.size:
+        for a, b in self.roadmap.tips_of(edges):
             for u, v in ((a, b), (b, a)):
                 row = slice(route.first[u], route.first[u + 1])
                 link = route.links[row] == v
@@ -148,15 +148,13 @@ class Planner:
 
     def _run(self, parent: IntArray, node: int, k: int) -> tuple[Leg, int]:
         """The drawn leg that ends in a node at layer k, and the layer it begins at."""
-        nodes, marks = [node], [k]
-        while parent[node] != FROM_HOME:
-            before = int(parent[node])
-            if self.roadmap.tip(before) != self.roadmap.tip(node):
-                k -= 1
-            node = before
-            nodes.append(node)
-            marks.append(k)
-        return Leg(True, tuple(nodes[::-1]), tuple(marks[::-1])), k
+        nodes = [node]
+        while parent[nodes[-1]] != FROM_HOME:
+            nodes.append(int(parent[nodes[-1]]))
+        tips = self.roadmap.tips_of(np.array(nodes))
+        marks = k - np.cumsum(np.append(0, tips[1:] != tips[:-1]))
+        leg = Leg(True, tuple(nodes[::-1]), tuple(marks[::-1].tolist()))
+        return leg, leg.layers[0]
 
     def joined(self, runs: list[Leg], skipped: tuple[int, ...]) -> Sequence:
         """Drawn legs with the shortest ways between them."""

@@ -16,7 +16,7 @@ from vdsm_pin.planner.fewest.explain import (
     refuse,
     refuse_proved,
 )
-from vdsm_pin.planner.fewest.explore import LEVELS, QUICK, Level, Outcome, explore
+from vdsm_pin.planner.fewest.explore import FULL, QUICK, Effort, Outcome, explore
 from vdsm_pin.planner.fewest.motion import Knots, Rows, dense_rows
 from vdsm_pin.planner.fewest.nearby import FAR, Nearby, nearby
 from vdsm_pin.planner.fewest.roadmap import Taste
@@ -138,14 +138,12 @@ class _Search:
     def with_reserve(self, reserve: float) -> Plan:
         return _plan(
             self.problem, self.clearance, self.margin + reserve, self.name,
-            self.taste, levels=QUICK,
+            self.taste, QUICK,
         )  # fmt: skip
 
     def with_taper(self, error: float) -> Plan:
         taste = replace(self.taste, taper=error)
-        return _plan(
-            self.problem, self.clearance, self.margin, self.name, taste, levels=QUICK
-        )
+        return _plan(self.problem, self.clearance, self.margin, self.name, taste, QUICK)
 
     def clearer(self, first: Plan) -> tuple[list[Plan], float]:
         """Plans with more and more clearance, and what the last has in reserve; [m]."""
@@ -181,20 +179,20 @@ def _plan(
     margin: float,
     name: str,
     taste: Taste,
-    levels: tuple[Level, ...] = LEVELS,
+    effort: Effort = FULL,
 ) -> Plan:
     check_start(problem, clearance)
     if not leans_ahead(problem):
         rows = unbend(problem, clearance, margin)
         there = from_there(problem, rows[-1])
-        rest = _plan(there, clearance, margin, name, taste, levels)
+        rest = _plan(there, clearance, margin, name, taste, effort)
         return with_unbending(problem, rows, rest)
     # What is kept is judged exactly, however much it is.
     most = margin + taste.taper * float(levers(problem.manipulator)[-1])
     quick = nearby(problem, clearance).up_to(FAR + most)
     best: Outcome | None = None
     try:
-        for outcome in explore(problem, quick, margin, taste, levels):
+        for outcome in explore(problem, quick, margin, taste, effort):
             best = outcome
             refuse_proved(problem, best)
         assert best is not None

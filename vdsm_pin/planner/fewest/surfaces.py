@@ -17,6 +17,7 @@ from vdsm_pin.geometry.compiled import borrowed, compiled
 from vdsm_pin.geometry.obstacles import STACK, crossings
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
+from vdsm_pin.geometry.segments import segments_apart
 from vdsm_pin.scene import Mesh, Obstacle
 
 STEP: Final = 1e-6
@@ -110,32 +111,6 @@ def _from_ball(ball: FloatArray, a: FloatArray, b: FloatArray) -> float:
 
 
 @compiled
-def _from_segment(a: FloatArray, b: FloatArray, p: FloatArray, q: FloatArray) -> float:
-    """Squared distance of two segments a-b and p-q; [m^2]."""
-    uu = vv = uv = uw = vw = 0.0
-    for c in range(3):
-        u, v, w = b[c] - a[c], q[c] - p[c], a[c] - p[c]
-        uu += u * u
-        vv += v * v
-        uv += u * v
-        uw += u * w
-        vw += v * w
-    # The place s on a-b that is nearest to the line of the other, then the place t
-    # nearest to that one, and s again where t had to be moved to an end.
-    room = uu * vv - uv * uv
-    s = min(1.0, max(0.0, (uv * vw - vv * uw) / room)) if room > 0.0 else 0.0
-    t = (uv * s + vw) / vv if vv > 0.0 else 0.0
-    if not 0.0 < t < 1.0:
-        t = min(1.0, max(0.0, t))
-        s = min(1.0, max(0.0, (uv * t - uw) / uu)) if uu > 0.0 else 0.0
-    square = 0.0
-    for c in range(3):
-        gap = a[c] + s * (b[c] - a[c]) - p[c] - t * (q[c] - p[c])
-        square += gap * gap
-    return square
-
-
-@compiled
 def _from_triangle(corners: FloatArray, a: FloatArray, b: FloatArray) -> float:
     """Squared distance of a segment from a triangle; [m^2].
 
@@ -143,8 +118,8 @@ def _from_triangle(corners: FloatArray, a: FloatArray, b: FloatArray) -> float:
     or the segment passes through it.
     """
     p, q, r = corners
-    square = min(_from_segment(a, b, p, q), _from_segment(a, b, q, r))
-    square = min(square, _from_segment(a, b, r, p))
+    square = min(segments_apart(a, b, p, q), segments_apart(a, b, q, r))
+    square = min(square, segments_apart(a, b, r, p))
     nx = (q[1] - p[1]) * (r[2] - p[2]) - (q[2] - p[2]) * (r[1] - p[1])
     ny = (q[2] - p[2]) * (r[0] - p[0]) - (q[0] - p[0]) * (r[2] - p[2])
     nz = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])

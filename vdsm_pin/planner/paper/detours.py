@@ -26,7 +26,6 @@ from vdsm_pin.planner.paper.tip_path import (
     drawn_rows,
     join,
     length_of,
-    nearest_station,
     off_path_rows,
     rows_at,
     undrawn_by,
@@ -74,7 +73,7 @@ def first_station(path: DesiredPath, region: DangerRegion) -> tuple[float, str]:
         The arc length [m], and a note where the scheme had to be widened.
     """
     if path.approach is Approach.SHORTEST or not path.closed:
-        return nearest_station(path), ""
+        return path.entry, ""
     start = path.start[1:]
     ray = region.centre - start
     offsets = project(path.corners) - start
@@ -86,7 +85,7 @@ def first_station(path: DesiredPath, region: DangerRegion) -> tuple[float, str]:
     along = (project(path.at(stations)) - start) @ ray / (ray @ ray)
     stations, along = stations[along > 1.0], along[along > 1.0]
     if not len(stations):
-        return nearest_station(path), "no equidistant point: the nearest point is used"
+        return path.entry, "no equidistant point: the nearest point is used"
     note = ""
     if path.approach is Approach.EQUIDISTANT and len(stations) > 1:
         note = f"{len(stations)} equidistant points: the nearest is used"

@@ -141,27 +141,9 @@ def off_path_rows(
     return Rows(points, stations, False, np.zeros(n_rows, np.int64))
 
 
-def nearest_station(path: DesiredPath) -> float:
-    """The "shortest distance" scheme: the point of the path nearest to the start.
-
-    An open path is drawn from its first corner, whatever the scheme.
-    """
-    if not path.closed or path.length == 0.0:
-        return 0.0
-    begins, ends = path.corners[:-1], path.corners[1:]
-    along = ends - begins
-    squared = np.einsum("ij,ij->i", along, along)
-    towards = np.einsum("ij,ij->i", path.start - begins, along)
-    part = np.clip(towards / np.where(squared > 0.0, squared, 1.0), 0.0, 1.0)
-    gaps = np.linalg.norm(begins + part[:, None] * along - path.start, axis=1)
-    side = int(np.argmin(gaps))
-    begin = path.corner_stations[side]
-    return float(begin + part[side] * np.sqrt(squared[side]))
-
-
 def straight_route(path: DesiredPath) -> Route:
     """The route where no obstacle is met: to the path, along it, and back."""
-    first = nearest_station(path)
+    first = path.entry
     drawn = drawn_rows(path, first)
     there = _straight(path, path.start, drawn.points[0], first)
     parts = [there, drawn]
