@@ -61,10 +61,10 @@ class Tolerances:
     joint_error: float = _held(1e-5, "rad")
     """Width to which the largest certified joint error is bisected; [rad]."""
 
-    slope_step: float = _held(1e-5, "m or rad")
-    """Step of the differences that a counterexample is sought along; [m], [rad].
+    flat_slope: float = _held(1e-4, "m/rad")
+    """Slopes of a clearance up to this are rounding where a counterexample is sought.
 
-    At a lever of a millimetre the distance changes by ten times the width of a bracket.
+    That is a lever of a tenth of a millimetre, and a ten-thousandth for the base.
     """
 
     least_bracket: float = _held(1e-6, "m")

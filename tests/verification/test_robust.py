@@ -17,6 +17,7 @@ from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.hasty import HastyProof, is_certified
 from vdsm_pin.verification.proof.coasting import crude_growth
+from vdsm_pin.verification.proof.layouts import SLICES
 from vdsm_pin.verification.proof.swept_links import load_errors, new_ends, room_of
 from vdsm_pin.verification.proof.terms import CERTIFIED, Rules
 from vdsm_pin.verification.records import ErrorBox
@@ -166,3 +167,17 @@ def test_the_crude_growth_is_above_every_exact_one() -> None:
         assert crude >= exact
         nearest = min(nearest, crude / exact)
     assert nearest < 1.2
+
+
+def test_what_is_asked_before_makes_no_question_harder() -> None:
+    """The nominal motion takes as few slices after an error of 45 degrees as before."""
+    proof = HastyProof(asked(BALL), swaying(300))
+
+    def slices(joint: float) -> int:
+        before = int(proof._proving.results.tally[SLICES])
+        proof.holds(ErrorBox(joint=joint), 0, proof.n_intervals)
+        return int(proof._proving.results.tally[SLICES]) - before
+
+    nominal = slices(0.0)
+    assert slices(LARGEST) >= 0
+    assert slices(0.0) == nominal

@@ -5,13 +5,10 @@ from vdsm_pin.geometry.compiled import compiled
 
 
 @compiled
-def segments_apart(a: FloatArray, b: FloatArray, p: FloatArray, q: FloatArray) -> float:
-    """Squared distance of two points, one of each segment a-b and p-q; [m^2].
-
-    Whatever the rounding, the points are points of the segments; so it is never less
-    than the squared distance of the segments by more than the rounding of the last
-    lines.
-    """
+def nearest_places(
+    a: FloatArray, b: FloatArray, p: FloatArray, q: FloatArray
+) -> tuple[float, float]:
+    """Where two segments a-b and p-q are nearest, as shares of each, 0 to 1; [-]."""
     uu = vv = uv = uw = vw = 0.0
     for c in range(3):
         u, v, w = b[c] - a[c], q[c] - p[c], a[c] - p[c]
@@ -28,6 +25,18 @@ def segments_apart(a: FloatArray, b: FloatArray, p: FloatArray, q: FloatArray) -
     if not 0.0 < t < 1.0:
         t = min(1.0, max(0.0, t))
         s = min(1.0, max(0.0, (uv * t - uw) / uu)) if uu > 0.0 else 0.0
+    return s, t
+
+
+@compiled
+def segments_apart(a: FloatArray, b: FloatArray, p: FloatArray, q: FloatArray) -> float:
+    """Squared distance of two points, one of each segment a-b and p-q; [m^2].
+
+    Whatever the rounding, the points are points of the segments; so it is never less
+    than the squared distance of the segments by more than the rounding of the last
+    lines.
+    """
+    s, t = nearest_places(a, b, p, q)
     square = 0.0
     for c in range(3):
         gap = a[c] + s * (b[c] - a[c]) - p[c] - t * (q[c] - p[c])

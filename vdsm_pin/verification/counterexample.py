@@ -14,13 +14,12 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.geometry.pieces import pack_pieces
-from vdsm_pin.geometry.row_bounds import link_gaps, row_brackets
-from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
+from vdsm_pin.verification.pair_slopes import link_slopes, obstacle_slopes
 from vdsm_pin.verification.proof.layouts import AT_LOWER, AT_UPPER, LOW, TIME
 from vdsm_pin.verification.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.verification.records import ClearanceChunk, Counterexample, ErrorBox, Pair
@@ -34,8 +33,14 @@ SHARES: Final = np.linspace(0.0, 1.0, 9)
 STEPS: Final = 8
 """Most walks from corner to corner; two or three are usual."""
 
-HALVINGS: Final = 16
-"""How often the step in time is halved around the nearest moment found."""
+GRIDS: Final = 4
+"""How often moments around the nearest one found are tried."""
+
+GRID: Final = 16
+"""So many on either side, each time so much closer together."""
+
+AROUND: Final = np.array(sorted(range(-GRID, GRID + 1), key=abs))
+"""Their numbers, the nearest first: of equally near moments it is kept."""
 
 PARTS: Final = 129
 """Shares of the offsets tried at once for the smallest that suffices."""
@@ -66,7 +71,7 @@ class Search:
     ) -> None:
         mine = [o for o in problem.scene.obstacles if o.name == pair.obstacle]
         self.problem = replace(problem, scene=Scene(tuple(mine)))
-        self.pair, self.rows = pair, trajectory
+        self.pair, self.rows = pair, trajectory.joints
         self.required = problem.required_self_clearance
         if pair.obstacle:
             self.pieces = pack_pieces([mine[0].pieces])
@@ -110,8 +115,9 @@ class Search:
         self, errors: ErrorBox, moments: tuple[Moment, ...]
     ) -> tuple[Moment, FloatArray]:
         """The nearest configuration found within the box: moment and offsets."""
-        n = 2 * self.rows.n_links
-        scale = np.append(errors.base, np.full(n, errors.joint)) * INSIDE
+        scale = np.full(self.rows.shape[1], errors.joint)
+        scale[0] = errors.base
+        scale *= INSIDE
         corners = self._first_corners()
         at = [(moment, corner) for moment in moments for corner in corners]
         q = np.array([self._joints(moment) for moment, _ in at])
@@ -122,59 +128,62 @@ class Search:
 
     def _joints(self, moment: Moment) -> FloatArray:
         """Nominal joint values, shape (1 + 2N,)."""
-        k = moment.interval
-        rows = self.rows.joints[k : k + 2]
-        return np.asarray(rows[0] + moment.share * (rows[-1] - rows[0]))
+        return np.asarray(self._between(moment.interval, np.array([moment.share]))[0])
+
+    def _between(self, interval: int, shares: FloatArray) -> FloatArray:
+        """Nominal joint values at shares (m,) of an interval, shape (m, 1 + 2N)."""
+        rows = self.rows[interval : interval + 2]
+        return np.asarray(rows[0] + shares[:, None] * (rows[-1] - rows[0]))
 
     def _first_corners(self) -> FloatArray:
         """Corners to start from: none, and every alpha or theta to one side."""
-        corners = np.zeros((5, 1 + 2 * self.rows.n_links))
+        corners = np.zeros((5, self.rows.shape[1]))
         corners[1, 1::2], corners[2, 1::2] = 1.0, -1.0
         corners[3, 2::2], corners[4, 2::2] = 1.0, -1.0
         return corners
 
     def _gaps(self, q: FloatArray) -> FloatArray:
         """Clearance of the pair in many configurations (m, 1 + 2N), shape (m,); [m]."""
-        arm, pair = self.problem.manipulator, self.pair
-        centres = joint_centres(arm, q[:, 0], q[:, 1::2], q[:, 2::2])
-        if not pair.obstacle:
-            gaps = link_gaps(centres, arm.link_radius)
-            return np.asarray(gaps[:, pair.link - 1, pair.other_link - 1])
-        ends = np.ascontiguousarray(centres[:, pair.link - 1 : pair.link + 1])
-        only = np.zeros(len(q), np.int64)
-        found = row_brackets(self.pieces, ends, only, TOLERANCES.bracket_gap)
-        return np.asarray(found[:, 1] - arm.link_radius)
+        return self._slopes(q)[0]
+
+    def _slopes(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The same, and how it changes with every joint, shape (m, 1 + 2N)."""
+        arm, link, other = (
+            self.problem.manipulator, self.pair.link - 1, self.pair.other_link - 1,
+        )  # fmt: skip
+        if not self.pair.obstacle:
+            gaps, slopes = link_slopes(q, arm.link_lengths, link, other)
+            return gaps - 2.0 * arm.link_radius, slopes
+        gaps, slopes = obstacle_slopes(
+            self.pieces, q, arm.link_lengths, link, TOLERANCES.bracket_gap
+        )
+        return gaps - arm.link_radius, slopes
 
     def _walk(
         self, q: FloatArray, offsets: FloatArray, scale: FloatArray
     ) -> FloatArray:
         """Offsets (m, 1 + 2N) at which the slopes lead nowhere else within the box."""
-        least, width = self._gaps(q + offsets), TOLERANCES.slope_step
+        flat = TOLERANCES.flat_slope
+        least, slopes = self._slopes(q + offsets)
         for _ in range(STEPS):
-            around = (q + offsets)[:, None] + width * np.vstack(
-                [np.eye(q.shape[1]), -np.eye(q.shape[1])]
-            )
-            gaps = self._gaps(around.reshape(-1, q.shape[1])).reshape(len(q), 2, -1)
-            slopes = gaps[:, 0] - gaps[:, 1]
-            flat = np.abs(slopes) <= 2.0 * TOLERANCES.bracket_gap
-            tried = np.where(flat, offsets, -np.sign(slopes) * scale)
-            found = self._gaps(q + tried)
+            tried = np.where(np.abs(slopes) <= flat, offsets, -np.sign(slopes) * scale)
+            found, steeper = self._slopes(q + tried)
             nearer = found < least
             if not nearer.any():
                 break
             least = np.where(nearer, found, least)
+            slopes = np.where(nearer[:, None], steeper, slopes)
             offsets = np.where(nearer[:, None], tried, offsets)
         return offsets
 
     def _settle(self, moment: Moment, offset: FloatArray) -> tuple[Moment, FloatArray]:
         """The nearest moment around one, the offsets kept."""
-        step = 0.5 * float(SHARES[1])
-        for _ in range(HALVINGS):
-            shares = moment.share + np.array([0.0, -step, step])
-            tried = [Moment(moment.interval, float(s)) for s in shares.clip(0.0, 1.0)]
-            gaps = self._gaps(np.array([self._joints(m) for m in tried]) + offset)
-            moment, step = tried[int(np.argmin(gaps))], 0.5 * step
-        return moment, offset
+        step, share = float(SHARES[1]) / GRID, moment.share
+        for _ in range(GRIDS):
+            shares = (share + step * AROUND).clip(0.0, 1.0)
+            gaps = self._gaps(self._between(moment.interval, shares) + offset)
+            share, step = float(shares[np.argmin(gaps)]), step / GRID
+        return Moment(moment.interval, share), offset
 
     def _judged(
         self, errors: ErrorBox, moment: Moment, offset: FloatArray

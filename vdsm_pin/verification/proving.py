@@ -105,6 +105,7 @@ def new_proving(
     errors: ErrorBox,
     pieces: PackedPieces | None = None,
     values: int = PROFILE_VALUES,
+    budget: int = BUDGET,
 ) -> Proving:
     """Everything ready, nothing judged.
 
@@ -114,6 +115,7 @@ def new_proving(
         errors: The proof covers every motion within it.
         pieces: `pack_scene(problem)`, where it is known already.
         values: Most values of the profile.
+        budget: Most slices of one interval and pair.
     """
     task = make_task(problem, errors, pieces)
     n_pairs, n_links = task.pairs.link.size, problem.manipulator.n_links
@@ -122,7 +124,7 @@ def new_proving(
     return Proving(
         task=task,
         motion=Motion(trajectory.x0, trajectory.alpha, trajectory.theta),
-        desk=new_desk(n_links, n_pairs, BUDGET),
+        desk=new_desk(n_links, n_pairs, budget),
         results=new_results(n_pairs, n_links + n_obstacles, n_intervals, values),
         culling=new_culling(task.pieces, n_links, n_obstacles, n_pairs),
         n_intervals=n_intervals,

@@ -2,7 +2,8 @@
 
 A motion survives what its weakest stretch survives. So the bisection looks at stretches
 that do not survive what the ones before did, and the whole is asked about the result.
-In the stretch that survives no more, an error is sought that loses the clearance.
+Around the first interval that survives no more, an error is sought that loses the
+clearance.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,12 +17,13 @@ import numpy as np
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.counterexample import Search, moments_of
 from vdsm_pin.verification.hasty import HastyProof, is_certified
 from vdsm_pin.verification.proof.layouts import LOW
 from vdsm_pin.verification.proof.terms import UNDECIDED
+from vdsm_pin.verification.proving import new_proving
 from vdsm_pin.verification.records import ErrorBox
+from vdsm_pin.verification.task import all_pairs
 
 LARGEST: Final = float(np.deg2rad(45.0))
 """Errors beyond this are not looked at; [rad]."""
@@ -34,6 +36,12 @@ FACTORS: Final = (1.25, 2.0, 4.0)
 
 SOUGHT: Final = 3
 """Pairs for which they are sought."""
+
+AROUND: Final = 16
+"""So many intervals before and after the first that is lost are searched."""
+
+LOOKS: Final = 8
+"""Slices of an interval that tell well enough where a pair is near."""
 
 
 def largest_joint_error(
@@ -129,18 +137,10 @@ def refuted_joint_error(
         The largest offset of a counterexample; NaN where none was found; [rad].
     """
     proof, above = HastyProof(problem, trajectory), certified + TOLERANCES.joint_error
-    firsts = range(0, proof.n_intervals, STRETCH)
-    lost = (
-        first
-        for first in firsts
-        if not _holds(
-            proof, errors, first, min(first + STRETCH, proof.n_intervals), above
-        )
-    )
-    first = next(lost, None)
-    if first is None:
+    lost = _first_lost(partial(_holds, proof, errors, joint=above), proof.n_intervals)
+    if lost is None:
         return nan
-    weakest = trajectory.part(first, first + STRETCH + 1)
+    weakest = trajectory.part(max(0, lost - AROUND), lost + AROUND + 2)
     for factor in FACTORS:
         found = _smallest(problem, weakest, replace(errors, joint=factor * above))
         if found:
@@ -148,17 +148,31 @@ def refuted_joint_error(
     return nan
 
 
+def _first_lost(holds: Callable[[int, int], bool], end: int) -> int | None:
+    """The first interval that is not proved; None where all are."""
+    stretches = ((k, min(k + STRETCH, end)) for k in range(0, end, STRETCH))
+    lost = next((stretch for stretch in stretches if not holds(*stretch)), None)
+    if lost is None:
+        return None
+    first, last = lost
+    while last - first > 1:
+        middle = (first + last) // 2
+        first, last = (middle, last) if holds(first, middle) else (first, middle)
+    return first
+
+
 def _smallest(
     problem: PlanningProblem, trajectory: Trajectory, errors: ErrorBox
 ) -> list[float]:
-    """Joint errors of counterexamples of the pairs that the box leaves undecided."""
-    proof = prove_clearance(problem, trajectory, errors)
-    among = np.flatnonzero(proof.counts[:, UNDECIDED] > 0)
-    nearest = among[np.argsort(proof.best[among, LOW], kind="stable")][:SOUGHT]
+    """Joint errors of counterexamples of pairs that the box leaves undecided."""
+    proving = new_proving(problem, trajectory, errors, values=1, budget=LOOKS)
+    proving.sweep(proving.results, 0, proving.n_intervals)
+    best, counts = proving.results.best, proving.results.counts
+    among = np.flatnonzero(counts[:, UNDECIDED] > 0)
+    nearest = among[np.argsort(best[among, LOW], kind="stable")][:SOUGHT]
+    pairs = all_pairs(problem)
     searches = [
-        Search(problem, trajectory, proof.pairs[k]).smallest(
-            errors, moments_of(proof.best[k])
-        )
+        Search(problem, trajectory, pairs[k]).smallest(errors, moments_of(best[k]))
         for k in nearest
     ]
     return [float(np.abs(found.offsets[1:]).max()) for found in searches if found]

@@ -145,6 +145,9 @@ def sweep(
     desk = borrowed(desk)
     results = borrowed(results)
     culling = borrowed(culling)
+    if task.rules.joint_error == 0.0:
+        # Whoever asks about several error boxes leaves here what the last one added.
+        desk.runs.growth[:] = 0.0
     limit, steady = results.limit, np.zeros(2, np.bool_)
     before = limit.copy()
     for start in range(first, last, BLOCK):

@@ -42,7 +42,7 @@ class Runs(NamedTuple):
 
 @compiled
 def new_runs() -> Runs:
-    """Fresh working space; without joint errors `growth` stays 0."""
+    """Fresh working space; without joint errors `growth` is to be 0."""
     return Runs(
         np.zeros(BLOCK),
         np.zeros(BLOCK),

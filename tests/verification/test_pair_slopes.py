@@ -1,0 +1,89 @@
+"""Slopes of a pair's clearance, against differences of distances found otherwise."""
+
+import numpy as np
+import pytest
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.pieces import pack_pieces
+from vdsm_pin.geometry.row_bounds import link_gaps, row_brackets
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.manipulator import built_in
+from vdsm_pin.scene import Box, Capsule, HalfSpace, Mesh, Obstacle, Sphere
+from vdsm_pin.verification.pair_slopes import link_slopes, obstacle_slopes
+
+ARM = built_in("hrm8")
+GOAL, STEP = 1e-11, 1e-6
+SHAPES = [
+    Sphere("o", np.array([2.0, 0.5, -0.9]), 0.2),
+    Capsule("o", np.array([2.0, 0.6, 0.6]), np.array([0.0, 0.6, 0.8]), 0.1, 0.1),
+    Box("o", np.array([1.5, -0.9, 0.4]), np.eye(3), np.array([0.2, 0.1, 0.15])),
+    HalfSpace("o", np.array([0.0, 0.0, 2.5]), np.array([0.0, 0.0, -1.0])),
+    Mesh(
+        "o",
+        np.array([[1.5, 0.8, -0.1], [2.5, 0.8, 0.0], [2.0, 0.9, 0.4], [2.0, 1.2, 0.2]]),
+        np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]]),
+        True,
+    ),
+]
+
+
+def poses(count: int, size: float) -> FloatArray:
+    rng = np.random.default_rng(3)
+    q = rng.uniform(-size, size, (count, 1 + 2 * ARM.n_links))
+    q[:, 0] *= 0.2
+    return q
+
+
+def centres(q: FloatArray) -> FloatArray:
+    return joint_centres(ARM, q[:, 0], q[:, 1::2], q[:, 2::2])
+
+
+def obstacle_gaps(shape: Obstacle, q: FloatArray, link: int) -> FloatArray:
+    ends = np.ascontiguousarray(centres(q)[:, link : link + 2])
+    pieces, only = pack_pieces([shape.pieces]), np.zeros(len(q), np.int64)
+    return row_brackets(pieces, ends, only, GOAL)[:, 1]
+
+
+def differences(gaps: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Central differences, and where both sides agree that there is a slope."""
+    here, ahead, behind = gaps
+    smooth = np.abs(ahead + behind - 2.0 * here) <= 1e-9
+    return (ahead - behind) / (2.0 * STEP), smooth
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
+def test_slopes_from_an_obstacle_are_those_of_differences(shape: Obstacle) -> None:
+    q, looked = poses(40, 0.25), 0
+    for link in (0, 4, 7):
+        gaps, slopes = obstacle_slopes(
+            pack_pieces([shape.pieces]), q, ARM.link_lengths, link, GOAL
+        )
+        np.testing.assert_allclose(gaps, obstacle_gaps(shape, q, link), atol=1e-9)
+        for j in range(q.shape[1]):
+            step = STEP * np.eye(q.shape[1])[j]
+            around = [obstacle_gaps(shape, q + k * step, link) for k in (0, 1, -1)]
+            found, smooth = differences(around)
+            smooth &= gaps > 0.01
+            np.testing.assert_allclose(slopes[smooth, j], found[smooth], atol=2e-4)
+            looked += int(smooth.sum())
+        assert not slopes[:, 1 + 2 * (link + 1) :].any()
+    assert looked > 1000
+
+
+def test_slopes_between_links_are_those_of_differences() -> None:
+    q, looked = poses(40, 0.7), 0
+    for link, other in ((0, 2), (1, 5), (3, 7)):
+        gaps, slopes = link_slopes(q, ARM.link_lengths, link, other)
+        known = link_gaps(centres(q), 0.0)[:, link, other]
+        np.testing.assert_allclose(gaps, known, atol=1e-12)
+        for j in range(q.shape[1]):
+            step = STEP * np.eye(q.shape[1])[j]
+            around = [
+                link_gaps(centres(q + k * step), 0.0)[:, link, other]
+                for k in (0, 1, -1)
+            ]
+            found, smooth = differences(around)
+            smooth &= gaps > 0.01
+            np.testing.assert_allclose(slopes[smooth, j], found[smooth], atol=2e-4)
+            looked += int(smooth.sum())
+    assert looked > 1000

@@ -1,0 +1,141 @@
+"""How the clearance of one pair falls with every joint, in compiled code.
+
+The distance of two bodies changes as their nearest points part along the line between
+them: each joint moves the link's nearest point by axis x arm (the slope is exact where
+the nearest points are the only ones).
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from vdsm_pin.geometry.arm import place
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.bodies import new_body
+from vdsm_pin.geometry.compiled import apart, borrowed, compiled
+from vdsm_pin.geometry.kernels import BRACKET, FAR, NEAR, NORMAL, SCRATCH_ROWS, UPPER
+from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
+from vdsm_pin.geometry.pieces import PackedPieces
+from vdsm_pin.geometry.segments import nearest_places
+
+
+@compiled
+def _slopes(
+    centres: FloatArray,
+    frames: FloatArray,
+    first: int,
+    link: int,
+    near: FloatArray,
+    far: FloatArray,
+    slopes: FloatArray,
+) -> float:
+    """Slopes of the distance of two points, of which the joints move one.
+
+    Args:
+        centres: Joint centres, shape (N + 1, 3); [m].
+        frames: R_base_link, shape (N, 3, 3); [-].
+        first: The first joint that moves the link and not its partner.
+        link: The link.
+        near: The point of the link, shape (3,); [m].
+        far: The point of its partner, shape (3,); [m].
+        slopes: Those of alpha and theta are written, shape (1 + 2 N,); [m/rad].
+
+    Returns:
+        How much the distance falls as the point moves along X; [-].
+    """
+    apart()
+    x, y, z = far[0] - near[0], far[1] - near[1], far[2] - near[2]
+    size = sqrt(x * x + y * y + z * z)
+    if not size > 0.0:
+        return 0.0
+    x, y, z = x / size, y / size, z / size
+    for joint in range(first, link + 1):
+        ax = near[0] - centres[joint, 0]
+        ay, az = near[1] - centres[joint, 1], near[2] - centres[joint, 2]
+        # The way of the point along n is n . (axis x arm) = axis . (arm x n).
+        tx, ty, tz = ay * z - az * y, az * x - ax * z, ax * y - ay * x
+        # Yaw turns about z of the link before, pitch about y of the link itself.
+        if joint > 0:
+            before = frames[joint - 1]
+            yaw = before[0, 2] * tx + before[1, 2] * ty + before[2, 2] * tz
+        else:
+            yaw = tz
+        own = frames[joint]
+        pitch = own[0, 1] * tx + own[1, 1] * ty + own[2, 1] * tz
+        slopes[1 + 2 * joint], slopes[2 + 2 * joint] = -yaw, -pitch
+    return float(x)
+
+
+@compiled
+def obstacle_slopes(
+    pieces: PackedPieces,
+    joints: FloatArray,
+    lengths: FloatArray,
+    link: int,
+    goal: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Distances of a link's axis from the first obstacle, and how they change.
+
+    Args:
+        pieces: The scene.
+        joints: Rows q = (x0, alpha1, theta1, ..), shape (m, 1 + 2 N); [m], [rad].
+        lengths: Link lengths, shape (N,); [m].
+        link: The link, from 0.
+        goal: Width of a distance bracket at which to stop; [m].
+
+    Returns:
+        Upper bounds of the distances, below zero only the sign is meant, shape (m,)
+        [m]; their slopes, shape (m, 1 + 2 N) [-], [m/rad].
+    """
+    pieces, joints = borrowed(pieces), borrowed(joints)
+    n_links = lengths.size
+    gaps, slopes = np.zeros(joints.shape[0]), np.zeros(joints.shape)
+    centres, frames = np.zeros((n_links + 1, 3)), np.zeros((n_links, 3, 3))
+    scratch = np.zeros((SCRATCH_ROWS + 2, 3))
+    stack = np.zeros(STACK, np.int64)
+    trial, out = np.zeros(BRACKET + 4), np.zeros(BRACKET + 4)
+    body = new_body(2, 0)
+    out[NORMAL] = 1.0
+    for m in range(joints.shape[0]):
+        q = joints[m]
+        place(q[0], q[1::2], q[2::2], lengths, centres, frames)
+        body.points[:] = centres[link : link + 2]
+        obstacle_bracket(pieces, 0, body, goal, scratch, stack, trial, out)
+        gaps[m], near, far = out[UPPER], out[NEAR:FAR], out[FAR:BRACKET]
+        slopes[m, 0] = -_slopes(centres, frames, 0, link, near, far, slopes[m])
+    return gaps, slopes
+
+
+@compiled
+def link_slopes(
+    joints: FloatArray, lengths: FloatArray, link: int, other: int
+) -> tuple[FloatArray, FloatArray]:
+    """Distances of the axes of two links, and how they change.
+
+    Args:
+        joints: Rows q = (x0, alpha1, theta1, ..), shape (m, 1 + 2 N); [m], [rad].
+        lengths: Link lengths, shape (N,); [m].
+        link: One link, from 0.
+        other: The other, behind it.
+
+    Returns:
+        Distances, shape (m,) [m]; their slopes, shape (m, 1 + 2 N) [-], [m/rad].
+    """
+    joints = borrowed(joints)
+    n_links = lengths.size
+    gaps, slopes = np.zeros(joints.shape[0]), np.zeros(joints.shape)
+    centres, frames = np.zeros((n_links + 1, 3)), np.zeros((n_links, 3, 3))
+    near, far = np.zeros(3), np.zeros(3)
+    for m in range(joints.shape[0]):
+        row = joints[m]
+        place(row[0], row[1::2], row[2::2], lengths, centres, frames)
+        a, b = centres[other], centres[other + 1]
+        p, q = centres[link], centres[link + 1]
+        s, t = nearest_places(a, b, p, q)
+        square = 0.0
+        for c in range(3):
+            near[c], far[c] = a[c] + s * (b[c] - a[c]), p[c] + t * (q[c] - p[c])
+            square += (near[c] - far[c]) ** 2
+        gaps[m] = sqrt(square)
+        _slopes(centres, frames, link + 1, other, near, far, slopes[m])
+    return gaps, slopes
