@@ -2,6 +2,7 @@
 
 import hashlib
 import io
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -193,3 +194,17 @@ def test_a_broken_document_is_refused_before_pinocchio_sees_it() -> None:
     text = urdf_text(HRM8).replace('<parent link="base" />', '<parent link="b" />')
     with pytest.raises(InvalidInput, match="parent link 'b' does not exist"):
         read_robot(HRM8, text)
+
+
+def test_an_arm_loaded_again_is_the_same_and_another_one_is_not_taken_for_it() -> None:
+    longer = replace(HRM8, link_lengths=1.5 * HRM8.link_lengths)
+    twin = replace(HRM8)
+    zero = np.zeros(1), np.zeros((1, 8)), np.zeros((1, 8))
+    for arm in (HRM8, HRM8, twin, longer, HRM8, longer):
+        robot = load_robot(arm)
+        assert robot.manipulator is arm
+        reach = robot.joint_centres(*zero)[0, -1, 0]
+        assert reach == pytest.approx(arm.total_length)
+        text = urdf_text(arm)
+        assert robot.urdf_sha256 == hashlib.sha256(text.encode()).hexdigest()
+    assert load_robot(HRM8).data is not load_robot(HRM8).data

@@ -6,7 +6,7 @@ translated here.
 """
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -22,6 +22,10 @@ POSE_SIZE: Final = 12
 
 FLOAT_BYTES: Final = 8
 """Size of a double."""
+
+
+_LAST: Final[list["RobotModel"]] = []
+"""The last arm that was loaded, if any: most problems of a batch have one arm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +135,12 @@ def load_robot(manipulator: Manipulator) -> RobotModel:
     Raises:
         VerificationFailed: If Pinocchio does not find in the URDF what was written.
     """
-    return read_robot(manipulator, urdf_text(manipulator))
+    if not (_LAST and _LAST[0].manipulator is manipulator):
+        text = urdf_text(manipulator)
+        if not (_LAST and _LAST[0].urdf_sha256 == _sha256(text)):
+            _LAST[:] = [read_robot(manipulator, text)]
+        _LAST[0] = replace(_LAST[0], manipulator=manipulator)
+    return replace(_LAST[0], data=_LAST[0].model.createData())
 
 
 def read_robot(manipulator: Manipulator, text: str) -> RobotModel:
@@ -170,13 +179,17 @@ def read_robot(manipulator: Manipulator, text: str) -> RobotModel:
     tip = model.frames[_frame_id(model, "tip")].placement
     return RobotModel(
         manipulator=manipulator,
-        urdf_sha256=hashlib.sha256(text.encode()).hexdigest(),
+        urdf_sha256=_sha256(text),
         model=model,
         data=model.createData(),
         capsules=capsules,
         T_link_capsule=frozen(T_link_capsule),
         p_link_tip=frozen(tip.translation),
     )
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _frame_id(model: Any, name: str) -> int:

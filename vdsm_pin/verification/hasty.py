@@ -11,7 +11,7 @@ from vdsm_pin.verification.proof.blocks import sweep
 from vdsm_pin.verification.proof.desk import forget
 from vdsm_pin.verification.proving import new_proving
 from vdsm_pin.verification.records import ErrorBox
-from vdsm_pin.verification.task import make_task
+from vdsm_pin.verification.task import with_errors
 
 BEYOND: Final = 4.0 * TOLERANCES.bracket_gap
 """Clearance asked for beyond the required one; [m].
@@ -32,7 +32,9 @@ class HastyProof:
     def __init__(self, problem: PlanningProblem, trajectory: Trajectory) -> None:
         # Nobody asks for a profile: all intervals share its one bin.
         self._proving = new_proving(problem, trajectory, ErrorBox(), values=1)
-        self._problem = problem
+        task = self._proving.task
+        pairs = task.pairs._replace(required=task.pairs.required + BEYOND)
+        self._task = task._replace(pairs=pairs)
         self.n_intervals = self._proving.n_intervals
 
     def holds(self, errors: ErrorBox, first: int, last: int) -> bool:
@@ -40,10 +42,7 @@ class HastyProof:
 
         Stops at the first that is not.
         """
-        known = self._proving
-        task = make_task(self._problem, errors, known.task.pieces)
-        asked = task.pairs._replace(required=task.pairs.required + BEYOND)
-        task = task._replace(pairs=asked)
+        known, task = self._proving, with_errors(self._task, errors)
         # Pairs that remember nothing: the answer depends on the question alone.
         forget(known.desk.planes)
         # No least clearance is asked for: whatever is proved may be culled.

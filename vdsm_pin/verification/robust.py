@@ -31,6 +31,9 @@ LARGEST: Final = float(np.deg2rad(45.0))
 STRETCH: Final = 256
 """Intervals asked about at once."""
 
+FIRST_STEP: Final = 1.0 / 8.0
+"""Part of an error that is not survived by which less is tried first; [-]."""
+
 FACTORS: Final = (1.25, 2.0, 4.0)
 """How far beyond what is proved counterexamples are sought."""
 
@@ -106,7 +109,7 @@ def _largest(holds: Callable[[float], bool], most: float) -> float:
     """The most, where it holds; else what holds and is nearly what does not."""
     if holds(most):
         return most
-    high, step = most, TOLERANCES.joint_error
+    high, step = most, max(TOLERANCES.joint_error, FIRST_STEP * most)
     low = max(0.0, most - step)
     while not holds(low):
         if low == 0.0:

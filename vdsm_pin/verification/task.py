@@ -64,12 +64,22 @@ def make_task(
     rules = Rules(
         lengths=np.array(arm.link_lengths),
         radius=float(arm.link_radius),
-        joint_error=float(errors.joint),
-        base_error=float(errors.base),
-        obstacle_error=float(errors.obstacle),
+        joint_error=0.0,
+        base_error=0.0,
+        obstacle_error=0.0,
         pad=arithmetic_pad(problem, packed),
         goal=TOLERANCES.bracket_gap,
         gap=TOLERANCES.least_bracket,
         slack=SLACK,
     )
-    return Task(packed, _packed_pairs(problem), rules)
+    return with_errors(Task(packed, _packed_pairs(problem), rules), errors)
+
+
+def with_errors(task: Task, errors: ErrorBox) -> Task:
+    """The same asked about another error box."""
+    rules = task.rules._replace(
+        joint_error=float(errors.joint),
+        base_error=float(errors.base),
+        obstacle_error=float(errors.obstacle),
+    )
+    return task._replace(rules=rules)
