@@ -9,12 +9,11 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import BRACKET, FAR, LOWER, NEAR, NORMAL
 from vdsm_pin.geometry.obstacles import node_support
 from vdsm_pin.verification.proof.coasting import coast
-from vdsm_pin.verification.proof.desk import Desk, load_rows, take_rows
+from vdsm_pin.verification.proof.desk import Desk, load_rows
 from vdsm_pin.verification.proof.holding import hold
 from vdsm_pin.verification.proof.layouts import (
     AT_UPPER,
@@ -115,28 +114,6 @@ def _look_at_row(
 
 
 @compiled
-def _dense_row(
-    task: Task,
-    desk: Desk,
-    results: Results,
-    m: int,
-    local: int,
-    pair: int,
-    verdict: int,
-    time: float,
-    point: FloatArray,
-) -> None:
-    """Write one interval to row m of the dense results; the ends are at its time."""
-    apart()
-    dense, places = results.dense, np.zeros(6)
-    witness_at(task, desk.ends, pair, point, places)
-    dense.lower[m, pair] = desk.runs.lower[local]
-    dense.upper[m, pair] = desk.runs.upper[local]
-    dense.time[m, pair], dense.verdict[m, pair] = time, verdict
-    dense.own[m, pair], dense.other[m, pair] = places[:3], places[3:]
-
-
-@compiled
 def _subdivide(
     task: Task,
     motion: Motion,
@@ -164,10 +141,23 @@ def _subdivide(
     if upper < best[UP]:
         best[UP], best[AT_UPPER], best[TIME] = upper, k, time
         best[OTHER:] = point
-    if results.dense.verdict.shape[0] > 0:
+    dense = results.dense
+    if dense.verdict.shape[0] > 0:
         row[START] = row[END] = time
         bound_between(task, motion, desk.ends, desk.space, row)
-        _dense_row(task, desk, results, m, local, pair, verdict, time, point)
+        dense.lower[m, pair], dense.upper[m, pair] = lower, upper
+        dense.time[m, pair], dense.verdict[m, pair] = time, verdict
+        witness_at(
+            task.pairs.link[pair],
+            task.pairs.frame[pair],
+            task.rules.radius,
+            desk.ends.centres[0],
+            desk.ends.frames[0],
+            point,
+            np.zeros((2, 3)),
+            dense.own[m, pair],
+            dense.other[m, pair],
+        )
     desk.planes[pair, SUPPORT] = desk.planes[pair, HELD_CLEARANCE] = -np.inf
     return verdict
 
@@ -184,12 +174,32 @@ def _dense_stretch(
 ) -> None:
     """Write intervals that one plane and witness bound to the dense results."""
     apart()
-    at_rows, point = desk.runs.at_rows, desk.planes[pair, POINT:WIDTH]
+    runs, rows, dense = desk.runs, desk.rows, results.dense
+    at_rows, point, core = (
+        runs.at_rows,
+        desk.planes[pair, POINT:WIDTH],
+        np.zeros((2, 3)),
+    )
+    link, frame, radius = (
+        task.pairs.link[pair],
+        task.pairs.frame[pair],
+        task.rules.radius,
+    )
+    centres, frames = rows.centres[0], rows.frames[1:]
     for r in range(first, last):
-        later = 1 if at_rows[r + 1] < at_rows[r] else 0
-        take_rows(desk.rows, r + later, r + later, desk.ends)
-        _dense_row(
-            task, desk, results, offset + r, r, pair, CERTIFIED, float(later), point
+        m, later = offset + r, 1 if at_rows[r + 1] < at_rows[r] else 0
+        dense.lower[m, pair], dense.upper[m, pair] = runs.lower[r], runs.upper[r]
+        dense.time[m, pair], dense.verdict[m, pair] = float(later), CERTIFIED
+        witness_at(
+            link,
+            frame,
+            radius,
+            centres[:, :, r + later],
+            frames[:, :, :, r + later],
+            point,
+            core,
+            dense.own[m, pair],
+            dense.other[m, pair],
         )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arm import place_between
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import apart, compiled
+from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.verification.proof.layouts import AT_UPPER, OTHER, OWN, TIME, UP
 from vdsm_pin.verification.proof.swept_links import Ends, local_points
 from vdsm_pin.verification.proof.terms import BASE, Motion, Task
@@ -14,42 +14,53 @@ from vdsm_pin.verification.proof.terms import BASE, Motion, Task
 
 @compiled
 def witness_at(
-    task: Task, ends: Ends, pair: int, point: FloatArray, out: FloatArray
+    link: int,
+    frame: int,
+    radius: float,
+    centres: FloatArray,
+    frames: FloatArray,
+    point: FloatArray,
+    core: FloatArray,
+    own: FloatArray,
+    other: FloatArray,
 ) -> None:
-    """Surface points of a link and of its partner.
+    """Surface points of a link and of its partner, in the base frame.
+
+    It takes bare arrays: handing on whole tuples takes longer than all it does.
 
     Args:
-        task: The scene, pairs and rules.
-        ends: The configuration is that of the start.
-        pair: The pair.
+        link: The link.
+        frame: Frame of the partner.
+        radius: Of the links; [m].
+        centres: Joint centres of the configuration, shape (N + 1, 3); [m].
+        frames: R_base_link, shape (N, 3, 3); [-].
         point: Core point of the partner, in its frame, shape (3,); [m].
-        out: Result, on the link, then on the partner, shape (6,); [m].
+        core: Working space, shape (2, 3).
+        own: Result on the link, shape (3,); [m].
+        other: Result on the partner, shape (3,); [m].
     """
-    apart()
-    link, frame = task.pairs.link[pair], task.pairs.frame[pair]
-    core, foot, span, along = np.zeros((2, 3)), np.zeros(3), 0.0, 0.0
-    local_points(ends.centres[0], ends.frames[0], link, frame, core)
+    local_points(centres, frames, link, frame, core)
+    span = along = squared = 0.0
     for c in range(3):
         d = core[1, c] - core[0, c]
         span += d * d
         along += d * (point[c] - core[0, c])
     t = min(1.0, max(0.0, along / span)) if span > 0.0 else 0.0
-    squared = 0.0
     for c in range(3):
-        foot[c] = core[0, c] + t * (core[1, c] - core[0, c])
-        squared += (point[c] - foot[c]) ** 2
+        core[0, c] += t * (core[1, c] - core[0, c])
+        squared += (point[c] - core[0, c]) ** 2
     gap = sqrt(squared)
-    share = task.rules.radius / gap if gap > 0.0 else 0.0
+    share = radius / gap if gap > 0.0 else 0.0
     for c in range(3):
-        foot[c] += share * (point[c] - foot[c])
+        core[0, c] += share * (point[c] - core[0, c])
     for c in range(3):
-        out[c], out[3 + c] = foot[c], point[c]
+        own[c], other[c] = core[0, c], point[c]
         if frame == BASE:
             continue
-        out[c] = out[3 + c] = ends.centres[0, frame, c]
+        own[c] = other[c] = centres[frame, c]
         for k in range(3):
-            out[c] += ends.frames[0, frame, c, k] * foot[k]
-            out[3 + c] += ends.frames[0, frame, c, k] * point[k]
+            own[c] += frames[frame, c, k] * core[0, k]
+            other[c] += frames[frame, c, k] * point[k]
 
 
 @compiled
@@ -65,7 +76,8 @@ def place_best(
         best: Best rows with core points of the partners; witnesses on return.
         order: The pairs, those of one instant together, shape (n_pairs,).
     """
-    at, when, places = -1, -1.0, np.zeros(6)
+    at, when, core = -1, -1.0, np.zeros((2, 3))
+    pairs, places = task.pairs, np.zeros((2, 3))
     for pair in order:
         row = best[pair]
         if not row[UP] < np.inf:
@@ -83,5 +95,15 @@ def place_best(
                 ends.centres[0],
                 ends.frames[0],
             )
-        witness_at(task, ends, pair, row[OTHER:], places)
-        row[OWN:] = places
+        witness_at(
+            pairs.link[pair],
+            pairs.frame[pair],
+            task.rules.radius,
+            ends.centres[0],
+            ends.frames[0],
+            row[OTHER:],
+            core,
+            places[0],
+            places[1],
+        )
+        row[OWN:] = places.ravel()
