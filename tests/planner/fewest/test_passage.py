@@ -5,9 +5,10 @@ import pytest
 from scenes_for_fewest import problem, random_problem
 
 from vdsm_pin.errors import CutOff
-from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, rotation_from_rpy
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.manipulator import built_in
+from vdsm_pin.planner.fewest.cells import DEPTH, adjoining, places
 from vdsm_pin.planner.fewest.passage import cut_off
 from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.fewest.strategy import plan_fewest
@@ -85,3 +86,38 @@ def test_what_lies_behind_a_narrow_hole_is_refused_with_place_and_obstacles() ->
                      closed=False, blocked=Blocked.FAIL)  # fmt: skip
     with pytest.raises(CutOff, match=r"way tried .* 'w\d.* at \(2\.\d+, 0\.0"):
         plan_fewest(narrow, link_clearance(narrow), 0.0)
+
+
+def _random_cells(rng: np.random.Generator) -> tuple[IntArray, IntArray]:
+    """Codes and levels of an octree that is deep in some places."""
+    codes, levels = np.zeros(1, np.int64), np.zeros(1, np.int64)
+    for _ in range(DEPTH):
+        deepest = np.flatnonzero(levels == levels.max())
+        some = np.append(rng.integers(0, len(codes), 25), rng.choice(deepest, 4))
+        chosen = np.unique(some[levels[some] < DEPTH])
+        count = np.ones(len(codes), dtype=np.int64)
+        count[chosen] = 8
+        kids = ((np.cumsum(count) - count)[chosen, None] + np.arange(8)).ravel()
+        codes, levels = np.repeat(codes, count), np.repeat(levels, count)
+        levels[kids] += 1
+        codes[kids] += np.tile(np.arange(8), len(chosen)) << (
+            3 * (DEPTH - levels[kids])
+        )
+    return codes, levels
+
+
+def test_cells_adjoin_where_their_boxes_share_a_part_of_a_face() -> None:
+    """Against every pair of boxes, down to the finest cells."""
+    rng = np.random.default_rng(2)
+    codes, levels = _random_cells(rng)
+    assert levels.max() == DEPTH
+    passable = rng.random(len(codes)) < 0.8
+    first, neighbours = adjoining(codes, levels, passable)
+    low = places(codes)
+    high = low + (1 << (DEPTH - levels))[:, None]
+    for n in range(len(codes)):
+        shared = np.minimum(high[n], high) - np.maximum(low[n], low)
+        touches = (shared >= 0).all(axis=1) & ((shared == 0).sum(axis=1) == 1)
+        known = np.flatnonzero(touches & passable) if passable[n] else np.zeros(0, int)
+        found = np.unique(neighbours[first[n] : first[n + 1]])
+        np.testing.assert_array_equal(found, known)

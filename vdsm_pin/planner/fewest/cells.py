@@ -14,6 +14,8 @@ from vdsm_pin.geometry.compiled import compiled
 
 DEPTH = 18
 """Level of the finest cells; three coordinates of so many bits fit an integer."""
+COORDINATE = sum(1 << (3 * bit) for bit in range(DEPTH))
+"""Bits of the first coordinate in a code; those of the others stand beside them."""
 SHUT = 0
 """Proved: a tip anywhere in the cell is too close to an obstacle or out of reach."""
 DOUBTFUL = 1
@@ -64,7 +66,35 @@ def holders(codes: IntArray, points: IntArray) -> IntArray:
 @compiled
 def _holder(codes: IntArray, code: int) -> int:
     """Number of the cell that holds a finest cell."""
-    return int(np.searchsorted(codes, code, side="right")) - 1
+    low, high = 0, codes.size
+    while high - low > 1:
+        middle = (low + high) // 2
+        if codes[middle] <= code:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@compiled
+def _beside(code: int, axis: int, level: int, ahead: bool) -> int:
+    """The finest cell beside the lowest corner of a cell, -1 outside of all.
+
+    A sum carries from bit to bit of one coordinate where those of the others are all
+    set.
+
+    Args:
+        code: The cell's.
+        axis: Along which axis, 0 to 2.
+        level: The cell's.
+        ahead: Whether past the cell, else one finest cell before it.
+    """
+    mask = COORDINATE << axis
+    own = code & mask
+    if ahead:
+        moved = ((own | ~mask) + (1 << (3 * (DEPTH - level) + axis))) & mask
+        return (code & ~mask) | moved if moved > own else -1
+    return (code & ~mask) | ((own - (1 << axis)) & mask) if own > 0 else -1
 
 
 @compiled
@@ -83,20 +113,15 @@ def adjoining(
     count = codes.size
     pairs = np.zeros((6 * count, 2), np.int64)
     found = 0
-    most = 1 << DEPTH
-    at = np.zeros(3, np.int64)
     for n in range(count):
         if not passable[n]:
             continue
-        size = 1 << (DEPTH - levels[n])
         for axis in range(3):
-            for step in (-1, size):
-                for c in range(3):
-                    at[c] = decode(codes[n], c)
-                at[axis] += step
-                if not 0 <= at[axis] < most:
+            for ahead in (False, True):
+                beside = _beside(codes[n], axis, levels[n], ahead)
+                if beside < 0:
                     continue
-                other = _holder(codes, encode(at[0], at[1], at[2]))
+                other = _holder(codes, beside)
                 # A smaller neighbour finds this cell from its own side.
                 if levels[other] <= levels[n] and passable[other]:
                     pairs[found, 0], pairs[found, 1] = n, other
