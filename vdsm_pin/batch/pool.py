@@ -241,13 +241,11 @@ def _serve(pipe: Connection, perform: Callable[[Task], Result]) -> None:
     """Life of a worker: it ends with its parent, however that ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    pipe.send(_READY)
-    while True:
-        try:
+    with contextlib.suppress(EOFError, BrokenPipeError):  # nobody is left to ask
+        pipe.send(_READY)
+        while True:
             task = pipe.recv()
-        except EOFError:
-            return
-        pipe.send(perform(task))
+            pipe.send(perform(task))
 
 
 def _end_with_parent() -> None:
