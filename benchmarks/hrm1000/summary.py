@@ -102,13 +102,21 @@ def comparison(outcomes: list[Outcome], limit: float) -> str:
     return "\n".join(lines)
 
 
-def misses(outcomes: list[Outcome], limit: float) -> str:
-    """What our strategy does not solve, by name."""
+def misses(outcomes: list[Outcome], limit: float, *, proved: bool) -> str:
+    """What our strategy does not solve, by name.
+
+    Args:
+        outcomes: Of every method.
+        limit: Processor time for planning; [s].
+        proved: Of these whether what is proved to have no plan, or the others.
+    """
     lines = [
         f"* {o.problem}: {o.answer}, {o.coverage:.1%} drawn, {o.plan_s:.1f} s. "
         f"{o.reason}"
         for o in outcomes
-        if o.method == OURS and not solved(o, limit)
+        if o.method == OURS
+        and not solved(o, limit)
+        and (o.answer == "infeasible") == proved
     ]
     return "\n".join(lines) or "None."
 
@@ -127,5 +135,7 @@ def document(outcomes: list[Outcome], settings: dict[str, Any]) -> str:
         f"{versions}.\n\n"
         f"{table(outcomes, limit)}\n\n"
         f"## What others solve\n\n{comparison(outcomes, limit)}\n\n"
-        f"## What `{OURS}` misses\n\n{misses(outcomes, limit)}\n"
+        f"## What `{OURS}` misses\n\n{misses(outcomes, limit, proved=False)}\n\n"
+        "## What it proves to have no plan though it was meant to have one\n\n"
+        f"{misses(outcomes, limit, proved=True)}\n"
     )

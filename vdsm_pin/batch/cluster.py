@@ -24,7 +24,11 @@ from vdsm_pin.report.run_record import versions
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-LONGEST_ERRAND: Final = 64  # problems; a scheduler then feeds two thousand cores
+LONGEST_ERRAND: Final = 64
+"""Problems. A scheduler needs about ten milliseconds for such an errand, so that it
+feeds some hundred cores that do ten problems a second, and more where they take longer.
+"""
+
 _ERRANDS_AHEAD: Final = 3  # for each thread, so that none waits for the scheduler
 _CONNECT: Final = "20s"
 

@@ -2,6 +2,9 @@
 
 Every strategy asks for clearances all the time, so this is where a clock can end it. It
 can only stop, never steer: until then every answer is the same as without a limit.
+
+It needs no signal, so that it serves threads and libraries. The command line raises one
+besides (`workflow.within`), which also ends what asks for no clearance.
 """
 
 import time
