@@ -24,8 +24,9 @@ FLOAT_BYTES: Final = 8
 """Size of a double."""
 
 
-_LAST: Final[list["RobotModel"]] = []
-"""The last arm that was loaded, if any: most problems of a batch have one arm."""
+_last: list["RobotModel | None"] = [None]
+"""The last arm that was loaded: most problems of a batch have one arm. Nobody changes
+its model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,12 +136,15 @@ def load_robot(manipulator: Manipulator) -> RobotModel:
     Raises:
         VerificationFailed: If Pinocchio does not find in the URDF what was written.
     """
-    if not (_LAST and _LAST[0].manipulator is manipulator):
+    # Read once and written once: other threads may load other arms meanwhile.
+    robot = _last[0]
+    if robot is None or robot.manipulator is not manipulator:
         text = urdf_text(manipulator)
-        if not (_LAST and _LAST[0].urdf_sha256 == _sha256(text)):
-            _LAST[:] = [read_robot(manipulator, text)]
-        _LAST[0] = replace(_LAST[0], manipulator=manipulator)
-    return replace(_LAST[0], data=_LAST[0].model.createData())
+        if robot is None or robot.urdf_sha256 != _sha256(text):
+            robot = read_robot(manipulator, text)
+        robot = replace(robot, manipulator=manipulator)
+        _last[0] = robot
+    return replace(robot, data=robot.model.createData())
 
 
 def read_robot(manipulator: Manipulator, text: str) -> RobotModel:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.segments import segments_apart
+from vdsm_pin.geometry.segments import squared_gap
 
 
 def _to_point(p: FloatArray, a: FloatArray, b: FloatArray) -> float:
@@ -61,7 +61,7 @@ def test_distance_is_the_least_of_all_cases(kind: str) -> None:
     for _ in range(300):
         ends = _random_ends(rng, kind)
         size = 1.0 + float(np.abs(ends).max()) ** 2
-        assert abs(segments_apart(*ends) - _apart(*ends)) <= 1e-12 * size
+        assert abs(squared_gap(*ends) - _apart(*ends)) <= 1e-12 * size
 
 
 def test_distance_is_the_same_whichever_way_round() -> None:
@@ -69,8 +69,8 @@ def test_distance_is_the_same_whichever_way_round() -> None:
     for _ in range(100):
         a, b, p, q = _random_ends(rng, "any")
         turned = [
-            segments_apart(*one, *other)
+            squared_gap(*one, *other)
             for one, other in itertools.product(((a, b), (b, a)), ((p, q), (q, p)))
         ]
-        turned.append(segments_apart(p, q, a, b))
+        turned.append(squared_gap(p, q, a, b))
         np.testing.assert_allclose(turned, turned[0], rtol=1e-9, atol=1e-13)

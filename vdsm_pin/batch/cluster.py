@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 LONGEST_ERRAND: Final = 64
 """Problems. A scheduler needs about ten milliseconds for such an errand, so that it
-feeds some hundred cores that do ten problems a second, and more where they take longer.
+feeds some five hundred cores that do ten problems a second, more where they take
+longer.
 """
 
 _ERRANDS_AHEAD: Final = 3  # for each thread, so that none waits for the scheduler

@@ -241,11 +241,14 @@ def _serve(pipe: Connection, perform: Callable[[Task], Result]) -> None:
     """Life of a worker: it ends with its parent, however that ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    with contextlib.suppress(EOFError, BrokenPipeError):  # nobody is left to ask
-        pipe.send(_READY)
-        while True:
+    answer: Any = _READY
+    while True:
+        try:
+            pipe.send(answer)
             task = pipe.recv()
-            pipe.send(perform(task))
+        except (EOFError, ConnectionError):  # nobody is left to ask
+            return
+        answer = perform(task)
 
 
 def _end_with_parent() -> None:

@@ -29,7 +29,7 @@ def nearest_places(
 
 
 @compiled
-def segments_apart(a: FloatArray, b: FloatArray, p: FloatArray, q: FloatArray) -> float:
+def squared_gap(a: FloatArray, b: FloatArray, p: FloatArray, q: FloatArray) -> float:
     """Squared distance of two points, one of each segment a-b and p-q; [m^2].
 
     Whatever the rounding, the points are points of the segments; so it is never less

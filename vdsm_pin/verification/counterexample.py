@@ -71,7 +71,7 @@ class Search:
     ) -> None:
         mine = [o for o in problem.scene.obstacles if o.name == pair.obstacle]
         self.problem = replace(problem, scene=Scene(tuple(mine)))
-        self.pair, self.rows = pair, trajectory.joints
+        self.pair, self.joints = pair, trajectory.joints
         self.required = problem.required_self_clearance
         if pair.obstacle:
             self.pieces = pack_pieces([mine[0].pieces])
@@ -115,7 +115,7 @@ class Search:
         self, errors: ErrorBox, moments: tuple[Moment, ...]
     ) -> tuple[Moment, FloatArray]:
         """The nearest configuration found within the box: moment and offsets."""
-        scale = np.full(self.rows.shape[1], errors.joint)
+        scale = np.full(self.joints.shape[1], errors.joint)
         scale[0] = errors.base
         scale *= INSIDE
         corners = self._first_corners()
@@ -132,12 +132,12 @@ class Search:
 
     def _between(self, interval: int, shares: FloatArray) -> FloatArray:
         """Nominal joint values at shares (m,) of an interval, shape (m, 1 + 2N)."""
-        rows = self.rows[interval : interval + 2]
+        rows = self.joints[interval : interval + 2]
         return np.asarray(rows[0] + shares[:, None] * (rows[-1] - rows[0]))
 
     def _first_corners(self) -> FloatArray:
         """Corners to start from: none, and every alpha or theta to one side."""
-        corners = np.zeros((5, self.rows.shape[1]))
+        corners = np.zeros((5, self.joints.shape[1]))
         corners[1, 1::2], corners[2, 1::2] = 1.0, -1.0
         corners[3, 2::2], corners[4, 2::2] = 1.0, -1.0
         return corners
@@ -167,12 +167,12 @@ class Search:
         least, slopes = self._slopes(q + offsets)
         for _ in range(STEPS):
             tried = np.where(np.abs(slopes) <= flat, offsets, -np.sign(slopes) * scale)
-            found, steeper = self._slopes(q + tried)
+            found, after = self._slopes(q + tried)
             nearer = found < least
             if not nearer.any():
                 break
             least = np.where(nearer, found, least)
-            slopes = np.where(nearer[:, None], steeper, slopes)
+            slopes = np.where(nearer[:, None], after, slopes)
             offsets = np.where(nearer[:, None], tried, offsets)
         return offsets
 
@@ -219,7 +219,7 @@ def moments_of(row: FloatArray) -> tuple[Moment, ...]:
     """Where a pair comes nearest: along the interval of its least lower bound.
 
     Args:
-        row: The pair's row of `ClearanceProof.best`.
+        row: The pair's, as `proof.layouts` lays out a best one.
     """
     spread = tuple(Moment(int(row[AT_LOWER]), float(share)) for share in SHARES)
     return (Moment(int(row[AT_UPPER]), float(row[TIME])), *spread)

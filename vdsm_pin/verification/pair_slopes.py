@@ -1,4 +1,4 @@
-"""How the clearance of one pair falls with every joint, in compiled code.
+"""How the clearance of one pair changes with every joint, in compiled code.
 
 The distance of two bodies changes as their nearest points part along the line between
 them: each joint moves the link's nearest point by axis x arm (the slope is exact where
@@ -27,6 +27,7 @@ def _slopes(
     link: int,
     near: FloatArray,
     far: FloatArray,
+    gap: float,
     slopes: FloatArray,
 ) -> float:
     """Slopes of the distance of two points, of which the joints move one.
@@ -35,9 +36,10 @@ def _slopes(
         centres: Joint centres, shape (N + 1, 3); [m].
         frames: R_base_link, shape (N, 3, 3); [-].
         first: The first joint that moves the link and not its partner.
-        link: The link.
-        near: The point of the link, shape (3,); [m].
+        link: The link that moves.
+        near: Its point, shape (3,); [m].
         far: The point of its partner, shape (3,); [m].
+        gap: The distance; below zero the points have passed each other; [m].
         slopes: Those of alpha and theta are written, shape (1 + 2 N,); [m/rad].
 
     Returns:
@@ -48,6 +50,7 @@ def _slopes(
     size = sqrt(x * x + y * y + z * z)
     if not size > 0.0:
         return 0.0
+    size = -size if gap < 0.0 else size
     x, y, z = x / size, y / size, z / size
     for joint in range(first, link + 1):
         ax = near[0] - centres[joint, 0]
@@ -102,7 +105,8 @@ def obstacle_slopes(
         body.points[:] = centres[link : link + 2]
         obstacle_bracket(pieces, 0, body, goal, scratch, stack, trial, out)
         gaps[m], near, far = out[UPPER], out[NEAR:FAR], out[FAR:BRACKET]
-        slopes[m, 0] = -_slopes(centres, frames, 0, link, near, far, slopes[m])
+        part = _slopes(centres, frames, 0, link, near, far, gaps[m], slopes[m])
+        slopes[m, 0] = -part
     return gaps, slopes
 
 
@@ -137,5 +141,5 @@ def link_slopes(
             near[c], far[c] = a[c] + s * (b[c] - a[c]), p[c] + t * (q[c] - p[c])
             square += (near[c] - far[c]) ** 2
         gaps[m] = sqrt(square)
-        _slopes(centres, frames, link + 1, other, near, far, slopes[m])
+        _slopes(centres, frames, link + 1, other, near, far, gaps[m], slopes[m])
     return gaps, slopes

@@ -152,7 +152,11 @@ def refuted_joint_error(
 
 
 def _first_lost(holds: Callable[[int, int], bool], end: int) -> int | None:
-    """The first interval that is not proved; None where all are."""
+    """An interval that is not proved, the first or nearly; None where all are.
+
+    What was proved before helps a little, so that a stretch may be lost of which both
+    halves hold, asked alone.
+    """
     stretches = ((k, min(k + STRETCH, end)) for k in range(0, end, STRETCH))
     lost = next((stretch for stretch in stretches if not holds(*stretch)), None)
     if lost is None:
@@ -167,7 +171,7 @@ def _first_lost(holds: Callable[[int, int], bool], end: int) -> int | None:
 def _smallest(
     problem: PlanningProblem, trajectory: Trajectory, errors: ErrorBox
 ) -> list[float]:
-    """Joint errors of counterexamples of pairs that the box leaves undecided."""
+    """Joint errors of counterexamples of pairs that a few slices leave undecided."""
     proving = new_proving(problem, trajectory, errors, values=1, budget=LOOKS)
     proving.sweep(proving.results, 0, proving.n_intervals)
     best, counts = proving.results.best, proving.results.counts

@@ -12,7 +12,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.geometry.compiled import borrowed, compiled
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
-from vdsm_pin.geometry.segments import segments_apart
+from vdsm_pin.geometry.segments import squared_gap
 from vdsm_pin.scene import Obstacle
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -118,7 +118,7 @@ def blocked_by(cores: FloatArray, ends: FloatArray, reach: float) -> BoolArray:
         for n in range(cores.shape[0]):
             least = reach + cores[n, 6]
             a, b = cores[n, :3], cores[n, 3:6]
-            if sqrt(segments_apart(a, b, ends[s, 0], ends[s, 1])) < least:
+            if sqrt(squared_gap(a, b, ends[s, 0], ends[s, 1])) < least:
                 blocked[s] = True
                 break
     return blocked

@@ -17,7 +17,7 @@ from vdsm_pin.geometry.compiled import borrowed, compiled
 from vdsm_pin.geometry.obstacles import STACK, crossings
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
-from vdsm_pin.geometry.segments import segments_apart
+from vdsm_pin.geometry.segments import squared_gap
 from vdsm_pin.scene import Mesh, Obstacle
 
 STEP: Final = 1e-6
@@ -118,8 +118,8 @@ def _from_triangle(corners: FloatArray, a: FloatArray, b: FloatArray) -> float:
     or the segment passes through it.
     """
     p, q, r = corners
-    square = min(segments_apart(a, b, p, q), segments_apart(a, b, q, r))
-    square = min(square, segments_apart(a, b, r, p))
+    square = min(squared_gap(a, b, p, q), squared_gap(a, b, q, r))
+    square = min(square, squared_gap(a, b, r, p))
     nx = (q[1] - p[1]) * (r[2] - p[2]) - (q[2] - p[2]) * (r[1] - p[1])
     ny = (q[2] - p[2]) * (r[0] - p[0]) - (q[0] - p[0]) * (r[2] - p[2])
     nz = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
