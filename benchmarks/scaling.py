@@ -48,11 +48,12 @@ Rebuilt by `python -m benchmarks.scaling --save reports/performance`.
 
 | what | value | how |
 |---|---|---|
-| throughput | {rate:.0f} problems a second | cores / processor time of a problem |
-| duration | {hours:.1f} h | problems / throughput |
+| most cores one scheduler feeds | {most:,.0f} | where it is busy all the time |
+| cores at work | {fed:,.0f} | no more than one scheduler feeds |
+| throughput | {rate:.0f} problems a second | cores at work / time of a problem |
+| duration | {minutes:.1f} min | problems / throughput |
 | errands | {errands:.1f} a second | throughput / {errand} problems an errand |
 | scheduler | {busy:.1%} of a core | errands x its processor time for one |
-| most cores one scheduler feeds | {most:,.0f} | where it were busy all the time |
 | written while it runs, keep all | {stream:.0f} MB/s | throughput x bytes of a folder |
 | storage, keep all | {keep_all:.0f} GB | problems x bytes of a folder |
 | storage, keep none | {keep_none:.1f} GB | problems x bytes of manifest and timing |
@@ -182,14 +183,16 @@ def page(results: Results, cores: int) -> str:
     keep_all = by_start["its folder, keep all"]
     keep_none = by_start["its folder, keep none, or failed where it passed"]
     errand_ms = by_start[f"scheduler, an errand of {LONGEST_ERRAND} problems"]["median"]
-    rate = cores / cost
+    most = LONGEST_ERRAND * cost / (errand_ms / 1e3)
+    fed = min(float(cores), most)
+    rate = fed / cost
     errands = rate / LONGEST_ERRAND
     busy = errands * errand_ms / 1e3
     return PAGE.format(
         around=described(surroundings()), measured=table(results),
         problems=PROBLEMS, cores=cores,
-        rate=rate, hours=PROBLEMS / rate / 3600.0, errands=errands,
-        errand=LONGEST_ERRAND, busy=busy, most=cores / busy,
+        fed=fed, rate=rate, minutes=PROBLEMS / rate / 60.0, errands=errands,
+        errand=LONGEST_ERRAND, busy=busy, most=most,
         stream=rate * keep_all["median"] / 1e3,
         keep_all=PROBLEMS * keep_all["median"] / 1e6,
         keep_none=PROBLEMS * keep_none["median"] / 1e6,
