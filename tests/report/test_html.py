@@ -77,7 +77,7 @@ def test_the_verdict_comes_first_and_only_certified_is_green(
 def test_everything_a_reader_needs_is_there(tmp_path: Path) -> None:
     text = Page(report(tmp_path, made_up.verification())).text
     for needed in (
-        "4.100 mm", "±0.132°", "87.3 %", "link 1 to pillar", "forward kinematics",
+        "4.100 mm", "±0.1317°", "87.3 %", "link 1 to pillar", "forward kinematics",
         "1000.0 mm", "vdsm verify made-up.yaml --trajectory 'a b.csv' --out out",
         "1" * 64, "numpy", "coal agreement", "42.500°",
     ):  # fmt: skip

@@ -4,7 +4,16 @@ import math
 
 import pytest
 
-from vdsm_pin.report.words import OUTCOMES, outcome, percent, place, quantity
+from vdsm_pin.report.words import (
+    MISSING,
+    OUTCOMES,
+    lost,
+    outcome,
+    percent,
+    place,
+    quantity,
+    survived,
+)
 
 
 @pytest.mark.parametrize(
@@ -72,3 +81,12 @@ def test_only_certified_counts_as_passed() -> None:
     assert len(set(marks)) == len(marks), (
         "marks must tell outcomes apart without colour"
     )
+
+
+def test_joint_errors_are_rounded_to_the_safe_side_and_told_apart() -> None:
+    error, more = math.radians(0.052978), math.radians(0.053407)
+    assert (survived(error), lost(more)) == ("±0.0529°", "±0.0535°")
+    assert survived(math.radians(0.13169)) == "±0.1316°"
+    assert (survived(0.0), survived(None), lost(math.nan)) == (
+        "±0.0000°", MISSING, MISSING,
+    )  # fmt: skip

@@ -23,11 +23,13 @@ from vdsm_pin.report.words import (
     OUTCOMES,
     check_title,
     limit,
+    lost,
     measured,
     outcome,
     percent,
     place,
     quantity,
+    survived,
     term,
 )
 from vdsm_pin.trajectory import Trajectory
@@ -77,6 +79,8 @@ def _environment() -> jinja2.Environment:
         "outcome": outcome,
         "point": _point,
         "measured": measured,
+        "survived": survived,
+        "lost": lost,
         "css_text": _css_text,
         "term": term,
         "place": place,

@@ -10,10 +10,12 @@ from vdsm_pin.report.words import (
     MISSING,
     check_title,
     limit,
+    lost,
     measured,
     outcome,
     percent,
     quantity,
+    survived,
     term,
 )
 
@@ -59,11 +61,10 @@ def show_verification(
     else:
         _plain_checks(file.checks)
     if file.max_joint_error_rad is not None:
-        error = measured(file.max_joint_error_rad, "rad")
+        error = survived(file.max_joint_error_rad)
         if file.refuted_joint_error_rad is not None:
-            lost = measured(file.refuted_joint_error_rad, "rad")
-            error += f", lost at ±{lost}"
-        more = ((term("max_joint_error_rad"), f"±{error}"), *more)
+            error += f", lost at {lost(file.refuted_joint_error_rad)}"
+        more = ((term("max_joint_error_rad"), error), *more)
     _facts(*more, ("report", str(folder / "report.html")))
 
 

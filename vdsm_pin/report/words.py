@@ -1,7 +1,7 @@
 """One vocabulary for terminal, JSON, HTML and JUnit: words, marks, units for people."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
@@ -122,6 +122,23 @@ def measured(value: float | None, unit: str) -> str:
         return MISSING
     factor, _ = _DISPLAY_UNITS.get(unit, (1.0, ""))
     return quantity(value if abs(value) * factor >= _SMALLEST_FIXED else 0.0, unit)
+
+
+def survived(error: float | None) -> str:
+    """A joint error that is proved to be survived, rounded down; [rad]."""
+    return _joint_error(error, math.floor)
+
+
+def lost(error: float | None) -> str:
+    """A joint error that is proved not to be survived, rounded up; [rad]."""
+    return _joint_error(error, math.ceil)
+
+
+def _joint_error(error: float | None, whole: Callable[[float], int]) -> str:
+    """To a ten-thousandth of a degree: fine enough to tell the two apart."""
+    if error is None or math.isnan(error):
+        return MISSING
+    return f"±{whole(math.degrees(error) * 1e4) / 1e4:.4f}°"
 
 
 def limit(value: float | None, unit: str) -> str:
