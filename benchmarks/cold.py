@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.common import Results, command
 
 
-def measure(repeats: int = 5) -> Results:
+def measure(repeats: int = 21) -> Results:
     """Seconds of processor time; the first run of each is not counted."""
     results: Results = {}
     with tempfile.TemporaryDirectory() as folder:

@@ -46,7 +46,7 @@ def measure(repeats: int) -> Results:
             count = found.trajectory.n_samples
             spans = timed(
                 lambda: plan(problem, clearance, 0.0),  # noqa: B023
-                repeats if which == "paper" else max(3, repeats // 4),
+                repeats,
                 MICRO / count,
             )
             peer = _peer(found)
