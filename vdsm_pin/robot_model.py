@@ -5,7 +5,6 @@ so that commands that do not verify start without them, and their failures are
 translated here.
 """
 
-import hashlib
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput, UnknownName, VerificationFailed
 from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.io.source import sha256_of
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.urdf_validator import validate_urdf
 from vdsm_pin.urdf_writer import urdf_text
@@ -140,7 +140,7 @@ def load_robot(manipulator: Manipulator) -> RobotModel:
     robot = _last[0]
     if robot is None or robot.manipulator is not manipulator:
         text = urdf_text(manipulator)
-        if robot is None or robot.urdf_sha256 != _sha256(text):
+        if robot is None or robot.urdf_sha256 != sha256_of([text.encode()]):
             robot = read_robot(manipulator, text)
         robot = replace(robot, manipulator=manipulator)
         _last[0] = robot
@@ -183,17 +183,13 @@ def read_robot(manipulator: Manipulator, text: str) -> RobotModel:
     tip = model.frames[_frame_id(model, "tip")].placement
     return RobotModel(
         manipulator=manipulator,
-        urdf_sha256=_sha256(text),
+        urdf_sha256=sha256_of([text.encode()]),
         model=model,
         data=model.createData(),
         capsules=capsules,
         T_link_capsule=frozen(T_link_capsule),
         p_link_tip=frozen(tip.translation),
     )
-
-
-def _sha256(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _frame_id(model: Any, name: str) -> int:

@@ -15,6 +15,7 @@ _SMALLEST_FIXED: Final = 1e-3  # below this, three decimals would print 0.000
 _LARGE: Final = 1e3  # from here on, a tenth is fine enough
 _SHARE_DIGITS: Final = 9
 _MOMENT_DIGITS: Final = 2
+_ERROR_DIGITS: Final = 4
 _DISPLAY_UNITS: Final[Mapping[str, tuple[float, str]]] = MappingProxyType(
     {"m": (MM_PER_M, " mm"), "rad": (math.degrees(1.0), "°"), "-": (1.0, "")}
 )
@@ -135,10 +136,11 @@ def lost(error: float | None) -> str:
 
 
 def _joint_error(error: float | None, whole: Callable[[float], int]) -> str:
-    """To a ten-thousandth of a degree: fine enough to tell the two apart."""
+    """In degrees, with digits enough to tell the two apart."""
     if error is None or math.isnan(error):
         return MISSING
-    return f"±{whole(math.degrees(error) * 1e4) / 1e4:.4f}°"
+    scale = 10.0**_ERROR_DIGITS
+    return f"±{whole(math.degrees(error) * scale) / scale:.{_ERROR_DIGITS}f}°"
 
 
 def limit(value: float | None, unit: str) -> str:
