@@ -45,14 +45,14 @@ from oracles.adversarial_truth import exact_bracket
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.proof.blocks import sweep
+from vdsm_pin.proof.culling import new_culling
+from vdsm_pin.proof.desk import new_desk
+from vdsm_pin.proof.terms import Motion, Pairs, Rules, Task
 from vdsm_pin.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.proof.blocks import sweep
-from vdsm_pin.verification.proof.culling import new_culling
-from vdsm_pin.verification.proof.desk import new_desk
-from vdsm_pin.verification.proof.terms import Motion, Pairs, Rules, Task
 from vdsm_pin.verification.proving import BUDGET, new_results
 from vdsm_pin.verification.records import ClearanceChunk, ErrorBox
 from vdsm_pin.verification.task import SLACK

@@ -11,11 +11,11 @@ from vdsm_pin.geometry.row_bounds import row_brackets
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
 from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.proof.layouts import RENEWED
 from vdsm_pin.scene import Mesh, Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.proof.layouts import RENEWED
 from vdsm_pin.verification.proving import new_proving
 from vdsm_pin.verification.records import ClearanceChunk, ErrorBox
 

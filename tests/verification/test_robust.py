@@ -11,15 +11,15 @@ from vdsm_pin.geometry.bodies import body_reach, new_body
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
 from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.proof.coasting import crude_growth
+from vdsm_pin.proof.layouts import SLICES
+from vdsm_pin.proof.swept_links import load_errors, new_ends, room_of
+from vdsm_pin.proof.terms import CERTIFIED, Rules
 from vdsm_pin.scene import Box, Cylinder, Obstacle, Scene, Sphere
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.hasty import HastyProof, is_certified
-from vdsm_pin.verification.proof.coasting import crude_growth
-from vdsm_pin.verification.proof.layouts import SLICES
-from vdsm_pin.verification.proof.swept_links import load_errors, new_ends, room_of
-from vdsm_pin.verification.proof.terms import CERTIFIED, Rules
 from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.robust import LARGEST, STRETCH, largest_joint_error
 

@@ -7,14 +7,14 @@ from vdsm_pin.geometry.arm import bends_and_drifts, place, place_between
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import Body, body_reach, body_support, new_body
 from vdsm_pin.manipulator import built_in
-from vdsm_pin.verification.proof.swept_links import (
+from vdsm_pin.proof.swept_links import (
     Ends,
     load_link,
     local_points,
     new_ends,
     room_of,
 )
-from vdsm_pin.verification.proof.terms import BASE, Rules
+from vdsm_pin.proof.terms import BASE, Rules
 
 ARM = built_in("hrm8")
 LENGTHS, N = np.array(ARM.link_lengths), ARM.n_links

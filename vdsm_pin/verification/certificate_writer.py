@@ -21,6 +21,10 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.proof.desk import new_desk
+from vdsm_pin.proof.layouts import FIRST, LAST, PLANE_NORMAL, RECORD
+from vdsm_pin.proof.recording import record
+from vdsm_pin.proof.terms import Motion, Task
 from vdsm_pin.scene import Prism
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.certificate_file import (
@@ -31,10 +35,6 @@ from vdsm_pin.verification.certificate_file import (
     Pair,
 )
 from vdsm_pin.verification.limits import extremes
-from vdsm_pin.verification.proof.desk import new_desk
-from vdsm_pin.verification.proof.layouts import FIRST, LAST, PLANE_NORMAL, RECORD
-from vdsm_pin.verification.proof.recording import record
-from vdsm_pin.verification.proof.terms import Motion, Task
 from vdsm_pin.verification.proving import BUDGET
 from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.task import all_pairs, make_task

@@ -14,8 +14,7 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.proof.layouts import (
+from vdsm_pin.proof.layouts import (
     AT_LOWER,
     AT_UPPER,
     HELD,
@@ -29,12 +28,13 @@ from vdsm_pin.verification.proof.layouts import (
     TIME,
     UP,
 )
-from vdsm_pin.verification.proof.narrowing import narrow
-from vdsm_pin.verification.proof.results import Dense, Results
-from vdsm_pin.verification.proof.rows import BLOCK
-from vdsm_pin.verification.proof.search import Witnesses
-from vdsm_pin.verification.proof.terms import BASE, CERTIFIED, LINKS, OBSTACLES
-from vdsm_pin.verification.proof.witnesses import place_best
+from vdsm_pin.proof.narrowing import narrow
+from vdsm_pin.proof.results import Dense, Results
+from vdsm_pin.proof.rows import BLOCK
+from vdsm_pin.proof.search import Witnesses
+from vdsm_pin.proof.terms import BASE, CERTIFIED, LINKS, OBSTACLES
+from vdsm_pin.proof.witnesses import place_best
+from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.proving import (
     BUDGET,
     CANDIDATES,

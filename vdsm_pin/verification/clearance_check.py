@@ -6,10 +6,10 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.proof.layouts import AT_UPPER, LOW, TIME, UP
+from vdsm_pin.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.scene import Mesh
 from vdsm_pin.verification.clearance import ClearanceProof
-from vdsm_pin.verification.proof.layouts import AT_UPPER, LOW, TIME, UP
-from vdsm_pin.verification.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.verification.records import Check, Counterexample, Verdict
 
 

@@ -15,13 +15,13 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, TIME
+from vdsm_pin.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.pair_slopes import link_slopes, obstacle_slopes
-from vdsm_pin.verification.proof.layouts import AT_LOWER, AT_UPPER, LOW, TIME
-from vdsm_pin.verification.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.verification.records import ClearanceChunk, Counterexample, ErrorBox, Pair
 
 PAIRS: Final = 8

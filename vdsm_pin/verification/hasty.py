@@ -5,10 +5,10 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.proof.blocks import sweep
+from vdsm_pin.proof.desk import forget
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.proof.blocks import sweep
-from vdsm_pin.verification.proof.desk import forget
 from vdsm_pin.verification.proving import new_proving
 from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.task import with_errors

@@ -7,13 +7,13 @@ import numpy as np
 
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.proof.blocks import sweep
+from vdsm_pin.proof.culling import Culling, new_culling
+from vdsm_pin.proof.desk import Desk, new_desk
+from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, BEST, TALLY, TIME
+from vdsm_pin.proof.results import Candidates, Dense, Results
+from vdsm_pin.proof.terms import Motion, Task
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.proof.blocks import sweep
-from vdsm_pin.verification.proof.culling import Culling, new_culling
-from vdsm_pin.verification.proof.desk import Desk, new_desk
-from vdsm_pin.verification.proof.layouts import AT_LOWER, AT_UPPER, BEST, TALLY, TIME
-from vdsm_pin.verification.proof.results import Candidates, Dense, Results
-from vdsm_pin.verification.proof.terms import Motion, Task
 from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.task import make_task
 

@@ -15,12 +15,12 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.proof.layouts import LOW
+from vdsm_pin.proof.terms import UNDECIDED
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.counterexample import Search, moments_of
 from vdsm_pin.verification.hasty import HastyProof, is_certified
-from vdsm_pin.verification.proof.layouts import LOW
-from vdsm_pin.verification.proof.terms import UNDECIDED
 from vdsm_pin.verification.proving import new_proving
 from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.task import all_pairs

@@ -7,9 +7,9 @@ import numpy as np
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.proof.terms import BASE, Pairs, Rules, Task
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import arithmetic_pad
-from vdsm_pin.verification.proof.terms import BASE, Pairs, Rules, Task
 from vdsm_pin.verification.records import ErrorBox, Pair
 
 SLACK: Final = 0.02

@@ -9,6 +9,7 @@ from vdsm_pin.errors import InvalidInput, VdsmError
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.proof.layouts import AT_UPPER, LOW, OTHER, OWN, TIME, UP
 from vdsm_pin.robot_model import RobotModel
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification import cable_check, coal_clearance, coal_links, fk, inside
@@ -16,7 +17,6 @@ from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.clearance_check import check_clearance
 from vdsm_pin.verification.counterexample import find_counterexamples
 from vdsm_pin.verification.limits import check_limits
-from vdsm_pin.verification.proof.layouts import AT_UPPER, LOW, OTHER, OWN, TIME, UP
 from vdsm_pin.verification.records import (
     Check,
     ClearanceChunk,

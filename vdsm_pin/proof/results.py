@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import apart, compiled
-from vdsm_pin.verification.proof.layouts import (
+from vdsm_pin.proof.layouts import (
     AT_LOWER,
     AT_UPPER,
     HELD,
@@ -14,7 +14,7 @@ from vdsm_pin.verification.proof.layouts import (
     TIME,
     UP,
 )
-from vdsm_pin.verification.proof.terms import Task, group_of
+from vdsm_pin.proof.terms import Task, group_of
 
 
 class Candidates(NamedTuple):

@@ -9,7 +9,7 @@ from math import sqrt
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import Body
 from vdsm_pin.geometry.compiled import apart, compiled
-from vdsm_pin.verification.proof.layouts import HELD_AT, HELD_CLEARANCE
+from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE
 
 
 @compiled

@@ -11,15 +11,15 @@ import numpy as np
 from vdsm_pin.geometry.arm import second_order
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import apart, compiled
-from vdsm_pin.verification.proof.holding import raise_to_held
-from vdsm_pin.verification.proof.layouts import (
+from vdsm_pin.proof.holding import raise_to_held
+from vdsm_pin.proof.layouts import (
     HELD_CLEARANCE,
     POINT,
     SUPPORT,
     WIDTH,
 )
-from vdsm_pin.verification.proof.rows import BLOCK, Rows, error_growth
-from vdsm_pin.verification.proof.terms import BASE, Rules, losses
+from vdsm_pin.proof.rows import BLOCK, Rows, error_growth
+from vdsm_pin.proof.terms import BASE, Rules, losses
 
 
 class Runs(NamedTuple):

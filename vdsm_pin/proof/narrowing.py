@@ -4,9 +4,9 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import apart, borrowed, compiled
-from vdsm_pin.verification.proof.desk import Desk
-from vdsm_pin.verification.proof.heaps import push
-from vdsm_pin.verification.proof.layouts import (
+from vdsm_pin.proof.desk import Desk
+from vdsm_pin.proof.heaps import push
+from vdsm_pin.proof.layouts import (
     AT_UPPER,
     END,
     INTERVAL,
@@ -17,11 +17,11 @@ from vdsm_pin.verification.proof.layouts import (
     TIME,
     UP,
 )
-from vdsm_pin.verification.proof.pair_sweep import sweep_pair
-from vdsm_pin.verification.proof.results import Results
-from vdsm_pin.verification.proof.rows import fill_rows
-from vdsm_pin.verification.proof.search import Witnesses, tighten
-from vdsm_pin.verification.proof.terms import Motion, Task
+from vdsm_pin.proof.pair_sweep import sweep_pair
+from vdsm_pin.proof.results import Results
+from vdsm_pin.proof.rows import fill_rows
+from vdsm_pin.proof.search import Witnesses, tighten
+from vdsm_pin.proof.terms import Motion, Task
 
 
 @compiled

@@ -11,8 +11,8 @@ import numpy as np
 from vdsm_pin.geometry.arm import second_order
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.geometry.compiled import apart, compiled
-from vdsm_pin.verification.proof.rows import Rows
-from vdsm_pin.verification.proof.terms import Rules
+from vdsm_pin.proof.rows import Rows
+from vdsm_pin.proof.terms import Rules
 
 
 @compiled

@@ -8,8 +8,8 @@ from vdsm_pin.geometry.arm import bends_and_drifts, place_between
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import BRACKET, LOWER, NEAR, UPPER
-from vdsm_pin.verification.proof.heaps import pop, push
-from vdsm_pin.verification.proof.layouts import (
+from vdsm_pin.proof.heaps import pop, push
+from vdsm_pin.proof.layouts import (
     END,
     INSTANT,
     INTERVAL,
@@ -20,9 +20,9 @@ from vdsm_pin.verification.proof.layouts import (
     START,
     WHEN,
 )
-from vdsm_pin.verification.proof.slices import Space, slice_bound
-from vdsm_pin.verification.proof.swept_links import Ends
-from vdsm_pin.verification.proof.terms import (
+from vdsm_pin.proof.slices import Space, slice_bound
+from vdsm_pin.proof.swept_links import Ends
+from vdsm_pin.proof.terms import (
     CERTIFIED,
     REFUTED,
     UNDECIDED,

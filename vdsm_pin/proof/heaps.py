@@ -2,7 +2,7 @@
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import apart, compiled
-from vdsm_pin.verification.proof.layouts import KEY
+from vdsm_pin.proof.layouts import KEY
 
 
 @compiled

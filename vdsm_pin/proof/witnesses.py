@@ -7,9 +7,9 @@ import numpy as np
 from vdsm_pin.geometry.arm import place_between
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import compiled
-from vdsm_pin.verification.proof.layouts import AT_UPPER, OTHER, OWN, TIME, UP
-from vdsm_pin.verification.proof.swept_links import Ends, local_points
-from vdsm_pin.verification.proof.terms import BASE, Motion, Task
+from vdsm_pin.proof.layouts import AT_UPPER, OTHER, OWN, TIME, UP
+from vdsm_pin.proof.swept_links import Ends, local_points
+from vdsm_pin.proof.terms import BASE, Motion, Task
 
 
 @compiled

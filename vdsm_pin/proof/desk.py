@@ -6,12 +6,12 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import apart, compiled
-from vdsm_pin.verification.proof.coasting import Runs, new_runs
-from vdsm_pin.verification.proof.layouts import HELD_CLEARANCE, PLANE, SLICE, SUPPORT
-from vdsm_pin.verification.proof.rows import BLOCK, Rows, new_rows
-from vdsm_pin.verification.proof.slices import Space, new_space
-from vdsm_pin.verification.proof.swept_links import Ends, load_errors, new_ends
-from vdsm_pin.verification.proof.terms import Task
+from vdsm_pin.proof.coasting import Runs, new_runs
+from vdsm_pin.proof.layouts import HELD_CLEARANCE, PLANE, SLICE, SUPPORT
+from vdsm_pin.proof.rows import BLOCK, Rows, new_rows
+from vdsm_pin.proof.slices import Space, new_space
+from vdsm_pin.proof.swept_links import Ends, load_errors, new_ends
+from vdsm_pin.proof.terms import Task
 
 
 class Desk(NamedTuple):

@@ -4,19 +4,19 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.geometry.compiled import apart, borrowed, compiled
-from vdsm_pin.verification.proof.coasting import glide, served
-from vdsm_pin.verification.proof.culling import Culling, cull
-from vdsm_pin.verification.proof.desk import Desk
-from vdsm_pin.verification.proof.layouts import POINT, UP, WIDTH
-from vdsm_pin.verification.proof.pair_sweep import sweep_pair
-from vdsm_pin.verification.proof.results import (
+from vdsm_pin.proof.coasting import glide, served
+from vdsm_pin.proof.culling import Culling, cull
+from vdsm_pin.proof.desk import Desk
+from vdsm_pin.proof.layouts import POINT, UP, WIDTH
+from vdsm_pin.proof.pair_sweep import sweep_pair
+from vdsm_pin.proof.results import (
     Results,
     nominate,
     note_block,
     note_upper,
 )
-from vdsm_pin.verification.proof.rows import BLOCK, fill_rows
-from vdsm_pin.verification.proof.terms import (
+from vdsm_pin.proof.rows import BLOCK, fill_rows
+from vdsm_pin.proof.terms import (
     BASE,
     CERTIFIED,
     Motion,

@@ -5,8 +5,8 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import apart, borrowed, compiled
 from vdsm_pin.geometry.kernels import NEAR, NORMAL
-from vdsm_pin.verification.proof.desk import Desk
-from vdsm_pin.verification.proof.layouts import (
+from vdsm_pin.proof.desk import Desk
+from vdsm_pin.proof.layouts import (
     CLAIM,
     END,
     FIRST,
@@ -18,9 +18,9 @@ from vdsm_pin.verification.proof.layouts import (
     SLICE,
     START,
 )
-from vdsm_pin.verification.proof.search import bound_between, new_witness, resolve
-from vdsm_pin.verification.proof.slices import leaf_bound, node_bound, plane_bound
-from vdsm_pin.verification.proof.terms import CERTIFIED, Motion, Task
+from vdsm_pin.proof.search import bound_between, new_witness, resolve
+from vdsm_pin.proof.slices import leaf_bound, node_bound, plane_bound
+from vdsm_pin.proof.terms import CERTIFIED, Motion, Task
 
 
 @compiled

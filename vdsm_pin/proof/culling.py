@@ -16,11 +16,11 @@ from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import NORMAL, UPPER
 from vdsm_pin.geometry.obstacles import obstacle_bracket
 from vdsm_pin.geometry.pieces import PackedPieces
-from vdsm_pin.verification.proof.boxes import box_gaps, box_reaches, link_box
-from vdsm_pin.verification.proof.results import Dense, Results
-from vdsm_pin.verification.proof.rows import Rows
-from vdsm_pin.verification.proof.slices import Space
-from vdsm_pin.verification.proof.terms import (
+from vdsm_pin.proof.boxes import box_gaps, box_reaches, link_box
+from vdsm_pin.proof.results import Dense, Results
+from vdsm_pin.proof.rows import Rows
+from vdsm_pin.proof.slices import Space
+from vdsm_pin.proof.terms import (
     BASE,
     CERTIFIED,
     OBSTACLES,

@@ -12,10 +12,10 @@ import numpy as np
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import BRACKET, FAR, LOWER, NEAR, NORMAL
 from vdsm_pin.geometry.obstacles import node_support
-from vdsm_pin.verification.proof.coasting import coast
-from vdsm_pin.verification.proof.desk import Desk, load_rows
-from vdsm_pin.verification.proof.holding import hold
-from vdsm_pin.verification.proof.layouts import (
+from vdsm_pin.proof.coasting import coast
+from vdsm_pin.proof.desk import Desk, load_rows
+from vdsm_pin.proof.holding import hold
+from vdsm_pin.proof.layouts import (
     AT_UPPER,
     END,
     HELD_CLEARANCE,
@@ -36,17 +36,17 @@ from vdsm_pin.verification.proof.layouts import (
     WHEN,
     WIDTH,
 )
-from vdsm_pin.verification.proof.results import Results, note_upper
-from vdsm_pin.verification.proof.search import bound_between, new_witness, resolve
-from vdsm_pin.verification.proof.slices import leaf_bracket, loaded_bound
-from vdsm_pin.verification.proof.terms import (
+from vdsm_pin.proof.results import Results, note_upper
+from vdsm_pin.proof.search import bound_between, new_witness, resolve
+from vdsm_pin.proof.slices import leaf_bracket, loaded_bound
+from vdsm_pin.proof.terms import (
     CERTIFIED,
     Motion,
     Task,
     group_of,
     is_nominal,
 )
-from vdsm_pin.verification.proof.witnesses import witness_at
+from vdsm_pin.proof.witnesses import witness_at
 
 STRETCH: Final = 8
 """Intervals that a new plane is tried on at first; doubled as long as it serves."""

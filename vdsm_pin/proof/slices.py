@@ -26,8 +26,8 @@ from vdsm_pin.geometry.obstacles import (
     push_children,
 )
 from vdsm_pin.geometry.pieces import PackedPieces
-from vdsm_pin.verification.proof.swept_links import Ends, load_link, room_of
-from vdsm_pin.verification.proof.terms import Pairs, Rules, losses
+from vdsm_pin.proof.swept_links import Ends, load_link, room_of
+from vdsm_pin.proof.terms import Pairs, Rules, losses
 
 EASE: Final = 0.5
 """Part of the slack that the pieces of a partner need not be told apart by."""

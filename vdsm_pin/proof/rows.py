@@ -12,7 +12,7 @@ import numpy as np
 from vdsm_pin.geometry.arm import second_order
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import apart, compiled
-from vdsm_pin.verification.proof.terms import Motion, Rules
+from vdsm_pin.proof.terms import Motion, Rules
 
 BLOCK: Final = 64
 """Intervals whose configurations are computed at once: they fit the cache."""

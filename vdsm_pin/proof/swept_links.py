@@ -14,7 +14,7 @@ from vdsm_pin.geometry.arm import second_order
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import Body
 from vdsm_pin.geometry.compiled import apart, compiled
-from vdsm_pin.verification.proof.terms import BASE, Rules
+from vdsm_pin.proof.terms import BASE, Rules
 
 
 class Ends(NamedTuple):

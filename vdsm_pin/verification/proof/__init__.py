@@ -1,1 +1,0 @@
-"""The compiled part of the clearance proof (docs/certificate.md)."""
