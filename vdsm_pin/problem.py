@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, frozen, running_sums
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
@@ -111,7 +111,7 @@ class DesiredPath:
     def corner_stations(self) -> FloatArray:
         """Arc length at each corner, shape (m,); [m]."""
         sides = np.linalg.norm(np.diff(self.corners, axis=0), axis=1)
-        return frozen(np.concatenate([[0.0], np.cumsum(sides)]))
+        return frozen(np.concatenate([[0.0], running_sums(sides)]))
 
     @property
     def length(self) -> float:

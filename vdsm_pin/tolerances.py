@@ -93,6 +93,13 @@ class Tolerances:
     scene_extent: float = _held(100.0, "m")
     """Largest coordinate in the base frame, for which `arithmetic` is derived; [m]."""
 
+    path_extent: float = _held(1e4, "m")
+    """Largest path_m of a trajectory; [m].
+
+    A closed path's length is known to 4 ulp of a double, so that after this many metres
+    of laps the place on it is off by 5e-12 m, within `arithmetic`.
+    """
+
     mesh_size_low: float = _held(1.0 / 300.0, "-")
     """Mesh diagonal over arm length below which the unit is taken to be wrong; [-].
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
+from vdsm_pin.tolerances import TOLERANCES
 
 MAX_ROWS: Final = 5_000_000
 """Largest number of rows of one trajectory."""
@@ -25,7 +26,8 @@ class Trajectory:
         theta: Pitch angles, shape (n_samples, N); [rad].
 
     Raises:
-        InvalidInput: If shapes disagree, a value is not finite, or there is no row.
+        InvalidInput: If shapes disagree, a value is not finite, a path_m goes beyond
+            `TOLERANCES.path_extent`, or there is no row.
     """
 
     on_path: BoolArray
@@ -56,6 +58,9 @@ class Trajectory:
             if not np.isfinite(getattr(self, name)).all():
                 message = f"trajectory has a value of {name} that is not finite"
                 raise InvalidInput(message)
+        if not (np.abs(self.path_m) <= TOLERANCES.path_extent).all():
+            message = f"trajectory has a path_m beyond {TOLERANCES.path_extent:g} m"
+            raise InvalidInput(message)
 
     @property
     def n_samples(self) -> int:

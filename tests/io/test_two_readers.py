@@ -10,10 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from far_scenes import FarScene
+from flint import ctx
 from oracles import ball_reader
 from problem_texts import TETRAHEDRON, binary_stl, edited, write_everything
 
 from vdsm_pin import scene
+from vdsm_pin.certificate_checker.balls import column
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull
 from vdsm_pin.io.problem_file import built_in_names, find_problem, read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
@@ -21,7 +24,10 @@ from vdsm_pin.manipulator import built_in
 from vdsm_pin.trajectory import Trajectory
 
 CLOSE = 1e-13
-"""Rounding of a few products of numbers of order 1; [m]."""
+"""Rounding of a few products of numbers of some metres; [m]."""
+
+PRECISION = 256
+"""Bits of the second reader: what is left of numbers of 1e12 is known to the last."""
 
 
 def numbers(balls: Any) -> np.ndarray:
@@ -35,10 +41,12 @@ def numbers(balls: Any) -> np.ndarray:
 
 def assert_same_solid(ours: scene.Obstacle, theirs: Any) -> None:
     if isinstance(ours, scene.Mesh):
-        linear = numbers([list(row) for row in theirs.linear.tolist()])
-        corners = theirs.corners @ linear.T + numbers(theirs.shift)
-        found = ours.vertices[ours.triangles]
-        np.testing.assert_allclose(found, corners, rtol=0, atol=CLOSE)
+        places = [
+            numbers(theirs.linear * column(*corner) + theirs.shift)
+            for corner in theirs.corners.reshape(-1, 3).tolist()
+        ]
+        found = ours.vertices[ours.triangles].reshape(-1, 3)
+        np.testing.assert_allclose(found, places, rtol=0, atol=CLOSE)
         return
     if isinstance(theirs, ball_reader.SweptPolygon):
         assert isinstance(ours, scene.Prism)
@@ -78,6 +86,11 @@ def assert_same_solid(ours: scene.Obstacle, theirs: Any) -> None:
 
 
 def assert_same_problem(path: Path) -> None:
+    with ctx.workprec(PRECISION):
+        assert_same_content(path)
+
+
+def assert_same_content(path: Path) -> None:
     file, theirs = read_problem(path), ball_reader.Problem(path)
     ours = file.problem
     assert file.sha256 == theirs.sha256
@@ -152,6 +165,25 @@ def test_both_read_every_shape_in_any_pose_alike(tmp_path: Path, seed: int) -> N
     text = edited(text, ("obstacles", 1, "polygon"), polygon)
     path.write_text(text)
     assert_same_problem(path)
+
+
+def check_far_scene(folder: Path, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    assert_same_problem(FarScene(rng, 10.0 ** rng.uniform(0, 11.5)).write(folder))
+
+
+@pytest.mark.parametrize("seed", range(150))
+def test_both_read_coordinates_alike_that_cancel(tmp_path: Path, seed: int) -> None:
+    check_far_scene(tmp_path, seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(1, 21))
+def test_both_read_many_coordinates_alike_that_cancel(
+    tmp_path: Path, seed: int
+) -> None:
+    for k in range(500):
+        check_far_scene(tmp_path, 1000 * seed + k)
 
 
 @pytest.mark.parametrize("kind", ["text.stl", "obj"])

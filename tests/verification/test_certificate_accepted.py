@@ -52,6 +52,42 @@ def test_the_verifiers_certificate_is_accepted(seed: int, tmp_path: Path) -> Non
     assert not fits(lines[1] | {"proofs": [[[0.0, 1.0, [[0, 1, 0.0]]]]]})
 
 
+def stood_away(path: Path, base: list[float]) -> None:
+    """Move the base of a problem file and everything beside it."""
+    data = json.loads(path.read_text())
+    data["base"] = {"position": base}
+    tip = data["tip_path"]
+    vectors = [*tip["points"]]
+    if isinstance(tip["start"], list):
+        vectors.append(tip["start"])
+    for obstacle in data["obstacles"]:
+        vectors += [obstacle[key] for key in ("center", "point") if key in obstacle]
+        if obstacle["shape"] == "prism":
+            axis = "xyz".index(obstacle["axis"])
+            away = base[(axis + 1) % 3], base[(axis + 2) % 3]
+            moved = np.array(obstacle["polygon"]) + away
+            obstacle["polygon"] = moved.tolist()
+            obstacle["from"] += base[axis]
+            obstacle["to"] += base[axis]
+    for vector in vectors:
+        vector[:] = (np.array(vector) + base).tolist()
+    path.write_text(json.dumps(data))
+
+
+@pytest.mark.parametrize("seed", range(2 * len(SHAPES)))
+def test_the_verifiers_certificate_is_accepted_far_away(
+    seed: int, tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(300 + seed)
+    shapes = [SHAPES[seed % len(SHAPES)], "prism_notched"]
+    case = random_case(rng, tmp_path, shapes)
+    far = 10.0 ** rng.uniform(2, 9)
+    stood_away(case.problem, rng.uniform(-far, far, 3).tolist())
+    written(case, case.certificate)
+    outcome = check_certificate(case.certificate, case.problem, case.trajectory)
+    assert outcome.accepted, outcome.reason
+
+
 @pytest.mark.parametrize("seed", range(len(SHAPES)))
 def test_the_certificate_of_the_survived_error_is_accepted(
     seed: int, tmp_path: Path

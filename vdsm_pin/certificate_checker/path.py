@@ -59,7 +59,9 @@ class Drawing:
         """
         a, b = stations if self.closed else map(self.local, stations)
         start = a if self.last is None else self.last
-        stop = start + (b - a) - self.laps(b - a + self.length / 2) * self.length
+        # The shorter way round; forwards where both are as long, as at an exact tie.
+        laps = -self.laps(self.length / 2 - (b - a))
+        stop = start + (b - a) - laps * self.length
         if self.last is None:
             self.stretches.append((start, start))
         low, high = self.stretches[-1]

@@ -34,6 +34,19 @@ def distinct(values: npt.NDArray[Any], axis: int | None = None) -> npt.NDArray[A
     return np.unique(values, return_index=True, axis=axis)[0]
 
 
+def running_sums(values: FloatArray) -> FloatArray:
+    """Sums of the first value, the first two and so on, shape (n,).
+
+    What each addition loses is summed too and given back (Knuth's two-sum), so that an
+    entry is off by one rounding of itself, however many values it has.
+    """
+    sums = np.cumsum(values)
+    before = np.concatenate([np.zeros(1), sums[:-1]])
+    added = sums - before
+    lost = (before - (sums - added)) + (values - added)
+    return np.asarray(sums + np.cumsum(lost))
+
+
 def rotation_from_rpy(rpy: FloatArray) -> FloatArray:
     """Rotation matrix Rz(yaw) @ Ry(pitch) @ Rx(roll), the URDF order.
 

@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io import problem_schema as schema
-from vdsm_pin.io.obstacle_builder import Frame
+from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.manipulator import (
     BUILT_IN,
@@ -60,8 +58,8 @@ class ArmBuilder:
                 model.name,
                 lengths,
                 float(self.frame.metres(model.link_radius)),
-                float(np.deg2rad(model.max_link_angle_deg)),
-                float(np.deg2rad(model.max_joint_angle_deg)),
+                float(radians(model.max_link_angle_deg)),
+                float(radians(model.max_joint_angle_deg)),
                 (low, high),
                 self._cables(model),
             )
@@ -104,6 +102,6 @@ class ArmBuilder:
                     found = len(cables.hole_angles_deg)
                     problem = f"has {found} rows, expected {count}, one per link"
                     raise self.document.invalid((*at, "hole_angles_deg"), problem)
-                angles = np.deg2rad(cables.hole_angles_deg)
+                angles = radians(cables.hole_angles_deg)
         metres = self.frame.metres([hole_radius, half_gap])
         return CableLayout(float(metres[0]), float(metres[1]), angles)

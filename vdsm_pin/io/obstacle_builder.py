@@ -11,50 +11,15 @@ import numpy as np
 
 from vdsm_pin import scene
 from vdsm_pin.errors import InvalidFile, InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import obstacle_schema as schema
+from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.units import UNITS_PER_METRE
 
 AXES: Final = {"x": 0, "y": 1, "z": 2}
 _LINK_NAME: Final = re.compile(r"link ?\d+", re.IGNORECASE)
-
-
-@dataclass(frozen=True)
-class Frame:
-    """The file's frame and unit against the base frame and the metre.
-
-    Args:
-        unit: Name of the length unit.
-        rotation: R_world_base, shape (3, 3); [-].
-        position: Origin of the base in the file's frame, shape (3,); [m].
-    """
-
-    unit: str
-    rotation: FloatArray
-    position: FloatArray
-
-    def metres(self, lengths: object) -> FloatArray:
-        """Lengths of the file in metres, any shape."""
-        return np.asarray(lengths, dtype=np.float64) / UNITS_PER_METRE[self.unit]
-
-    def shown(self, metres: float) -> str:
-        """A length as the user would write it."""
-        return f"{metres * UNITS_PER_METRE[self.unit]:.6g} {self.unit}"
-
-    def point(self, lengths: object) -> FloatArray:
-        """Points of the file in the base frame, shape (..., 3); [m]."""
-        return (self.metres(lengths) - self.position) @ self.rotation
-
-    def direction(self, vector: FloatArray) -> FloatArray:
-        """A direction of the file in the base frame, shape (3,)."""
-        return vector @ self.rotation
-
-    def orientation(self, rpy_deg: list[float]) -> FloatArray:
-        """Roll, pitch, yaw of the file as R_base_body, shape (3, 3)."""
-        return self.rotation.T @ rotation_from_rpy(np.deg2rad(rpy_deg))
 
 
 def unit_vector(vector: FloatArray) -> FloatArray | None:
@@ -173,16 +138,17 @@ class ObstacleBuilder:
         if not model.from_ < model.to:
             problem = f"is {model.to:g}, expected above from = {model.from_:g}"
             raise self.document.invalid((*at, "to"), problem)
-        polygon = without_repeats(np.array(model.polygon), closed=True)
-        self._check_simple(polygon, (*at, "polygon"))
+        polygon = np.array(model.polygon)
+        self._check_simple(without_repeats(polygon, closed=True), (*at, "polygon"))
         # Columns: the two axes of the section, then the sweep; right-handed.
         order = np.roll(np.arange(3), -1 - AXES[model.axis])
-        low, high = self.frame.metres([model.from_, model.to])
+        base = self.frame.origin[order]
+        low, high = self.frame.metres(np.array([model.from_, model.to]) - base[2])
         return scene.Prism(
             model.name,
-            self.frame.point([0.0, 0.0, 0.0]),
+            np.zeros(3),
             self.frame.rotation.T[:, order],
-            self.frame.metres(polygon),
+            without_repeats(self.frame.metres(polygon - base[:2]), closed=True),
             (float(low), float(high)),
         )
 
@@ -200,9 +166,10 @@ class ObstacleBuilder:
 
     @build.register
     def _(self, model: schema.HalfSpaceModel, at: Location) -> scene.Obstacle:
-        normal = self._unit(model.normal, (*at, "normal"))
-        point = self.frame.point(model.point)
-        return scene.HalfSpace(model.name, point, self.frame.direction(normal))
+        unit = self._unit(model.normal, (*at, "normal"))
+        normal = self.frame.direction(unit)
+        foot = self.frame.height(model.point, model.normal) * normal
+        return scene.HalfSpace(model.name, foot, normal)
 
     @build.register
     def _(self, model: schema.MeshModel, at: Location) -> scene.Obstacle:
@@ -213,17 +180,18 @@ class ObstacleBuilder:
             problem = f"{model.file!r}:{place} {error.problem}"
             raise self.document.invalid((*at, "file"), problem) from None
         self.mesh_contents.append(mesh.content)
-        vertices = mesh.vertices * model.scale
         if model.check_size:
-            self._check_size(vertices, model, at)
-        turned = vertices @ rotation_from_rpy(np.deg2rad(model.rpy_deg)).T
-        corners = self.frame.point(turned + np.array(model.center))
+            self._check_size(mesh.vertices, model, at)
+        corners = self.frame.placed(
+            mesh.vertices, model.scale, model.rpy_deg, model.center
+        )
         return scene.Mesh(model.name, corners, mesh.triangles, mesh.watertight)
 
     def _check_size(
         self, vertices: FloatArray, model: schema.MeshModel, at: Location
     ) -> None:
-        size = float(self.frame.metres(np.linalg.norm(np.ptp(vertices, axis=0))))
+        diagonal = np.linalg.norm(np.ptp(vertices, axis=0)) * model.scale
+        size = float(self.frame.metres(diagonal))
         ratio = size / self.arm_length
         if TOLERANCES.mesh_size_low <= ratio <= TOLERANCES.mesh_size_high:
             return
@@ -256,7 +224,7 @@ def _extent(obstacle: scene.Obstacle) -> float:
     """Largest distance of a solid's stated points from the base's origin; [m]."""
     match obstacle:
         case scene.HalfSpace():
-            return float(abs(obstacle.normal @ obstacle.point))
+            return float(np.linalg.norm(obstacle.point))
         case scene.Mesh():
             points, grown = obstacle.vertices, 0.0
         case scene.Prism():

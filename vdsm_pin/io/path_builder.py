@@ -7,7 +7,8 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import problem_schema as schema
-from vdsm_pin.io.obstacle_builder import Frame, without_repeats
+from vdsm_pin.io.frames import Frame, radians
+from vdsm_pin.io.obstacle_builder import without_repeats
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.kinematics import joint_centres, link_angles
 from vdsm_pin.manipulator import Manipulator
@@ -78,7 +79,7 @@ class PathBuilder:
                 if not abs(value) <= limit + np.rad2deg(TOLERANCES.joint_limit):
                     problem = f"is {value:g} deg, the joint's limit is {limit:g} deg"
                     raise self.document.invalid((*at, name, i), problem)
-        alpha, theta = np.deg2rad([model.alpha_deg, model.theta_deg])
+        alpha, theta = radians([model.alpha_deg, model.theta_deg])
         psi = link_angles(alpha, theta)
         worst = int(np.argmax(psi))
         if not psi[worst] <= self.arm.max_link_angle + TOLERANCES.joint_limit:

@@ -8,12 +8,12 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.arm_builder import ArmBuilder
-from vdsm_pin.io.obstacle_builder import Frame, ObstacleBuilder
+from vdsm_pin.io.frames import Frame, radians
+from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.path_builder import PathBuilder
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.units import UNITS_PER_METRE
 
 
 @dataclass(frozen=True)
@@ -65,11 +65,11 @@ def build_problem(
 
 
 def _frame(model: schema.ProblemModel) -> tuple[Frame, FloatArray]:
-    rotation = rotation_from_rpy(np.deg2rad(model.base.rpy_deg))
-    position = np.array(model.base.position) / UNITS_PER_METRE[model.length_unit]
+    rotation = rotation_from_rpy(radians(model.base.rpy_deg))
+    frame = Frame(model.length_unit, rotation, np.array(model.base.position))
     T_world_base = np.eye(4)
-    T_world_base[:3, :3], T_world_base[:3, 3] = rotation, position
-    return Frame(model.length_unit, rotation, position), T_world_base
+    T_world_base[:3, :3], T_world_base[:3, 3] = rotation, frame.metres(frame.origin)
+    return frame, T_world_base
 
 
 def _check_links_apart(

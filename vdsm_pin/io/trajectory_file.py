@@ -21,6 +21,7 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.io.source import check_is_file
 from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import MAX_ROWS, Trajectory
 
 CHUNK_ROWS: Final = 5_000
@@ -204,7 +205,9 @@ class _Reader:
         self._check(
             (on_path == 0.0) | (on_path == 1.0), first, on_path, "on_path", "0 or 1"
         )
-        self._check(path_m >= 0.0, first, path_m, "path_m", "0 or more")
+        most = TOLERANCES.path_extent
+        good = (path_m >= 0.0) & (path_m <= most)
+        self._check(good, first, path_m, "path_m", f"0 to {most:g} m")
 
     def _check(
         self, good: BoolArray, first: int, values: FloatArray, name: str, expected: str

@@ -1,5 +1,9 @@
 """What is drawn of the desired path, how much of it, and in which order."""
 
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -13,6 +17,15 @@ from vdsm_pin.verification.records import Check, Verdict
 SAME_PLACE: Final = TOLERANCES.tip_on_path
 """Stations so near each other are the same place: no nearer is the tip known; [m]."""
 
+HALF_LAP: Final = 1e-9
+"""Steps so near to half a lap are decided in exact arithmetic; [-]."""
+
+FINE: Final = 200
+"""Bits behind the point of a length that is known exactly, in metres."""
+
+SAME_LAP: Final = Fraction(1, 2**100)
+"""Steps so near to half a lap are half a lap; [-]."""
+
 
 def wrapped(path: DesiredPath, stations: FloatArray) -> FloatArray:
     """Stations modulo the length where the path is closed, clamped elsewhere."""
@@ -22,11 +35,38 @@ def wrapped(path: DesiredPath, stations: FloatArray) -> FloatArray:
 
 
 def runs(path: DesiredPath, stations: FloatArray) -> FloatArray:
-    """How far each interval advances along the path, shape (n - 1,); [m]."""
+    """How far each interval advances along the path, shape (n - 1,); [m].
+
+    On a closed path the shorter way round, and forwards where both are as long.
+    """
     run = np.diff(stations)
-    if path.closed and path.length > 0.0:
-        return np.asarray(run - path.length * np.round(run / path.length))
-    return np.asarray(np.diff(wrapped(path, stations)))
+    if not (path.closed and path.length > 0.0):
+        return np.asarray(np.diff(wrapped(path, stations)))
+    laps = run / path.length - 0.5
+    whole = np.ceil(laps)
+    unsure = np.flatnonzero(np.abs(laps - np.round(laps)) < HALF_LAP)
+    if unsure.size:
+        length = exact_length(path)
+        for k in unsure.tolist():
+            whole[k] = _laps_taken_off(stations[k : k + 2].tolist(), length)
+    return np.asarray(run - path.length * whole)
+
+
+def exact_length(path: DesiredPath) -> Fraction:
+    """Arc length of a path, too short by less than 2^-`FINE` m a side; [m]."""
+    total = 0
+    for begin, end in pairwise(path.corners.tolist()):
+        sides = (Fraction(b) - Fraction(a) for a, b in zip(begin, end, strict=True))
+        total += math.isqrt(math.floor(sum(side**2 for side in sides) * 4**FINE))
+    return Fraction(total, 2**FINE)
+
+
+def _laps_taken_off(stations: Sequence[float], length: Fraction) -> int:
+    """Laps in a step beyond half a lap, where doubles cannot tell."""
+    begin, end = map(Fraction, stations)
+    laps = (end - begin) / length - Fraction(1, 2)
+    nearest = round(laps)
+    return nearest if abs(laps - nearest) < SAME_LAP else math.ceil(laps)
 
 
 def drawn_intervals(trajectory: Trajectory) -> IntArray:
