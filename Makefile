@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-slow lint check urdf figures report soundness bench dist clean
+.PHONY: demo test test-slow lint check urdf figures report soundness mutants bench dist clean
 
 demo: $(VENV)/.installed
 	$(BIN)/vdsm batch --out out/demo
@@ -35,6 +35,9 @@ report: figures
 
 soundness: $(VENV)/.installed
 	$(BIN)/python analysis/soundness.py --queries 10000000 --save reports/soundness.md
+
+mutants: $(VENV)/.installed
+	$(BIN)/python -m analysis.mutation --sample 1000 --save reports/mutants.md
 
 bench: $(VENV)/.installed
 	$(BIN)/python -m benchmarks.report --save reports/performance

@@ -9,6 +9,7 @@ compiled functions therefore import little.
 
 import hashlib
 import inspect
+import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -208,7 +209,12 @@ def compiled(function: F) -> F:
     Arguments are positional: arrays, numbers, and tuples of them. For each new kind of
     them (dtype, dimensions, memory order, whether writeable) there is code of its own,
     so that no array is ever taken for another.
+
+    With NUMBA_DISABLE_JIT=1, as numba has it, functions stay as they stand: for
+    debuggers and for coverage.
     """
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
+        return function
     return cast(F, _Compiled(function))
 
 

@@ -1,0 +1,215 @@
+"""Counts how many small changes of the code the fast tests notice.
+
+    python -m analysis.mutation --sample 1000 --seed 0 --save reports/mutants.md
+
+A change that no test can notice, since it changes nothing that is promised, stands in
+`equivalent.txt` with its reason.
+"""
+
+import argparse
+import multiprocessing
+import random
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from analysis.mutation.changes import Change, changes
+from analysis.mutation.coverage_map import PLAIN, CoverageMap, coverage_map
+from analysis.mutation.trial import Trial, copy_checkout, import_libraries, try_change
+
+ROOT: Final = Path(__file__).parents[2]
+EQUIVALENT: Final = Path(__file__).with_name("equivalent.txt")
+BUDGET: Final = 12.0
+"""Tests are asked for a change until their usual times come to this; [s]."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Modules that are changed and the tests that shall notice."""
+
+    name: str
+    modules: tuple[str, ...]
+    tests: tuple[str, ...]
+
+
+GROUPS: Final = (
+    Group(
+        "checker",
+        ("vdsm_pin/certificate_checker/*.py",),
+        (
+            "tests/test_certificate_checker.py",
+            "tests/verification/test_certificate_accepted.py",
+            "tests/io/test_two_readers.py",
+        ),
+    ),
+    Group("readers", ("vdsm_pin/io/**/*.py",), ("tests/io",)),
+    Group("verification", ("vdsm_pin/verification/*.py",), ("tests/verification",)),
+    Group("proof", ("vdsm_pin/proof/*.py",), ("tests/verification", "tests/geometry")),
+    Group(
+        "arm",
+        (
+            "vdsm_pin/kinematics.py",
+            "vdsm_pin/cables.py",
+            "vdsm_pin/geometry/cable_kernels.py",
+            "vdsm_pin/geometry/joint_kernels.py",
+        ),
+        (
+            "tests/test_kinematics.py",
+            "tests/test_cables.py",
+            "tests/verification/test_cable_check.py",
+        ),
+    ),
+)
+
+
+def equivalent_changes() -> dict[str, str]:
+    """Reason by key of each change that is known to change nothing."""
+    if not EQUIVALENT.exists():
+        return {}
+    lines = EQUIVALENT.read_text(encoding="utf-8").splitlines()
+    rows = (line.partition(" | ") for line in lines if line and line[0] != "#")
+    return {key: reason for key, _, reason in rows}
+
+
+def modules_of(group: Group) -> list[str]:
+    """Paths of a group's modules, from the root of the checkout."""
+    found = (path for pattern in group.modules for path in sorted(ROOT.glob(pattern)))
+    return [str(path.relative_to(ROOT)) for path in found]
+
+
+def is_compiled(module: str) -> bool:
+    """Whether a module has functions that become machine code."""
+    return "@compiled" in (ROOT / module).read_text(encoding="utf-8")
+
+
+def sampled(groups: list[Group], size: int, seed: int) -> dict[str, list[Change]]:
+    """A sample of all changes, by group."""
+    every = [
+        (g.name, c) for g in groups for m in modules_of(g) for c in changes(ROOT, m)
+    ]
+    chosen = random.Random(seed).sample(every, min(size, len(every)))
+    return {g.name: [c for name, c in chosen if name == g.name] for g in groups}
+
+
+def maps_of(group: Group, chosen: list[Change]) -> dict[bool, CoverageMap]:
+    """What tests cover, of machine code as Python and of the rest."""
+    maps = {}
+    for plain in (False, True):
+        modules = sorted({c.module for c in chosen if is_compiled(c.module) is plain})
+        if modules:
+            maps[plain] = coverage_map(ROOT, modules, list(group.tests), plain)
+    return maps
+
+
+def _work(
+    folder: Path,
+    tasks: "multiprocessing.Queue[tuple[Change, list[str], float, str | None] | None]",
+    done: "multiprocessing.Queue[Trial]",
+) -> None:
+    import_libraries()
+    while (task := tasks.get()) is not None:
+        done.put(try_change(folder, *task))
+
+
+def _as_it_is(module: str) -> Change:
+    """No change at all: its tests must pass, else a failure says nothing."""
+    content = (ROOT / module).read_text(encoding="utf-8")
+    return Change(module, 0, "", "", "", content)
+
+
+def tried(group: Group, chosen: list[Change], jobs: int) -> Iterator[Trial]:
+    """Try changes on so many processes; as they end."""
+    maps = maps_of(group, chosen)
+    chosen = [*map(_as_it_is, sorted({c.module for c in chosen})), *chosen]
+    tasks: multiprocessing.Queue = multiprocessing.Queue()
+    done: multiprocessing.Queue = multiprocessing.Queue()
+    for change in chosen:
+        plain = is_compiled(change.module)
+        tests = maps[plain].asked(change.module, change.line, BUDGET)
+        usual = sum(maps[plain].seconds[test] for test in tests)
+        tasks.put((change, tests, usual, PLAIN if plain else None))
+    with tempfile.TemporaryDirectory(prefix="mutants-") as place:
+        workers = []
+        for k in range(jobs):
+            copy_checkout(ROOT, Path(place) / str(k))
+            tasks.put(None)
+            words = (Path(place) / str(k), tasks, done)
+            workers.append(
+                multiprocessing.Process(target=_work, args=words, daemon=True)
+            )
+            workers[-1].start()
+        for _ in chosen:
+            trial = done.get()
+            if trial.change.line:
+                yield trial
+            elif trial.noticed:
+                message = f"tests of {trial.change.module} fail without a change"
+                raise RuntimeError(message)
+        for worker in workers:
+            worker.join()
+
+
+def page(trials: dict[str, list[Trial]], known: dict[str, str], seed: int) -> str:
+    """The counts as Markdown, and what nobody noticed."""
+    lines = [
+        "# Small changes of the code, and how many the fast tests notice",
+        "",
+        "One change at a time: a comparison, a sign, an operator, a constant. "
+        f"Made by `make mutants`, seed {seed}.",
+        "",
+        "| code | changes | equivalent | noticed | share of the others |",
+        "|---|---|---|---|---|",
+    ]
+    for name, found in trials.items():
+        alike = sum(not t.noticed and t.change.key in known for t in found)
+        seen = sum(t.noticed for t in found)
+        share = 100.0 * seen / max(1, len(found) - alike)
+        lines.append(f"| {name} | {len(found)} | {alike} | {seen} | {share:.1f} % |")
+    missed = [t for found in trials.values() for t in found
+              if not t.noticed and t.change.key not in known]  # fmt: skip
+    lines += ["", "## Not noticed", ""]
+    where = Counter(t.change.module for t in missed)
+    lines += [f"* {module}: {count}" for module, count in where.most_common()]
+    lines += ["", *(f"    {t.change.key}  (line {t.change.line}, {t.tests} tests)"
+                    for t in sorted(missed, key=lambda t: t.change.key))]  # fmt: skip
+    lines += ["", "## Equivalent", "", "They stand with their reasons in "
+              "`analysis/mutation/equivalent.txt`."]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Parse arguments, try changes, write the page."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sample", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument(
+        "--group",
+        action="append",
+        help="only these; " + ", ".join(g.name for g in GROUPS),
+    )
+    parser.add_argument("--module", default="", help="part of the modules' paths")
+    parser.add_argument("--save", type=Path)
+    asked = parser.parse_args()
+    groups = [g for g in GROUPS if not asked.group or g.name in asked.group]
+    known, trials = equivalent_changes(), {}
+    for name, chosen in sampled(groups, asked.sample, asked.seed).items():
+        group = next(g for g in groups if g.name == name)
+        wanted = [c for c in chosen if asked.module in c.module]
+        trials[name] = []
+        for trial in tried(group, wanted, asked.jobs):
+            trials[name].append(trial)
+            if not trial.noticed and trial.change.key not in known:
+                print(f"not noticed: {trial.change.key} (line {trial.change.line})")
+    text = page(trials, known, asked.seed)
+    if asked.save:
+        asked.save.write_text(text, encoding="utf-8")
+    print(text)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

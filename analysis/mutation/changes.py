@@ -1,0 +1,188 @@
+"""One change in a module: of a comparison, a sign, an operator or a constant."""
+
+import ast
+import copy
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+COMPARISONS: Final[dict[type, tuple[type, ...]]] = {
+    ast.Lt: (ast.LtE, ast.GtE),
+    ast.LtE: (ast.Lt, ast.Gt),
+    ast.Gt: (ast.GtE, ast.LtE),
+    ast.GtE: (ast.Gt, ast.Lt),
+    ast.Eq: (ast.NotEq,),
+    ast.NotEq: (ast.Eq,),
+    ast.In: (ast.NotIn,),
+    ast.NotIn: (ast.In,),
+    ast.Is: (ast.IsNot,),
+    ast.IsNot: (ast.Is,),
+}
+OPERATORS: Final[dict[type, tuple[type, ...]]] = {
+    ast.Add: (ast.Sub,),
+    ast.Sub: (ast.Add,),
+    ast.Mult: (ast.Div,),
+    ast.Div: (ast.Mult,),
+    ast.FloorDiv: (ast.Mult,),
+    ast.Mod: (ast.Mult,),
+    ast.Pow: (ast.Mult,),
+    ast.BitAnd: (ast.BitOr,),
+    ast.BitOr: (ast.BitAnd,),
+}
+NAMES: Final = {"min": "max", "max": "min", "all": "any", "any": "all"}
+
+
+@dataclass(frozen=True)
+class Change:
+    """One change.
+
+    Args:
+        module: Path from the root of the checkout.
+        line: Its line, from 1.
+        function: Dotted name of what it stands in; "" at the module's top.
+        before: The changed expression as it is.
+        after: The same, changed.
+        content: The module with the change.
+    """
+
+    module: str
+    line: int
+    function: str
+    before: str
+    after: str
+    content: str
+
+    @property
+    def key(self) -> str:
+        """What stays the same when lines move."""
+        return f"{self.module}:{self.function}: {self.before} -> {self.after}"
+
+
+def _swapped(node: ast.AST) -> Iterator[ast.AST]:
+    """The same node with one thing in it changed."""
+    if isinstance(node, ast.Compare):
+        for k, operator in enumerate(node.ops):
+            for other in COMPARISONS.get(type(operator), ()):
+                changed = copy.deepcopy(node)
+                changed.ops[k] = other()
+                yield changed
+    elif isinstance(node, ast.BinOp | ast.AugAssign):
+        for other in OPERATORS.get(type(node.op), ()):
+            changed = copy.deepcopy(node)
+            changed.op = other()
+            yield changed
+    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.Not):
+        yield copy.deepcopy(node.operand)
+    elif isinstance(node, ast.BoolOp):
+        changed = copy.deepcopy(node)
+        changed.op = ast.Or() if isinstance(node.op, ast.And) else ast.And()
+        yield changed
+    elif isinstance(node, ast.Constant):
+        for value in _other_values(node.value):
+            yield ast.copy_location(ast.Constant(value), node)
+    elif isinstance(node, ast.Call):
+        yield from _other_calls(node)
+
+
+def _other_values(value: object) -> tuple[object, ...]:
+    if isinstance(value, bool):
+        return (not value,)
+    if isinstance(value, int):
+        return (value + 1,)
+    if isinstance(value, float):
+        return (2.0 * value,) if value else (1.0,)
+    return ()
+
+
+def _other_calls(node: ast.Call) -> Iterator[ast.AST]:
+    called = node.func
+    name = called.id if isinstance(called, ast.Name) else getattr(called, "attr", "")
+    if name in NAMES:
+        changed = copy.deepcopy(node)
+        if isinstance(changed.func, ast.Name):
+            changed.func.id = NAMES[name]
+        elif isinstance(changed.func, ast.Attribute):
+            changed.func.attr = NAMES[name]
+        yield changed
+
+
+class _Places(ast.NodeVisitor):
+    """Finds the nodes that compute something, and the function each stands in."""
+
+    def __init__(self) -> None:
+        self.found: list[tuple[ast.AST, str]] = []
+        self._within: list[str] = []
+
+    def visit(self, node: ast.AST) -> None:
+        """Note a node and go on below it, where it is no annotation and no text."""
+        if isinstance(node, ast.JoinedStr | ast.Import | ast.ImportFrom):
+            return
+        self.found.append((node, ".".join(self._within)))
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            self._within.append(node.name)
+            if isinstance(node, ast.FunctionDef):
+                for default in (*node.args.defaults, *node.args.kw_defaults):
+                    if default is not None:
+                        self.visit(default)
+            for child in node.body:
+                self.visit(child)
+            self._within.pop()
+        elif isinstance(node, ast.AnnAssign):
+            if node.value is not None:
+                self.visit(node.value)
+        elif isinstance(node, ast.Subscript):
+            self.visit(node.value)
+            self.visit(node.slice)
+        else:
+            self.generic_visit(node)
+
+
+def changes(root: Path, module: str) -> list[Change]:
+    """Every change of a module.
+
+    Args:
+        root: Of the checkout.
+        module: Path from there.
+
+    Returns:
+        In the order of the source.
+    """
+    source = (root / module).read_text(encoding="utf-8")
+    tree = ast.parse(source)
+    places = _Places()
+    places.visit(tree)
+    found = []
+    for node, function in places.found:
+        if not hasattr(node, "lineno"):
+            continue
+        for changed in _swapped(node):
+            found.append(
+                Change(
+                    module=module,
+                    line=node.lineno,
+                    function=function,
+                    before=ast.unparse(node),
+                    after=ast.unparse(ast.fix_missing_locations(changed)),
+                    content=_with(source, node, changed),
+                )
+            )
+    return found
+
+
+def _with(source: str, node: ast.AST, changed: ast.AST) -> str:
+    """The source with a node's text replaced; every other line keeps its number."""
+    assert isinstance(node, ast.expr | ast.AugAssign)
+    assert node.end_lineno is not None
+    assert node.end_col_offset is not None
+    lines = source.encode().split(b"\n")
+    first, last = node.lineno - 1, node.end_lineno - 1
+    head = lines[first][: node.col_offset]
+    tail = lines[last][node.end_col_offset :]
+    text = ast.unparse(changed)
+    if isinstance(node, ast.expr):
+        text = f"({text})"
+    middle = head + text.encode() + tail
+    # An expression of several lines stands in brackets, where blank lines are free.
+    padding = [b""] * (last - first)
+    return b"\n".join([*lines[:first], middle, *padding, *lines[last + 1 :]]).decode()

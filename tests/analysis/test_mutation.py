@@ -1,0 +1,100 @@
+"""Changes are what they say, and a test that looks notices them."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+from analysis.mutation.changes import changes  # noqa: E402
+from analysis.mutation.coverage_map import coverage_map  # noqa: E402
+
+MODULE = '''"""A module."""
+
+SIZE: float = 2.0
+
+
+def inside(low, value, high=1.0):
+    """Whether a value lies between.
+
+    >= 3 lines of text with 1 number stay.
+    """
+    if value < low and not value == 7:
+        return min(
+            -value,
+            high * 2,
+        )
+    return f"{value + 1}"
+'''
+
+
+def test_every_change_is_one_valid_module_that_differs(tmp_path: Path) -> None:
+    (tmp_path / "module.py").write_text(MODULE)
+    found = changes(tmp_path, "module.py")
+    assert {(one.before, one.after) for one in found} >= {
+        ("2.0", "4.0"),
+        ("1.0", "2.0"),
+        ("value < low", "value <= low"),
+        ("value < low", "value >= low"),
+        ("value < low and (not value == 7)", "value < low or not value == 7"),
+        ("not value == 7", "value == 7"),
+        ("-value", "value"),
+        ("high * 2", "high / 2"),
+        ("min(-value, high * 2)", "max(-value, high * 2)"),
+    }
+    assert len({one.key for one in found}) == len(found)
+    for one in found:
+        assert one.content != MODULE
+        assert one.content.count("\n") == MODULE.count("\n")
+        assert one.before != one.after
+        assert ast.parse(one.content)
+
+
+def test_text_and_annotations_stay(tmp_path: Path) -> None:
+    (tmp_path / "module.py").write_text(MODULE)
+    assert not any("+" in one.before for one in changes(tmp_path, "module.py"))
+
+
+def test_the_map_knows_which_test_runs_a_line(tmp_path: Path) -> None:
+    (tmp_path / "module.py").write_text("def one():\n    return 1\n")
+    test = "from module import one\n\ndef test_one():\n    assert one() == 1\n"
+    (tmp_path / "test_one.py").write_text(test)
+    (tmp_path / "analysis").symlink_to(ROOT / "analysis")
+    seen = coverage_map(tmp_path, ["module.py"], ["test_one.py"], plain=False)
+    assert seen.asked("module.py", 2, budget=1.0) == ["test_one.py::test_one"]
+    assert seen.asked("module.py", 3, budget=1.0) == []
+
+
+TRIED = """
+import sys
+from pathlib import Path
+from analysis.mutation.changes import changes
+from analysis.mutation.trial import try_change
+
+folder = Path(sys.argv[1])
+for change in changes(folder, "module.py"):
+    trial = try_change(folder, change, ["test_one.py::test_one"], 1.0, None)
+    print(change.before, "->", change.after, trial.noticed)
+"""
+
+
+def test_a_change_that_matters_is_noticed_and_the_module_is_put_back(
+    tmp_path: Path,
+) -> None:
+    module = "def one(x):\n    if x < 3:\n        return 0\n    return 5\n"
+    (tmp_path / "module.py").write_text(module)
+    (tmp_path / "test_one.py").write_text(
+        "from module import one\n\ndef test_one():\n    assert one(0) == 0\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", TRIED, str(tmp_path)],
+        cwd=ROOT, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    said = set(ended.stdout.splitlines())
+    assert "x < 3 -> x >= 3 True" in said
+    assert "x < 3 -> x <= 3 False" in said  # nobody asks about 3
+    assert "0 -> 1 True" in said
+    assert "5 -> 6 False" in said
+    assert (tmp_path / "module.py").read_text() == module
