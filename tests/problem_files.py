@@ -22,6 +22,21 @@ required_clearance: 3.5
 OUT_OF_REACH = NEAR.replace("[3126, 100, -200]", "[3126, 9000, -200]")
 """The same with a corner no arm of this length reaches."""
 
+BEHIND_A_WALL = """\
+vdsm_problem: 1
+name: wall
+length_unit: mm
+manipulator: hrm8
+obstacles:
+  - {name: wall, shape: half_space, point: [0, 400, 0], normal: [0, -1, 0]}
+tip_path:
+  start: [3126, 0, 0]
+  points: [[3126, 0, 0], [3126, 2500, 0]]
+  spacing: 40
+required_clearance: 3.5
+"""
+"""A straight path of which 400 - 61.5 - 3.5 mm lie before a wall, 13.4 %."""
+
 
 def write_problem(path: Path, text: str) -> Path:
     """Write a problem file and give its path."""

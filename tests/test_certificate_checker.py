@@ -47,7 +47,11 @@ STRAIGHT = {
         "max_joint_angle_deg": 50,
     },
     "obstacles": [],
-    "tip_path": {"start": [1, 0, 0], "points": [[1, 0, 0], [1.3, 0, 0]]},
+    "tip_path": {
+        "start": [1, 0, 0],
+        "points": [[1, 0, 0], [1.3, 0, 0]],
+        "required_coverage": 0,
+    },
     "required_clearance": 0.002,
 }
 NO_ERRORS = (0.0, 0.0, 0.0)

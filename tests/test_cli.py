@@ -3,6 +3,7 @@
 Commands run in this process through `main`; one runs as a real process.
 """
 
+import html
 import json
 import math
 import re
@@ -14,7 +15,7 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-from problem_files import NEAR, OUT_OF_REACH, write_problem
+from problem_files import BEHIND_A_WALL, NEAR, OUT_OF_REACH, write_problem
 
 from vdsm_pin.cli import app, main
 from vdsm_pin.errors import NoPlanFound
@@ -175,6 +176,78 @@ def test_an_infeasible_problem_leaves_nothing(vdsm: Shell, tmp_path: Path) -> No
     assert ran.status == 1
     assert "reach" in one_message(ran)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_plan_that_draws_less_than_required_is_written_and_called_incomplete(
+    vdsm: Shell, tmp_path: Path
+) -> None:
+    problem = write_problem(tmp_path / "wall.yaml", BEHIND_A_WALL)
+    out = tmp_path / "out"
+    ran = vdsm("plan", problem, "--out", out)
+    assert (ran.status, ran.err) == (1, "")
+    assert ran.out.startswith("◐ incomplete")
+    plan = json.loads((out / "plan.json").read_text(encoding="utf-8"))
+    assert plan["verdict"] == "incomplete"
+    assert 0.12 < plan["coverage"] < 335.0 / 2500.0
+    share = f"{math.floor(plan['coverage'] * 1000) / 10:.1f} % drawn"
+    assert plan["reason"].startswith(f"incomplete: {share}, because the path is not")
+    assert "within the margin of 'wall'" in plan["reason"]
+    assert plan["reason"] in ran.out
+
+    words = ["--trajectory", out / "trajectory.csv", "--out", out]
+    ran = vdsm("verify", problem, *words, "--certificate", tmp_path / "proof")
+    assert ran.status == 1
+    assert ran.out.startswith("◐ incomplete")
+    assert f"incomplete: {share}, because the motion leaves out 1 stretch" in ran.out
+    assert re.search(r"\n  coverage of the desired path +1\d\.\d %\n", ran.out)
+    assert not (tmp_path / "proof").exists()
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert html.escape(plan["reason"], quote=False).replace("'", "&#39;") in page
+
+
+@pytest.mark.parametrize("share", [0.1, 0.0])
+def test_less_coverage_is_enough_where_the_problem_says_so(
+    vdsm: Shell, tmp_path: Path, share: float
+) -> None:
+    asked = f"spacing: 40\n  required_coverage: {share}\n"
+    text = BEHIND_A_WALL.replace("spacing: 40\n", asked)
+    problem, out = write_problem(tmp_path / "wall.yaml", text), tmp_path / "out"
+    ran = vdsm("plan", problem, "--out", out)
+    assert (ran.status, ran.out.split()[:2]) == (0, ["✓", "certified"])
+    assert re.search(r"not drawn +from 0\.\d+ m to 2\.5000 m", ran.out)
+    ran = vdsm("verify", problem, "--trajectory", out / "trajectory.csv", "--out", out)
+    assert ran.status == 0
+    assert re.search(r"1\d\.\d % of the desired path is drawn", ran.out)
+
+
+def test_without_detours_nothing_is_planned_that_leaves_something_out(
+    vdsm: Shell, tmp_path: Path
+) -> None:
+    text = BEHIND_A_WALL.replace("spacing: 40", "blocked: fail")
+    problem = write_problem(tmp_path / "wall.yaml", text)
+    ran = vdsm("plan", problem, "--out", tmp_path / "out")
+    assert ran.status == 1
+    assert "'wall' blocks the tip path" in one_message(ran)
+    assert not (tmp_path / "out").exists()
+
+
+def test_two_rows_that_rest_on_the_path_draw_nothing(
+    vdsm: Shell, tmp_path: Path
+) -> None:
+    problem = write_problem(tmp_path / "wall.yaml", BEHIND_A_WALL)
+    joints = ",".join(["0.0"] * 17)
+    names = ",".join(f"alpha{i}_rad,theta{i}_rad" for i in range(1, 9))
+    rows = [
+        f"waypoint,on_path,path_m,x0_m,{names}",
+        *(f"{k},1,0.0,{joints}" for k in "01"),
+    ]
+    motion = write_problem(tmp_path / "rest.csv", "\n".join(rows) + "\n")
+    ran = vdsm("verify", problem, "--trajectory", motion, "--out", tmp_path / "out")
+    assert ran.status == 1
+    assert "incomplete: 0.0 % drawn" in ran.out
+    failed = [line for line in ran.out.splitlines() if line.endswith("◐ incomplete")]
+    assert [line.split()[0] for line in failed] == ["coverage"]
+    assert ran.out.count("✓ certified") == 15
 
 
 def test_a_search_in_vain_tells_how_far_it_came_and_how_long_it_took(

@@ -29,7 +29,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Plan motions of hyper-redundant arms and prove that they are collision-free.",
-    epilog="Exit status: 0 certified; 1 refuted, undecided or infeasible; 2 bad input.",
+    epilog="Exit status: 0 certified; 1 incomplete, refuted, undecided or infeasible; "
+    "2 bad input.",
 )
 
 Problem = Annotated[
@@ -58,10 +59,13 @@ def plan(
 ) -> None:
     """Plan a motion.
 
-    Writes trajectory.csv and plan.json, or nothing where there is no certified plan.
+    Writes trajectory.csv and plan.json, or nothing where there is no plan. A plan that
+    draws less of the path than required is written, is called incomplete, and ends with
+    status 1.
     """
     from vdsm_pin.io.problem_file import read_problem
     from vdsm_pin.report.terminal import show_plan
+    from vdsm_pin.report.words import outcome
     from vdsm_pin.workflow import plan_to_folder, within
 
     source, begin = read_problem(problem), time.monotonic()
@@ -74,6 +78,7 @@ def plan(
             error.args = (f"no plan found: {error}; searched for {spent:.1f} s",)
         raise
     show_plan(file, out)
+    raise typer.Exit(PASSED if outcome(file.verdict).passed else NOT_PASSED)
 
 
 @app.command(

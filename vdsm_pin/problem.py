@@ -22,7 +22,10 @@ class Approach(StrEnum):
 
 
 class Blocked(StrEnum):
-    """What to do where the desired path itself cannot be drawn."""
+    """What to do where the desired path itself cannot be drawn.
+
+    Draw the rest of it, or refuse to plan at all.
+    """
 
     DETOUR = "detour"
     FAIL = "fail"
@@ -64,7 +67,7 @@ class DesiredPath:
     approach: Approach = Approach.SHORTEST
     retreat: float = 0.0
     blocked: Blocked = Blocked.DETOUR
-    required_coverage: float = 0.0
+    required_coverage: float = 1.0
     start_joints: FloatArray | None = None
     order: Order = Order.AS_GIVEN
 

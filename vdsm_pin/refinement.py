@@ -35,6 +35,9 @@ OVERSHOOT: Final = 1.25
 """The margin grows by this times what is missing, as a plan with a larger margin also
 swings a little farther; [-]."""
 
+HANDED_OUT: Final = (Verdict.CERTIFIED, Verdict.INCOMPLETE)
+"""Verdicts of motions that are clear and within their limits at every instant."""
+
 LOG: Final = logging.getLogger(__name__)
 
 
@@ -57,12 +60,12 @@ class Round:
 
 @dataclass(frozen=True)
 class Refinement:
-    """A certified plan and how it came about.
+    """A plan and how it came about.
 
     Args:
         plan: The plan, its notes extended by the rounds.
-        verification: Its certified verification.
-        rounds: Every round; the last one is certified.
+        verification: Its verification: certified, or incomplete.
+        rounds: Every round; the last one has the same verdict.
     """
 
     plan: Plan
@@ -77,7 +80,7 @@ def plan_and_verify(
     *,
     time_limit: float | None = None,
 ) -> Refinement:
-    """Plan by a strategy until the verification certifies the plan.
+    """Plan by a strategy until the verification has nothing against the plan.
 
     Args:
         problem: What is asked.
@@ -87,11 +90,11 @@ def plan_and_verify(
             [s].
 
     Returns:
-        The certified plan.
+        The plan; incomplete where it draws less of the path than required.
 
     Raises:
         UnknownName: If there is no such strategy.
-        Infeasible: If the strategy has no plan, or none that is certified;
+        Infeasible: If the strategy has no plan, or none that is proved;
             `OutOfTime` if the limit ended the planning.
     """
     plan_with = strategy(strategy_name)
@@ -108,7 +111,7 @@ def plan_and_verify(
         verification = verify(problem, plan.trajectory, robot)
         rounds.append(_round(margin, verification))
         LOG.info("margin %.6f m: %s", margin, rounds[-1].reason)
-        if verification.verdict is Verdict.CERTIFIED:
+        if verification.verdict in HANDED_OUT:
             notes = plan.notes if len(rounds) == 1 else (*plan.notes, _story(rounds))
             return Refinement(replace(plan, notes=notes), verification, tuple(rounds))
         missing = problem.required_clearance - rounds[-1].clearance

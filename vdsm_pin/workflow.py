@@ -109,11 +109,13 @@ def error_box(joint_deg: float, base_mm: float, obstacle_mm: float) -> ErrorBox:
 def plan_to_folder(
     source: ProblemFile, strategy: str, folder: Path, command: str
 ) -> PlanFile:
-    """Plan, and write trajectory.csv and plan.json: only a certified plan comes back.
+    """Plan, and write trajectory.csv and plan.json.
+
+    A plan is certified, or incomplete: it is clear, but draws less than required.
 
     Raises:
         UnknownName: If there is no such strategy.
-        Infeasible: If there is no certified plan; nothing is written.
+        Infeasible: If there is no such plan; nothing is written.
         InvalidInput: If the folder cannot be written.
     """
     # Whoever has a trajectory verified needs no planner.

@@ -14,7 +14,7 @@ import os
 import tempfile
 import time
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -34,7 +34,7 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.strategies import STRATEGIES, strategy
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.robot_model import RobotModel, load_robot
 from vdsm_pin.tolerances import TOLERANCES
@@ -138,12 +138,17 @@ def attempt(problem: PlanningProblem, key: tuple[str, int], name: str, limit: fl
     )  # fmt: skip
 
 
+def whole_or_nothing(problem: PlanningProblem) -> PlanningProblem:
+    """The same problem for which a part of the path is no answer."""
+    return replace(problem, path=replace(problem.path, blocked=Blocked.FAIL))
+
+
 def one(task: tuple[str, int, tuple[str, ...]], limit: float) -> list[Outcome]:
     """One problem by every method named."""
     family, number, names = task
     with tempfile.TemporaryDirectory() as folder:
         path = generate(Path(folder), family, number)
-        problem = read_problem(path).problem
+        problem = whole_or_nothing(read_problem(path).problem)
         return [attempt(problem, (family, number), name, limit) for name in names]
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import junitparser
 import pytest
 from batch_folders import tree
-from problem_files import NEAR, OUT_OF_REACH, write_problem
+from problem_files import BEHIND_A_WALL, NEAR, OUT_OF_REACH, write_problem
 
 from vdsm_pin.batch.progress import Progress
 from vdsm_pin.batch.run import Batch, Interrupted, expanded, run_batch
@@ -73,6 +73,22 @@ def test_every_problem_has_its_row_and_its_folder(reference: Path) -> None:
     (suite,) = junitparser.JUnitXml.fromfile(str(reference / "junit.xml"))
     assert (suite.tests, suite.failures, suite.errors) == (4, 1, 1)
     assert not (reference / ".unfinished").exists()
+
+
+def test_a_plan_that_draws_too_little_is_no_pass(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_problem(tmp_path / "wall.yaml", BEHIND_A_WALL)
+    asked = Batch((str(tmp_path / "wall.yaml"),), tmp_path / "out", "fewest")
+    (row,) = run_batch(asked)
+    assert row.outcome == "incomplete"
+    assert "within the margin of 'wall'" in row.reason
+    assert "incomplete" in capsys.readouterr().out
+    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert "0 of 1 problems certified" in page
+    assert "within the margin of" in page
+    (suite,) = junitparser.JUnitXml.fromfile(str(tmp_path / "out" / "junit.xml"))
+    assert (suite.tests, suite.failures, suite.errors) == (1, 1, 0)
 
 
 def test_jobs_and_order_change_no_byte(

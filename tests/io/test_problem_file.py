@@ -98,7 +98,7 @@ def test_minimal_file_gets_the_stated_defaults(tmp_path: Path) -> None:
     path = problem.path
     assert (path.closed, path.spacing, path.retreat) == (False, 0.01, 0.0)
     assert (path.approach, path.blocked) == (Approach.SHORTEST, Blocked.DETOUR)
-    assert (path.required_coverage, path.order) == (0.0, Order.AS_GIVEN)
+    assert (path.required_coverage, path.order) == (1.0, Order.AS_GIVEN)
     assert path.start_joints is None
 
 

@@ -243,7 +243,7 @@ class Problem:
         corners = _without_repeats(corners, cyclic=self.closed)
         points = [column(*corner) * self._unit for corner in corners]
         self.path = [self._inward(point - self._origin) for point in points]
-        self.coverage = _real(path.pop("required_coverage", "0"))
+        self.coverage = _real(path.pop("required_coverage", "1"))
         free = ("start", "spacing", "approach", "retreat", "blocked", "order")
         _use_up(path, "tip_path", *free)
 

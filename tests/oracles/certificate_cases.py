@@ -124,6 +124,7 @@ def random_problem(rng: np.random.Generator, folder: Path, shapes: Any) -> Any:
         "tip_path": {
             "start": [sum(lengths), 0.0, 0.0],
             "points": [[0.5, 0.1, 0.0], [0.6, 0.1, 0.0], [0.6, 0.3, 0.2]],
+            "required_coverage": 0.0,
         },
         "required_clearance": 0.002,
     }

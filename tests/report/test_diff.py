@@ -33,6 +33,7 @@ def test_equal_folders_have_no_difference(tmp_path: Path) -> None:
     [
         ({"outcome": "refuted"}, True),
         ({"outcome": "undecided"}, True),
+        ({"outcome": "incomplete"}, True),
         ({"min_clearance_lower_m": 0.0040}, True),
         ({"min_clearance_lower_m": 0.0050}, False),
         ({"min_clearance_lower_m": None}, True),

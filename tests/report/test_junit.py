@@ -29,6 +29,7 @@ ROWS = [
     row("d", "error", "bad file"),
     row("e", "timeout", "late"),
     row("f", "undecided", "neither"),
+    row("g", "incomplete", "13.2 % drawn"),
 ]
 
 
@@ -41,7 +42,7 @@ def test_each_outcome_has_its_place() -> None:
     text = junit_text(ROWS)
     suites = junitparser.JUnitXml.fromstring(text.encode())
     (suite,) = suites
-    assert (suite.tests, suite.failures, suite.errors) == (6, 3, 2)
+    assert (suite.tests, suite.failures, suite.errors) == (7, 4, 2)
     kinds = {case.name: [type(r).__name__ for r in case.result] for case in suite}
     assert kinds == {
         "a": [],
@@ -50,6 +51,7 @@ def test_each_outcome_has_its_place() -> None:
         "d": ["Error"],
         "e": ["Error"],
         "f": ["Failure"],
+        "g": ["Failure"],
     }
 
 
@@ -64,7 +66,7 @@ def test_the_usual_schema_accepts_it(
     ("good", "bad"),
     [
         ('name="a"', 'title="a"'),
-        ('tests="6"', 'tests="six"'),
+        ('tests="7"', 'tests="six"'),
         ("<failure", "<fault"),
         (' errors="2"', ""),
     ],

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Self
 
 from vdsm_pin.batch.task import Done
 from vdsm_pin.report.files import BatchRow
-from vdsm_pin.report.words import outcome, quantity, term
+from vdsm_pin.report.words import outcome, percent, quantity, term
+from vdsm_pin.tolerances import TOLERANCES
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
@@ -55,6 +56,8 @@ class Progress:
             near = _said(row, "min_clearance_lower_m", "m")
             near = near if row.closest_link else "no obstacle"
             tail = f"{near}, {_said(row, 'max_link_angle_rad', 'rad')}"
+            if row.coverage is not None and row.coverage < 1.0 - TOLERANCES.coverage:
+                tail += f", {percent(row.coverage)} drawn"
         kept = " (kept)" if done.kept else ""
         if self._bar is None:
             sys.stdout.write(f"{head} {verdict} {row.folder}{kept}  {tail}\n")

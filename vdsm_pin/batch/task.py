@@ -170,9 +170,12 @@ def _short_hash(problem: str) -> str:
 
 
 def _plan_and_verify(task: Task, source: ProblemFile) -> BatchRow:
-    plan_to_folder(source, task.strategy, task.aside, task.command)
+    plan = plan_to_folder(source, task.strategy, task.aside, task.command)
     order = VerifyOrder(source, task.aside / TRAJECTORY, task.aside, task.command)
     verified = verify_to_folder(order)
     drawing = picture(verified.records)
     (task.aside / "picture.svg").write_text(drawing, encoding="utf-8")
-    return batch_row(task.folder, task.strategy, verified.file)
+    row = batch_row(task.folder, task.strategy, verified.file)
+    # The planner knows why it left something out, the verification does not.
+    same = plan.verdict == verified.file.verdict == "incomplete"
+    return row.model_copy(update={"reason": plan.reason}) if same else row

@@ -146,13 +146,15 @@ class TipPathModel(FileModel):
     )
     blocked: Literal["detour", "fail"] = Field(
         default="detour",
-        description="What to do where the desired path itself cannot be drawn.",
+        description="What to do where the desired path itself cannot be drawn: plan "
+        "the rest of it, or no plan at all.",
     )
     required_coverage: float = Field(
-        default=0.0,
+        default=1.0,
         ge=0.0,
         le=1.0,
-        description="Least part of the desired path that must be drawn, 0 to 1.",
+        description="Least part of the desired path that must be drawn, 0 to 1. A "
+        "motion that draws less is incomplete, which is not passed.",
     )
     order: Literal["as_given", "free"] = Field(
         default="as_given",

@@ -40,8 +40,10 @@ class Plan:
         centres: Joint centres O_1..O_{N+1}, shape (n_samples, N + 1, 3); [m].
         trajectory: Joint values, the plan proper.
         cable_lengths: l_ja, l_jb, l_jc, shape (n_samples, N, 3); [m].
-        notes: What the user should know, one sentence each: stretches not drawn,
-            rounds of refinement and their reasons, lower bounds proved.
+        undrawn: Stretches of the desired path that are not drawn, each with the reason:
+            "from 0.5000 m to 1.0000 m along the path (why)".
+        notes: What else the user should know, one sentence each: rounds of refinement
+            and their reasons, lower bounds proved.
         rivals: Further plans of the same, none where the strategy has decided: the
             largest joint error that is proved to be survived decides between them and
             this one, which loses a draw.
@@ -53,6 +55,7 @@ class Plan:
     centres: FloatArray
     trajectory: Trajectory
     cable_lengths: FloatArray
+    undrawn: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     rivals: tuple["Plan", ...] = ()
 

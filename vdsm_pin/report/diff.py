@@ -14,7 +14,15 @@ from vdsm_pin.report.tables import read_summary
 from vdsm_pin.report.words import outcome, quantity, term
 from vdsm_pin.tolerances import TOLERANCES
 
-_ORDER: Final = ("error", "timeout", "refuted", "undecided", "infeasible", "certified")
+_ORDER: Final = (
+    "error",
+    "timeout",
+    "refuted",
+    "undecided",
+    "infeasible",
+    "incomplete",
+    "certified",
+)
 _RANK: Final = {word: rank for rank, word in enumerate(_ORDER)}
 
 

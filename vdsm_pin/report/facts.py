@@ -26,7 +26,7 @@ from vdsm_pin.report.files import (
     VerificationFile,
 )
 from vdsm_pin.report.run_record import RunRecord, machine, versions
-from vdsm_pin.report.words import check_title, place, quantity
+from vdsm_pin.report.words import check_title, percent, place, quantity
 from vdsm_pin.tolerances import TOLERANCES, UNITS
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import (
@@ -181,6 +181,8 @@ def reason(verification: Verification) -> str:
     """The verdict in one sentence."""
     if verification.verdict is Verdict.CERTIFIED:
         return _certified_sentence(verification)
+    if verification.verdict is Verdict.INCOMPLETE:
+        return _incomplete_sentence(verification, _left_out(verification))
     bad = [c for c in verification.checks if c.verdict is verification.verdict]
     if not bad:
         return "No check was carried out, so nothing is proved."
@@ -201,18 +203,46 @@ def reason(verification: Verification) -> str:
     return f"{undecided} This counts as not passed."
 
 
+def plan_reason(plan: Plan, verification: Verification) -> str:
+    """The verdict on a plan in one sentence, with what the strategy knows of it."""
+    if verification.verdict is not Verdict.INCOMPLETE or not plan.undrawn:
+        return reason(verification)
+    why = f"the path is not drawn {'; '.join(plan.undrawn)}"
+    return _incomplete_sentence(verification, why)
+
+
+def _incomplete_sentence(verification: Verification, why: str) -> str:
+    drawn = percent(verification.coverage)
+    required = percent(verification.problem.path.required_coverage)
+    return f"incomplete: {drawn} drawn, because {why}; {required} is required"
+
+
+def _left_out(verification: Verification) -> str:
+    """What the motion leaves out of the desired path, in words."""
+    gaps = verification.undrawn
+    if not len(gaps):
+        return "no waypoint draws the desired path"
+    first = " to ".join(quantity(float(station), "m") for station in gaps[0])
+    stretches = "1 stretch, from" if len(gaps) == 1 else f"{len(gaps)} stretches, from"
+    return f"the motion leaves out {stretches} {first} along the path"
+
+
 def _certified_sentence(verification: Verification) -> str:
     count = len(verification.checks)
     smallest = min_clearance(verification)
+    drawn = percent(verification.coverage)
     if smallest is None:
-        return f"All {count} checks passed over the whole motion; no obstacle is there."
+        return (
+            f"All {count} checks passed over the whole motion; no obstacle is there; "
+            f"{drawn} of the desired path is drawn."
+        )
     required = quantity(verification.problem.required_clearance, "m")
     box = asdict(verification.errors)
     errors = ", with any error of the error box," if any(box.values()) else ""
     return (
         f"All {count} checks passed; at every instant of the motion{errors} the arm "
-        f"keeps at least {quantity(smallest.lower_m, 'm')} from every obstacle; "
-        f"{required} are required."
+        f"keeps at least {quantity(smallest.lower_m, 'm')} from every obstacle, "
+        f"{required} are required; {drawn} of the desired path is drawn."
     )
 
 
@@ -275,6 +305,8 @@ def plan_file(
         problem=plan.problem.name,
         strategy=plan.strategy,
         verdict=verification.verdict.value,
+        reason=plan_reason(plan, verification),
+        undrawn=plan.undrawn,
         notes=plan.notes,
         rounds=rounds,
         coverage=finite(verification.coverage),

@@ -11,11 +11,17 @@ from vdsm_pin.io.problem_file import SCHEMA_DIALECT, problem_schema
 
 Point = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 VerdictWord = Annotated[
-    Literal["certified", "refuted", "undecided"],
+    Literal["certified", "incomplete", "refuted", "undecided"],
     Field(description="only certified counts as passed"),
 ]
 OutcomeWord = Literal[
-    "certified", "refuted", "undecided", "infeasible", "error", "timeout"
+    "certified",
+    "incomplete",
+    "refuted",
+    "undecided",
+    "infeasible",
+    "error",
+    "timeout",
 ]
 
 
@@ -196,6 +202,10 @@ class PlanFile(FileModel):
     problem: str = Field(description=_PROBLEM)
     strategy: str = Field(description=_STRATEGY)
     verdict: VerdictWord
+    reason: str = Field(description="the verdict in one sentence")
+    undrawn: tuple[str, ...] = Field(
+        description="stretches of the desired path not drawn, and why"
+    )
     notes: tuple[str, ...] = Field(description="what the strategy has to say")
     rounds: int = Field(description="rounds of plan, verify, larger margins")
     coverage: FiniteFloat | None = Field(description=_COVERAGE)

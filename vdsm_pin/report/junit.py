@@ -8,7 +8,7 @@ from vdsm_pin.report.words import outcome
 
 
 def junit_text(rows: Sequence[BatchRow]) -> str:
-    """The batch as JUnit XML; infeasible, refuted and undecided are failures.
+    """The batch as JUnit XML; all that did not pass and is no error failed.
 
     Durations are zero: they would differ from run to run, and timing.csv has them.
     """

@@ -24,6 +24,8 @@ def show_plan(file: PlanFile, folder: Path) -> None:
     """One plan in a few lines."""
     motion = file.motion
     typer.echo(_headline(file.verdict, f"{file.problem}, planned by {file.strategy}"))
+    if not outcome(file.verdict).passed:
+        typer.echo(f"  {file.reason}")
     changed = motion.changed_angles_mean_on_path
     mean = MISSING if changed is None else f"{changed:.2f} on average on the path"
     ends = (measured(x0, "m") for x0 in (motion.x0_min_m, motion.x0_max_m))
@@ -39,6 +41,7 @@ def show_plan(file: PlanFile, folder: Path) -> None:
             f"{mean}, {motion.changed_angles_max} at most",
         ),
         ("base travel", " to ".join(ends)),
+        *(("not drawn", stretch) for stretch in file.undrawn),
         *(("note", note) for note in file.notes),
         ("files in", str(folder)),
     )
@@ -60,6 +63,7 @@ def show_verification(
         _rich_checks(file)
     else:
         _plain_checks(file.checks)
+    more = ((term("coverage"), percent(file.coverage)), *more)
     if file.max_joint_error_rad is not None:
         error = survived(file.max_joint_error_rad)
         if file.refuted_joint_error_rad is not None:

@@ -73,6 +73,13 @@ OUTCOMES: Final[Mapping[str, Outcome]] = MappingProxyType(
                 "Neither proved nor refuted within the budget; counts as not passed.",
             ),
             Outcome(
+                "incomplete",
+                "◐",
+                "yellow",
+                False,
+                "Proved, but less of the desired path is drawn than required.",
+            ),
+            Outcome(
                 "infeasible", "∅", "magenta", False, "The planner has no plan for it."
             ),
             Outcome("error", "!", "red", False, "The input or the run was broken."),

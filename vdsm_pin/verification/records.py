@@ -12,20 +12,24 @@ from vdsm_pin.trajectory import Trajectory
 
 
 class Verdict(StrEnum):
-    """Outcome of one check or of the whole; undecided is a failure."""
+    """Outcome of one check or of the whole; only certified counts as passed.
+
+    Incomplete is a motion that draws less of the desired path than required and passes
+    every other check.
+    """
 
     CERTIFIED = "certified"
+    INCOMPLETE = "incomplete"
     REFUTED = "refuted"
     UNDECIDED = "undecided"
 
 
 def combine(verdicts: tuple[Verdict, ...]) -> Verdict:
-    """Refuted beats undecided beats certified; nothing at all is undecided."""
-    if Verdict.REFUTED in verdicts:
-        return Verdict.REFUTED
-    if Verdict.UNDECIDED in verdicts or not verdicts:
-        return Verdict.UNDECIDED
-    return Verdict.CERTIFIED
+    """The worst of refuted, undecided, incomplete, certified; of none undecided."""
+    for worst in (Verdict.REFUTED, Verdict.UNDECIDED, Verdict.INCOMPLETE):
+        if worst in verdicts:
+            return worst
+    return Verdict.CERTIFIED if verdicts else Verdict.UNDECIDED
 
 
 @dataclass(frozen=True)

@@ -174,7 +174,7 @@ def test_obs2_begins_and_ends_at_its_equidistant_point() -> None:
 
 def test_undrawn_stretches_are_told() -> None:
     plan = plan_of("obs2")
-    assert any("not drawn from 2.2000 m" in note for note in plan.notes)
+    assert any("from 2.2000 m" in stretch for stretch in plan.undrawn)
     failing = replace(plan.problem.path, blocked=Blocked.FAIL)
     with pytest.raises(PathBlocked, match="blocked: fail"):
         planned(replace(plan.problem, path=failing))
@@ -201,7 +201,7 @@ def test_an_approach_that_ends_on_the_danger_region_is_straight() -> None:
     path = replace(problem.path, approach=Approach.NEAREST_EQUIDISTANT)
     plan = planned(replace(problem, path=path))
     check_plan(plan)
-    assert len(plan.notes) == 1
+    assert (len(plan.undrawn), len(plan.notes)) == (1, 0)
     joined = int(np.argmax(plan.trajectory.on_path))
     tip = plan.tip_path.points[: joined + 1, 1:]
     way = np.linalg.norm(np.diff(tip, axis=0), axis=1).sum()

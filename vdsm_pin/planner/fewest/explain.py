@@ -30,14 +30,10 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 
 
-def demanded(problem: PlanningProblem) -> float:
-    """Least part of the path that must be drawn; [-]."""
-    path = problem.path
-    return 1.0 if path.blocked is Blocked.FAIL else path.required_coverage
-
-
 def refuse_proved(problem: PlanningProblem, outcome: Outcome) -> None:
-    """Raise where it is proved that too little of the path can be drawn.
+    """Raise where it is proved that nothing of the path can be drawn.
+
+    Where the problem allows no detour, something that cannot be drawn is enough.
 
     Raises:
         OutOfReach: Beyond the reach of the curled arm.
@@ -46,24 +42,24 @@ def refuse_proved(problem: PlanningProblem, outcome: Outcome) -> None:
         CutOff: No way leads to too much of the path.
     """
     rows, proof = outcome.rows, outcome.proof
-    length = problem.path.length
     shut = _length(rows, _either_end(proof.closed))
-    none_open = bool(proof.closed.all())
-    if none_open or (length > 0.0 and 1.0 - shut / length < demanded(problem)):
+    whole = problem.path.blocked is Blocked.FAIL
+    if proof.closed.all() or (whole and shut > 0.0):
         raise _proved(problem, rows, proof)
 
 
 def refuse(problem: PlanningProblem, outcome: Outcome) -> None:
-    """Raise where too little of the path was found to be drawn; no proof.
+    """Raise where no motion was found, or none that draws the whole path; no proof.
+
+    Less will do where the problem allows detours.
 
     Raises:
         NoPlanFound: The search did not get that far.
     """
-    length = problem.path.length
-    if outcome.found is None:
-        raise NoPlanFound(how_far(problem, outcome))
-    share = 1.0 if not length > 0.0 else _drawn(problem, outcome) / length
-    if share < demanded(problem) - TOLERANCES.coverage:
+    missing = problem.path.length - _drawn(problem, outcome)
+    allowed = TOLERANCES.coverage * problem.path.length
+    whole = problem.path.blocked is Blocked.FAIL
+    if outcome.found is None or (whole and missing > allowed):
         raise NoPlanFound(how_far(problem, outcome))
 
 
@@ -166,7 +162,7 @@ def notes_of(
     trajectory: Trajectory,
     centres: FloatArray,
 ) -> tuple[str, ...]:
-    """Notes of a plan: what is not drawn, how sparse it is, what is proved.
+    """Notes of a plan: its order, how sparse it is, what is proved.
 
     Args:
         problem: What was asked.
@@ -178,7 +174,7 @@ def notes_of(
     Returns:
         One sentence each.
     """
-    notes = [*_undrawn(problem, outcome), *_order(outcome)]
+    notes = _order(outcome)
     on_path = trajectory.on_path
     if not on_path.any():
         return tuple(notes)
@@ -243,11 +239,11 @@ def _order(outcome: Outcome) -> list[str]:
     return [f"drawn in another order than given, as the problem allows: {pieces}"]
 
 
-def _undrawn(problem: PlanningProblem, outcome: Outcome) -> list[str]:
-    """One note for each stretch that is not drawn."""
+def undrawn(problem: PlanningProblem, outcome: Outcome) -> tuple[str, ...]:
+    """Each stretch that is not drawn, and why."""
     assert outcome.found is not None
     route = outcome.found.roadmap.route
-    notes = []
+    stretches = []
     stretch: list[int] = []
     skipped = outcome.found.sequence.skipped
     for k, after in itertools.zip_longest(skipped, skipped[1:]):
@@ -258,9 +254,9 @@ def _undrawn(problem: PlanningProblem, outcome: Outcome) -> list[str]:
         why = "no way was found, which proves nothing"
         if route.closed[k]:
             why = f"proved: {_closed_by(problem, outcome, a, b)}"
-        notes.append(f"not drawn from {a:.4f} m to {b:.4f} m along the path ({why})")
+        stretches.append(f"from {a:.4f} m to {b:.4f} m along the path ({why})")
         stretch = []
-    return notes
+    return tuple(stretches)
 
 
 def _closed_by(

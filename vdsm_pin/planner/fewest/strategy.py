@@ -15,6 +15,7 @@ from vdsm_pin.planner.fewest.explain import (
     notes_of,
     refuse,
     refuse_proved,
+    undrawn,
 )
 from vdsm_pin.planner.fewest.explore import FULL, QUICK, Effort, Outcome, explore
 from vdsm_pin.planner.fewest.motion import Knots, Rows, dense_rows
@@ -229,6 +230,7 @@ def _written(
         rows.centres,
         trajectory,
         cable_lengths(arm, alpha, theta),
+        undrawn(problem, outcome),
         notes_of(problem, enough, outcome, trajectory, rows.centres),
     )
 

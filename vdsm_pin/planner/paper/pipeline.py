@@ -74,6 +74,11 @@ def plan_paper(
         motion.centres,
         trajectory,
         cables,
+        tuple(
+            f"from {a:.4f} m to {b:.4f} m along the path (left out by the paper's rule "
+            f"on its way round {problem.scene.names[0]!r}; nothing is proved)"
+            for a, b in motion.route.undrawn
+        ),
         motion.route.notes,
     )
 

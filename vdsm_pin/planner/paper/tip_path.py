@@ -175,11 +175,7 @@ def join(path: DesiredPath, parts: list[Rows], notes: tuple[str, ...] = ()) -> R
     points = np.concatenate([rows.points for rows in kept])
     side = np.concatenate([rows.side for rows in kept])
     undrawn = undrawn_by(path, [rows for rows in kept if rows.on_path])
-    route = Route(TipPath(points, on_path, stations), side, undrawn, notes)
-    gaps = tuple(
-        f"the desired path is not drawn from {a:.4f} m to {b:.4f} m" for a, b in undrawn
-    )
-    return replace(route, notes=(*gaps, *notes))
+    return Route(TipPath(points, on_path, stations), side, undrawn, notes)
 
 
 def undrawn_by(path: DesiredPath, drawn: list[Rows]) -> FloatArray:
