@@ -1,5 +1,7 @@
 """Mesh files: the same triangles from every format, and damage named."""
 
+import hashlib
+import tracemalloc
 from collections import Counter
 from pathlib import Path
 
@@ -9,6 +11,7 @@ from problem_texts import TETRAHEDRON, binary_stl
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.mesh_file import is_closed, read_mesh
+from vdsm_pin.io.source import BLOCK
 
 
 def text_stl(corners: np.ndarray, name: str = "part") -> str:
@@ -124,10 +127,92 @@ def test_a_binary_file_that_begins_with_solid_is_binary(tmp_path: Path) -> None:
     assert read_mesh(write(tmp_path, "a.stl", content)).watertight
 
 
+def test_trailing_bytes_and_counts_of_streaming_programs_are_read(
+    tmp_path: Path,
+) -> None:
+    for content, note in (
+        (binary_stl(TETRAHEDRON) + b"\n", "1 bytes behind the last triangle"),
+        (with_count(0), "its header counts 0 triangles, 4 are there"),
+        (with_count(0xFFFFFFFF), "its header counts 4294967295 triangles, 4 are there"),
+    ):
+        mesh = read_mesh(write(tmp_path, "a.stl", content))
+        np.testing.assert_array_equal(mesh.vertices[mesh.triangles], TETRAHEDRON)
+        assert mesh.notes == (note,)
+
+
+@pytest.mark.parametrize("name", ["Gehäuse", "корпус", "外壳", "solid", "\x1b[31m"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1", "cp1251"])
+@pytest.mark.parametrize("ends", ["\n", "\r\n", "\r"])
+def test_names_and_remarks_may_be_in_any_encoding_and_lines_end_anyhow(
+    tmp_path: Path, name: str, encoding: str, ends: str
+) -> None:
+    for file, text in (
+        ("a.stl", text_stl(TETRAHEDRON, name)),
+        ("a.obj", f"# {name}\no {name}\n{obj(TETRAHEDRON)}"),
+    ):
+        content = text.replace("\n", ends).encode(encoding, "replace")
+        mesh = read_mesh(write(tmp_path, file, content))
+        np.testing.assert_array_equal(mesh.vertices[mesh.triangles], TETRAHEDRON)
+
+
+def test_an_obj_line_goes_on_behind_a_backslash_but_not_behind_one_in_a_remark(
+    tmp_path: Path,
+) -> None:
+    text = "# C:\\parts\\\nv 0 0 \\\n0\nv 1 0 0 # x \\\nv 0 1 0\nf 1 \\\n 2 \\\n3"
+    mesh = read_mesh(write(tmp_path, "a.obj", text))
+    corners = mesh.vertices[mesh.triangles][0].tolist()
+    assert corners == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+
+
+def test_lines_and_points_of_an_obj_have_no_surface_and_are_counted(
+    tmp_path: Path,
+) -> None:
+    text = "v 0 0 0 0.5 0.5 0.5\nv 1 0 0 1\nv 0 1 0\nf 1 2 3\nl 1 2\np 1\n"
+    mesh = read_mesh(write(tmp_path, "a.obj", text))
+    assert len(mesh.triangles) == 1
+    assert mesh.notes == ("2 lines and points left out",)
+
+
+def test_vertices_that_no_face_uses_do_not_count(tmp_path: Path) -> None:
+    text = "v nan 0 0\nv 0 0 0\nv 1e20 0 0\nv 1 0 0\nv 0 1 0\nf 2 4 5\n"
+    mesh = read_mesh(write(tmp_path, "a.obj", text))
+    assert mesh.vertices.shape == (3, 3)
+
+
+def test_the_digest_sees_every_byte_of_the_file_once(tmp_path: Path) -> None:
+    for name, content in (
+        ("a.stl", binary_stl(TETRAHEDRON) + b"tail"),
+        ("a.stl", text_stl(TETRAHEDRON).encode()),
+        ("a.obj", obj(TETRAHEDRON).encode() * 3),
+    ):
+        digest = hashlib.sha256(b"before")
+        read_mesh(write(tmp_path, name, content), digest)
+        assert digest.digest() == hashlib.sha256(b"before" + content).digest()
+
+
+def test_memory_stays_near_that_of_the_triangles(tmp_path: Path) -> None:
+    n = 150
+    grid = np.arange(n * n).reshape(n, n) + 1
+    faces = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], -1)
+    lines = [f"v {i / 7} {j / 7} 0" for i in range(n) for j in range(n)]
+    lines += [f"f {a} {b} {c} {d}" for a, b, c, d in faces.reshape(-1, 4).tolist()]
+    path = write(tmp_path, "a.obj", "\n".join(lines))
+    tracemalloc.start()
+    mesh = read_mesh(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2 * BLOCK + 600 * len(mesh.triangles)
+
+
 NAN = np.where(np.arange(36).reshape(4, 3, 3) == 20, np.nan, TETRAHEDRON)
 
 
-DART = "v 0 0 0\nv 2 1 0\nv 0 2 0\nv 1 1 0\nf 1 2 3 4\n"
+def with_count(count: int) -> bytes:
+    """A binary STL whose header promises another number of triangles."""
+    whole = binary_stl(TETRAHEDRON)
+    return whole[:80] + count.to_bytes(4, "little") + whole[84:]
+
+
 DAMAGE = [
     ("a.stl", b"", "is empty"),
     ("a.stl", b"\x01" * 50, "is neither text nor binary STL: only 50 bytes"),
@@ -142,13 +227,31 @@ DAMAGE = [
         "solid\nouter loop\nvertex 0 0 0\nendloop\nendsolid",
         "has 1 corners",
     ),
-    ("a.stl", "solid \xff".encode("latin-1"), "line 1: is not UTF-8 text"),
+    ("a.stl", "solid \xff".encode("latin-1"), "is truncated"),
+    ("a.stl", text_stl(TETRAHEDRON).encode("utf-16"), "is UTF-16 text, expected"),
+    ("a.stl", "solid a\n".encode("utf-16"), "is UTF-16 text, expected UTF-8 or"),
+    ("a.stl", "facet normal 0 0 1\n" * 9, "is neither text nor binary STL"),
+    ("a.stl", binary_stl(TETRAHEDRON)[:-50], "damaged: its header promises 4 tria"),
+    ("a.stl", binary_stl(TETRAHEDRON) + b"x" * 50, "damaged: its header promises 4"),
+    ("a.stl", with_count(0) + b"x", "damaged: its header promises 0 tria"),
+    ("a.stl", with_count(5_000_001)[:84], "damaged: its header promises 5000001 tr"),
+    ("a.stl", text_stl(TETRAHEDRON).replace("1.0", "1_0"), "line 5: found '0.0 1_0 "),
+    ("a.obj", "v 0 0 0\n".encode("utf-16"), "is UTF-16 text, expected UTF-8 or ASC"),
+    ("a.obj", "v 0 0 0\nf 1 1 \\\n\\\n9\n", "line 2: the face corner '9' names none"),
+    ("a.obj", "v 0,5 0 0\n", "line 1: found '0,5 0 0', expected 3 numbers"),
+    ("a.obj", "v 0 0 0\nsurf 0 1 0 1\n", "line 2: has a free-form curve or surface"),
+    ("a.obj", "call b.obj\n", "line 1: takes in another file (call), expected all"),
+    ("a.obj", "v" + " 0" * 600_000, "line 1: is longer than 1048576 characters"),
+    ("a.obj", "v \\\n" * 600_000, "line 1: goes on for more than 1048576 char"),
     ("a.obj", "v 0 0\n", "line 1: found '0 0', expected 3 numbers"),
     ("a.obj", "v 0 0 0\nf 1 1 2\n", "line 2: the face corner '2' names none of"),
     ("a.obj", "v 0 0 0\nf 1 1 0\n", "line 2: the face corner '0' names none of"),
     ("a.obj", "v 0 0 0\nf 1 1\n", "line 2: a face has 2 corners, expected 3 or more"),
-    ("a.obj", DART, "line 5: the face is not convex"),
-    ("a.obj", "v 0 0 inf\nf 1 1 1\n", "triangle 1: has a coordinate that is not"),
+    (
+        "a.obj",
+        "v 0 0 0\nv 0 0 inf\nf 1 1 2\n",
+        "vertex 2: has a coordinate that is not",
+    ),
     ("a.obj", "hello\n", "has no triangle"),
     ("a.ply", "ply\n", "has the ending '.ply', expected .stl or .obj"),
 ]

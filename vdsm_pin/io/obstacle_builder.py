@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import singledispatchmethod
 from pathlib import Path
 from typing import Final
@@ -15,6 +15,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import obstacle_schema as schema
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.mesh_file import read_mesh
+from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -40,13 +41,14 @@ class ObstacleBuilder:
         folder: Where relative mesh paths start.
         frame: The file's unit and pose.
         arm_length: For judging the size of a mesh; [m].
+        digest: Gets the bytes of the mesh files, in the order of the obstacles.
     """
 
     document: YamlDocument
     folder: Path
     frame: Frame
     arm_length: float
-    mesh_contents: list[bytes] = field(default_factory=list)
+    digest: Digest
 
     def build_all(self, models: list[schema.ObstacleModel]) -> scene.Scene:
         """All obstacles, in file order.
@@ -174,12 +176,11 @@ class ObstacleBuilder:
     @build.register
     def _(self, model: schema.MeshModel, at: Location) -> scene.Obstacle:
         try:
-            mesh = read_mesh(self.folder / model.file)
+            mesh = read_mesh(self.folder / model.file, self.digest)
         except InvalidFile as error:
             place = f" {error.where}:" if error.where else ""
             problem = f"{model.file!r}:{place} {error.problem}"
             raise self.document.invalid((*at, "file"), problem) from None
-        self.mesh_contents.append(mesh.content)
         if model.check_size:
             self._check_size(mesh.vertices, model, at)
         corners = self.frame.placed(

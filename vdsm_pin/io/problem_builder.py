@@ -1,6 +1,5 @@
 """A checked problem file to a planning problem: units, frames, defaults, and sense."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,27 +10,20 @@ from vdsm_pin.io.arm_builder import ArmBuilder
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.path_builder import PathBuilder
+from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.problem import PlanningProblem
 
 
-@dataclass(frozen=True)
-class BuiltProblem:
-    """A planning problem and the files it was made from besides its own.
-
-    Args:
-        problem: In the base frame; [m], [rad].
-        mesh_contents: Bytes of the mesh files in the order of the obstacles.
-    """
-
-    problem: PlanningProblem
-    mesh_contents: tuple[bytes, ...]
-
-
 def build_problem(
-    model: schema.ProblemModel, document: YamlDocument, *, name: str, folder: Path
-) -> BuiltProblem:
+    model: schema.ProblemModel,
+    document: YamlDocument,
+    *,
+    name: str,
+    folder: Path,
+    digest: Digest,
+) -> PlanningProblem:
     """The planning problem that a file describes.
 
     Args:
@@ -39,9 +31,10 @@ def build_problem(
         document: The same with line numbers, for messages.
         name: Name of the problem where the file gives none.
         folder: Where relative mesh paths start.
+        digest: Gets the bytes of the mesh files, in the order of the obstacles.
 
     Returns:
-        The problem and the meshes' bytes.
+        The problem, in the base frame; [m], [rad].
 
     Raises:
         InvalidFile: If values that are each in range make no sense together.
@@ -50,9 +43,9 @@ def build_problem(
     arm = ArmBuilder(document, frame).build(model.manipulator)
     self_clearance = float(frame.metres(model.required_self_clearance))
     _check_links_apart(arm, self_clearance, frame, document)
-    obstacles = ObstacleBuilder(document, folder, frame, arm.total_length)
+    obstacles = ObstacleBuilder(document, folder, frame, arm.total_length, digest)
     scene = obstacles.build_all(model.obstacles)
-    problem = PlanningProblem(
+    return PlanningProblem(
         model.name or name,
         arm,
         scene,
@@ -61,7 +54,6 @@ def build_problem(
         T_world_base,
         self_clearance,
     )
-    return BuiltProblem(problem, tuple(obstacles.mesh_contents))
 
 
 def _frame(model: schema.ProblemModel) -> tuple[Frame, FloatArray]:

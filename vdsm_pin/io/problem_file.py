@@ -1,5 +1,6 @@
 """Problem files by path or built-in name: the only reader of the YAML contract."""
 
+import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -11,7 +12,7 @@ from vdsm_pin.io.obstacle_schema import MeshModel
 from vdsm_pin.io.problem_builder import build_problem
 from vdsm_pin.io.problem_errors import first_error
 from vdsm_pin.io.problem_schema import ProblemModel
-from vdsm_pin.io.source import check_is_file, decode, read_bytes, sha256_of
+from vdsm_pin.io.source import check_is_file, decode, read_bytes
 from vdsm_pin.io.yaml_reader import read_yaml
 from vdsm_pin.problem import PlanningProblem
 
@@ -60,12 +61,15 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
     except ValidationError as error:
         raise first_error(error, document) from None
     stem = "".join(c if c.isascii() and c.isalnum() else "_" for c in path.stem[:100])
-    built = build_problem(model, document, name=stem, folder=path.parent)
+    digest = hashlib.sha256(content)
+    problem = build_problem(
+        model, document, name=stem, folder=path.parent, digest=digest
+    )
     named = (one for one in model.obstacles if isinstance(one, MeshModel))
     return ProblemFile(
-        built.problem,
+        problem,
         path,
-        sha256_of([content, *built.mesh_contents]),
+        digest.hexdigest(),
         tuple(path.parent / mesh.file for mesh in named),
     )
 

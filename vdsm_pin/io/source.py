@@ -1,10 +1,41 @@
 """Bytes from disk, with every way a path can be wrong told in one sentence."""
 
 import hashlib
-from collections.abc import Iterable
+import io
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Final, Protocol
 
 from vdsm_pin.errors import InvalidFile
+
+BLOCK: Final = 1 << 20
+"""Bytes read at one time."""
+
+
+class Digest(Protocol):
+    """A hash that bytes can be added to."""
+
+    def update(self, data: bytes | memoryview, /) -> None:
+        """Add bytes."""
+
+    def hexdigest(self) -> str:
+        """The hash so far, in hexadecimal."""
+
+
+@dataclass(frozen=True)
+class OpenFile:
+    """A file that is being read, from the start.
+
+    Args:
+        size: Of the whole file; [bytes].
+        content: Its bytes; what is read goes through the digest.
+    """
+
+    size: int
+    content: "io.BufferedReader[Any]"
 
 
 def check_is_file(path: Path, *, named: object = None) -> None:
@@ -50,11 +81,7 @@ def read_bytes(path: Path, *, limit: int) -> bytes:
     except OSError as error:
         reason = error.strerror or str(error)
         raise InvalidFile(file=path, problem=f"cannot be read: {reason}") from None
-    if not data:
-        raise InvalidFile(file=path, problem="is empty")
-    if len(data) > limit:
-        problem = f"is larger than {limit / 1e6:.0f} MB, the most that is read"
-        raise InvalidFile(file=path, problem=problem)
+    _check_size(path, len(data), limit)
     return data
 
 
@@ -79,6 +106,61 @@ def decode(data: bytes, path: Path) -> str:
         line = data.count(b"\n", 0, error.start) + 1
         problem = f"is not UTF-8 text (byte 0x{data[error.start]:02x})"
         raise InvalidFile(file=path, where=f"line {line}", problem=problem) from None
+
+
+@contextmanager
+def opened(path: Path, *, limit: int, digest: Digest) -> Iterator[OpenFile]:
+    """A file of bounded size to be read in pieces, all of it into a digest.
+
+    Args:
+        path: The file.
+        limit: Largest size accepted; [bytes].
+        digest: Gets every byte of the file, in order, also those that are not asked
+            for.
+
+    Raises:
+        InvalidFile: If it cannot be read, is empty or is too large.
+    """
+    check_is_file(path)
+    try:
+        with path.open("rb", buffering=0) as raw:
+            size = os.fstat(raw.fileno()).st_size
+            _check_size(path, size, limit)
+            content = io.BufferedReader(_Hashed(raw, digest, size), BLOCK)
+            yield OpenFile(size, content)
+            while content.read(BLOCK):
+                pass
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InvalidFile(file=path, problem=f"cannot be read: {reason}") from None
+
+
+def _check_size(path: Path, size: int, limit: int) -> None:
+    if not size:
+        raise InvalidFile(file=path, problem="is empty")
+    if size > limit:
+        problem = f"is larger than {limit / 1e6:.0f} MB, the most that is read"
+        raise InvalidFile(file=path, problem=problem)
+
+
+class _Hashed(io.RawIOBase):
+    """A file as far as it was long when it was opened; a digest sees what is read."""
+
+    def __init__(self, raw: io.RawIOBase, digest: Digest, size: int) -> None:
+        self._raw, self._digest, self._left = raw, digest, size
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: object, /) -> int:
+        view = memoryview(buffer)[: self._left]  # type: ignore[arg-type]
+        count = self._raw.readinto(view) or 0
+        if not count and self._left:
+            message = "it was cut short while it was read"
+            raise OSError(message)
+        self._digest.update(view[:count])
+        self._left -= count
+        return count
 
 
 def sha256_of(parts: Iterable[bytes]) -> str:
