@@ -83,7 +83,7 @@ def _surface_panel(axes: Axes, run: Run) -> None:
     axes.set_xlim(0, run.trajectory.n_samples - 1)
     axes.set_ylim(*SURFACE)
     draw_limit(axes, run.problem.required_clearance * MM_PER_M)
-    near = next(one for one in run.verification.closest if one.pair.obstacle)
+    near = next(one for one in run.verification.approaches if one.pair.obstacle)
     least = near.lower * MM_PER_M
     axes.plot(near.interval, least, "o", color=style.INK, markersize=2.6, zorder=6)
     _note(axes, f"at least {least:.1f}")

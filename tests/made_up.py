@@ -114,7 +114,7 @@ def verification(
         errors=ErrorBox(),
         pairs=pairs,
         checks=checks,
-        closest=closest,
+        approaches=closest,
         profile=profile,
         coverage=0.873,
         undrawn=np.array([[1.0, 1.5]]),

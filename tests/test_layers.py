@@ -19,6 +19,7 @@ LAYERS = {
     "units": 0,
     "kept": 0,
     "startup": 0,
+    "notebook": 1,
     "geometry": 1,
     "proof": 1.5,
     "manipulator": 2,
@@ -39,6 +40,7 @@ LAYERS = {
     "workflow": 13,
     "batch": 13,
     "certificate_checker": 13,
+    "api": 14,
     "cli": 14,
 }
 ROBOTICS = {"pinocchio", "coal", "yourdfpy", "meshcat", "hppfcl"}

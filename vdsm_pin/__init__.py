@@ -1,3 +1,103 @@
-"""Planning and proved collision analysis for hyper-redundant manipulators."""
+"""Planning and proved collision analysis for hyper-redundant manipulators.
+
+    import vdsm_pin as vp
+
+    problem = vp.read_problem("paper/obs1")
+    plan = vp.plan(problem, strategy="fewest")
+    result = vp.verify(problem, plan.trajectory, errors=vp.error_box(base_mm=0.1))
+    vp.write_report(result, "report.html")
+
+Names are imported when they are first used: importing the package costs nothing.
+"""
+
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from vdsm_pin.api import (
+        error_box,
+        plan,
+        read_problem,
+        read_trajectory,
+        verify,
+        write_certificate,
+        write_report,
+        write_trajectory,
+    )
+    from vdsm_pin.errors import Infeasible, InvalidInput, VdsmError
+    from vdsm_pin.manipulator import CableLayout, Manipulator, built_in
+    from vdsm_pin.problem import DesiredPath
+    from vdsm_pin.problem import PlanningProblem as Problem
+    from vdsm_pin.scene import (
+        Box,
+        Capsule,
+        Cylinder,
+        HalfSpace,
+        Mesh,
+        Prism,
+        Scene,
+        Sphere,
+    )
+    from vdsm_pin.trajectory import Trajectory
+    from vdsm_pin.verification.records import ErrorBox, Verdict
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "Box",
+    "CableLayout",
+    "Capsule",
+    "Cylinder",
+    "DesiredPath",
+    "ErrorBox",
+    "HalfSpace",
+    "Infeasible",
+    "InvalidInput",
+    "Manipulator",
+    "Mesh",
+    "Prism",
+    "Problem",
+    "Scene",
+    "Sphere",
+    "Trajectory",
+    "VdsmError",
+    "Verdict",
+    "built_in",
+    "error_box",
+    "plan",
+    "read_problem",
+    "read_trajectory",
+    "verify",
+    "write_certificate",
+    "write_report",
+    "write_trajectory",
+]
+
+_HOMES: Final = {
+    "errors": ("Infeasible", "InvalidInput", "VdsmError"),
+    "manipulator": ("CableLayout", "Manipulator", "built_in"),
+    "problem": ("DesiredPath",),
+    "scene": (
+        *("Box", "Capsule", "Cylinder", "HalfSpace", "Mesh", "Prism"),
+        *("Scene", "Sphere"),
+    ),
+    "trajectory": ("Trajectory",),
+    "verification.records": ("ErrorBox", "Verdict"),
+}
+"""Where names live that are not in `api`."""
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        message = f"module {__name__!r} has no attribute {name!r}"
+        raise AttributeError(message)
+    from importlib import import_module
+
+    homes = (home for home, names in _HOMES.items() if name in names)
+    module, wanted = next(homes, "api"), name
+    if name == "Problem":
+        module, wanted = "problem", "PlanningProblem"
+    return getattr(import_module(f"{__name__}.{module}"), wanted)
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])

@@ -1,14 +1,16 @@
 """The planning problem: arm, scene, desired tip path, required clearance."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, frozen, running_sums
 from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.notebook import Summarised, in_mm
 from vdsm_pin.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -150,7 +152,23 @@ class DesiredPath:
 
 
 @dataclass(frozen=True)
-class PlanningProblem:
+class ProblemSource:
+    """The files a problem was read from.
+
+    Args:
+        path: The problem file.
+        sha256: Of its bytes followed by those of its meshes, in the order of the
+            obstacles.
+        meshes: The mesh files it names, in the same order.
+    """
+
+    path: Path
+    sha256: str
+    meshes: tuple[Path, ...] = ()
+
+
+@dataclass(frozen=True, repr=False)
+class PlanningProblem(Summarised):
     """All the planner may read, in the base frame: x along the rail.
 
     Args:
@@ -163,6 +181,7 @@ class PlanningProblem:
             its last column; readers and writers apply it, nobody else needs it.
         required_self_clearance: Least distance between the surfaces of two links that
             are not neighbours; [m].
+        source: Where it was read; None where it was built in Python or changed since.
 
     Raises:
         InvalidInput: If a required clearance is negative or not finite, or the
@@ -176,14 +195,15 @@ class PlanningProblem:
     required_clearance: float
     T_world_base: FloatArray
     required_self_clearance: float = 0.0
+    source: ProblemSource | None = field(default=None, init=False, compare=False)
 
     def __post_init__(self) -> None:
         """Freeze the pose and check the clearance."""
         object.__setattr__(self, "T_world_base", frozen(self.T_world_base))
-        for field in ("required_clearance", "required_self_clearance"):
-            value = getattr(self, field)
+        for name in ("required_clearance", "required_self_clearance"):
+            value = getattr(self, name)
             if not 0.0 <= value < np.inf:
-                message = f"{field} is {value} m, expected 0 or more"
+                message = f"{name} is {value} m, expected 0 or more"
                 raise InvalidInput(message)
         joints, count = self.path.start_joints, 1 + 2 * self.manipulator.n_links
         if joints is not None and not (
@@ -191,3 +211,20 @@ class PlanningProblem:
         ):
             message = f"start_joints is {joints.tolist()}, expected {count} numbers"
             raise InvalidInput(message)
+
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """Arm, scene, path and what is required."""
+        return (
+            ("name", self.name),
+            ("arm", f"{self.manipulator.name}, {self.manipulator.n_links} links"),
+            ("obstacles", ", ".join(self.scene.names[:8]) or "none"),
+            ("path", in_mm(self.path.length)),
+            ("required clearance", in_mm(self.required_clearance)),
+            ("file", str(self.source.path) if self.source else "built in Python"),
+        )
+
+    def read_from(self, source: ProblemSource) -> "PlanningProblem":
+        """The same problem, known to stand in these files."""
+        same = replace(self)
+        object.__setattr__(same, "source", source)
+        return same

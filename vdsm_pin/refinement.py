@@ -142,8 +142,6 @@ def _chosen(plan: Plan) -> Plan:
 
 def _round(margin: float, verification: Verification) -> Round:
     """The round in numbers and words; the worst check that failed is its reason."""
-    to_obstacles = [near.lower for near in verification.closest if near.pair.obstacle]
-    clearance = min(to_obstacles, default=np.inf)
     failed = [
         check for check in verification.checks if check.verdict is not Verdict.CERTIFIED
     ]
@@ -155,7 +153,7 @@ def _round(margin: float, verification: Verification) -> Round:
             f"{check.name}: {check.verdict} with {check.worst:.6g} {check.unit} "
             f"against {check.limit:.6g} {check.unit}"
         )
-    return Round(margin, verification.verdict, float(clearance), reason)
+    return Round(margin, verification.verdict, verification.min_clearance, reason)
 
 
 def _story(rounds: list[Round]) -> str:

@@ -7,14 +7,15 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
+from vdsm_pin.notebook import Summarised, in_mm
 from vdsm_pin.tolerances import TOLERANCES
 
 MAX_ROWS: Final = 5_000_000
 """Largest number of rows of one trajectory."""
 
 
-@dataclass(frozen=True)
-class Trajectory:
+@dataclass(frozen=True, repr=False)
+class Trajectory(Summarised):
     """What a planner hands over and a verifier judges.
 
     Args:
@@ -80,6 +81,17 @@ class Trajectory:
         """
         angles = np.stack([self.alpha, self.theta], axis=2).reshape(self.n_samples, -1)
         return np.concatenate([self.x0[:, None], angles], axis=1)
+
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """Its size and what it moves."""
+        low, high = float(self.x0.min()), float(self.x0.max())
+        largest = float(np.rad2deg(max(abs(self.alpha).max(), abs(self.theta).max())))
+        return (
+            ("links", str(self.n_links)),
+            ("waypoints", f"{self.n_samples}, {int(self.on_path.sum())} on the path"),
+            ("x0", f"{in_mm(low)} to {in_mm(high)}"),
+            ("largest angle", f"{largest:.3f} deg"),
+        )
 
     def part(self, first: int, last: int) -> "Trajectory":
         """The rows from `first` up to `last`, or to the end where there are fewer."""

@@ -34,7 +34,7 @@ def run_facts(run: Run) -> dict[str, Any]:
     rows, psi = run.trajectory, run.psi
     motion = motion_facts(rows)
     to_obstacles = [
-        near.lower for near in run.verification.closest if near.pair.obstacle
+        near.lower for near in run.verification.approaches if near.pair.obstacle
     ]
     facts: dict[str, Any] = {
         "verdict": run.verification.verdict.value,

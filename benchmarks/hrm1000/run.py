@@ -128,7 +128,7 @@ def attempt(problem: PlanningProblem, key: tuple[str, int], name: str, limit: fl
     trajectory, verification = done.trajectory, done.verification
     angles = link_angles(trajectory.alpha, trajectory.theta)
     changed = (angles > TOLERANCES.changed_angle).sum(axis=1)[trajectory.on_path]
-    near = [item.lower for item in verification.closest if item.pair.obstacle]
+    near = [item.lower for item in verification.approaches if item.pair.obstacle]
     failed = [c.name for c in verification.checks if c.verdict is not Verdict.CERTIFIED]
     return Outcome(
         problem.name, *key, name, str(verification.verdict), "; ".join(failed),

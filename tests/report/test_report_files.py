@@ -73,7 +73,7 @@ def test_undefined_numbers_become_null_and_never_pass() -> None:
         errors=judged.errors,
         pairs=judged.pairs,
         checks=checks,
-        closest=(),
+        approaches=(),
         profile=judged.profile,
         tip_deviation=math.nan,
         coverage=math.nan,
@@ -114,6 +114,6 @@ def test_motion_facts_follow_the_rows() -> None:
 
 def test_links_near_each_other_do_not_hide_the_obstacles() -> None:
     judged = made_up.verification()
-    near = replace(judged.closest[0], pair=Pair(1, other_link=3), lower=0.001)
-    both = written(replace(judged, closest=(near, *judged.closest)))
+    near = replace(judged.approaches[0], pair=Pair(1, other_link=3), lower=0.001)
+    both = written(replace(judged, approaches=(near, *judged.approaches)))
     assert both.min_clearance == written(judged).min_clearance

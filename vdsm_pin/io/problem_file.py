@@ -14,7 +14,7 @@ from vdsm_pin.io.problem_errors import first_error
 from vdsm_pin.io.problem_schema import ProblemModel
 from vdsm_pin.io.source import check_is_file, decode, read_bytes
 from vdsm_pin.io.yaml_reader import read_yaml
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem import PlanningProblem, ProblemSource
 
 MAX_PROBLEM_BYTES: Final = 32 << 20
 
@@ -29,16 +29,26 @@ class ProblemFile:
 
     Args:
         problem: What to plan.
-        path: The file.
-        sha256: Of the file's bytes followed by those of its meshes, in the order of
-            the obstacles.
-        meshes: The mesh files it names, in the same order.
+        source: The files it was read from.
     """
 
     problem: PlanningProblem
-    path: Path
-    sha256: str
-    meshes: tuple[Path, ...] = ()
+    source: ProblemSource
+
+    @property
+    def path(self) -> Path:
+        """The problem file."""
+        return self.source.path
+
+    @property
+    def sha256(self) -> str:
+        """Of the problem file and its meshes."""
+        return self.source.sha256
+
+    @property
+    def meshes(self) -> tuple[Path, ...]:
+        """The mesh files it names."""
+        return self.source.meshes
 
 
 def read_problem(name_or_path: str | Path) -> ProblemFile:
@@ -66,12 +76,12 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
         model, document, name=stem, folder=path.parent, digest=digest
     )
     named = (one for one in model.obstacles if isinstance(one, MeshModel))
-    return ProblemFile(
-        problem,
+    source = ProblemSource(
         path,
         digest.hexdigest(),
         tuple(path.parent / mesh.file for mesh in named),
     )
+    return ProblemFile(problem.read_from(source), source)
 
 
 def find_problem(name_or_path: str | Path) -> Path:

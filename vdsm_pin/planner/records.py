@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
+from vdsm_pin.notebook import Summarised
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.trajectory import Trajectory
 
@@ -29,8 +30,8 @@ class TipPath:
             object.__setattr__(self, name, frozen(getattr(self, name), dtype))
 
 
-@dataclass(frozen=True)
-class Plan:
+@dataclass(frozen=True, repr=False)
+class Plan(Summarised):
     """A planned motion with what each step found.
 
     Args:
@@ -58,6 +59,16 @@ class Plan:
     undrawn: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     rivals: tuple["Plan", ...] = ()
+
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """How it was planned, its size, and the notes."""
+        drawn = int(self.trajectory.on_path.sum())
+        return (
+            ("problem", self.problem.name),
+            ("strategy", self.strategy),
+            ("waypoints", f"{self.trajectory.n_samples}, {drawn} on the path"),
+            *(("note", note) for note in self.notes),
+        )
 
 
 LinkClearance: TypeAlias = Callable[[FloatArray], FloatArray]

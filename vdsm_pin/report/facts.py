@@ -157,7 +157,7 @@ def failing(verification: Verification) -> tuple[Failing, ...]:
 
 def nearest_to_obstacle(verification: Verification) -> int | None:
     """Index of the closest approach to an obstacle; None without obstacles."""
-    near = (i for i, row in enumerate(verification.closest) if row.pair.obstacle)
+    near = (i for i, row in enumerate(verification.approaches) if row.pair.obstacle)
     return next(near, None)
 
 
@@ -166,10 +166,9 @@ def min_clearance(verification: Verification) -> MinClearance | None:
     index = nearest_to_obstacle(verification)
     if index is None:
         return None
-    row = verification.closest[index]
-    lower = min(near.lower for near in verification.closest if near.pair.obstacle)
+    row = verification.approaches[index]
     return MinClearance(
-        lower_m=finite(lower),
+        lower_m=finite(verification.min_clearance),
         upper_m=finite(row.upper),
         moment=row.moment,
         link=row.pair.link,
@@ -267,7 +266,9 @@ def verification_file(
         checks=tuple(check_row(check) for check in verification.checks),
         min_clearance=min_clearance(verification),
         required_clearance_m=verification.problem.required_clearance,
-        closest=tuple(closest_row(verification, row) for row in verification.closest),
+        closest=tuple(
+            closest_row(verification, row) for row in verification.approaches
+        ),
         coverage=finite(verification.coverage),
         path_length_m=verification.problem.path.length,
         undrawn_m=tuple((float(a), float(b)) for a, b in verification.undrawn),

@@ -87,14 +87,16 @@ class PageData:
 
 def report_data(verification: Verification) -> PageData:
     """The data of a report."""
-    intervals = np.array([row.interval for row in verification.closest], dtype=np.int64)
+    intervals = np.array(
+        [row.interval for row in verification.approaches], dtype=np.int64
+    )
     shown = thinned(verification.trajectory, np.concatenate([intervals, intervals + 1]))
     plots = charts(verification, shown)
     text = _embedded(
         {
             "scene": scene_data(verification.problem),
             "motion": motion_data(verification.trajectory, shown),
-            "closest": [closest_data(row) for row in verification.closest],
+            "closest": [closest_data(row) for row in verification.approaches],
             "marks": [
                 asdict(one) for one in failing(verification) if one.moment is not None
             ],

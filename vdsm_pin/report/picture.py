@@ -27,7 +27,7 @@ def picture(verification: Verification) -> str:
     """The arm at the moment of its smallest clearance, in its scene."""
     problem, rows = verification.problem, verification.trajectory
     arm = problem.manipulator
-    k = verification.closest[0].interval if verification.closest else 0
+    k = verification.approaches[0].interval if verification.approaches else 0
     one = slice(k, k + 1)
     centres = joint_centres(arm, rows.x0[one], rows.alpha[one], rows.theta[one])[0]
     seen, path = _view(centres), _view(_thin(problem.path.corners))

@@ -3,10 +3,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from math import nan
+from math import inf, nan
 from typing import TypeAlias
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.notebook import Summarised, in_mm
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.trajectory import Trajectory
 
@@ -203,8 +204,8 @@ class ClearanceProfile:
     first_interval: IntArray
 
 
-@dataclass(frozen=True)
-class Verification:
+@dataclass(frozen=True, repr=False)
+class Verification(Summarised):
     """The judgement of one trajectory against one problem.
 
     Args:
@@ -213,7 +214,7 @@ class Verification:
         errors: The error box the clearance proof covers.
         pairs: Every pair judged, in the column order of the chunks.
         checks: One row per check, in a fixed order.
-        closest: The closest approaches over the whole motion, nearest first, one per
+        approaches: The closest approaches over the whole motion, nearest first, one per
             pair at most, ten at most; the first is the minimum clearance.
         profile: Brackets along the motion.
         tip_deviation: Bound of the distance from the desired path on the intervals
@@ -233,7 +234,7 @@ class Verification:
     errors: ErrorBox
     pairs: tuple[Pair, ...]
     checks: tuple[Check, ...]
-    closest: tuple[ClosestApproach, ...]
+    approaches: tuple[ClosestApproach, ...]
     profile: ClearanceProfile
     tip_deviation: float
     coverage: float
@@ -246,3 +247,25 @@ class Verification:
     def verdict(self) -> Verdict:
         """Certified only if every check is."""
         return combine(tuple(check.verdict for check in self.checks))
+
+    @property
+    def min_clearance(self) -> float:
+        """Proved least clearance from any obstacle, infinite without obstacles; [m]."""
+        near = (one.lower for one in self.approaches if one.pair.obstacle)
+        return min(near, default=inf)
+
+    def closest(self, count: int) -> tuple[ClosestApproach, ...]:
+        """The nearest approaches, obstacles first, `count` of them at most."""
+        return self.approaches[:count]
+
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """Verdict, clearance, and the checks that did not pass."""
+        bad = (c for c in self.checks if c.verdict is not Verdict.CERTIFIED)
+        rows = [
+            ("problem", self.problem.name),
+            ("verdict", self.verdict.value),
+            ("proved clearance", in_mm(self.min_clearance)),
+            ("waypoints", str(self.trajectory.n_samples)),
+            *((c.name, f"{c.verdict.value} {c.where}".strip()) for c in bad),
+        ]
+        return tuple(rows)

@@ -96,7 +96,7 @@ def verify(
         errors=box,
         pairs=proof.pairs,
         checks=tuple(checks),
-        closest=closest_approaches(problem, trajectory, proof),
+        approaches=closest_approaches(problem, trajectory, proof),
         profile=proof.profile,
         tip_deviation=tip.deviation,
         coverage=tip.coverage,

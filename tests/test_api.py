@@ -1,0 +1,138 @@
+"""The package from Python: every name, every example, and what is refused."""
+
+import ast
+import doctest
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import vdsm_pin as vp
+from vdsm_pin import api
+from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.errors import VerificationFailed
+from vdsm_pin.manipulator import paper_hole_angles
+
+
+def test_every_name_is_there_and_is_what_type_checkers_see() -> None:
+    tree = ast.parse(Path(vp.__file__).read_text(encoding="utf-8"))
+    imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    seen = {}
+    for node in imports:
+        for alias in node.names:
+            seen[alias.asname or alias.name] = node.module, alias.name
+    assert set(vp.__all__) <= set(seen)
+    for name in vp.__all__:
+        module, its_name = seen[name]
+        assert getattr(vp, name) is getattr(sys.modules[str(module)], its_name)
+        assert getattr(vp, name).__doc__
+    assert set(vp.__all__) <= set(dir(vp))
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'plam'"):
+        _ = vp.plam  # type: ignore[attr-defined]
+
+
+def test_importing_the_package_imports_nothing_heavy() -> None:
+    program = "import vdsm_pin, sys; print(*sys.modules)"
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert not {"numpy", "pydantic", "numba", "pinocchio"} & set(ended.stdout.split())
+
+
+def test_the_examples_do_what_they_say(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    found = doctest.testmod(api)
+    assert found.attempted > 15
+    assert found.failed == 0
+
+
+ARM = vp.Manipulator(
+    name="three",
+    link_lengths=np.array([0.4, 0.3, 0.3]),
+    link_radius=0.03,
+    max_link_angle=1.0,
+    max_joint_angle=0.9,
+    base_range=(-2.0, 2.0),
+    cables=vp.CableLayout(0.02, 0.01, paper_hole_angles(3)),
+)
+
+
+def in_python(name: str = "mine") -> vp.Problem:
+    path = vp.DesiredPath(
+        start=np.array([1.0, 0.0, 0.0]),
+        points=np.array([[1.0, 0.0, 0.0], [1.2, 0.0, 0.0]]),
+    )
+    ball = vp.Sphere("ball", np.array([0.6, 0.3, 0.0]), 0.1)
+    return vp.Problem(name, ARM, vp.Scene((ball,)), path, 0.01, np.eye(4))
+
+
+def test_a_problem_built_in_python_is_planned_verified_and_reported(
+    tmp_path: Path,
+) -> None:
+    problem = in_python()
+    plan = vp.plan(problem)
+    result = vp.verify(problem, plan.trajectory)
+    assert result.verdict is vp.Verdict.CERTIFIED
+    # The arm stays on the rail, 0.3 m from the ball's centre.
+    assert result.min_clearance == pytest.approx(0.3 - 0.1 - 0.03, abs=2e-6)
+    assert result.closest(1) == result.approaches[:1]
+    vp.write_report(result, tmp_path / "report.html")
+    assert "built in Python" in repr(problem)
+    assert "certified" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    file = tmp_path / "t.csv"
+    vp.write_trajectory(file, plan.trajectory)
+    with pytest.raises(vp.InvalidInput, match="this problem has none"):
+        vp.write_certificate(result, tmp_path / "c", file)
+
+
+def test_a_certificate_is_of_the_files_that_were_verified(tmp_path: Path) -> None:
+    problem = vp.read_problem("paper/free")
+    plan = vp.plan(problem, "paper")
+    result = vp.verify(problem, plan.trajectory)
+    file, certificate = tmp_path / "t.csv", tmp_path / "c"
+    vp.write_trajectory(file, plan.trajectory)
+    vp.write_certificate(result, certificate, file)
+    assert problem.source is not None
+    assert check_certificate(certificate, problem.source.path, file).accepted
+
+    vp.write_trajectory(file, plan.trajectory.part(0, 50))
+    with pytest.raises(vp.InvalidInput, match="another motion"):
+        vp.write_certificate(result, certificate, file)
+
+    changed = replace(problem, required_clearance=0.5)
+    assert changed.source is None  # it stands in no file
+    with pytest.raises(vp.InvalidInput, match="this problem has none"):
+        vp.write_certificate(vp.verify(changed, plan.trajectory), certificate, file)
+
+
+def test_no_certificate_of_what_is_not_certified(tmp_path: Path) -> None:
+    problem = vp.read_problem("paper/obs1")
+    straight = vp.plan(vp.read_problem("paper/free"), "paper").trajectory
+    result = vp.verify(problem, straight)
+    assert result.verdict is vp.Verdict.REFUTED
+    file = tmp_path / "t.csv"
+    vp.write_trajectory(file, straight)
+    with pytest.raises(VerificationFailed, match="refuted"):
+        vp.write_certificate(result, tmp_path / "c", file)
+    assert not (tmp_path / "c").exists()
+
+
+def test_results_show_themselves_in_a_few_lines() -> None:
+    problem = in_python("<b>&")
+    plan = vp.plan(problem)
+    result = vp.verify(problem, plan.trajectory)
+    for value in (problem, plan, plan.trajectory, result):
+        assert len(repr(value).splitlines()) < 15
+        assert len(repr(value)) < 1000
+        page = value._repr_html_()
+        assert "<b>" not in page
+    assert "169.999 mm" in repr(result)  # proved: rounded down
+    assert "&lt;b&gt;&amp;" in result._repr_html_()

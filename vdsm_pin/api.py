@@ -1,0 +1,246 @@
+"""The package from Python: plan, verify, write down. `import vdsm_pin` has all of it.
+
+>>> import vdsm_pin as vp
+>>> problem = vp.read_problem("paper/free")
+>>> plan = vp.plan(problem, strategy="paper")
+>>> result = vp.verify(problem, plan.trajectory)
+>>> result.verdict.value
+'certified'
+"""
+
+from math import radians
+from pathlib import Path
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.io import problem_file, trajectory_file
+from vdsm_pin.io.atomic import atomic_path
+from vdsm_pin.planner.records import Plan
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.records import ErrorBox, Verification
+
+PYTHON = "from Python"
+"""What a report names as command and problem file where there is none."""
+
+
+def read_problem(name_or_path: str | Path) -> PlanningProblem:
+    """The problem of a built-in name or a file.
+
+    Args:
+        name_or_path: Such as `paper/obs1` or `problems/mine.yaml`.
+
+    Returns:
+        The problem in metres, radians and the base frame (x along the rail).
+
+    Raises:
+        InvalidFile: If the file or its content breaks the contract of docs/files.md.
+
+    Example:
+        >>> read_problem("paper/obs1").manipulator.n_links
+        8
+    """
+    return problem_file.read_problem(name_or_path).problem
+
+
+def plan(
+    problem: PlanningProblem,
+    strategy: str = "fewest",
+    *,
+    time_limit: float | None = None,
+) -> Plan:
+    """Plan a motion and have it verified.
+
+    Args:
+        problem: What is asked.
+        strategy: `fewest`, `clearest`, `sturdiest` or `paper`.
+        time_limit: For planning; None for none; [s].
+
+    Returns:
+        A certified plan: `trajectory`, joint `centres` of shape (n_samples, N + 1, 3)
+        in metres, `cable_lengths` of shape (n_samples, N, 3) in metres, `notes`.
+
+    Raises:
+        UnknownName: If there is no such strategy.
+        Infeasible: If no certified plan was found.
+
+    Example:
+        >>> made = plan(read_problem("paper/free"), strategy="paper")
+        >>> made.cable_lengths.shape[1:]
+        (8, 3)
+    """
+    from vdsm_pin.refinement import plan_and_verify
+
+    robot = load_robot(problem.manipulator)
+    return plan_and_verify(problem, strategy, robot, time_limit=time_limit).plan
+
+
+def error_box(
+    *, joint_deg: float = 0.0, base_mm: float = 0.0, obstacle_mm: float = 0.0
+) -> ErrorBox:
+    """How far the real motion may stray from the nominal one.
+
+    Args:
+        joint_deg: Largest error of every joint angle; [deg].
+        base_mm: Largest error of x0; [mm].
+        obstacle_mm: Largest displacement of an obstacle's surface; [mm].
+
+    Example:
+        >>> error_box(base_mm=2.0).base
+        0.002
+    """
+    return ErrorBox(
+        joint=radians(joint_deg),
+        base=base_mm / MM_PER_M,
+        obstacle=obstacle_mm / MM_PER_M,
+    )
+
+
+def verify(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    *,
+    errors: ErrorBox | None = None,
+    joint_error: bool = False,
+) -> Verification:
+    """Judge a trajectory over continuous time, whoever made it.
+
+    Args:
+        problem: What is asked.
+        trajectory: Rows of joint values, joined by straight lines in joint space.
+        errors: The clearance is proved for every motion within it.
+        joint_error: Whether to look for the largest joint error that is certified.
+
+    Returns:
+        `verdict`, `min_clearance` in metres, `closest(count)`, `checks`.
+
+    Raises:
+        InvalidInput: If the trajectory is of another arm or an error is negative.
+
+    Example:
+        >>> problem = read_problem("paper/obs1")
+        >>> made = plan(problem)
+        >>> result = verify(problem, made.trajectory, errors=error_box(base_mm=0.1))
+        >>> result.verdict.value, result.min_clearance > 0.010
+        ('certified', True)
+        >>> result.closest(1)[0].pair.obstacle
+        'pillar'
+    """
+    from vdsm_pin.verification.verify import verify as judge
+
+    robot = load_robot(problem.manipulator)
+    return judge(problem, trajectory, robot, errors=errors, joint_error=joint_error)
+
+
+def write_report(result: Verification, path: str | Path) -> None:
+    """Write the report page of a verification: one file that works offline.
+
+    Args:
+        result: What `verify` returned.
+        path: The HTML file; it appears whole or not at all.
+
+    Raises:
+        InvalidFile: If the file cannot be written.
+
+    Example:
+        >>> problem = read_problem("paper/free")
+        >>> made = plan(problem, strategy="paper")
+        >>> write_report(verify(problem, made.trajectory), "out/api/report.html")
+    """
+    from vdsm_pin.report.facts import verification_file
+    from vdsm_pin.report.html import write_report as write
+    from vdsm_pin.report.run_record import RunRecord
+
+    source = result.problem.source
+    record = RunRecord(
+        command=PYTHON,
+        problem_file=str(source.path) if source else PYTHON,
+        problem_sha256=source.sha256 if source else "",
+        urdf_sha256=load_robot(result.problem.manipulator).urdf_sha256,
+    )
+    with atomic_path(path) as temporary:
+        write(temporary, result, verification_file(result, record))
+
+
+def write_certificate(
+    result: Verification, path: str | Path, trajectory: str | Path
+) -> None:
+    """Write the proof of a certified motion, for `vdsm check-certificate`.
+
+    Args:
+        result: What `verify` returned, of a problem that was read from a file.
+        path: The certificate; it appears whole or not at all.
+        trajectory: The file that holds `result.trajectory`, to whose bytes the
+            certificate is bound; `write_trajectory` writes it.
+
+    Raises:
+        InvalidInput: If the problem has no file, or the trajectory file holds another
+            motion.
+        VerificationFailed: If the motion is not certified.
+        InvalidFile: If a file cannot be read or written.
+
+    Example:
+        >>> problem = read_problem("paper/free")
+        >>> made = plan(problem, strategy="paper")
+        >>> write_trajectory("out/api/free.csv", made.trajectory)
+        >>> result = verify(problem, made.trajectory)
+        >>> write_certificate(result, "out/api/free.certificate", "out/api/free.csv")
+    """
+    from vdsm_pin.report.run_record import sha256_of
+    from vdsm_pin.verification import certificate_writer
+
+    problem, source = result.problem, result.problem.source
+    if source is None:
+        message = "a certificate is bound to a problem file; this problem has none"
+        raise InvalidInput(message)
+    if not _same(read_trajectory(trajectory, problem), result.trajectory):
+        message = f"{trajectory}: is another motion than the verified one"
+        raise InvalidInput(message)
+    hashes = certificate_writer.Hashes(
+        problem=source.sha256,
+        trajectory=sha256_of(Path(trajectory)),
+        urdf=load_robot(problem.manipulator).urdf_sha256,
+    )
+    certificate_writer.write_certificate(Path(path), result, hashes)
+
+
+def _same(one: Trajectory, other: Trajectory) -> bool:
+    return all(
+        np.array_equal(getattr(one, name), getattr(other, name))
+        for name in ("on_path", "path_m", "x0", "alpha", "theta")
+    )
+
+
+def read_trajectory(path: str | Path, problem: PlanningProblem) -> Trajectory:
+    """The trajectory of a CSV file (docs/files.md).
+
+    Args:
+        path: The file.
+        problem: Whose arm moves.
+
+    Raises:
+        InvalidFile: If the file breaks its contract or is of another arm.
+
+    Example:
+        >>> problem = read_problem("paper/free")
+        >>> write_trajectory("out/api/t.csv", plan(problem, "paper").trajectory)
+        >>> read_trajectory("out/api/t.csv", problem).n_links
+        8
+    """
+    return trajectory_file.read_trajectory(path, problem.manipulator)
+
+
+def write_trajectory(path: str | Path, trajectory: Trajectory) -> None:
+    """Write a trajectory as CSV, with digits that read back as the same doubles.
+
+    Args:
+        path: The file; it appears whole or not at all.
+        trajectory: What to write.
+
+    Raises:
+        InvalidFile: If the file cannot be written.
+    """
+    trajectory_file.write_trajectory(path, trajectory)

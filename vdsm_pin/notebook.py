@@ -1,0 +1,34 @@
+"""How results show themselves in a console and in a notebook."""
+
+from html import escape
+from math import isfinite
+
+from vdsm_pin.units import MM_PER_M
+
+
+class Summarised:
+    """A value whose `repr` and notebook view are a few lines, not its arrays."""
+
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """What a reader asks first: names and values in words."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        """The class, then a name and value a line."""
+        rows = self.summary()
+        width = max(len(name) for name, _ in rows)
+        lines = (f"  {name.ljust(width)}  {value}" for name, value in rows)
+        return "\n".join([type(self).__name__, *lines])
+
+    def _repr_html_(self) -> str:
+        """The same as a table."""
+        cells = (
+            f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>"
+            for name, value in self.summary()
+        )
+        return f"<table>{''.join(cells)}</table>"
+
+
+def in_mm(length: float) -> str:
+    """A length in words; [m] to mm."""
+    return f"{length * MM_PER_M:.3f} mm" if isfinite(length) else "-"
