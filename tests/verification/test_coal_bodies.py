@@ -199,11 +199,46 @@ def test_inside_a_solid_mesh_coal_speaks_of_its_skin_only() -> None:
 
 def test_a_shape_coal_refuses_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*arguments: object) -> None:
-        message = "QH6154 initial simplex is flat"
+        message = "the simplex is flat"
         raise RuntimeError(message)
 
-    monkeypatch.setattr(coal.Convex, "convexHull", refuse)
+    monkeypatch.setattr(coal, "Convex", refuse)
     triangle = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     prism = Prism("bar", np.zeros(3), np.eye(3), triangle, (0.0, 1.0))
     with pytest.raises(VerificationFailed, match=r"'bar': Coal refuses.*flat"):
         coal_bodies(prism)
+
+
+def random_prism(rng: np.random.Generator) -> Prism:
+    """Thick or flat, of three corners or of many, in any pose."""
+    corners = int(rng.choice([3, 4, 7, 40, 600]))
+    turns = np.sort(rng.uniform(0.0, 2.0 * np.pi, corners))
+    turns[:3] = np.array([0.0, 2.0, 4.0]) + rng.uniform(0.0, 1.0, 3)
+    turns = np.sort(turns)
+    flat = [1.0, 10.0 ** rng.uniform(-15, -1)][rng.integers(2)]
+    section = np.column_stack([np.cos(turns), flat * np.sin(turns)])
+    span = [1.0, 10.0 ** rng.uniform(-15, -1)][rng.integers(2)]
+    rotation = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    rotation *= np.linalg.det(rotation)
+    turned = section[:: int(rng.choice([-1, 1]))]
+    return Prism("bar", rng.uniform(-1, 1, 3), rotation, turned, (0.0, span))
+
+
+def test_flat_prisms_and_many_corners_are_measured() -> None:
+    """Coal's own hull ends the process where a body is flat, without a word."""
+    rng, request = np.random.default_rng(4), distance_request()
+    capsule, apart = coal.Capsule(RADIUS, 2.0 * HALF), 0
+    for _ in range(400):
+        prism, axis = random_prism(rng), unit(rng)
+        centre = rng.uniform(-2.0, 2.0, 3)
+        pose = coal.Transform3s(rotation_to(axis), centre)
+        found = measure(request, capsule, pose, coal_bodies(prism)).distance
+        ends = np.array([[centre - HALF * axis, centre + HALF * axis]])
+        pieces = pack_pieces([prism.pieces])
+        bracket = row_brackets(pieces, ends, np.zeros(1, np.int64), 1e-9)[0] - RADIUS
+        if bracket[0] > 0.0:
+            apart += 1
+            assert bracket[0] - 1e-7 < found < bracket[1] + 1e-7
+        else:
+            assert found < 1e-7
+    assert apart > 150

@@ -105,12 +105,11 @@ def _bodies(coal: Any, obstacle: Obstacle) -> tuple[CoalBody, ...]:
             body = coal.Halfspace(normal, float(normal @ obstacle.point))
             return (_placed(coal, body, np.zeros(3)),)
         case Prism():
-            return tuple(
-                _placed(
-                    coal, _hull(coal, _prism_corners(obstacle, section)), np.zeros(3)
-                )
+            parts = (
+                _swept(coal, _prism_corners(obstacle, section))
                 for section in obstacle.convex_sections
             )
+            return tuple(_placed(coal, part, np.zeros(3)) for part in parts)
         case Mesh():
             return (_placed(coal, _surface(coal, obstacle), np.zeros(3)),)
 
@@ -135,10 +134,25 @@ def _prism_corners(prism: Prism, section: FloatArray) -> FloatArray:
     return np.asarray(prism.origin + np.vstack(ends) @ prism.rotation.T)
 
 
-def _hull(coal: Any, corners: FloatArray) -> Any:
-    points = coal.StdVec_Vec3s()
+def _swept(coal: Any, corners: FloatArray) -> Any:
+    """A convex polygon swept along a line, by its corners at both ends, (2 k, 3).
+
+    Coal is told the faces: its own way to find them ends the process where the body
+    is flat. A corner may have below 256 neighbours, so the ends are cut in zigzag.
+    """
+    k = len(corners) // 2
+    zigzag = [i // 2 if i % 2 == 0 else k - 1 - i // 2 for i in range(k)]
+    faces: list[tuple[int, int, int]] = []
+    for i, (a, b, c) in enumerate(zip(zigzag, zigzag[1:], zigzag[2:], strict=False)):
+        low = (a, b, c) if i % 2 else (a, c, b)
+        faces += [low, (k + low[0], k + low[2], k + low[1])]
+    for i in range(k):
+        j = (i + 1) % k
+        faces += [(i, j, k + j), (i, k + j, k + i)]
+    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
     points.extend(list(corners))
-    return coal.Convex.convexHull(points, True, "Qt")
+    triangles.extend([coal.Triangle(*face) for face in faces])
+    return coal.Convex(points, triangles)
 
 
 def _surface(coal: Any, mesh: Mesh) -> Any:
