@@ -88,7 +88,7 @@ class ClearanceCsv(_OwnFile):
             for point in (chunk.link_point, chunk.other_point)
         ]
         table = np.concatenate([np.stack(columns, axis=2), *points], axis=2)
-        self._file.write(self._form.rows(table.reshape(n * m, -1)))
+        self._file.write(self._form.rows(table.reshape(n * m, table.shape[2])))
 
 
 def write_link_angles(path: Path, verification: Verification) -> None:
