@@ -19,6 +19,7 @@ LAYERS = {
     "units": 0,
     "kept": 0,
     "startup": 0,
+    "text": 0,
     "notebook": 1,
     "geometry": 1,
     "proof": 1.5,
@@ -49,7 +50,7 @@ ROBOTICS_ALLOWED = {"robot_model", "verification", "visualization", "cli"}
 MODULES = sorted(PACKAGE.rglob("*.py"))
 CHECKER = PACKAGE / "certificate_checker"
 READING = {
-    *("errors", "problem", "scene", "trajectory"),
+    *("errors", "problem", "scene", "text", "trajectory"),
     *("io.problem_file", "io.source", "io.trajectory_file"),
 }
 """What the certificate checker shares: files as they were read."""

@@ -189,7 +189,7 @@ def write_certificate(
         >>> result = verify(problem, made.trajectory)
         >>> write_certificate(result, "out/api/free.certificate", "out/api/free.csv")
     """
-    from vdsm_pin.report.run_record import sha256_of
+    from vdsm_pin.io.source import sha256_of_file
     from vdsm_pin.verification import certificate_writer
 
     problem, source = result.problem, result.problem.source
@@ -201,7 +201,7 @@ def write_certificate(
         raise InvalidInput(message)
     hashes = certificate_writer.Hashes(
         problem=source.sha256,
-        trajectory=sha256_of(Path(trajectory)),
+        trajectory=sha256_of_file(Path(trajectory)),
         urdf=load_robot(problem.manipulator).urdf_sha256,
     )
     certificate_writer.write_certificate(Path(path), result, hashes)

@@ -15,6 +15,7 @@ import typer
 from vdsm_pin.errors import InvalidInput, NoPlanFound, OutOfTime, VdsmError
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY, STRATEGIES
 from vdsm_pin.startup import live_briefly
+from vdsm_pin.text import printable, show_everything
 
 PASSED: Final = 0
 NOT_PASSED: Final = 1
@@ -327,6 +328,7 @@ def diff(
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the command; every error raised on purpose becomes one message."""
     live_briefly()
+    show_everything()
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         app(given, prog_name="vdsm", obj=shlex.join(["vdsm", *given]))
@@ -343,5 +345,5 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
 
 def _fail(error: Exception, status: int) -> NoReturn:
-    typer.echo(f"vdsm: {error}", err=True)
+    typer.echo(printable(f"vdsm: {error}"), err=True)
     sys.exit(status)

@@ -21,9 +21,15 @@
 Messages say what, where, how much and against what; the same facts are attributes.
 """
 
+from vdsm_pin.text import printable
+
 
 class VdsmError(Exception):
-    """Base of all errors raised on purpose."""
+    """Base of all errors raised on purpose; as text one line that can be shown."""
+
+    def __str__(self) -> str:
+        """The message, which may quote a file: every sign of it can be seen."""
+        return printable(super().__str__())
 
 
 class InvalidInput(VdsmError):

@@ -17,12 +17,13 @@ from pydantic import ValidationError
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.compiled import is_compiling
 from vdsm_pin.io.problem_file import ProblemFile
+from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.report.facts import plan_file, verification_file
 from vdsm_pin.report.files import PlanFile, VerificationFile
 from vdsm_pin.report.folder import check_output_file, check_output_folder, staged
 from vdsm_pin.report.pdf import find_browser, print_page
-from vdsm_pin.report.run_record import RunRecord, sha256_of
+from vdsm_pin.report.run_record import RunRecord
 from vdsm_pin.report.tables import ClearanceCsv, write_cables, write_link_angles
 from vdsm_pin.robot_model import RobotModel, load_robot
 from vdsm_pin.units import MM_PER_M
@@ -130,7 +131,7 @@ def plan_to_folder(
             command=command,
             problem_file=str(source.path),
             problem_sha256=source.sha256,
-            trajectory_sha256=sha256_of(aside / TRAJECTORY),
+            trajectory_sha256=sha256_of_file(aside / TRAJECTORY),
             urdf_sha256=robot.urdf_sha256,
         )
         file = plan_file(
@@ -196,7 +197,7 @@ def planned_by(trajectory: Path) -> PlanFile | None:
         plan = PlanFile.model_validate_json(beside.read_text(encoding="utf-8"))
     except (OSError, ValidationError, UnicodeDecodeError):
         return None
-    same = plan.hashes.trajectory_sha256 == sha256_of(trajectory)
+    same = plan.hashes.trajectory_sha256 == sha256_of_file(trajectory)
     return plan if same else None
 
 
@@ -218,6 +219,6 @@ def _record(order: VerifyOrder, robot: RobotModel) -> RunRecord:
         command=order.command,
         problem_file=str(order.source.path),
         problem_sha256=order.source.sha256,
-        trajectory_sha256=sha256_of(order.trajectory),
+        trajectory_sha256=sha256_of_file(order.trajectory),
         urdf_sha256=robot.urdf_sha256,
     )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Self
 from vdsm_pin.batch.task import Done
 from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.words import outcome, percent, quantity, term
+from vdsm_pin.text import printable
 from vdsm_pin.tolerances import TOLERANCES
 
 if TYPE_CHECKING:
@@ -51,22 +52,22 @@ class Progress:
         width = len(str(self._total))
         head = f"[{self._count:>{width}}/{self._total}]"
         verdict = f"{known.mark} {known.word:<10}"
-        tail = row.reason
+        tail = printable(row.reason)
         if known.passed:
             near = _said(row, "min_clearance_lower_m", "m")
             near = near if row.closest_link else "no obstacle"
             tail = f"{near}, {_said(row, 'max_link_angle_rad', 'rad')}"
             if row.coverage is not None and row.coverage < 1.0 - TOLERANCES.coverage:
                 tail += f", {percent(row.coverage)} drawn"
-        kept = " (kept)" if done.kept else ""
+        place = printable(row.folder) + (" (kept)" if done.kept else "")
         if self._bar is None:
-            sys.stdout.write(f"{head} {verdict} {row.folder}{kept}  {tail}\n")
+            sys.stdout.write(f"{head} {verdict} {place}  {tail}\n")
             sys.stdout.flush()
             return
         from rich.text import Text
 
         line = Text.assemble(
-            head + " ", (verdict, known.colour), f" {row.folder}{kept}  ", (tail, "dim")
+            head + " ", (verdict, known.colour), f" {place}  ", (tail, "dim")
         )
         self._bar.console.print(line)
         self._bar.advance(self._bar.task_ids[0])

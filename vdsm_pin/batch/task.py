@@ -12,11 +12,13 @@ from pydantic import ValidationError
 
 from vdsm_pin.errors import Infeasible, VdsmError
 from vdsm_pin.io.problem_file import ProblemFile, read_problem
+from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.report.facts import batch_row
 from vdsm_pin.report.files import BatchRow, ManifestFile, TimingFile
 from vdsm_pin.report.picture import picture
-from vdsm_pin.report.run_record import sha256_of, versions
+from vdsm_pin.report.run_record import versions
 from vdsm_pin.report.words import outcome
+from vdsm_pin.text import printable
 from vdsm_pin.workflow import TRAJECTORY, VerifyOrder, plan_to_folder, verify_to_folder
 
 MANIFEST: Final = "manifest.json"
@@ -114,10 +116,10 @@ def failed_row(task: Task, word: str, reason: str) -> BatchRow:
     return BatchRow.model_validate(
         {
             "folder": task.folder,
-            "problem": task.problem,
+            "problem": printable(task.problem),
             "strategy": task.strategy,
             "outcome": word,
-            "reason": reason,
+            "reason": printable(reason),
         }
     )
 
@@ -125,7 +127,7 @@ def failed_row(task: Task, word: str, reason: str) -> BatchRow:
 def write_manifest(task: Task, row: BatchRow, digest: str) -> None:
     """Write manifest.json, which makes the folder a finished one."""
     task.aside.mkdir(parents=True, exist_ok=True)
-    files = {path.name: sha256_of(path) for path in sorted(task.aside.iterdir())}
+    files = {path.name: sha256_of_file(path) for path in sorted(task.aside.iterdir())}
     manifest = ManifestFile(
         problem_sha256=digest, settings=task.settings, row=row, files=files
     )
@@ -138,7 +140,7 @@ def finished(task: Task, digest: str) -> BatchRow | None:
         text = (task.final / MANIFEST).read_text(encoding="utf-8")
         manifest = ManifestFile.model_validate_json(text)
         intact = all(
-            sha256_of(task.final / name) == expected
+            sha256_of_file(task.final / name) == expected
             for name, expected in manifest.files.items()
         )
     except (OSError, ValidationError, UnicodeDecodeError):

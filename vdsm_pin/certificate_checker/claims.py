@@ -164,8 +164,7 @@ class Check:
         if rows[0] == 0:
             base = [float(self.joints[0, 0]), 0.0, 0.0]
             for mesh in (one for one in self.solids if isinstance(one, Mesh)):
-                outside = mesh.excludes(base)
-                claim(outside, f"the arm is not proved outside {mesh.name}")
+                claim(mesh.excludes(base), f"the arm is not proved outside {mesh.name}")
         if on_path.all():
             tips = [pose.centres[-1] for pose in poses]
             self.drawing.draw(stations, tips, self.motion.bounds(0)[-1][0] / 8)

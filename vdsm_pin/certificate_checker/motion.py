@@ -74,7 +74,9 @@ class Interval:
         self._bounds: dict[int, list[tuple[Ball, Ball, Ball]]] = {}
 
     def pose(self, time: float) -> Pose:
-        """The configuration at a time in [0, 1]."""
+        """The configuration at a time in [0, 1]; pairs share most of their times."""
+        if len(self.poses) > 1_000:  # as many are held at a time
+            self.poses.clear()
         if time not in self.poses:
             steps = zip(self.start, self.change, strict=True)
             joints = [start + change * time for start, change in steps]

@@ -23,8 +23,7 @@ class Drawing:
         self.stations = [arb(0)]
         for a, b in pairwise(self.corners):
             self.stations.append(self.stations[-1] + norm(b - a))
-        self.length = self.stations[-1]
-        self.deviation = arb(0)
+        self.length, self.deviation = self.stations[-1], arb(0)
         self.stretches: list[tuple[Ball, Ball]] = []
         self.last: Ball | None = None  # station of the row before; None off the path
 
@@ -60,8 +59,7 @@ class Drawing:
         a, b = stations if self.closed else map(self.local, stations)
         start = a if self.last is None else self.last
         # The shorter way round; forwards where both are as long, as at an exact tie.
-        laps = -self.laps(self.length / 2 - (b - a))
-        stop = start + (b - a) - laps * self.length
+        stop = start + (b - a) + self.laps(self.length / 2 - (b - a)) * self.length
         if self.last is None:
             self.stretches.append((start, start))
         low, high = self.stretches[-1]
@@ -87,9 +85,8 @@ class Drawing:
         """Share of the path in the union of the stretches; never above the true one."""
         parts = []
         for low, high in self.stretches:
-            start = self.local(low)
-            stop = start + (high - low)
-            parts += [(start, stop), (arb(0), stop - self.length)]
+            start, size = self.local(low), high - low
+            parts += [(start, start + size), (arb(0), start + size - self.length)]
         total, reached = arb(0), arb(0)
         for start, stop in sorted(parts, key=lambda part: float(part[0])):
             # Only what lies beyond everything before it is added: none counts twice.

@@ -21,8 +21,9 @@ from vdsm_pin.certificate_checker.claims import Check
 from vdsm_pin.certificate_checker.solids import Mesh
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.io.source import check_is_file
+from vdsm_pin.io.source import bounded_lines, check_is_file, sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory
+from vdsm_pin.text import printable, show_everything
 
 PRECISION: Final = 128
 """Bits of a ball: lengths are known to about 1e-35 m."""
@@ -57,17 +58,20 @@ def _lines(path: Path) -> Iterator[dict[str, Any]]:
         Rejected: If the last line is missing, not the last or does not fit the others.
     """
     digest = hashlib.sha256()
-    with path.open("rb") as file:
-        for raw in file:
-            line = json.loads(raw.decode(), object_pairs_hook=_unique)
-            claim(isinstance(line, dict), "a line is not an object")
-            if "end" in line:
-                seal = {"end": True, "sha256": digest.hexdigest()}
-                fits = line == seal and raw.endswith(b"\n") and not file.read(1)
-                claim(fits, "the last line does not fit what is before or behind it")
-                return
-            digest.update(raw)
-            yield line
+    lines = bounded_lines(path)
+    for raw in lines:
+        lists = raw.count(b"[") + raw.count(b"{")
+        # An empty list takes 64 bytes when it is read, and 3 in the file.
+        claim(6 * lists <= max(len(raw), 4096), "a line is lists and no numbers")
+        line = json.loads(raw.decode(), object_pairs_hook=_unique)
+        claim(isinstance(line, dict), "a line is not an object")
+        if "end" in line:
+            seal = {"end": True, "sha256": digest.hexdigest()}
+            fits = line == seal and raw.endswith(b"\n") and not next(lines, b"")
+            claim(fits, "the last line does not fit what is before or behind it")
+            return
+        digest.update(raw)
+        yield line
     claim(False, "the last line is missing")
 
 
@@ -93,17 +97,16 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
     check_is_file(certificate)
     source = read_problem(problem)
     rows = read_trajectory(trajectory, source.problem.manipulator)
-    sha256, reason = hashlib.sha256(trajectory.read_bytes()).hexdigest(), ""
+    sha256, reason = sha256_of_file(trajectory), ""
     hashes = {"problem_sha256": source.sha256, "trajectory_sha256": sha256}
     with ctx.workprec(PRECISION):
         check = Check(source.problem, rows, hashes)
         try:
             check.run(_lines(certificate))
         except Rejected as error:
-            reason = f"{check.place}: {error}"
+            reason = printable(f"{check.place}: {error}")
         except DAMAGE as error:
-            text, at = " ".join(str(error).split()) or type(error).__name__, check.place
-            text = f"cannot be read as a certificate: {text}"
+            text, at = f"cannot be read as a certificate: {error}", check.place
             raise InvalidFile(file=certificate, where=at, problem=text) from None
     meshes = [mesh for mesh in check.solids if isinstance(mesh, Mesh)]
     surfaces = tuple(mesh.name for mesh in meshes if not mesh.has_inside)
@@ -119,6 +122,7 @@ def main(arguments: Sequence[str]) -> int:
     if len(arguments) != 3:
         sys.stderr.write("usage: check-certificate CERTIFICATE PROBLEM TRAJECTORY\n")
         return 2
+    show_everything()
     try:
         outcome = check_certificate(*map(Path, arguments))
     except InvalidInput as error:

@@ -73,14 +73,15 @@ class Solid:
             pieces: Corner numbers of polygons that make up the prism's section, all
                 of as many corners; or a permutation of the numbers of the triangles.
         """
-        numbers = np.array(pieces, dtype=int)
+        parts = f"pieces of {self.name} do not make up the whole"
         if self.ends is None:
-            whole = sorted(pieces) == [*range(len(self.points))]
-            self.points = self.points[numbers]
-        else:
-            whole = boundary(pieces) == boundary([range(self.ends.shape[1])])
-            self.points = np.concatenate(self.ends[:, numbers], axis=1)
-        claim(whole, f"pieces of {self.name} do not make up the whole")
+            claim(sorted(pieces) == [*range(len(self.points))], parts)
+            self.points = self.points[np.array(pieces, dtype=int)]
+            return
+        corners = range(self.ends.shape[1])
+        claim(sum(map(len, pieces)) <= 3 * len(corners), parts)  # as many as triangles
+        claim(boundary(pieces) == boundary([corners]), parts)
+        self.points = np.concatenate(self.ends[:, np.array(pieces, dtype=int)], axis=1)
 
 
 def boundary(loops: Iterable[Sequence[int]]) -> dict[tuple[int, int], int]:
@@ -126,22 +127,19 @@ class Mesh(Solid):
         return not self.has_inside
 
 
-def _ends(round_: scene.Capsule | scene.Cylinder) -> Any:
-    half = round_.half_length * round_.axis
-    return [[round_.centre - half, round_.centre + half]]
-
-
 def solid(obstacle: scene.Obstacle) -> Solid:
     """The solid of an obstacle as it was read."""
     name = obstacle.name
     match obstacle:
         case scene.Sphere():
             found = Solid(name, [[obstacle.centre]], radius=obstacle.radius)
-        case scene.Capsule():
-            found = Solid(name, _ends(obstacle), radius=obstacle.radius)
-        case scene.Cylinder():
-            found = Solid(name, _ends(obstacle))
-            found.disc = unit(column(*obstacle.axis.tolist())), arb(obstacle.radius)
+        case scene.Capsule() | scene.Cylinder():
+            half, radius = obstacle.half_length * obstacle.axis, arb(obstacle.radius)
+            found = Solid(name, [[obstacle.centre - half, obstacle.centre + half]])
+            if isinstance(obstacle, scene.Capsule):
+                found.radius = radius
+            else:
+                found.disc = unit(column(*obstacle.axis.tolist())), radius
         case scene.Box():
             corners = np.array([*product((-1, 1), repeat=3)]) * obstacle.half_size
             corners = obstacle.centre + corners @ obstacle.rotation.T

@@ -14,6 +14,9 @@ from vdsm_pin.errors import InvalidFile
 BLOCK: Final = 1 << 20
 """Bytes read at one time."""
 
+MAX_LINE: Final = 64 << 20
+"""Longest line that is read; [bytes]. The numbers of 5 million triangles have 40 MB."""
+
 
 class Digest(Protocol):
     """A hash that bytes can be added to."""
@@ -161,6 +164,38 @@ class _Hashed(io.RawIOBase):
         self._digest.update(view[:count])
         self._left -= count
         return count
+
+
+def bounded_lines(path: Path, *, limit: int = MAX_LINE) -> Iterator[bytes]:
+    """The lines of a file, one at a time, with their line ends.
+
+    Args:
+        path: The file.
+        limit: Longest line accepted; [bytes].
+
+    Raises:
+        InvalidFile: If a line is longer, or the file cannot be read.
+    """
+    number = 0
+    try:
+        with path.open("rb") as stream:
+            while line := stream.readline(limit + 1):
+                number += 1
+                if len(line) > limit:
+                    problem = f"is longer than {limit >> 20} MB, the most that is read"
+                    raise InvalidFile(
+                        file=path, where=f"line {number}", problem=problem
+                    )
+                yield line
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InvalidFile(file=path, problem=f"cannot be read: {reason}") from None
+
+
+def sha256_of_file(path: Path) -> str:
+    """SHA-256 of a file's bytes, read in blocks, in hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def sha256_of(parts: Iterable[bytes]) -> str:

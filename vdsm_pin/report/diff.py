@@ -12,6 +12,7 @@ from vdsm_pin.report.facts import batch_row
 from vdsm_pin.report.files import BatchRow, VerificationFile
 from vdsm_pin.report.tables import read_summary
 from vdsm_pin.report.words import outcome, quantity, term
+from vdsm_pin.text import printable
 from vdsm_pin.tolerances import TOLERANCES
 
 _ORDER: Final = (
@@ -87,7 +88,10 @@ def diff_lines(changes: Sequence[Change]) -> list[str]:
         return ["no difference"]
     ordered = sorted(changes, key=lambda change: not change.worse)
     lines = [
-        f"{'▼ worse ' if change.worse else '▲ better'}  {change.problem}: {change.what}"
+        printable(
+            f"{'▼ worse ' if change.worse else '▲ better'}  "
+            f"{change.problem}: {change.what}"
+        )
         for change in ordered
     ]
     worse = sum(change.worse for change in changes)

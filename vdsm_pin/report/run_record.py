@@ -1,15 +1,14 @@
 """What a report says about the run itself: inputs, versions, machine, command."""
 
-import hashlib
 import os
 import platform
 from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
-from pathlib import Path
 from typing import Final
 
 from vdsm_pin import __version__
+from vdsm_pin.text import printable
 
 _LIBRARIES: Final = ("pin", "coal", "numpy", "numba", "yourdfpy", "meshcat")
 
@@ -32,6 +31,11 @@ class RunRecord:
     trajectory_sha256: str = ""
     urdf_sha256: str = ""
 
+    def __post_init__(self) -> None:
+        """Spell what a file cannot hold: paths need not be text."""
+        for name in ("command", "problem_file"):
+            object.__setattr__(self, name, printable(getattr(self, name)))
+
 
 @cache
 def versions() -> dict[str, str]:
@@ -50,9 +54,3 @@ def machine() -> str:
     """The machine in one line: system, architecture, number of processors."""
     system = f"{platform.system()} {platform.machine()}"
     return f"{system}, {os.cpu_count() or 1} processors"
-
-
-def sha256_of(path: Path) -> str:
-    """SHA-256 of a file's bytes, read in blocks."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

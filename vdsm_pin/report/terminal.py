@@ -18,6 +18,7 @@ from vdsm_pin.report.words import (
     survived,
     term,
 )
+from vdsm_pin.text import printable
 
 
 def show_plan(file: PlanFile, folder: Path) -> None:
@@ -58,7 +59,7 @@ def show_verification(
         more: Names and values of further lines.
     """
     typer.echo(_headline(file.verdict, file.problem))
-    typer.echo(f"  {file.reason}")
+    typer.echo(f"  {printable(file.reason)}")
     if sys.stdout.isatty():
         _rich_checks(file)
     else:
@@ -76,13 +77,14 @@ def _facts(*rows: tuple[str, str]) -> None:
     """Names and values in two columns."""
     width = max(len(name) for name, _ in rows)
     for name, value in rows:
-        typer.echo(f"  {name:<{width}}  {value}")
+        typer.echo(f"  {name:<{width}}  {printable(value)}")
 
 
 def _headline(word: str, subject: str) -> str:
     known = outcome(word)
     colour = known.colour if sys.stdout.isatty() else None
-    return typer.style(f"{known.mark} {word}", fg=colour, bold=True) + f"  {subject}"
+    shown = printable(subject)
+    return typer.style(f"{known.mark} {word}", fg=colour, bold=True) + f"  {shown}"
 
 
 def _cells(check: CheckRow) -> tuple[str, str, str, str, str]:

@@ -1,0 +1,35 @@
+"""Text of unknown origin, made fit to be shown.
+
+Names, values and messages from files reach terminals and reports. A file may hold signs
+there that move a cursor, hide or turn text round, or that no encoding can write; every
+message passes through here first.
+"""
+
+import sys
+from typing import Final
+
+LONGEST: Final = 4_000
+"""Characters of one message; what a file holds may be longer."""
+
+
+def printable(text: str) -> str:
+    r"""One line in which every sign can be seen, for terminals and files.
+
+    Control signs, line ends, signs of no width, those that turn the direction and lone
+    surrogates are spelled as escapes, such as \x1b; what is too long is cut.
+    """
+    if len(text) > LONGEST:
+        text = f"{text[:LONGEST]}..."
+    if text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
+    )
+
+
+def show_everything() -> None:
+    """Let this process's output spell what the terminal's encoding cannot write."""
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure is not None:
+            reconfigure(errors="backslashreplace")
