@@ -1,5 +1,7 @@
 """Refinement: what is missing is added, and nothing uncertified is handed out."""
 
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +12,12 @@ from vdsm_pin.errors import Infeasible, NoPlanFound
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.paper.pipeline import plan_paper
-from vdsm_pin.planner.records import LinkClearance, Plan
+from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification import coal_clearance, coal_missing
+from vdsm_pin.verification.coal_clearance import CoalDistances, coal_distances
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import ErrorBox, Verdict
 from vdsm_pin.verification.robust import largest_joint_error
@@ -32,7 +36,7 @@ def test_missing_clearance_between_waypoints_is_added_to_the_margin(
     """Without its reserve the planner comes too close between waypoints."""
 
     def close(
-        problem: PlanningProblem, clearance: LinkClearance, margin: float
+        problem: PlanningProblem, clearance: LinkClearance, margin: Margin
     ) -> Plan:
         return plan_paper(problem, clearance, margin - TOLERANCES.planned_reserve)
 
@@ -42,9 +46,10 @@ def test_missing_clearance_between_waypoints_is_added_to_the_margin(
         problem, "paper", load_robot(problem.manipulator)
     )
     assert result.verification.verdict is Verdict.CERTIFIED
-    assert [one.verdict for one in result.rounds[:-1]] == [Verdict.REFUTED] * (
-        len(result.rounds) - 1
-    )
+    found_by = {one.measured_by for ended in result.rounds for one in ended.adjustments}
+    assert "proof" in found_by
+    assert all(one.adjustments for one in result.rounds[:-1])
+    assert not result.rounds[-1].adjustments
     assert len(result.rounds) >= 2  # between waypoints the bent arm swings closer
     margins = [one.margin for one in result.rounds]
     assert margins == sorted(margins)
@@ -58,7 +63,7 @@ def test_a_plan_that_cannot_be_certified_is_not_handed_out(
     """A planner that ignores the obstacle and the margin never gets through."""
 
     def blind(
-        problem: PlanningProblem, clearance: LinkClearance, margin: float
+        problem: PlanningProblem, clearance: LinkClearance, margin: Margin
     ) -> Plan:
         free = replace(problem, scene=read_problem("paper/free").problem.scene)
         return plan_paper(free, clearance, margin)
@@ -85,7 +90,7 @@ def test_of_rivals_the_one_that_is_proved_to_survive_most_is_taken(
     free = replace(task, scene=read_problem("paper/free").problem.scene)
 
     def boasting(
-        problem: PlanningProblem, clearance: LinkClearance, margin: float
+        problem: PlanningProblem, clearance: LinkClearance, margin: Margin
     ) -> Plan:
         lean, wide = (plan_fewest(problem, clearance, m) for m in (0.0, 0.03))
         blind = replace(plan_fewest(free, clearance, margin), problem=problem)
@@ -104,3 +109,69 @@ def test_of_rivals_the_one_that_is_proved_to_survive_most_is_taken(
     assert "of 3 plans" in result.plan.notes[-1]
     assert not result.plan.rivals
     assert result.verification.verdict is Verdict.CERTIFIED
+
+
+def off_by(error: float) -> Callable[..., Iterator[CoalDistances]]:
+    """Coal, with an error on every distance."""
+
+    def measured(*words: object) -> Iterator[CoalDistances]:
+        for found in coal_distances(*words):  # type: ignore[arg-type]
+            yield replace(found, distance=found.distance + error)
+
+    return measured
+
+
+@pytest.mark.parametrize("name", ["paper", "fewest"])
+def test_with_a_coal_that_reports_less_the_plan_keeps_so_much_more(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = replace(short("obs3"), required_clearance=0.010)
+    robot = load_robot(problem.manipulator)
+    honest = refinement.plan_and_verify(problem, name, robot)
+    assert not honest.rounds[0].adjustments
+    before = honest.verification.min_clearance
+    error = 0.005 + before - problem.required_clearance
+    monkeypatch.setattr(coal_missing, "coal_distances", off_by(-error))
+    careful = refinement.plan_and_verify(problem, name, robot)
+    assert careful.verification.min_clearance >= before + 0.005
+    first = careful.rounds[0]
+    assert first.verdict is None
+    assert {one.measured_by for one in first.adjustments} == {"Coal"}
+    assert "Coal measures" in careful.plan.notes[-1]
+
+
+def test_with_a_coal_that_reports_more_no_plan_is_returned(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem = short("obs3")
+    robot = load_robot(problem.manipulator)
+    for module in (coal_missing, coal_clearance):
+        monkeypatch.setattr(module, "coal_distances", off_by(0.005))
+    with pytest.raises(NoPlanFound, match="Coal"):
+        refinement.plan_and_verify(problem, "paper", robot)
+
+
+def test_without_coal_there_is_no_plan(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = short("obs3")
+    robot = load_robot(problem.manipulator)
+    monkeypatch.setitem(sys.modules, "coal", None)
+    with pytest.raises(ImportError):
+        refinement.plan_and_verify(problem, "paper", robot)
+
+
+def test_only_the_link_that_coal_names_gets_a_margin() -> None:
+    """A blunder of the planner at one link: the others keep what they had."""
+    problem = short("obs3")
+    robot = load_robot(problem.manipulator)
+    plan = plan_paper(problem, link_clearance(problem), 0.0)
+    margins = np.zeros((8, 1))
+    assert refinement._by_coal(robot, plan, margins) == ()
+    tight = replace(problem, required_clearance=0.0037)
+    found = refinement._by_coal(robot, replace(plan, problem=tight), margins)
+    links = {one.link for one in found}
+    assert links
+    assert links < set(range(1, 9))
+    raised = refinement._raised(tight, margins, found)
+    assert set(np.flatnonzero(raised[:, 0]) + 1) == links
+    for one in found:
+        assert one.margin > tight.required_clearance - one.distance > 0.0

@@ -1,24 +1,28 @@
-"""Plan, verify, plan again with a larger margin, until the proof goes through.
+"""Plan, measure, verify, plan again with larger margins, until the proof goes through.
 
-The planner looks at places of the motion; between them the arm swings, and only the
-verification (proved brackets over continuous time, with Coal as second opinion) knows
-by how much. What is missing is added to the margin of the next round. A motion that was
-not certified is never handed out as a plan.
+Coal measures every plan at its waypoints: a link that it finds nearer to an obstacle
+than required gets what is missing as a margin of its own from that obstacle, and the
+plan is made again. Between waypoints the arm swings, and only the verification (proved
+brackets over continuous time) knows by how much; what it finds missing is added in the
+same way. Coal proposes, the bracket proves: a motion with a failed check is never
+handed out as a plan.
 """
 
 import logging
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
 from vdsm_pin.errors import Infeasible, NoPlanFound
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.planner.time_limit import within_time
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import RobotModel
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.coal_missing import coal_missing
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import ErrorBox, Verdict, Verification
 from vdsm_pin.verification.robust import (
@@ -28,7 +32,7 @@ from vdsm_pin.verification.robust import (
 )
 from vdsm_pin.verification.verify import verify
 
-MAX_ROUNDS: Final = 6
+MAX_ROUNDS: Final = 8
 """Rounds before giving up."""
 
 OVERSHOOT: Final = 1.25
@@ -42,20 +46,46 @@ LOG: Final = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Round:
-    """One round of planning and verifying.
+class Adjustment:
+    """A margin that was raised after a round, and why.
 
     Args:
-        margin: What the strategy was asked to keep beyond the required clearance; [m].
-        verdict: What the verification said.
-        clearance: Proved smallest clearance to obstacles; infinite without any; [m].
+        moment: Where the clearance was missed, in waypoints of that round's motion.
+        link: 1 to N.
+        obstacle: Its name.
+        measured_by: "Coal" at a waypoint, or "proof" over an interval.
+        distance: What it found; [m].
+        margin: What the link keeps beyond the required clearance from now on; [m].
+    """
+
+    moment: float
+    link: int
+    obstacle: str
+    measured_by: Literal["Coal", "proof"]
+    distance: float
+    margin: float
+
+
+@dataclass(frozen=True)
+class Round:
+    """One round of planning, measuring and verifying.
+
+    Args:
+        margin: The largest that a link was asked to keep beyond the required
+            clearance; [m].
+        verdict: What the verification said; None where Coal found clearance missing
+            and nothing was proved.
+        clearance: Smallest clearance to obstacles, proved, or measured where nothing
+            was proved; infinite without any; [m].
         reason: Why the round ended as it did, one sentence.
+        adjustments: The margins that were raised after it.
     """
 
     margin: float
-    verdict: Verdict
+    verdict: Verdict | None
     clearance: float
     reason: str
+    adjustments: tuple[Adjustment, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -100,24 +130,84 @@ def plan_and_verify(
     plan_with = strategy(strategy_name)
     clearance = within_time(link_clearance(problem), time_limit)
     rounds: list[Round] = []
-    margin = 0.0
+    margins = np.zeros((problem.manipulator.n_links, len(problem.scene.obstacles)))
     while True:
         try:
-            plan = _chosen(plan_with(problem, clearance, margin))
+            plan = _chosen(plan_with(problem, clearance, margins.copy()))
         except Infeasible as error:
             if rounds:
                 error.args = (f"{error}; before that {_story(rounds)}",)
             raise
-        verification = verify(problem, plan.trajectory, robot)
-        rounds.append(_round(margin, verification))
-        LOG.info("margin %.6f m: %s", margin, rounds[-1].reason)
-        if verification.verdict in HANDED_OUT:
+        adjustments = _by_coal(robot, plan, margins)
+        if adjustments:
+            rounds.append(_measured(margins, adjustments))
+        else:
+            verification = verify(problem, plan.trajectory, robot)
+            adjustments = _by_proof(verification, margins)
+            rounds.append(_proved(margins, verification, adjustments))
+        LOG.info("margin %.6f m: %s", rounds[-1].margin, rounds[-1].reason)
+        if rounds[-1].verdict in HANDED_OUT:
             notes = plan.notes if len(rounds) == 1 else (*plan.notes, _story(rounds))
             return Refinement(replace(plan, notes=notes), verification, tuple(rounds))
-        missing = problem.required_clearance - rounds[-1].clearance
-        if not missing > 0.0 or len(rounds) == MAX_ROUNDS:
+        if not adjustments or len(rounds) == MAX_ROUNDS:
             raise NoPlanFound(_story(rounds))
-        margin += OVERSHOOT * missing + TOLERANCES.planned_clearance
+        margins = _raised(problem, margins, adjustments)
+
+
+def _by_coal(
+    robot: RobotModel, plan: Plan, margins: FloatArray
+) -> tuple[Adjustment, ...]:
+    """What Coal finds missing at the waypoints of a plan."""
+    problem = plan.problem
+    return tuple(
+        _adjustment(
+            problem, margins, float(one.waypoint), one.link, one.obstacle,
+            ("Coal", one.distance),
+        )
+        for one in coal_missing(robot, problem, plan.trajectory)
+    )  # fmt: skip
+
+
+def _by_proof(
+    verification: Verification, margins: FloatArray
+) -> tuple[Adjustment, ...]:
+    """What the proof finds missing over the intervals of a plan."""
+    problem = verification.problem
+    names = problem.scene.names
+    return tuple(
+        _adjustment(
+            problem, margins, near.moment, near.pair.link,
+            names.index(near.pair.obstacle), ("proof", near.lower),
+        )
+        for near in verification.approaches
+        if near.pair.obstacle and near.lower < problem.required_clearance
+    )  # fmt: skip
+
+
+def _adjustment(
+    problem: PlanningProblem,
+    margins: FloatArray,
+    moment: float,
+    link: int,
+    obstacle: int,
+    found: tuple[Literal["Coal", "proof"], float],
+) -> Adjustment:
+    measured_by, distance = found
+    missing = problem.required_clearance - distance
+    more = OVERSHOOT * missing + TOLERANCES.planned_clearance
+    margin = float(margins[link - 1, obstacle]) + more
+    name = problem.scene.names[obstacle]
+    return Adjustment(moment, link, name, measured_by, distance, margin)
+
+
+def _raised(
+    problem: PlanningProblem, margins: FloatArray, adjustments: tuple[Adjustment, ...]
+) -> FloatArray:
+    """The margins of the next round, shape (N, n_obstacles); [m]."""
+    raised = margins.copy()
+    for one in adjustments:
+        raised[one.link - 1, problem.scene.names.index(one.obstacle)] = one.margin
+    return raised
 
 
 def _chosen(plan: Plan) -> Plan:
@@ -140,8 +230,22 @@ def _chosen(plan: Plan) -> Plan:
     return replace(plans[best], notes=(*plans[best].notes, note), rivals=())
 
 
-def _round(margin: float, verification: Verification) -> Round:
-    """The round in numbers and words; the worst check that failed is its reason."""
+def _measured(margins: FloatArray, adjustments: tuple[Adjustment, ...]) -> Round:
+    """A round that Coal ended."""
+    worst = min(adjustments, key=lambda one: one.distance)
+    reason = (
+        f"Coal measures {worst.distance:.6g} m between link {worst.link} and "
+        f"{worst.obstacle} at waypoint {worst.moment:.0f}"
+    )
+    return Round(_largest(margins), None, worst.distance, reason, adjustments)
+
+
+def _proved(
+    margins: FloatArray,
+    verification: Verification,
+    adjustments: tuple[Adjustment, ...],
+) -> Round:
+    """A round that was verified; the worst check that failed is its reason."""
     failed = [
         check for check in verification.checks if check.verdict is not Verdict.CERTIFIED
     ]
@@ -153,14 +257,19 @@ def _round(margin: float, verification: Verification) -> Round:
             f"{check.name}: {check.verdict} with {check.worst:.6g} {check.unit} "
             f"against {check.limit:.6g} {check.unit}"
         )
-    return Round(margin, verification.verdict, verification.min_clearance, reason)
+    verdict, clearance = verification.verdict, verification.min_clearance
+    return Round(_largest(margins), verdict, clearance, reason, adjustments)
+
+
+def _largest(margins: FloatArray) -> float:
+    return float(margins.max(initial=0.0))
 
 
 def _story(rounds: list[Round]) -> str:
     """The rounds in one sentence."""
     parts = [
-        f"round {k} with a margin of {one.margin * 1e3:.3f} mm was {one.verdict} "
-        f"({one.reason})"
+        f"round {k} with a margin of {one.margin * 1e3:.3f} mm was "
+        f"{one.verdict or 'too near'} ({one.reason})"
         for k, one in enumerate(rounds, start=1)
     ]
     return "; ".join(parts)

@@ -134,9 +134,7 @@ def plan_to_folder(
             trajectory_sha256=sha256_of_file(aside / TRAJECTORY),
             urdf_sha256=robot.urdf_sha256,
         )
-        file = plan_file(
-            refinement.plan, refinement.verification, len(refinement.rounds), record
-        )
+        file = plan_file(refinement, record)
         (aside / PLAN).write_text(file.text(), encoding="utf-8")
     return file
 

@@ -11,6 +11,7 @@ import pytest
 
 from vdsm_pin.errors import UnknownName
 from vdsm_pin.planner.records import Plan, TipPath
+from vdsm_pin.refinement import Adjustment, Refinement, Round
 from vdsm_pin.report.facts import batch_row, plan_file, verification_file
 from vdsm_pin.report.files import (
     SCHEMA_NAMES,
@@ -47,8 +48,14 @@ def test_plan_and_manifest_fit_their_schemas() -> None:
     tip = TipPath(np.zeros((rows.n_samples, 3)), rows.on_path, rows.path_m)
     zero = np.zeros((rows.n_samples, 8, 3))
     plan = Plan(judged.problem, "paper", tip, zero, rows, zero, ("a note",))
-    file = plan_file(plan, judged, 2, made_up.RECORD)
+    raised = Adjustment(3.0, 7, "pillar", "Coal", 0.001, 0.0032)
+    first = Round(0.0, None, 0.001, "too near", (raised,))
+    rounds = (first, Round(0.0032, judged.verdict, 0.0035, "every check passed"))
+    file = plan_file(Refinement(plan, judged, rounds), made_up.RECORD)
     jsonschema.validate(json.loads(file.text()), schema("plan"))
+    assert file.rounds == 2
+    assert file.adjustments[0].round == 1
+    assert file.adjustments[0].link == 7
     row = batch_row("made-up", "paper", written(judged))
     manifest = ManifestFile(
         problem_sha256="1", settings={"strategy": "paper"}, row=row, files={"a": "b"}

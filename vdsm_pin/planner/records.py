@@ -71,6 +71,10 @@ class Plan(Summarised):
         )
 
 
+Margin: TypeAlias = float | FloatArray
+"""What a plan keeps beyond the required clearance: one number, or one for each link and
+obstacle, shape (N, n_obstacles); [m]."""
+
 LinkClearance: TypeAlias = Callable[[FloatArray], FloatArray]
 """Joint centres (n, m + 1, 3) to proved lower bounds of the clearance between each of m
 links in a row and the nearest obstacle surface (n, m); [m]. Links may be any straight

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Final, TypeAlias, cast
 from vdsm_pin.errors import UnknownName
 
 if TYPE_CHECKING:
-    from vdsm_pin.planner.records import LinkClearance, Plan
+    from vdsm_pin.planner.records import LinkClearance, Margin, Plan
     from vdsm_pin.problem import PlanningProblem
 
-Strategy: TypeAlias = "Callable[[PlanningProblem, LinkClearance, float], Plan]"
+Strategy: TypeAlias = "Callable[[PlanningProblem, LinkClearance, Margin], Plan]"
 """(problem, clearance, margin) -> plan. `margin` is what the strategy shall keep beyond
 the required clearance [m]; the refinement raises it where verification asks for it."""
 

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import asdict, dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.files import (
+    AdjustmentRow,
     BatchRow,
     CheckRow,
     ClosestRow,
@@ -36,6 +37,9 @@ from vdsm_pin.verification.records import (
     Verdict,
     Verification,
 )
+
+if TYPE_CHECKING:  # whoever verifies needs no planner
+    from vdsm_pin.refinement import Refinement
 
 _CHUNK: Final = 65_536  # rows treated at once, so that memory stays bounded
 _PASSED: Final = Verdict.CERTIFIED
@@ -298,10 +302,9 @@ def tolerances() -> dict[str, ToleranceRow]:
     return {name: ToleranceRow(value=values[name], unit=UNITS[name]) for name in values}
 
 
-def plan_file(
-    plan: Plan, verification: Verification, rounds: int, record: RunRecord
-) -> PlanFile:
-    """plan.json of one plan and the verification it was accepted with."""
+def plan_file(refinement: "Refinement", record: RunRecord) -> PlanFile:
+    """plan.json of one plan, its rounds and the verification it was accepted with."""
+    plan, verification = refinement.plan, refinement.verification
     return PlanFile(
         problem=plan.problem.name,
         strategy=plan.strategy,
@@ -309,7 +312,20 @@ def plan_file(
         reason=plan_reason(plan, verification),
         undrawn=plan.undrawn,
         notes=plan.notes,
-        rounds=rounds,
+        rounds=len(refinement.rounds),
+        adjustments=tuple(
+            AdjustmentRow(
+                round=number,
+                moment=one.moment,
+                link=one.link,
+                obstacle=one.obstacle,
+                measured_by=one.measured_by,
+                distance_m=finite(one.distance),
+                margin_m=one.margin,
+            )
+            for number, ended in enumerate(refinement.rounds, start=1)
+            for one in ended.adjustments
+        ),
         coverage=finite(verification.coverage),
         motion=motion_facts(plan.trajectory),
         hashes=hashes(record),

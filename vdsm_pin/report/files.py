@@ -195,6 +195,23 @@ class VerificationFile(FileModel):
     command: str = Field(description=_COMMAND)
 
 
+class AdjustmentRow(FileModel):
+    """A margin that was raised because a link missed the required clearance."""
+
+    round: int = Field(description="after which round of planning, from 1")
+    moment: FiniteFloat = Field(description=f"where it was missed; {_MOMENT}")
+    link: int = Field(description=_LINK)
+    obstacle: str = Field(description="name of the obstacle")
+    measured_by: Literal["Coal", "proof"] = Field(
+        description="Coal at a waypoint, or the proof over an interval"
+    )
+    distance_m: FiniteFloat | None = Field(description="what it found")
+    margin_m: FiniteFloat = Field(
+        description="kept by this link from this obstacle beyond the required "
+        "clearance in the next round"
+    )
+
+
 class PlanFile(FileModel):
     """plan.json."""
 
@@ -207,7 +224,10 @@ class PlanFile(FileModel):
         description="stretches of the desired path not drawn, and why"
     )
     notes: tuple[str, ...] = Field(description="what the strategy has to say")
-    rounds: int = Field(description="rounds of plan, verify, larger margins")
+    rounds: int = Field(description="rounds of plan, measure, verify, larger margins")
+    adjustments: tuple[AdjustmentRow, ...] = Field(
+        default=(), description="margins raised between rounds, and what asked for it"
+    )
     coverage: FiniteFloat | None = Field(description=_COVERAGE)
     motion: MotionFacts
     hashes: Hashes

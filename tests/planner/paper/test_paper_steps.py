@@ -135,7 +135,7 @@ def test_joints_end_outside_the_region_or_in_proportion(kind: str) -> None:
     tip = tip[~region.contains(tip)]
     up = np.array([0.0, 1.0])
     for direction in (up, None):
-        planar = slide_joints(HRM8, tip, region, 1, direction)
+        planar = slide_joints(HRM8, tip, region, np.zeros(8), 1, direction)
         moved = 0
         for i in range(8, 1, -1):
             reference = HRM8.ratio(i, i + 1) * planar[:, i]
@@ -155,11 +155,26 @@ def test_joints_end_outside_the_region_or_in_proportion(kind: str) -> None:
         assert moved > 100
 
 
+def test_a_margin_moves_the_joints_of_its_link_alone() -> None:
+    """Link 5 keeps 20 mm more: its joints, 5 and 6, slide on a boundary farther out."""
+    region, up = disc(0.7, 0.6, 0.302), np.array([0.0, 1.0])
+    tip = np.array([[1.0, 0.6 + np.sqrt(0.302**2 - 0.3**2)]])
+    margins = np.zeros(8)
+    before = slide_joints(HRM8, tip, region, margins, 1, up)
+    margins[4] = 0.020
+    after = slide_joints(HRM8, tip, region, margins, 1, up)
+    gaps = np.linalg.norm(after[0, 3:8] - [0.7, 0.6], axis=1)
+    # Joints 4 to 8 slide; 4 follows 5 in proportion unless it is inside again.
+    np.testing.assert_allclose(gaps[[1, 2]], 0.322, atol=1e-12)
+    np.testing.assert_allclose(gaps[[3, 4]], 0.302, atol=1e-12)
+    np.testing.assert_array_equal(after[0, 6:], before[0, 6:])
+
+
 def test_figure_8_only_deviated_joints_bend() -> None:
     """obs1, tip at A5: P_8..P_4 on the boundary, P_3 and P_2 in proportion (6.2.1)."""
     region = disc(0.7, 0.6, 0.302)
     tip = np.array([[1.0, 0.6 + np.sqrt(0.302**2 - 0.3**2)]])
-    planar = slide_joints(HRM8, tip, region, 1, np.array([0.0, 1.0]))
+    planar = slide_joints(HRM8, tip, region, np.zeros(8), 1, np.array([0.0, 1.0]))
     centres = lift(HRM8, planar, np.array([3.126]))
     psi = np.rad2deg(link_angles(*joint_angles(HRM8, centres)))[0]
     np.testing.assert_array_equal(psi > 1e-6, [1, 0, 0, 1, 1, 1, 1, 1])

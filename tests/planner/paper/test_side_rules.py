@@ -29,6 +29,9 @@ CORES = {
     "triangle": [[0.35, 0.3], [0.5, 0.4], [0.4, 0.55]],
 }
 
+NONE = np.zeros(8)
+"""No margins."""
+
 
 def score(
     problem: PlanningProblem,
@@ -48,6 +51,7 @@ def score(
                 least_cosine(arm),
                 forbidden.corners,
                 forbidden.radius,
+                NONE,
                 swing,
             )
             count = len(able) if able.all() else int(np.argmin(able))
@@ -71,7 +75,7 @@ def best_of_all(
     best = (-1, 0.0)
     for numbers in (range(CROSS), range(CROSS, len(lines))):
         for k, region in product(numbers, regions):
-            rule = SideRule(region, side, lines[k])
+            rule = SideRule(region, side, lines[k], NONE)
             mine = score(problem, forbidden, rule, sequences)
             best = max(best, mine)
             if k < CROSS and mine[0] == sum(map(len, sequences)):
@@ -91,7 +95,7 @@ def test_no_rule_left_early_would_have_won(core: str, side: int) -> None:
             ends = rng.uniform([0.8, 0.3], [1.3, 1.3], (2, 2))
             part = np.linspace(0.0, 1.0, rng.integers(20, 60))[:, None]
             sequences.append(ends[0] + part * (ends[1] - ends[0]))
-        rule = choose_rule(problem, forbidden, [forbidden], side, sequences)
+        rule = choose_rule(problem, forbidden, [forbidden], side, sequences, NONE)
         mine = score(problem, forbidden, rule, sequences)
         assert mine == pytest.approx(
             best_of_all(problem, forbidden, side, sequences), abs=1e-12
@@ -101,7 +105,7 @@ def test_no_rule_left_early_would_have_won(core: str, side: int) -> None:
 def test_nothing_wanted_takes_the_first_rule() -> None:
     problem = read_problem("paper/obs1").problem
     forbidden = DangerRegion("disc", np.array(CORES["disc"]), 0.1)
-    rule = choose_rule(problem, forbidden, [forbidden], 1, [])
+    rule = choose_rule(problem, forbidden, [forbidden], 1, [], NONE)
     assert rule.region.radius == forbidden.radius
 
 

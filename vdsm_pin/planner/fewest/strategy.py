@@ -30,7 +30,7 @@ from vdsm_pin.planner.fewest.unbend import (
     with_unbending,
 )
 from vdsm_pin.planner.fewest.widest import drawn_length, widest
-from vdsm_pin.planner.records import LinkClearance, Plan, TipPath
+from vdsm_pin.planner.records import LinkClearance, Margin, Plan, TipPath
 from vdsm_pin.planner.start import check_start
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
@@ -41,34 +41,38 @@ CLEAREST: Final = Taste(angle=0.2, room=0.2, room_cost=8.0)
 
 
 def plan_fewest(
-    problem: PlanningProblem, clearance: LinkClearance, margin: float
+    problem: PlanningProblem, clearance: LinkClearance, margin: Margin
 ) -> Plan:
     """A plan that draws all it can with as few changed link angles as it finds.
 
     Args:
         problem: What is asked.
         clearance: Clearance of links at given joint centres.
-        margin: Kept beyond the required clearance; [m].
+        margin: Kept beyond the required clearance, the largest by every link; [m].
 
     Raises:
         Infeasible: With the proof where there is one, else `NoPlanFound`.
     """
-    return _plan(problem, clearance, margin, "fewest", FEWEST)
+    return _plan(problem, clearance, _largest(margin), "fewest", FEWEST)
+
+
+def _largest(margin: Margin) -> float:
+    return float(np.max(margin, initial=0.0))
 
 
 def plan_clearest(
-    problem: PlanningProblem, clearance: LinkClearance, margin: float
+    problem: PlanningProblem, clearance: LinkClearance, margin: Margin
 ) -> Plan:
     """The plan with the largest clearance found, at the price of straight joints.
 
     Arguments and errors are those of `plan_fewest`.
     """
-    search = _Search(problem, clearance, margin, "clearest", CLEAREST)
+    search = _Search(problem, clearance, _largest(margin), "clearest", CLEAREST)
     plans, reserve = search.clearer(search.plan())
     plan = plans[-1]
     if not problem.scene.obstacles:
         return plan
-    most = problem.required_clearance + margin + reserve
+    most = search.kept + reserve
     note = (
         f"of the plans tried none with a clearance above {most * 1e3:.1f} mm draws as "
         "much"
@@ -77,7 +81,7 @@ def plan_clearest(
 
 
 def plan_sturdiest(
-    problem: PlanningProblem, clearance: LinkClearance, margin: float
+    problem: PlanningProblem, clearance: LinkClearance, margin: Margin
 ) -> Plan:
     """The plan thought to survive the largest error of all joints, and its rivals.
 
@@ -85,7 +89,7 @@ def plan_sturdiest(
     who can prove what a motion survives has the choice. Arguments and errors are those
     of `plan_fewest`.
     """
-    lean = _Search(problem, clearance, margin, "sturdiest", FEWEST)
+    lean = _Search(problem, clearance, _largest(margin), "sturdiest", FEWEST)
     wide = replace(lean, taste=CLEAREST)
     found = _if_found(wide.plan)
     if not found:

@@ -46,6 +46,7 @@ class AcrossRail:
         axis: 0 where w is y, 1 where w is z.
         side: The arm passes at larger w (1) or at smaller w (-1).
         bend: Joint b that moves, 2..N.
+        margins: How far the region is grown for each link, shape (N,); [m].
     """
 
     problem: PlanningProblem
@@ -53,12 +54,13 @@ class AcrossRail:
     axis: int
     side: int
     bend: int
+    margins: FloatArray
 
     def route(self, missing: float) -> Route:
         """Step 4: as without obstacles; the tip itself must stay clear."""
         route = straight_route(self.problem.path)
         points = route.tip_path.points[:, [0, 1 + self.axis]]
-        inside = self.region.contains(points)
+        inside = self.region.grown(self.margins[-1]).contains(points)
         if inside.any():
             waypoint = int(np.argmax(inside))
             reason = (
@@ -69,10 +71,11 @@ class AcrossRail:
         return route
 
     def clearance(self, centres: FloatArray) -> float:
-        """From the section and its lee, taken as endless, less the margin."""
+        """From the section and its lee, taken as endless, less the margins."""
         chains = np.ascontiguousarray(centres[..., [0, 1 + self.axis]])
         reserve = self.region.radius - planned_gap(self.problem)
-        return float(self.region.core_distance(chains).min()) - reserve
+        distance = self.region.link_distances(chains) - self.margins
+        return float(distance.min()) - reserve
 
     def joints(self, route: Route, reference: FloatArray) -> FloatArray:
         """Step 5: the bend moves as little as clears the region."""
@@ -90,7 +93,7 @@ class AcrossRail:
         """Smallest move of the bend that clears the region, (n,); [m]."""
         moves = least_moves(
             self.region.corners,
-            self.region.radius,
+            self._radii,
             self._pieces,
             self.axis,
             reference[:, self.bend - 1],
@@ -136,7 +139,7 @@ class AcrossRail:
         """Whether the arm of one bend stays out of the region, (n,)."""
         return clear_bends(
             self.region.corners,
-            self.region.radius,
+            self._radii,
             self._pieces,
             self.axis,
             planar[:, self.bend - 1],
@@ -148,6 +151,13 @@ class AcrossRail:
     def _pieces(self) -> FloatArray:
         """Lengths of the two straight pieces, shape (2,); [m]."""
         return np.diff(self.problem.manipulator.stations[[0, self.bend - 1, -1]])
+
+    @property
+    def _radii(self) -> FloatArray:
+        """Radius of the region for each of the two straight pieces, shape (2,); [m]."""
+        b = self.bend - 1
+        margins = self.margins[:b].max(), self.margins[b:].max()
+        return self.region.radius + np.array(margins)
 
     def largest_angle(self, points: FloatArray) -> float:
         """Largest link angle with the tip at points; infinite where there is none.
@@ -176,7 +186,7 @@ class AcrossRail:
 
 
 def across_rail(
-    problem: PlanningProblem, section: Section, axis: str, margin: float
+    problem: PlanningProblem, section: Section, axis: str, margins: FloatArray
 ) -> Iterator[AcrossRail]:
     """Choices for one obstacle prismatic along Y or Z, the least bent first.
 
@@ -184,10 +194,10 @@ def across_rail(
         problem: What was asked.
         section: The obstacle's section in the view (x, w).
         axis: "y" or "z", along which it is prismatic.
-        margin: Kept beyond the required clearance; [m].
+        margins: Kept beyond the required clearance by each link, shape (N,); [m].
     """
     manipulator = problem.manipulator
-    growth = grown_by(problem, margin)
+    growth = grown_by(problem)
     which = VIEWS[axis][1] - 1
     points = drawn_rows(problem.path, 0.0).points
     points = points[:: max(1, len(points) // TRIAL_ROWS)]
@@ -196,7 +206,7 @@ def across_rail(
     for side in (first, -first):
         region = _with_lee(section, growth, side, problem)
         choices = [
-            AcrossRail(problem, region, which, side, bend)
+            AcrossRail(problem, region, which, side, bend, margins)
             for bend in range(2, manipulator.n_links + 1)
         ]
         yield from sorted(choices, key=lambda choice: choice.largest_angle(points))

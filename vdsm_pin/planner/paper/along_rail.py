@@ -42,22 +42,24 @@ class AlongRail:
         forbidden: The region no part of a link's axis may enter.
         region: The danger region of the tip; it holds those of both sides.
         rules: The rule of each side, by 1 and -1.
+        margins: How far `forbidden` is grown for each link, shape (N,); [m].
     """
 
     problem: PlanningProblem
     forbidden: DangerRegion
     region: DangerRegion
     rules: dict[int, SideRule]
+    margins: FloatArray
 
     def route(self, missing: float) -> Route:
         """Step 4."""
         return detour_route(self.problem.path, self.region, self.stands, missing)
 
     def clearance(self, centres: FloatArray) -> float:
-        """From the section, taken as endless along the rail, less the margin."""
-        distance = self.forbidden.core_distance(project(centres)).min()
+        """From the section, taken as endless along the rail, less the margins."""
+        distance = self.forbidden.link_distances(project(centres)) - self.margins
         reserve = self.forbidden.radius - planned_gap(self.problem)
-        return float(distance) - reserve
+        return float(distance.min()) - reserve
 
     def joints(self, route: Route, reference: FloatArray) -> FloatArray:
         """Step 5: the joints slide where the arm passes the obstacle."""
@@ -75,19 +77,19 @@ class AlongRail:
 
 
 def along_rail(
-    problem: PlanningProblem, section: Section, margin: float
+    problem: PlanningProblem, section: Section, margins: FloatArray
 ) -> Iterator[AlongRail]:
     """Choices for one obstacle prismatic along X, the paper's own first.
 
     Args:
         problem: What was asked.
         section: The obstacle's section in the plane Y0Z0.
-        margin: Kept beyond the required clearance; [m].
+        margins: Kept beyond the required clearance by each link, shape (N,); [m].
 
     Raises:
         PathBlocked: If the rail or the start lies in the danger region.
     """
-    growth = grown_by(problem, margin)
+    growth = grown_by(problem)
     forbidden = _grown(section, growth)
     for what, point in (
         ("the rail", np.zeros(2)),
@@ -101,10 +103,10 @@ def along_rail(
             )
             raise PathBlocked(obstacle=section.name, reason=reason)
     shapes = _shapes(problem, section, growth)
-    yield _choice(problem, forbidden, shapes)
+    yield _choice(problem, forbidden, shapes, margins)
     if len(shapes) > 1:
         for shape in shapes[::-3]:
-            yield _choice(problem, forbidden, [shape])
+            yield _choice(problem, forbidden, [shape], margins)
 
 
 def _shapes(
@@ -125,21 +127,25 @@ def _grown(section: Section, growth: float) -> DangerRegion:
 
 
 def _choice(
-    problem: PlanningProblem, forbidden: DangerRegion, shapes: list[DangerRegion]
+    problem: PlanningProblem,
+    forbidden: DangerRegion,
+    shapes: list[DangerRegion],
+    margins: FloatArray,
 ) -> AlongRail:
     """For each side the rule that brings the tip farthest along its path."""
     sequences = _sequences(problem, shapes[0])
     rules = {
-        side: choose_rule(problem, forbidden, shapes, side, sequences[side])
+        side: choose_rule(problem, forbidden, shapes, side, sequences[side], margins)
         for side in (1, -1)
     }
     # Blunter shapes hold sharper ones, grown ones those less grown.
     regions = [rule.region for rule in rules.values()]
     bluntest = max(regions, key=lambda r: _rank(r, shapes))
     grown = max(r.radius - shapes[_rank(r, shapes)].radius for r in regions)
-    radius = shapes[_rank(bluntest, shapes)].radius + grown
+    # The tip ends the last link, whose margin it keeps.
+    radius = shapes[_rank(bluntest, shapes)].radius + grown + margins[-1]
     region = DangerRegion(forbidden.name, bluntest.corners, radius)
-    return AlongRail(problem, forbidden, region, rules)
+    return AlongRail(problem, forbidden, region, rules, margins)
 
 
 def _sequences(

@@ -34,7 +34,7 @@ class Avoidance(Protocol):
         ...
 
     def clearance(self, centres: FloatArray) -> float:
-        """Smallest clearance at joint centres (n, N + 1, 3), less any margin; [m]."""
+        """Smallest clearance at joint centres (n, N + 1, 3), less the margins; [m]."""
         ...
 
     def joints(self, route: Route, reference: FloatArray) -> FloatArray:
@@ -57,18 +57,23 @@ class Straight:
     Args:
         problem: What was asked.
         link_clearance: Clearance of every link at given joint centres.
+        margins: Kept beyond the required clearance by each link, shape (N,); [m].
     """
 
     problem: PlanningProblem
     link_clearance: LinkClearance
+    margins: FloatArray
 
     def clearance(self, centres: FloatArray) -> float:
         """By the function handed in; a few waypoints tell where it is hopeless."""
         if not self.problem.scene.obstacles:
             return np.inf
         needed = self.problem.required_clearance
-        few = float(self.link_clearance(centres[::SPARSE]).min())
-        return few if few < needed else float(self.link_clearance(centres).min())
+        few = self._least(centres[::SPARSE])
+        return few if few < needed else self._least(centres)
+
+    def _least(self, centres: FloatArray) -> float:
+        return float((self.link_clearance(centres) - self.margins).min())
 
     def route(self, missing: float) -> Route:
         """Step 4 without obstacles: the whole path."""
@@ -79,7 +84,7 @@ class Straight:
         return reference
 
 
-def avoidances(problem: PlanningProblem, margin: float) -> Iterator[Avoidance]:
+def avoidances(problem: PlanningProblem, margins: FloatArray) -> Iterator[Avoidance]:
     """Every way the paper's rule offers to go round the scene's obstacle.
 
     A body that is prismatic along several axes is tried along X first, where only its
@@ -87,7 +92,7 @@ def avoidances(problem: PlanningProblem, margin: float) -> Iterator[Avoidance]:
 
     Args:
         problem: What was asked.
-        margin: Kept beyond the required clearance; [m].
+        margins: Kept beyond the required clearance by each link, shape (N,); [m].
 
     Raises:
         NoPlanFound: If the paper's rule does not cover the scene.
@@ -113,9 +118,9 @@ def avoidances(problem: PlanningProblem, margin: float) -> Iterator[Avoidance]:
             continue
         try:
             if axis == "x":
-                yield from along_rail(problem, section, margin)
+                yield from along_rail(problem, section, margins)
             else:
-                yield from across_rail(problem, section, axis, margin)
+                yield from across_rail(problem, section, axis, margins)
         except Infeasible as error:
             refusal = refusal or error
     if refusal is not None:

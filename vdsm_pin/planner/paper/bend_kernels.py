@@ -10,7 +10,7 @@ from vdsm_pin.planner.paper.region_kernels import keeps_out
 @compiled
 def _clear(
     corners: FloatArray,
-    radius: float,
+    radii: FloatArray,
     lengths: FloatArray,
     axis: int,
     bend: FloatArray,
@@ -27,15 +27,15 @@ def _clear(
         return False
     bend_x = tip_x - np.sqrt(second)
     base_x = bend_x - np.sqrt(first)
-    return keeps_out(corners, radius, base_x, 0.0, bend_x, along) and keeps_out(
-        corners, radius, bend_x, along, tip_x, tip[axis]
+    return keeps_out(corners, radii[0], base_x, 0.0, bend_x, along) and keeps_out(
+        corners, radii[1], bend_x, along, tip_x, tip[axis]
     )
 
 
 @compiled
 def clear_bends(
     corners: FloatArray,
-    radius: float,
+    radii: FloatArray,
     lengths: FloatArray,
     axis: int,
     bends: FloatArray,
@@ -46,7 +46,7 @@ def clear_bends(
 
     Args:
         corners: Of the region in the view (x, w), shape (m, 2); [m].
-        radius: Of the region; [m].
+        radii: Of the region for each straight piece, shape (2,); [m].
         lengths: Of the two straight pieces, shape (2,); [m].
         axis: 0 where w is y, 1 where w is z.
         bends: Projected bend P_b, shape (n, 2); P_1 is the origin; [m].
@@ -56,7 +56,7 @@ def clear_bends(
     able = np.zeros(len(tips), np.bool_)
     for k in range(len(tips)):
         able[k] = _clear(
-            corners, radius, lengths, axis, bends[k], 0.0, tips[k], tip_x[k]
+            corners, radii, lengths, axis, bends[k], 0.0, tips[k], tip_x[k]
         )
     return able
 
@@ -64,7 +64,7 @@ def clear_bends(
 @compiled
 def least_moves(
     corners: FloatArray,
-    radius: float,
+    radii: FloatArray,
     lengths: FloatArray,
     axis: int,
     bends: FloatArray,
@@ -78,7 +78,7 @@ def least_moves(
 
     Args:
         corners: As in `clear_bends`, and all up to `tip_x`.
-        radius: As there.
+        radii: As there.
         lengths: As there.
         axis: As there.
         bends: As there.
@@ -94,9 +94,7 @@ def least_moves(
         for step in range(1, scan + 1):
             part = step / scan
             move = part * farthest[k]
-            if _clear(
-                corners, radius, lengths, axis, bends[k], move, tips[k], tip_x[k]
-            ):
+            if _clear(corners, radii, lengths, axis, bends[k], move, tips[k], tip_x[k]):
                 high = part
                 break
             low = part
@@ -105,9 +103,7 @@ def least_moves(
         for _ in range(halvings):
             middle = 0.5 * (low + high)
             move = middle * farthest[k]
-            if _clear(
-                corners, radius, lengths, axis, bends[k], move, tips[k], tip_x[k]
-            ):
+            if _clear(corners, radii, lengths, axis, bends[k], move, tips[k], tip_x[k]):
                 high = middle
             else:
                 low = middle

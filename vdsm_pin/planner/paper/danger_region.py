@@ -49,9 +49,20 @@ class DangerRegion:
         """Straight parts of the boundary, shape (n, 2 ends, 2); [m]."""
         return frozen(sides_of(self.corners, self.radius))
 
+    def grown(self, margin: float) -> "DangerRegion":
+        """The same region, farther out by a margin; [m]."""
+        return DangerRegion(self.name, self.corners, self.radius + margin)
+
     def core_distance(self, chains: FloatArray) -> FloatArray:
         """Distance of polylines to the core, shape (n, m, 2) to (n,); [m]."""
         return core_distances(self.corners, read_only(chains))
+
+    def link_distances(self, chains: FloatArray) -> FloatArray:
+        """Distance of each link of polylines to the core, (n, m, 2) to (n, m - 1)."""
+        links = [
+            self.core_distance(chains[:, i : i + 2]) for i in range(chains.shape[1] - 1)
+        ]
+        return np.stack(links, axis=1)
 
     def contains(self, points: FloatArray) -> BoolArray:
         """Whether points lie inside, shape (n, 2) to (n,); the boundary is outside."""

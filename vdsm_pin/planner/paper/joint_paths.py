@@ -17,6 +17,7 @@ def slide_joints(
     manipulator: Manipulator,
     tip: FloatArray,
     region: DangerRegion,
+    margins: FloatArray,
     side: int,
     direction: FloatArray | None,
 ) -> FloatArray:
@@ -30,6 +31,7 @@ def slide_joints(
         manipulator: The arm with its ratios.
         tip: Projected tip P_{N+1}, shape (n_samples, 2); [m].
         region: The danger region, in the plane Y0Z0.
+        margins: How far it is grown for each link, shape (N,); [m].
         side: On which side of the region the arm passes, 1 for the larger polar angle
             about P_1, -1 for the smaller.
         direction: The auxiliary lines, a unit vector towards that side, shape (2,); or
@@ -42,5 +44,5 @@ def slide_joints(
     planar[:, -1] = tip
     line = np.zeros(2) if direction is None else direction
     ratios = chain_ratios(manipulator)
-    slide_chains(region.corners, region.radius, ratios, side, line, planar)
+    slide_chains(region.corners, region.radius, ratios, margins, side, line, planar)
     return planar

@@ -15,7 +15,7 @@ from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.scale import scale
 from vdsm_pin.planner.paper.solve import solve
 from vdsm_pin.planner.paper.tip_path import Route, subdivided
-from vdsm_pin.planner.records import LinkClearance, Plan
+from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.planner.spacing import row_steps
 from vdsm_pin.planner.start import check_start
 from vdsm_pin.problem import Blocked, PlanningProblem
@@ -46,7 +46,7 @@ class Motion:
 
 
 def plan_paper(
-    problem: PlanningProblem, clearance: LinkClearance, margin: float
+    problem: PlanningProblem, clearance: LinkClearance, margin: Margin
 ) -> Plan:
     """Plan by the paper's seven steps.
 
@@ -64,7 +64,7 @@ def plan_paper(
     _check_straight(problem)
     check_feasibility(problem.manipulator, problem.path)
     check_start(problem, clearance)
-    motion = _best_motion(problem, clearance, margin)
+    motion = _best_motion(problem, clearance, _by_link(problem, margin))
     trajectory = motion.trajectory
     cables = cable_lengths(problem.manipulator, trajectory.alpha, trajectory.theta)
     return Plan(
@@ -81,6 +81,13 @@ def plan_paper(
         ),
         motion.route.notes,
     )
+
+
+def _by_link(problem: PlanningProblem, margin: Margin) -> FloatArray:
+    """The largest margin of each link from any obstacle, shape (N,); [m]."""
+    shape = problem.manipulator.n_links, max(1, len(problem.scene.obstacles))
+    given = np.zeros(shape) if np.size(margin) == 0 else np.broadcast_to(margin, shape)
+    return np.array(given.max(axis=1))
 
 
 def _check_straight(problem: PlanningProblem) -> None:
@@ -103,7 +110,7 @@ def _check_straight(problem: PlanningProblem) -> None:
 def _best_motion(
     problem: PlanningProblem,
     clearance: LinkClearance,
-    margin: float,
+    margins: FloatArray,
     reserve: float = 0.0,
 ) -> Motion:
     """The first motion that draws the whole path, else the one that draws most.
@@ -111,16 +118,16 @@ def _best_motion(
     Args:
         problem: What is asked.
         clearance: Clearance of every link at given joint centres.
-        margin: Aimed at beyond the required clearance; [m].
-        reserve: Part of the margin that rows between judged ones may use up; [m].
+        margins: Aimed at beyond the required clearance by each link, shape (N,); [m].
+        reserve: Part of the margins that rows between judged ones may use up; [m].
     """
-    straight = Straight(problem, clearance)
+    straight = Straight(problem, clearance, margins)
     motion = _motion(problem, straight, straight.route(np.inf))
-    if straight.clearance(motion.centres) >= problem.required_clearance + margin:
+    if straight.clearance(motion.centres) >= problem.required_clearance:
         return motion
     best: Motion | None = None
     missing, reason, grazing = np.inf, None, np.inf
-    for avoidance in avoidances(problem, margin):
+    for avoidance in avoidances(problem, margins):
         try:
             route = avoidance.route(missing)  # Step 4
             motion = _motion(problem, avoidance, route)
@@ -134,7 +141,7 @@ def _best_motion(
         if missing == 0.0:
             break
     if best is None and reserve == 0.0 and grazing <= GRAZE:
-        return _best_motion(problem, clearance, margin + GRAZE, GRAZE)
+        return _best_motion(problem, clearance, margins + GRAZE, GRAZE)
     if best is None:
         raise reason or NoPlanFound("the paper's rule offers no way round")
     _refuse_gaps(problem, best)

@@ -92,9 +92,9 @@ def section_along(obstacle: Obstacle, axis: str) -> Section | None:
     return Section(obstacle.name, ring, 0.0)
 
 
-def grown_by(problem: PlanningProblem, margin: float) -> float:
+def grown_by(problem: PlanningProblem) -> float:
     """How far the axis of a link stays from an obstacle's surface; [m]."""
-    return problem.manipulator.link_radius + planned_gap(problem) + margin
+    return problem.manipulator.link_radius + planned_gap(problem)
 
 
 def planned_gap(problem: PlanningProblem) -> float:

@@ -49,16 +49,13 @@ class SideRule:
         side: 1 or -1.
         direction: The auxiliary line, a unit vector towards the side, shape (2,); None
             for circles about P_1; [-].
+        margins: How far the region is grown for each link, shape (N,); [m].
     """
 
     region: DangerRegion
     side: int
     direction: FloatArray | None
-
-    @property
-    def line(self) -> FloatArray:
-        """The direction as the kernels take it: zero for circles, shape (2,); [-]."""
-        return np.zeros(2) if self.direction is None else self.direction
+    margins: FloatArray
 
 
 def choose_rule(
@@ -67,6 +64,7 @@ def choose_rule(
     shapes: list[DangerRegion],
     side: int,
     sequences: list[FloatArray],
+    margins: FloatArray,
 ) -> SideRule:
     """The paper's cross where it does all that is wanted, else the best line.
 
@@ -77,6 +75,7 @@ def choose_rule(
         side: 1 or -1.
         sequences: Projected tips wanted on this side, going into the shadow, shape
             (n, 2) each; [m].
+        margins: How far regions are grown for each link, shape (N,); [m].
 
     Returns:
         The rule that brings the tip farthest; of several, the one that shortens the
@@ -95,19 +94,19 @@ def choose_rule(
         np.concatenate([np.zeros((0, 2)), *sequences]),
         np.cumsum([0, *map(len, sequences)]),
         COARSE,
-        np.array([SideRule(shapes[0], side, line).line for line in lines]),
+        np.array([np.zeros(2) if line is None else line for line in lines]),
         cores,
         n_corners,
         np.array([region.radius for region in regions]),
         np.array(numbers),
         n_cross,
         side,
-        (chain_ratios(arm), arm.link_lengths, least_cosine(arm)),
+        (chain_ratios(arm), arm.link_lengths, margins, least_cosine(arm)),
         (forbidden.corners, forbidden.radius),
         LARGEST_SWING,
     )
     line, number = numbers[chosen]
-    return SideRule(regions[number], side, lines[line])
+    return SideRule(regions[number], side, lines[line], margins)
 
 
 def _regions(
@@ -146,7 +145,9 @@ def anchors(problem: PlanningProblem) -> FloatArray:
 
 def slid(manipulator: Manipulator, tip: FloatArray, rule: SideRule) -> FloatArray:
     """Step 5 by one rule: tip (n, 2) to joints (n, N + 1, 2); [m]."""
-    return slide_joints(manipulator, tip, rule.region, rule.side, rule.direction)
+    return slide_joints(
+        manipulator, tip, rule.region, rule.margins, rule.side, rule.direction
+    )
 
 
 def least_cosine(manipulator: Manipulator) -> float:
@@ -178,5 +179,6 @@ def stands(
         least_cosine(manipulator),
         forbidden.corners,
         forbidden.radius,
+        rule.margins,
         LARGEST_SWING,
     )

@@ -19,6 +19,7 @@ def slide_chain(
     sides: FloatArray,
     radius: float,
     ratios: FloatArray,
+    margins: FloatArray,
     side: int,
     direction: FloatArray,
     bearing: float,
@@ -28,14 +29,18 @@ def slide_chain(
     ux, uy = direction[0], direction[1]
     for i in range(ratios.shape[0] - 1, 0, -1):
         x, y = ratios[i] * chain[i + 1, 0], ratios[i] * chain[i + 1, 1]
-        if point_to_core(corners, x, y) < radius:
+        # Joint i ends link i - 1 and begins link i: the larger margin counts.
+        margin = max(margins[i - 1], margins[i])
+        reach = radius + margin
+        if point_to_core(corners, x, y) < reach:
+            edge = sides if margin == 0.0 else sides_of(corners, reach)
             if ux == 0.0 and uy == 0.0:
                 circle = np.hypot(x, y)
-                turn = reach_along_circle(corners, sides, radius, circle, bearing, side)
+                turn = reach_along_circle(corners, edge, reach, circle, bearing, side)
                 x = circle * np.cos(bearing + side * turn)
                 y = circle * np.sin(bearing + side * turn)
             else:
-                far = leave_along(corners, sides, radius, x, y, ux, uy)
+                far = leave_along(corners, edge, reach, x, y, ux, uy)
                 x, y = x + far * ux, y + far * uy
         chain[i, 0], chain[i, 1] = x, y
 
@@ -45,6 +50,7 @@ def slide_chains(
     corners: FloatArray,
     radius: float,
     ratios: FloatArray,
+    margins: FloatArray,
     side: int,
     direction: FloatArray,
     planar: FloatArray,
@@ -55,6 +61,7 @@ def slide_chains(
         corners: Of the region, shape (c, 2); [m].
         radius: Of the region; [m].
         ratios: k_{i,i+1} for i = 1..N (Eq. 6), shape (N,); [-].
+        margins: How far the region is grown for each link, shape (N,); [m].
         side: 1 or -1.
         direction: Auxiliary line, a unit vector, shape (2,); zero for circles about the
             origin; [-].
@@ -64,7 +71,9 @@ def slide_chains(
     sides = sides_of(corners, radius)
     bearing = np.arctan2(corners[:, 1].mean(), corners[:, 0].mean())
     for k in range(planar.shape[0]):
-        slide_chain(corners, sides, radius, ratios, side, direction, bearing, planar[k])
+        slide_chain(
+            corners, sides, radius, ratios, margins, side, direction, bearing, planar[k]
+        )
 
 
 @compiled
@@ -74,6 +83,7 @@ def extent_of(
     least_cosine: float,
     corners: FloatArray,
     radius: float,
+    margins: FloatArray,
     links: FloatArray,
 ) -> float:
     """Extent of one configuration along X; -1 where it cannot be taken; [m].
@@ -84,6 +94,7 @@ def extent_of(
         least_cosine: Cosine of the largest link angle; [-].
         corners: Of the region the links keep out of, shape (c, 2); [m].
         radius: Of that region; [m].
+        margins: How far the region is grown for each link, shape (N,); [m].
         links: Set to the directions of the links, shape (N, 3); [-].
     """
     extent = 0.0
@@ -98,7 +109,7 @@ def extent_of(
         if not cosine >= least_cosine:
             return -1.0
         a, b = chain[i], chain[i + 1]
-        if not keeps_out(corners, radius, a[0], a[1], b[0], b[1]):
+        if not keeps_out(corners, radius + margins[i], a[0], a[1], b[0], b[1]):
             return -1.0
         extent += lengths[i] * links[i, 0]
     return extent
@@ -111,6 +122,7 @@ def standing(
     least_cosine: float,
     corners: FloatArray,
     radius: float,
+    margins: FloatArray,
     largest_swing: float,
 ) -> BoolArray:
     """Which configurations can be taken, neighbours following each other, (n,).
@@ -122,7 +134,9 @@ def standing(
     before = np.zeros((lengths.shape[0], 3))
     here = np.zeros((lengths.shape[0], 3))
     for k in range(planar.shape[0]):
-        extent = extent_of(planar[k], lengths, least_cosine, corners, radius, here)
+        extent = extent_of(
+            planar[k], lengths, least_cosine, corners, radius, margins, here
+        )
         able[k] = extent > 0.0
         if able[k] and k > 0 and able[k - 1]:
             able[k] = np.abs(here - before).max() <= largest_swing

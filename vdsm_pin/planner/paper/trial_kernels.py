@@ -9,9 +9,9 @@ from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.planner.paper.region_kernels import sides_of
 from vdsm_pin.planner.paper.sliding_kernels import extent_of, slide_chain
 
-Arm: TypeAlias = tuple[FloatArray, FloatArray, float]
-"""k_{i,i+1} for i = 1..N (Eq. 6) and the links' lengths, (N,) each, and the cosine of
-the largest link angle; [-], [m], [-]."""
+Arm: TypeAlias = tuple[FloatArray, FloatArray, FloatArray, float]
+"""k_{i,i+1} for i = 1..N (Eq. 6), the links' lengths and margins, (N,) each, and the
+cosine of the largest link angle; [-], [m], [m], [-]."""
 
 Core: TypeAlias = tuple[FloatArray, float]
 """Corners of a region, shape (n, 2), and its radius; [m]."""
@@ -50,16 +50,18 @@ def _reach(
         The count, and the largest shortening of the arm along X among them; [m].
     """
     corners, sides, radius, bearing = region
-    ratios, lengths, least_cosine = arm
+    ratios, lengths, margins, least_cosine = arm
     n_links = lengths.shape[0]
     chain = np.zeros((n_links + 1, 2))
     before, here = np.zeros((n_links, 3)), np.zeros((n_links, 3))
     total, shortening = lengths.sum(), 0.0
     for k in range(0, tip.shape[0], stride):
         chain[n_links] = tip[k]
-        slide_chain(corners, sides, radius, ratios, side, direction, bearing, chain)
+        slide_chain(
+            corners, sides, radius, ratios, margins, side, direction, bearing, chain
+        )
         extent = extent_of(
-            chain, lengths, least_cosine, forbidden[0], forbidden[1], here
+            chain, lengths, least_cosine, forbidden[0], forbidden[1], margins, here
         )
         if extent < 0.0:
             return k, shortening

@@ -1,0 +1,83 @@
+"""What Coal finds missing at the rows of a planned motion: it steers the planner.
+
+Coal measures, the planner moves joints, the proof judges: nothing here is a verdict.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.coal_clearance import CoalDistances, coal_distances
+
+NEAR: Final = 0.5
+"""Pairs are measured up to this part of the body's radius past the required clearance;
+[-]."""
+
+
+@dataclass(frozen=True)
+class Missing:
+    """A link that comes nearer to an obstacle than required, where it comes nearest.
+
+    Args:
+        waypoint: Row of the trajectory, from 0.
+        link: 1 to N.
+        obstacle: Number of the obstacle in the scene, from 0.
+        distance: What Coal measures; [m].
+        normal: Unit vector from the obstacle to the link between Coal's witness points,
+            shape (3,); zero where they coincide; [-].
+    """
+
+    waypoint: int
+    link: int
+    obstacle: int
+    distance: float
+    normal: FloatArray
+
+
+def coal_missing(
+    robot: RobotModel, problem: PlanningProblem, trajectory: Trajectory
+) -> tuple[Missing, ...]:
+    """Links that miss the required clearance at a row, as Coal measures it.
+
+    Args:
+        robot: The arm in Pinocchio and Coal.
+        problem: The scene and the required clearance.
+        trajectory: Every row is looked at.
+
+    Returns:
+        One entry for each link and obstacle that come too near, at their worst row, in
+        the order of links and obstacles. A distance that Coal cannot tell is no reason
+        to move: the proof decides.
+    """
+    if not problem.scene.obstacles:
+        return ()
+    reach = problem.required_clearance + NEAR * problem.manipulator.link_radius
+    worst: dict[tuple[int, int], Missing] = {}
+    for found in coal_distances(robot, problem, trajectory, reach):
+        for k in np.flatnonzero(found.distance < problem.required_clearance):
+            if not np.isfinite(found.distance[k]):
+                continue
+            one = _missing(found, int(k))
+            key = one.link, one.obstacle
+            if key not in worst or one.distance < worst[key].distance:
+                worst[key] = one
+    return tuple(worst[key] for key in sorted(worst))
+
+
+def _missing(found: CoalDistances, k: int) -> Missing:
+    towards = found.link_point[k] - found.other_point[k]
+    # Inside each other the witness points lie the other way round.
+    towards = towards if found.distance[k] >= 0.0 else -towards
+    length = float(np.linalg.norm(towards))
+    return Missing(
+        waypoint=int(found.waypoint[k]),
+        link=int(found.link[k]) + 1,
+        obstacle=int(found.obstacle[k]),
+        distance=float(found.distance[k]),
+        normal=towards / length if length > 0.0 else np.zeros(3),
+    )
