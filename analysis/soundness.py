@@ -176,7 +176,7 @@ def whole(batch: Batch) -> tuple[Any, Any]:
         name="queries",
         manipulator=arm,
         scene=Scene(tuple(bodies)),
-        path=DesiredPath(tip, tip[None]),
+        tip_path=DesiredPath(tip, tip[None]),
         required_clearance=clearance,
         T_world_base=np.eye(4),
         required_self_clearance=between,

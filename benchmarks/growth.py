@@ -51,7 +51,7 @@ def at_waypoints(n: int, folder: Path) -> Runs:
         return joint_centres(ARM, joints[0], *angles_from_cables(ARM, lengths))
 
     obs1 = read_problem("paper/obs1").problem
-    drawn = replace(obs1, path=replace(obs1.path, spacing=obs1.path.length / n))
+    drawn = replace(obs1, tip_path=replace(obs1.path, spacing=obs1.path.length / n))
     clearance = link_clearance(drawn)
     return {
         "plan paper/obs1": lambda: plan_paper(drawn, clearance, 0.0),

@@ -225,6 +225,39 @@ def test_a_tip_that_strays_between_rows_is_rejected(tmp_path: Path) -> None:
     assert "tip_deviation_m" in refused(case)
 
 
+def test_a_motion_that_shall_draw_nothing_claims_nothing_of_a_path(
+    tmp_path: Path,
+) -> None:
+    data = {key: value for key, value in STRAIGHT.items() if key != "tip_path"}
+    case = Case(tmp_path, data, straight_rows([0.0, 0.1]), NO_ERRORS)
+    assert (case.lines[0]["coverage"], case.lines[0]["tip_deviation_m"]) == (None, None)
+    assert judge(case).accepted
+    for key in ("coverage", "tip_deviation_m"):
+        claimed = edited(case, lambda lines, key=key: lines[0].update({key: 0.0}))
+        assert "the problem has none" in refused(case, sealed(claimed))
+
+
+def test_a_path_cannot_be_claimed_away(tmp_path: Path) -> None:
+    case = Case(tmp_path, STRAIGHT, straight_rows([0.0, 0.1]), NO_ERRORS)
+    assert judge(case).accepted
+    none = {"coverage": None, "tip_deviation_m": None}
+    away = edited(case, lambda lines: lines[0].update(none))
+    refused(case, sealed(away))
+
+
+@pytest.mark.parametrize(("on_path", "good"), [([0, 1], True), ([0, 0], False)])
+def test_one_row_draws_a_path_of_one_point(
+    on_path: list[int], good: bool, tmp_path: Path
+) -> None:
+    path = {"start": [1, 0, 0], "points": [[1.1, 0, 0]]}
+    data, q = STRAIGHT | {"tip_path": path}, straight_rows([0.0, 0.1])
+    case = Case(tmp_path, data, q, NO_ERRORS, on_path=on_path, path_m=[0.0, 0.0])
+    if good:
+        assert judge(case).accepted
+    else:
+        assert "coverage" in refused(case)
+
+
 # ---- meshes and their inside ---------------------------------------------------------
 
 

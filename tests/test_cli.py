@@ -17,6 +17,7 @@ import jsonschema
 import pytest
 from problem_files import BEHIND_A_WALL, NEAR, OUT_OF_REACH, write_problem
 
+from vdsm_pin.batch.run import Batch, run_batch
 from vdsm_pin.cli import app, main
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.planner.strategies import STRATEGIES, strategy
@@ -248,6 +249,54 @@ def test_two_rows_that_rest_on_the_path_draw_nothing(
     failed = [line for line in ran.out.splitlines() if line.endswith("◐ incomplete")]
     assert [line.split()[0] for line in failed] == ["coverage"]
     assert ran.out.count("✓ certified") == 15
+
+
+def test_a_problem_without_path_is_verified_and_shown_and_cannot_be_planned(
+    vdsm: Shell, tmp_path: Path
+) -> None:
+    """A joint-space move past a ball: clearance, limits, start and goal."""
+    joints = "{x0: 100, alpha_deg: [20, 0, 0, 0, 0, 0, 0, 0], theta_deg: [%s]}"
+    text = BEHIND_A_WALL.partition("tip_path:")[0] + (
+        "start: [3126, 0, 0]\n"
+        f"goal: {{joints: {joints % ', '.join(['0'] * 8)}}}\n"
+        "required_clearance: 3.5\n"
+    )
+    text = text.replace("[0, 400, 0]", "[0, 1400, 0]")
+    problem = write_problem(tmp_path / "move.yaml", text)
+    names = ",".join(f"alpha{i}_rad,theta{i}_rad" for i in range(1, 9))
+    rows = [f"waypoint,on_path,path_m,x0_m,{names}"]
+    for k in range(11):
+        turn = [0.1 * k * math.radians(20), *[0.0] * 15]
+        rows.append(",".join(map(str, (k, 0, 0.0, 0.01 * k, *turn))))
+    motion = write_problem(tmp_path / "move.csv", "\n".join(rows) + "\n")
+    out, proof = tmp_path / "out", tmp_path / "proof"
+    words = ["--trajectory", motion, "--out", out, "--certificate", proof]
+    ran = vdsm("verify", problem, *words)
+    assert ran.status == 0, ran.out
+    assert "no desired path is asked for" in ran.out
+    assert "joints at their goal" in ran.out
+    for word in ("nan", "coverage", "on the path", "not available", "None"):
+        assert word not in ran.out
+    content = json.loads((out / "verification.json").read_text(encoding="utf-8"))
+    jsonschema.validate(content, schema("verification"))
+    assert content["coverage"] is content["path_length_m"] is None
+    page = (out / "report.html").read_text(encoding="utf-8")
+    words_of_page = re.sub(r"<(script|style).*?</\1>", "", page, flags=re.DOTALL)
+    assert "desired path</th><td>none" in words_of_page
+    for word in ("nan", "Coverage", ">None"):
+        assert word not in words_of_page
+    assert vdsm("check-certificate", proof, problem, motion).status == 0
+    assert vdsm("diff", out, out).out.strip() == "no difference"
+    view = ["view", problem, "--html", tmp_path / "view.html"]
+    assert vdsm(*view).status == 0
+    assert vdsm(*view, "--trajectory", motion).status == 0
+
+    ran = vdsm("plan", problem, "--out", tmp_path / "plan")
+    assert ran.status == 2
+    assert "move.yaml: tip_path: is missing; planning needs it" in one_message(ran)
+    assert not (tmp_path / "plan").exists()
+    (row,) = run_batch(Batch((str(problem),), tmp_path / "batch", "fewest"))
+    assert (row.outcome, "tip_path: is missing" in row.reason) == ("error", True)
 
 
 def test_a_search_in_vain_tells_how_far_it_came_and_how_long_it_took(

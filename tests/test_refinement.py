@@ -27,7 +27,7 @@ def short(name: str) -> PlanningProblem:
     """A paper scene with a short piece of its path, to keep the test quick."""
     problem = read_problem(f"paper/{name}").problem
     points = np.array([[3.126, 0.9, 0.9], [3.126, 1.0, 1.0]])
-    return replace(problem, path=replace(problem.path, points=points, closed=False))
+    return replace(problem, tip_path=replace(problem.path, points=points, closed=False))
 
 
 def test_missing_clearance_between_waypoints_is_added_to_the_margin(
@@ -77,7 +77,7 @@ def test_a_plan_that_cannot_be_certified_is_not_handed_out(
 def test_reasons_of_the_planner_pass_through() -> None:
     problem = short("obs3")
     start = replace(problem.path, start=np.array([3.126, 0.0, 2.5]))
-    problem = replace(problem, path=start)
+    problem = replace(problem, tip_path=start)
     with pytest.raises(Infeasible, match="beyond the reach"):
         refinement.plan_and_verify(problem, "paper", load_robot(problem.manipulator))
 

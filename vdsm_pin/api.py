@@ -61,7 +61,9 @@ def plan(
 
     Returns:
         A certified plan: `trajectory`, joint `centres` of shape (n_samples, N + 1, 3)
-        in metres, `cable_lengths` of shape (n_samples, N, 3) in metres, `notes`.
+        in metres, `cable_lengths` of shape (n_samples, N, 3) in metres, `notes`. Where
+        it draws less of the path than required it is clear, but incomplete: `undrawn`
+        says what is left out, and `verify` gives the verdict.
 
     Raises:
         UnknownName: If there is no such strategy.

@@ -82,6 +82,24 @@ def _refuse_lengths(manipulator: Manipulator, centres: FloatArray) -> NoReturn:
     )
 
 
+def straight_joints(manipulator: Manipulator, tip: FloatArray) -> FloatArray:
+    """Joint values of the straight arm whose tip is at a place, its base behind it.
+
+    Args:
+        manipulator: The arm.
+        tip: Shape (3,), nearer to the rail than the arm is long; [m].
+
+    Returns:
+        q = (x0, alpha1, theta1, ..), shape (1 + 2N,); [m] in the first entry, [rad] in
+        the others.
+    """
+    length, (x, y, z) = manipulator.total_length, tip.tolist()
+    along = float(np.sqrt(length**2 - y**2 - z**2))
+    joints = np.zeros(1 + 2 * manipulator.n_links)
+    joints[:3] = x - along, np.arctan2(y, along), np.arcsin(-z / length)
+    return joints
+
+
 def link_angles(alpha: FloatArray, theta: FloatArray) -> FloatArray:
     """psi_i, the angle between adjacent links, same shape; [rad] (Eq. 2).
 

@@ -1,7 +1,7 @@
 """How results show themselves in a console and in a notebook."""
 
 from html import escape
-from math import isfinite
+from math import floor, isfinite
 
 from vdsm_pin.units import MM_PER_M
 
@@ -27,6 +27,11 @@ class Summarised:
             for name, value in self.summary()
         )
         return f"<table>{''.join(cells)}</table>"
+
+
+def in_percent(share: float) -> str:
+    """A share from 0 to 1 in words, rounded down; rounding noise is nothing."""
+    return f"{floor(round(share, 9) * 1000.0) / 10.0:.1f} %"
 
 
 def in_mm(length: float) -> str:

@@ -167,6 +167,27 @@ class ProblemSource:
     meshes: tuple[Path, ...] = ()
 
 
+@dataclass(frozen=True)
+class Posture:
+    """Where the arm stands, in the base frame.
+
+    Args:
+        tip: Position of the tip, shape (3,); [m].
+        joints: Joint values q = (x0, alpha1, theta1, ..), shape (1 + 2N,), with `tip`
+            their tip; None where the tip alone is known; [m] in the first entry, [rad]
+            in the others.
+    """
+
+    tip: FloatArray
+    joints: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        object.__setattr__(self, "tip", frozen(self.tip))
+        if self.joints is not None:
+            object.__setattr__(self, "joints", frozen(self.joints))
+
+
 @dataclass(frozen=True, repr=False)
 class PlanningProblem(Summarised):
     """All the planner may read, in the base frame: x along the rail.
@@ -175,42 +196,72 @@ class PlanningProblem(Summarised):
         name: Name for reports and folders.
         manipulator: The arm.
         scene: The obstacles.
-        path: What the tip shall draw.
+        tip_path: What the tip shall draw, and from where; None where it shall draw
+            nothing: clearance, limits, start and goal are asked for, no more.
         required_clearance: Least distance between surfaces; [m].
         T_world_base: Pose of the base frame in the user's frame, shape (4, 4), [m] in
             its last column; readers and writers apply it, nobody else needs it.
         required_self_clearance: Least distance between the surfaces of two links that
             are not neighbours; [m].
+        start: Where a motion without tip path begins; None where anywhere will do.
+        goal: Where a motion without tip path ends; None where anywhere will do.
         source: Where it was read; None where it was built in Python or changed since.
 
     Raises:
-        InvalidInput: If a required clearance is negative or not finite, or the
-            joint values at the start do not fit the arm.
+        InvalidInput: If a required clearance is negative or not finite, joint values
+            do not fit the arm, or a start or goal stands beside a tip path.
     """
 
     name: str
     manipulator: Manipulator
     scene: Scene
-    path: DesiredPath
+    tip_path: DesiredPath | None
     required_clearance: float
     T_world_base: FloatArray
     required_self_clearance: float = 0.0
+    start: Posture | None = None
+    goal: Posture | None = None
     source: ProblemSource | None = field(default=None, init=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Freeze the pose and check the clearance."""
+        """Freeze the pose and check the values."""
         object.__setattr__(self, "T_world_base", frozen(self.T_world_base))
         for name in ("required_clearance", "required_self_clearance"):
             value = getattr(self, name)
             if not 0.0 <= value < np.inf:
                 message = f"{name} is {value} m, expected 0 or more"
                 raise InvalidInput(message)
-        joints, count = self.path.start_joints, 1 + 2 * self.manipulator.n_links
-        if joints is not None and not (
-            joints.shape == (count,) and np.isfinite(joints).all()
-        ):
-            message = f"start_joints is {joints.tolist()}, expected {count} numbers"
+        if self.tip_path is not None and (self.start or self.goal):
+            message = "start and goal belong to problems without tip_path"
             raise InvalidInput(message)
+        for posture in (self.begin, self.goal):
+            if posture is not None and posture.joints is not None:
+                self._check_joints(posture.joints)
+
+    def _check_joints(self, joints: FloatArray) -> None:
+        count = 1 + 2 * self.manipulator.n_links
+        if joints.shape != (count,) or not np.isfinite(joints).all():
+            message = f"joint values are {joints.tolist()}, expected {count} numbers"
+            raise InvalidInput(message)
+
+    @property
+    def path(self) -> DesiredPath:
+        """What the tip shall draw, of a problem that says so.
+
+        Raises:
+            InvalidInput: If the tip shall draw nothing.
+        """
+        if self.tip_path is None:
+            message = f"problem {self.name!r} has no tip_path: there is nothing to draw"
+            raise InvalidInput(message)
+        return self.tip_path
+
+    @property
+    def begin(self) -> Posture | None:
+        """Where a motion begins; None where anywhere will do."""
+        if self.tip_path is None:
+            return self.start
+        return Posture(self.tip_path.start, self.tip_path.start_joints)
 
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Arm, scene, path and what is required."""
@@ -218,7 +269,7 @@ class PlanningProblem(Summarised):
             ("name", self.name),
             ("arm", f"{self.manipulator.name}, {self.manipulator.n_links} links"),
             ("obstacles", ", ".join(self.scene.names[:8]) or "none"),
-            ("path", in_mm(self.path.length)),
+            ("path", in_mm(self.path.length) if self.tip_path else "none"),
             ("required clearance", in_mm(self.required_clearance)),
             ("file", str(self.source.path) if self.source else "built in Python"),
         )

@@ -20,6 +20,7 @@ from vdsm_pin.errors import InvalidInput, VdsmError
 from vdsm_pin.io.atomic import write_text
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
+from vdsm_pin.kinematics import straight_joints
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.facts import straight_arm
 from vdsm_pin.report.folder import check_output_file
@@ -32,10 +33,17 @@ _LOOK: Final = 0.25  # seconds between looks at the files
 
 
 def at_start(problem: PlanningProblem) -> Trajectory:
-    """The arm where it begins, as a motion of one row."""
-    joints = problem.path.start_joints
-    if joints is None:
+    """The arm where it begins, as a motion of one row.
+
+    A start known by its tip is the straight arm's; where any start will do the arm is
+    straight along its rail.
+    """
+    begin = problem.begin
+    if begin is None:
         return straight_arm(problem)
+    joints = begin.joints
+    if joints is None:
+        joints = straight_joints(problem.manipulator, begin.tip)
     angles, zero = joints[1:].reshape(1, -1, 2), np.zeros(1)
     return Trajectory(
         zero.astype(bool), zero, joints[:1], angles[:, :, 0], angles[:, :, 1]

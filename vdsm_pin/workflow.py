@@ -14,7 +14,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from vdsm_pin.errors import OutOfTime
+from vdsm_pin.errors import InvalidFile, OutOfTime
 from vdsm_pin.geometry.compiled import is_compiling
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
@@ -122,6 +122,7 @@ def plan_to_folder(
     # Whoever has a trajectory verified needs no planner.
     from vdsm_pin.refinement import plan_and_verify
 
+    _check_plannable(source)
     check_output_folder(folder)
     robot = load_robot(source.problem.manipulator)
     refinement = plan_and_verify(source.problem, strategy, robot)
@@ -137,6 +138,21 @@ def plan_to_folder(
         file = plan_file(refinement, record)
         (aside / PLAN).write_text(file.text(), encoding="utf-8")
     return file
+
+
+def _check_plannable(source: ProblemFile) -> None:
+    """Refuse what no strategy can plan.
+
+    Raises:
+        InvalidFile: If the problem has no tip path.
+    """
+    if source.problem.tip_path is None:
+        need = (
+            "is missing; planning needs it: tip_path states the start and what the tip "
+            "shall draw, a goal alone is not planned yet. Without it `vdsm verify` "
+            "judges a given motion"
+        )
+        raise InvalidFile(file=source.path, where="tip_path", problem=need)
 
 
 def verify_to_folder(order: VerifyOrder) -> Verified:

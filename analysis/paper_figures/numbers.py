@@ -32,7 +32,7 @@ def numbers(runs: Runs) -> dict[str, Any]:
 def run_facts(run: Run) -> dict[str, Any]:
     """What the page says about one plan; millimetres and degrees."""
     rows, psi = run.trajectory, run.psi
-    motion = motion_facts(rows)
+    motion = motion_facts(run.problem, rows)
     to_obstacles = [
         near.lower for near in run.verification.approaches if near.pair.obstacle
     ]

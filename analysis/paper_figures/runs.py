@@ -95,7 +95,7 @@ class Runs:
         problem = read_problem(f"paper/{scene}").problem
         if self._spacing is None:
             return problem
-        return replace(problem, path=replace(problem.path, spacing=self._spacing))
+        return replace(problem, tip_path=replace(problem.path, spacing=self._spacing))
 
     def __call__(self, scene: str, strategy: str) -> Run:
         """The certified plan of a scene by a strategy.

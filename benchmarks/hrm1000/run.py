@@ -140,7 +140,7 @@ def attempt(problem: PlanningProblem, key: tuple[str, int], name: str, limit: fl
 
 def whole_or_nothing(problem: PlanningProblem) -> PlanningProblem:
     """The same problem for which a part of the path is no answer."""
-    return replace(problem, path=replace(problem.path, blocked=Blocked.FAIL))
+    return replace(problem, tip_path=replace(problem.path, blocked=Blocked.FAIL))
 
 
 def one(task: tuple[str, int, tuple[str, ...]], limit: float) -> list[Outcome]:

@@ -107,7 +107,13 @@ ONE_VALUE: list[tuple[tuple[Any, ...], Any, str]] = [
         [PILLAR, PILLAR | {"center": [0, 0, 900]}],
         "obstacles[1].name (line 15): is 'pillar', which obstac",
     ),
-    (("tip_path",), ..., "tip_path (line 1): is missing; expected: What the tip"),
+    (("tip_path",), 3, "tip_path (line 15): is 3, expected a mapping"),
+    (
+        ("start",),
+        [3126, 0, 0],
+        "start (line 43): stands beside tip_path, which has its",
+    ),
+    (("goal",), {"tip": [3126, 0, 0]}, "goal (line 43): stands beside tip_path, which"),
     (("tip_path", "points"), [], "tip_path.points (line 20): is [], expected at least"),
     (("tip_path", "points"), ..., "tip_path.points (line 15): is missing"),
     (("tip_path", "points", 1), [1, 2], "points[1] (line 24): is [1, 2], expected at"),
@@ -227,6 +233,42 @@ def test_one_wrong_value_is_refused_in_one_sentence(
     tmp_path: Path, location: tuple[Any, ...], value: Any, expected: str
 ) -> None:
     assert expected in refused_text(tmp_path, edited(OBS1, location, value))
+
+
+NO_PATH = edited(OBS1, ("tip_path",))
+ENDS: list[tuple[tuple[Any, ...], Any, str]] = [
+    (("goal",), {}, "goal (line 16): has neither of tip and joints, expected one"),
+    (
+        ("goal",),
+        {"tip": [3126, 0, 0], "joints": STRAIGHT},
+        "goal (line 16): has both of tip and joints, expected one of them",
+    ),
+    (
+        ("goal",),
+        {"tip": [0, 3126, 0]},
+        "goal.tip (line 17): lies 3126 mm from the rail",
+    ),
+    (
+        ("goal",),
+        {"tips": [0, 0, 0]},
+        "goal.tips (line 17): is not a known key; known: t",
+    ),
+    (
+        ("goal",),
+        {"joints": STRAIGHT | {"x0": 5001}},
+        "goal.joints.x0 (line 18): is 5001",
+    ),
+    (("goal",), [3126, 0, 0], "goal (line 16): is [3126, 0, 0], expected a mapping"),
+    (("start",), [3126, 2200, 0], "start (line 16): needs a link angle psi of 44.73"),
+    (("start",), {"joints": STRAIGHT | {"x0": -5001}}, "start.joints.x0 (line 18): is"),
+]
+
+
+@pytest.mark.parametrize(("location", "value", "expected"), ENDS)
+def test_a_wrong_start_or_goal_without_path_is_refused_in_one_sentence(
+    tmp_path: Path, location: tuple[Any, ...], value: Any, expected: str
+) -> None:
+    assert expected in refused_text(tmp_path, edited(NO_PATH, location, value))
 
 
 NOT_PLAIN_YAML = [

@@ -123,6 +123,28 @@ def test_every_field_arrives_in_si(tmp_path: Path) -> None:
     )  # fmt: skip
 
 
+def test_without_a_path_start_and_goal_stand_on_their_own(tmp_path: Path) -> None:
+    text = edited(MINIMAL, ("tip_path",))
+    free = read_text(tmp_path, text)
+    assert (free.tip_path, free.start, free.goal) == (None, None, None)
+    joints = {"x0": 0.1, "alpha_deg": [10] + [0] * 7, "theta_deg": [0] * 8}
+    given = edited(text, ("start",), [3.126, 0, 0])
+    given = edited(given, ("goal",), {"joints": joints})
+    problem = read_text(tmp_path, given)
+    assert problem.start is not None
+    assert problem.goal is not None
+    assert problem.start.joints is None
+    np.testing.assert_allclose(problem.start.tip, [3.126, 0, 0], atol=1e-15)
+    turn = np.deg2rad(10)
+    tip = [0.1 + 3.126 * np.cos(turn), 3.126 * np.sin(turn), 0.0]
+    np.testing.assert_allclose(problem.goal.tip, tip, atol=1e-12)
+    given = edited(given, ("goal",), {"tip": [3.0, 0.1, 0]})
+    goal = read_text(tmp_path, given).goal
+    assert goal is not None
+    assert goal.joints is None
+    np.testing.assert_allclose(goal.tip, [3.0, 0.1, 0], atol=1e-15)
+
+
 def test_start_joints_and_their_tip_agree(tmp_path: Path) -> None:
     problem = read_problem(write_everything(tmp_path)).problem
     q = problem.path.start_joints

@@ -199,7 +199,8 @@ class Problem:
             require(name not in self.shapes, f"two obstacles are named {name!r}")
             self.shapes[name] = self._shape(obstacle.pop("shape"), obstacle)
             _use_up(obstacle, f"obstacle {name!r}", "check_size")
-        self._read_path(data.pop("tip_path"))
+        if "tip_path" in data:
+            self._read_path(data.pop("tip_path"))
         self.clearance = self._length(data.pop("required_clearance"))
         self.self_clearance = self._length(data.pop("required_self_clearance", "0"))
         _use_up(data, "the problem", "vdsm_problem", "name")

@@ -322,10 +322,13 @@ class OracleWriter:
         for low, high in sorted(parts):
             total += max(0.0, high - max(low, reached))
             reached = max(reached, high)
-        return deviation, total / length if length else float(bool(parts))
+        return deviation, total / length if length else float(on.any())
 
     def header(self) -> dict[str, Any]:
-        deviation, coverage = self.tip_and_coverage()
+        tip = {"tip_deviation_m": None, "coverage": None}
+        if self.problem.tip_path is not None:
+            deviation, coverage = self.tip_and_coverage()
+            tip = {"tip_deviation_m": deviation + 1e-11, "coverage": coverage - 1e-11}
         alpha, theta = self.q[:, 1::2], self.q[:, 2::2]
         psi = np.arctan2(
             np.hypot(np.sin(theta), np.cos(theta) * np.sin(alpha)),
@@ -358,9 +361,7 @@ class OracleWriter:
                 "x0_min_m": float(self.q[:, 0].min()),
                 "x0_max_m": float(self.q[:, 0].max()),
             },
-            "tip_deviation_m": deviation + 1e-11,
-            "coverage": coverage - 1e-11,
-        }
+        } | tip
 
     def lines(self) -> list[Any]:
         """The certificate's lines but the last one."""

@@ -100,14 +100,14 @@ def test_a_tip_off_the_path_by_two_micrometres_is_refuted_at_its_row() -> None:
 
 def test_a_wrong_start_is_refuted() -> None:
     problem, motion = drawing()
-    moved = replace(problem, path=replace(problem.path, start=SQUARE[0] + 2e-6))
+    moved = replace(problem, tip_path=replace(problem.path, start=SQUARE[0] + 2e-6))
     assert named(check_tip(moved, motion).checks, "start").verdict is Verdict.REFUTED
     joints = motion.joints[0].copy()
-    given = replace(problem, path=replace(problem.path, start_joints=joints))
+    given = replace(problem, tip_path=replace(problem.path, start_joints=joints))
     good = named(check_tip(given, motion).checks, "joints at")
     assert good.verdict is Verdict.CERTIFIED
     joints[3] += 1e-6
-    given = replace(problem, path=replace(problem.path, start_joints=joints))
+    given = replace(problem, tip_path=replace(problem.path, start_joints=joints))
     bad = named(check_tip(given, motion).checks, "joints at")
     assert bad.verdict is Verdict.REFUTED
 
@@ -188,7 +188,7 @@ def parts(motion: Trajectory, *ranges: tuple[int, int]) -> Trajectory:
 @pytest.mark.parametrize("closed", [True, False])
 def test_pieces_in_another_order_are_refuted_unless_free(closed: bool) -> None:
     problem, motion = drawing()
-    problem = replace(problem, path=replace(problem.path, closed=closed))
+    problem = replace(problem, tip_path=replace(problem.path, closed=closed))
     if not closed:
         motion = motion.part(0, 120)
     given = parts(motion, (0, 40), (50, 70), (80, 110))
@@ -201,7 +201,7 @@ def test_pieces_in_another_order_are_refuted_unless_free(closed: bool) -> None:
     ):  # fmt: skip
         (row,) = check_order(problem, rows)
         assert row.verdict is (Verdict.CERTIFIED if right else Verdict.REFUTED)
-        free = replace(problem, path=replace(problem.path, order=Order.FREE))
+        free = replace(problem, tip_path=replace(problem.path, order=Order.FREE))
         assert check_order(free, rows) == ()
 
 
@@ -233,7 +233,7 @@ def test_laps_in_one_go_and_rounding_are_in_order() -> None:
 
 def test_coverage_that_nobody_asks_for_is_no_check() -> None:
     problem, motion = drawing(201, 0.5)
-    asked = replace(problem, path=replace(problem.path, required_coverage=0.0))
+    asked = replace(problem, tip_path=replace(problem.path, required_coverage=0.0))
     report = check_tip(asked, motion)
     assert not [check for check in report.checks if "coverage" in check.name]
     assert report.coverage == pytest.approx(0.5, abs=1e-9)

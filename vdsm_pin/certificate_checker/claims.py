@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 from flint import arb
 
-from vdsm_pin.certificate_checker.balls import claim, column, norm, number, unit
+from vdsm_pin.certificate_checker.balls import Matrix, claim, column, norm, number, unit
 from vdsm_pin.certificate_checker.motion import Interval
 from vdsm_pin.certificate_checker.path import Drawing
 from vdsm_pin.certificate_checker.solids import Mesh, Solid, solid
@@ -62,7 +62,9 @@ class Check:
             axis = [[[0.0, 0.0, 0.0], [self.arm.link_lengths[i], 0.0, 0.0]]]
             body = Solid(f"link {i + 1}", axis, radius=self.arm.link_radius)
             self.pairs += [Pair(link, body, i + 1) for link in links[i + 2 :]]
-        self.drawing, self.psi = Drawing(problem.path), arb(0)
+        path = problem.tip_path
+        self.drawing = None if path is None else Drawing(path)
+        self.psi = arb(0)
         self.motion: Interval  # the last one read
         self.n_intervals, self.n_claims, self.place = 0, 0, "header"
 
@@ -153,40 +155,57 @@ class Check:
         self.n_claims += 1
 
     def _rows(self, rows: tuple[int, int]) -> None:
-        """Take psi and the tip at both rows into what is said of the whole motion."""
+        """Take both rows into what is said of the whole motion."""
         poses = [self.motion.pose(0.0), self.motion.pose(1.0)]
-        stations = [arb(float(self.rows.path_m[row])) for row in rows]
-        on_path = self.rows.on_path[list(rows)]
-        for on, pose, station in zip(on_path, poses, stations, strict=True):
-            away = norm(pose.centres[-1] - self.drawing.point(station))
-            claim(not on or away <= TIP, "the tip is {} m off the path", away)
-            self.psi = self.psi.max(pose.psi)
+        self.psi = self.psi.max(poses[0].psi).max(poses[1].psi)
         if rows[0] == 0:
             base = [float(self.joints[0, 0]), 0.0, 0.0]
             for mesh in (one for one in self.solids if isinstance(one, Mesh)):
                 claim(mesh.excludes(base), f"the arm is not proved outside {mesh.name}")
+        if self.drawing is not None:
+            self._draw(self.drawing, rows, [pose.centres[-1] for pose in poses])
+
+    def _draw(
+        self, drawing: Drawing, rows: tuple[int, int], tips: list[Matrix]
+    ) -> None:
+        """Take what the tip does at both rows and in between into the drawing."""
+        stations = [arb(float(self.rows.path_m[row])) for row in rows]
+        on_path = self.rows.on_path[list(rows)]
+        for on, tip, station in zip(on_path, tips, stations, strict=True):
+            away = norm(tip - drawing.point(station))
+            claim(not on or away <= TIP, "the tip is {} m off the path", away)
+        drawing.touched |= bool(on_path.any())
         if on_path.all():
-            tips = [pose.centres[-1] for pose in poses]
-            self.drawing.draw(stations, tips, self.motion.bounds(0)[-1][0] / 8)
+            drawing.draw(stations, tips, self.motion.bounds(0)[-1][0] / 8)
         else:
-            self.drawing.last = None
+            drawing.last = None
 
     def _close(self) -> None:
         """Check what is said of the whole motion, and its limits; -x bounds x below."""
-        arm, path, header, q = self.arm, self.problem.path, self.header, self.joints
+        arm, header, q = self.arm, self.header, self.joints
         claim(set(header["limits"]) == set(LIMITS), f"limits: expected {LIMITS}")
         alpha, theta, psi, low, high = (header["limits"][key] for key in LIMITS)
-        tip, stray = header["tip_deviation_m"], self.drawing.deviation
-        share, drawn = header["coverage"], self.drawing.coverage()
-        for name, claimed, proved, limit in (
+        claims = [
             ("alpha_rad", alpha, abs(q[:, 1::2]).max(), arm.max_joint_angle),
             ("theta_rad", theta, abs(q[:, 2::2]).max(), arm.max_joint_angle),
             ("psi_rad", psi, self.psi, arm.max_link_angle),
             ("-x0_min_m", -low, -q[:, 0].min(), -arm.base_range[0]),
             ("x0_max_m", high, q[:, 0].max(), arm.base_range[1]),
-            ("tip_deviation_m", tip, stray, path.spacing),
-            ("-coverage", -share, -drawn, -path.required_coverage),
-        ):
+        ]
+        tip, share, drawing = (
+            header["tip_deviation_m"],
+            header["coverage"],
+            self.drawing,
+        )
+        if drawing is None:
+            claim(tip is share is None, "claims a desired path, the problem has none")
+        else:
+            path, drawn = self.problem.path, drawing.coverage()
+            claims += [
+                ("tip_deviation_m", tip, drawing.deviation, path.spacing),
+                ("-coverage", -share, -drawn, -path.required_coverage),
+            ]
+        for name, claimed, proved, limit in claims:
             bound, value = arb(proved), number(claimed)
             holds = bound <= value <= bound + SLACK
             claim(holds, name + " is {}, proved is {}", value, bound)

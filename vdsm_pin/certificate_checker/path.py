@@ -26,6 +26,7 @@ class Drawing:
         self.length, self.deviation = self.stations[-1], arb(0)
         self.stretches: list[tuple[Ball, Ball]] = []
         self.last: Ball | None = None  # station of the row before; None off the path
+        self.touched = False  # whether any row is on the path
 
     def laps(self, station: Ball) -> int:
         """Whole laps in a station; the nearest number where that is not certain."""
@@ -92,4 +93,4 @@ class Drawing:
             # Only what lies beyond everything before it is added: none counts twice.
             total += (stop.min(self.length) - start.max(reached)).max(arb(0))
             reached = reached.max(stop)
-        return total / self.length if self.length > 0 else arb(len(self.stretches) > 0)
+        return total / self.length if self.length > 0 else arb(self.touched)

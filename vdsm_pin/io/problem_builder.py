@@ -10,6 +10,7 @@ from vdsm_pin.io.arm_builder import ArmBuilder
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.path_builder import PathBuilder
+from vdsm_pin.io.posture_builder import PostureBuilder
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.manipulator import Manipulator
@@ -45,14 +46,19 @@ def build_problem(
     _check_links_apart(arm, self_clearance, frame, document)
     obstacles = ObstacleBuilder(document, folder, frame, arm.total_length, digest)
     scene = obstacles.build_all(model.obstacles)
+    _check_ends(model, document)
+    paths = PathBuilder(document, frame, arm)
+    postures = PostureBuilder(document, frame, arm)
     return PlanningProblem(
-        model.name or name,
-        arm,
-        scene,
-        PathBuilder(document, frame, arm).build(model.tip_path),
-        float(frame.metres(model.required_clearance)),
-        T_world_base,
-        self_clearance,
+        name=model.name or name,
+        manipulator=arm,
+        scene=scene,
+        tip_path=paths.build(model.tip_path) if model.tip_path else None,
+        required_clearance=float(frame.metres(model.required_clearance)),
+        T_world_base=T_world_base,
+        required_self_clearance=self_clearance,
+        start=postures.start(model.start, ("start",)) if model.start else None,
+        goal=postures.goal(model.goal, ("goal",)) if model.goal else None,
     )
 
 
@@ -62,6 +68,19 @@ def _frame(model: schema.ProblemModel) -> tuple[Frame, FloatArray]:
     T_world_base = np.eye(4)
     T_world_base[:3, :3], T_world_base[:3, 3] = rotation, frame.metres(frame.origin)
     return frame, T_world_base
+
+
+def _check_ends(model: schema.ProblemModel, document: YamlDocument) -> None:
+    """A path says itself where the motion begins; start and goal are for the others."""
+    if model.tip_path is None:
+        return
+    for name, advice in (
+        ("start", "give it as tip_path.start"),
+        ("goal", "let the path end there"),
+    ):
+        if getattr(model, name) is not None:
+            problem = f"stands beside tip_path, which has its own; {advice}"
+            raise document.invalid((name,), problem)
 
 
 def _check_links_apart(

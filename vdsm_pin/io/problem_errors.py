@@ -24,6 +24,7 @@ _MODELS: Final[Mapping[str | int, type[FileModel]]] = {
     "base": schema.BasePoseModel,
     "tip_path": schema.TipPathModel,
     "joints": schema.JointsModel,
+    "goal": schema.GoalModel,
     "cylinder": shapes.CylinderModel,
     "capsule": shapes.CapsuleModel,
     "sphere": shapes.SphereModel,

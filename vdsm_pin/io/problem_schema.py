@@ -114,6 +114,17 @@ class StartJointsModel(FileModel):
     joints: JointsModel = Field(description="Joint values at the start.")
 
 
+class GoalModel(FileModel):
+    """Where a motion without tip path ends, one of the two."""
+
+    tip: Vector | None = Field(
+        default=None, description="Where the tip is at the end [length_unit]."
+    )
+    joints: JointsModel | None = Field(
+        default=None, description="Joint values at the end."
+    )
+
+
 Start: TypeAlias = Annotated[
     Annotated[Vector, Tag("point")] | Annotated[StartJointsModel, Tag("joints")],
     Discriminator(_list_or_not),
@@ -183,7 +194,21 @@ class ProblemModel(FileModel):
         description="Where the rail is. Default: at the origin.",
     )
     obstacles: list[ObstacleModel] = Field(default=[], description="Solids to avoid.")
-    tip_path: TipPathModel = Field(description="What the tip shall draw.")
+    tip_path: TipPathModel | None = Field(
+        default=None,
+        description="What the tip shall draw. Default: nothing; then clearance, "
+        "limits, start and goal are asked for, no more.",
+    )
+    start: Start | None = Field(
+        default=None,
+        description="Without tip_path: where the motion begins, as tip_path.start. "
+        "Default: anywhere.",
+    )
+    goal: GoalModel | None = Field(
+        default=None,
+        description="Without tip_path: where the motion ends, {tip: [x, y, z]} "
+        "[length_unit] or {joints: ...}. Default: anywhere.",
+    )
     required_clearance: NotNegative = Field(
         description="Between the surfaces of arm and obstacles [length_unit]."
     )

@@ -67,6 +67,7 @@ class Plan(Summarised):
             ("problem", self.problem.name),
             ("strategy", self.strategy),
             ("waypoints", f"{self.trajectory.n_samples}, {drawn} on the path"),
+            *(("not drawn", stretch) for stretch in self.undrawn),
             *(("note", note) for note in self.notes),
         )
 

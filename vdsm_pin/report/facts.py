@@ -59,7 +59,7 @@ def changed_angles(psi: FloatArray) -> IntArray:
     return np.asarray((psi > TOLERANCES.changed_angle).sum(axis=1))
 
 
-def motion_facts(trajectory: Trajectory) -> MotionFacts:
+def motion_facts(problem: PlanningProblem, trajectory: Trajectory) -> MotionFacts:
     """Extremes over the rows of a trajectory."""
     largest = np.zeros(trajectory.n_links)
     changed = np.zeros(trajectory.n_samples, dtype=np.int64)
@@ -68,10 +68,10 @@ def motion_facts(trajectory: Trajectory) -> MotionFacts:
         psi = link_angles(trajectory.alpha[part], trajectory.theta[part])
         largest = np.maximum(largest, psi.max(axis=0))
         changed[part] = changed_angles(psi)
-    on_path = changed[trajectory.on_path]
+    on_path = changed[trajectory.on_path & (problem.tip_path is not None)]
     return MotionFacts(
         waypoints=trajectory.n_samples,
-        on_path_waypoints=int(trajectory.on_path.sum()),
+        on_path_waypoints=None if problem.tip_path is None else int(on_path.size),
         max_link_angle_rad=tuple(float(value) for value in largest),
         x0_min_m=float(trajectory.x0.min()),
         x0_max_m=float(trajectory.x0.max()),
@@ -233,11 +233,13 @@ def _left_out(verification: Verification) -> str:
 def _certified_sentence(verification: Verification) -> str:
     count = len(verification.checks)
     smallest = min_clearance(verification)
-    drawn = percent(verification.coverage)
+    drawn = f"{percent(verification.coverage)} of the desired path is drawn"
+    if verification.problem.tip_path is None:
+        drawn = "no desired path is asked for"
     if smallest is None:
         return (
             f"All {count} checks passed over the whole motion; no obstacle is there; "
-            f"{drawn} of the desired path is drawn."
+            f"{drawn}."
         )
     required = quantity(verification.problem.required_clearance, "m")
     box = asdict(verification.errors)
@@ -245,7 +247,7 @@ def _certified_sentence(verification: Verification) -> str:
     return (
         f"All {count} checks passed; at every instant of the motion{errors} the arm "
         f"keeps at least {quantity(smallest.lower_m, 'm')} from every obstacle, "
-        f"{required} are required; {drawn} of the desired path is drawn."
+        f"{required} are required; {drawn}."
     )
 
 
@@ -262,19 +264,20 @@ def verification_file(
     verification: Verification, record: RunRecord
 ) -> VerificationFile:
     """verification.json of one verification."""
-    errors = verification.errors
+    errors, problem = verification.errors, verification.problem
+    path = problem.tip_path
     return VerificationFile(
-        problem=verification.problem.name,
+        problem=problem.name,
         verdict=verification.verdict.value,
         reason=reason(verification),
         checks=tuple(check_row(check) for check in verification.checks),
         min_clearance=min_clearance(verification),
-        required_clearance_m=verification.problem.required_clearance,
+        required_clearance_m=problem.required_clearance,
         closest=tuple(
             closest_row(verification, row) for row in verification.approaches
         ),
         coverage=finite(verification.coverage),
-        path_length_m=verification.problem.path.length,
+        path_length_m=None if path is None else path.length,
         undrawn_m=tuple((float(a), float(b)) for a, b in verification.undrawn),
         error_box=ErrorBoxRow(
             joint_error_rad=errors.joint,
@@ -287,7 +290,7 @@ def verification_file(
             counterexample_row(verification, found)
             for found in verification.counterexamples
         ),
-        motion=motion_facts(verification.trajectory),
+        motion=motion_facts(problem, verification.trajectory),
         hashes=hashes(record),
         versions=versions(),
         machine=machine(),
@@ -327,7 +330,7 @@ def plan_file(refinement: "Refinement", record: RunRecord) -> PlanFile:
             for one in ended.adjustments
         ),
         coverage=finite(verification.coverage),
-        motion=motion_facts(plan.trajectory),
+        motion=motion_facts(plan.problem, plan.trajectory),
         hashes=hashes(record),
         versions=versions(),
         command=record.command,
@@ -363,8 +366,8 @@ def cables(problem: PlanningProblem, rows: Trajectory) -> FloatArray:
 
 
 def straight_arm(problem: PlanningProblem) -> Trajectory:
-    """The straight arm with its tip at the start's x, as a motion of one row."""
-    arm = problem.manipulator
-    base = np.array([problem.path.start[0] - arm.total_length])
-    zero, angles = np.zeros(1), np.zeros((1, arm.n_links))
+    """The straight arm along its rail, as a motion of one row."""
+    low, high = problem.manipulator.base_range
+    base, zero = np.array([min(max(low, 0.0), high)]), np.zeros(1)
+    angles = np.zeros((1, problem.manipulator.n_links))
     return Trajectory(zero.astype(bool), zero, base, angles, angles)

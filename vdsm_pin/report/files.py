@@ -28,7 +28,9 @@ OutcomeWord = Literal[
 _MOMENT: Final = "in waypoints, 12.25 is a quarter of the way from 12 to 13"
 _LINK: Final = "links count from 1 at the base"
 _FRAME: Final = "in the frame of the problem file"
-_COVERAGE: Final = "proved share of the desired path that is drawn, 0 to 1"
+_COVERAGE: Final = (
+    "proved share of the desired path that is drawn, 0 to 1; null where there is none"
+)
 _CHANGED: Final = "mean number of changed link angles on the path"
 _JOINT_ERROR: Final = "largest joint error still certified; null where not sought"
 _PROBLEM: Final = "name of the problem"
@@ -133,7 +135,9 @@ class MotionFacts(FileModel):
     """What the arm does, measured at the waypoints."""
 
     waypoints: int = Field(description="rows of the trajectory")
-    on_path_waypoints: int = Field(description="those with the tip on the desired path")
+    on_path_waypoints: int | None = Field(
+        description="those with the tip on the desired path; null where there is none"
+    )
     max_link_angle_rad: tuple[FiniteFloat, ...] = Field(
         description="largest link angle psi of each joint, from the base to the tip"
     )
@@ -174,7 +178,9 @@ class VerificationFile(FileModel):
         description="ten closest approaches, obstacles first, each pair once"
     )
     coverage: FiniteFloat | None = Field(description=_COVERAGE)
-    path_length_m: FiniteFloat = Field(description="of the desired path")
+    path_length_m: FiniteFloat | None = Field(
+        description="of the desired path; null where there is none"
+    )
     undrawn_m: tuple[tuple[FiniteFloat, FiniteFloat], ...] = Field(
         description="stretches of the desired path not drawn: arc lengths from and to"
     )

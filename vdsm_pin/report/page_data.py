@@ -39,19 +39,21 @@ def scene_data(problem: PlanningProblem) -> dict[str, Any]:
         "colours": list(link_colours(arm.n_links)),
         "pose": problem.T_world_base.ravel().tolist(),
         "obstacles": solids,
-        "path": packed(problem.path.corners),
-        "start": problem.path.start.tolist(),
+        "path": packed(() if problem.tip_path is None else problem.tip_path.corners),
     }
 
 
-def motion_data(trajectory: Trajectory, shown: Thinned) -> dict[str, Any]:
+def motion_data(
+    problem: PlanningProblem, trajectory: Trajectory, shown: Thinned
+) -> dict[str, Any]:
     """The joint values of the rows shown; the page computes the poses from them."""
     rows = shown.rows
+    on_path = () if problem.tip_path is None else trajectory.on_path[rows]
     return {
         "nSamples": trajectory.n_samples,
         "complete": shown.complete,
         "rows": packed(rows, "<i4"),
-        "onPath": packed(trajectory.on_path[rows], "u1"),
+        "onPath": packed(on_path, "u1"),
         "pathM": packed(trajectory.path_m[rows]),
         "x0": packed(trajectory.x0[rows]),
         "alpha": packed(trajectory.alpha[rows]),
@@ -95,7 +97,7 @@ def report_data(verification: Verification) -> PageData:
     text = _embedded(
         {
             "scene": scene_data(verification.problem),
-            "motion": motion_data(verification.trajectory, shown),
+            "motion": motion_data(verification.problem, verification.trajectory, shown),
             "closest": [closest_data(row) for row in verification.approaches],
             "marks": [
                 asdict(one) for one in failing(verification) if one.moment is not None
@@ -112,7 +114,7 @@ def view_data(problem: PlanningProblem, trajectory: Trajectory) -> str:
     return _embedded(
         {
             "scene": scene_data(problem),
-            "motion": motion_data(trajectory, shown),
+            "motion": motion_data(problem, trajectory, shown),
             "closest": [],
             "marks": [],
             "charts": [],

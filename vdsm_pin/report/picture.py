@@ -30,7 +30,8 @@ def picture(verification: Verification) -> str:
     k = verification.approaches[0].interval if verification.approaches else 0
     one = slice(k, k + 1)
     centres = joint_centres(arm, rows.x0[one], rows.alpha[one], rows.theta[one])[0]
-    seen, path = _view(centres), _view(_thin(problem.path.corners))
+    corners = np.zeros((0, 3)) if problem.tip_path is None else problem.path.corners
+    seen, path = _view(centres), _view(_thin(corners))
     everything = np.vstack([seen, path])
     low, span = everything.min(axis=0), np.ptp(everything, axis=0)
     room = np.array([_WIDTH, _HEIGHT]) - 2.0 * _MARGIN
@@ -45,10 +46,10 @@ def picture(verification: Verification) -> str:
         'fill-opacity=".7" stroke="#8791a0"/>'
         for outline in _outlines(verification)
     ]
-    line = _text(scale * path + shift)
-    parts.append(
-        f'<polyline points="{line}" fill="none" stroke="#d9480f" stroke-width="1.5"/>'
-    )
+    if len(path):
+        line = _text(scale * path + shift)
+        ink = 'fill="none" stroke="#d9480f" stroke-width="1.5"'
+        parts.append(f'<polyline points="{line}" {ink}/>')
     width = max(3.0, 2.0 * arm.link_radius * scale)
     body = scale * seen + shift
     parts += [

@@ -7,7 +7,6 @@ import typer
 
 from vdsm_pin.report.files import CheckRow, PlanFile, VerificationFile
 from vdsm_pin.report.words import (
-    MISSING,
     check_title,
     limit,
     lost,
@@ -28,18 +27,20 @@ def show_plan(file: PlanFile, folder: Path) -> None:
     if not outcome(file.verdict).passed:
         typer.echo(f"  {file.reason}")
     changed = motion.changed_angles_mean_on_path
-    mean = MISSING if changed is None else f"{changed:.2f} on average on the path"
+    mean = "" if changed is None else f"{changed:.2f} on average on the path, "
     ends = (measured(x0, "m") for x0 in (motion.x0_min_m, motion.x0_max_m))
+    path: list[tuple[str, str]] = []
+    waypoints = f"{motion.waypoints}"
+    if motion.on_path_waypoints is not None:
+        waypoints += f", {motion.on_path_waypoints} on the path"
+        path = [(term("coverage"), percent(file.coverage))]
     _facts(
-        (
-            term("waypoints"),
-            f"{motion.waypoints}, {motion.on_path_waypoints} on the path",
-        ),
-        (term("coverage"), percent(file.coverage)),
+        (term("waypoints"), waypoints),
+        *path,
         (term("max_link_angle_rad"), measured(max(motion.max_link_angle_rad), "rad")),
         (
             term("changed_angles_mean_on_path"),
-            f"{mean}, {motion.changed_angles_max} at most",
+            f"{mean}{motion.changed_angles_max} at most",
         ),
         ("base travel", " to ".join(ends)),
         *(("not drawn", stretch) for stretch in file.undrawn),
@@ -64,7 +65,8 @@ def show_verification(
         _rich_checks(file)
     else:
         _plain_checks(file.checks)
-    more = ((term("coverage"), percent(file.coverage)), *more)
+    if file.path_length_m is not None:
+        more = ((term("coverage"), percent(file.coverage)), *more)
     if file.max_joint_error_rad is not None:
         error = survived(file.max_joint_error_rad)
         if file.refuted_joint_error_rad is not None:

@@ -57,10 +57,13 @@ class HeaderLine(LineModel):
         "the order in which planes count them"
     )
     limits: ClaimedLimits
-    tip_deviation_m: FiniteFloat = Field(
-        ge=0.0, description="of the tip from the path between waypoints, at most"
+    tip_deviation_m: Annotated[FiniteFloat, Field(ge=0.0)] | None = Field(
+        description="of the tip from the path between waypoints, at most; null where "
+        "there is no desired path"
     )
-    coverage: Share = Field(description="of the desired path, at least")
+    coverage: Share | None = Field(
+        description="of the desired path, at least; null where there is none"
+    )
 
 
 class IntervalLine(LineModel):

@@ -94,6 +94,7 @@ def _header(
 ) -> HeaderLine:
     problem, trajectory = verification.problem, verification.trajectory
     box, found = verification.errors, extremes(trajectory)
+    drawn = problem.tip_path is not None
     return HeaderLine(
         problem_sha256=hashes.problem,
         trajectory_sha256=hashes.trajectory,
@@ -114,8 +115,8 @@ def _header(
             x0_min_m=found.x0_min,
             x0_max_m=found.x0_max,
         ),
-        tip_deviation_m=verification.tip_deviation,
-        coverage=verification.coverage,
+        tip_deviation_m=verification.tip_deviation if drawn else None,
+        coverage=verification.coverage if drawn else None,
     )
 
 

@@ -110,9 +110,8 @@ def coverage(path: DesiredPath, trajectory: Trajectory) -> tuple[float, FloatArr
         Coverage in [0, 1], rounded downwards, and gaps longer than
         `TOLERANCES.on_path_length`, from and to, shape (k, 2); [m].
     """
-    if not path.length > 0.0:
-        drawn = bool(drawn_intervals(trajectory).size)
-        return float(drawn), frozen(np.zeros((0, 2)))
+    if not path.length > 0.0:  # one point: drawn by any waypoint there
+        return float(trajectory.on_path.any()), frozen(np.zeros((0, 2)))
     spans = _stretches(path, trajectory)
     edges = np.concatenate([[0.0], spans.ravel(), [path.length]]).reshape(-1, 2)
     gaps = edges[edges[:, 1] - edges[:, 0] > TOLERANCES.on_path_length]

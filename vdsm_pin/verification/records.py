@@ -7,7 +7,7 @@ from math import inf, nan
 from typing import TypeAlias
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.notebook import Summarised, in_mm
+from vdsm_pin.notebook import Summarised, in_mm, in_percent
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.trajectory import Trajectory
 
@@ -219,7 +219,8 @@ class Verification(Summarised):
         profile: Brackets along the motion.
         tip_deviation: Bound of the distance from the desired path on the intervals
             that draw it; 0 where there is none; [m].
-        coverage: Proved part of the desired path that is drawn, 0 to 1; [-].
+        coverage: Proved part of the desired path that is drawn, 0 to 1; NaN where there
+            is none; [-].
         undrawn: Stretches not drawn, arc lengths from and to, shape (k, 2); [m].
         joint_error: Largest joint error still certified; 0 if none is; NaN if it was
             not asked for; [rad].
@@ -266,6 +267,7 @@ class Verification(Summarised):
             ("verdict", self.verdict.value),
             ("proved clearance", in_mm(self.min_clearance)),
             ("waypoints", str(self.trajectory.n_samples)),
+            *([("drawn", in_percent(self.coverage))] if self.problem.tip_path else []),
             *((c.name, f"{c.verdict.value} {c.where}".strip()) for c in bad),
         ]
         return tuple(rows)

@@ -1,11 +1,11 @@
-"""The tip against the desired path: at its start, at rows, in between."""
+"""The tip against the desired path: at rows and in between."""
 
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.problem import DesiredPath, PlanningProblem
@@ -19,6 +19,7 @@ from vdsm_pin.verification.drawing import (
     runs,
     wrapped,
 )
+from vdsm_pin.verification.ends import check_ends
 from vdsm_pin.verification.records import Check, Verdict
 
 CHUNK: Final = 16_384
@@ -33,7 +34,8 @@ class TipReport:
         checks: One row of evidence each.
         deviation: Bound of the tip's distance from the place on the path that belongs
             to the same instant, over all intervals on the path; 0 without any; [m].
-        coverage: Proved part of the path that is drawn, 0 to 1; [-].
+        coverage: Proved part of the path that is drawn, 0 to 1; NaN where there is no
+            path; [-].
         undrawn: Stretches not drawn, from and to, shape (k, 2); [m].
     """
 
@@ -134,73 +136,53 @@ def _row_check(
     )
 
 
-def _start_checks(
-    problem: PlanningProblem, trajectory: Trajectory, tips: FloatArray
-) -> tuple[Check, ...]:
-    gap = float(np.linalg.norm(tips[0] - problem.path.start))
-    tip = Check(
-        name="tip at its start",
-        verdict=Verdict.CERTIFIED if gap <= TOLERANCES.tip_on_path else Verdict.REFUTED,
-        count=1,
-        worst=gap,
-        limit=TOLERANCES.tip_on_path,
-        unit="m",
-        moment=0.0,
-    )
-    joints = problem.path.start_joints
-    if joints is None:
-        return (tip,)
-    row = np.stack([trajectory.alpha[0], trajectory.theta[0]], axis=1).ravel()
-    off = np.abs(np.concatenate([trajectory.x0[:1], row]) - joints)
-    worst = float(off.max())
-    kept = worst <= TOLERANCES.start_joints
-    return (
-        tip,
-        Check(
-            name="joints at their start",
-            verdict=Verdict.CERTIFIED if kept else Verdict.REFUTED,
-            count=joints.size,
-            worst=worst,
-            limit=TOLERANCES.start_joints,
-            unit="-",
-            moment=0.0,
-        ),
-    )
-
-
 def check_tip(problem: PlanningProblem, trajectory: Trajectory) -> TipReport:
-    """Tip on the path at rows and in between, at its start, and what is drawn.
+    """The tip at its start and goal, and on the path where there is one.
 
     Args:
-        problem: Arm and desired path.
+        problem: Arm, start, desired path and goal.
         trajectory: What is judged.
 
     Returns:
-        The rows of evidence. Between the rows the tip must stay within one spacing of
-        the path; the deviation is a bound from above, so one that is larger proves
-        nothing.
+        The rows of evidence; of what the problem does not ask for there are none.
     """
     tips = tip_positions(problem.manipulator, trajectory)
+    ends = check_ends(problem, trajectory, tips)
+    if problem.tip_path is None:
+        return TipReport(ends, 0.0, float("nan"), frozen(np.zeros((0, 2))))
     deviation, interval = _deviation(problem, trajectory, tips)
     share, undrawn = coverage(problem.path, trajectory)
-    drawn = int(drawn_intervals(trajectory).size)
-    near = drawn > 0 and deviation <= problem.path.spacing
-    between = Check(
-        name="tip near the desired path between the waypoints",
-        verdict=Verdict.CERTIFIED if near else Verdict.UNDECIDED,
-        count=drawn,
-        worst=deviation if drawn else float("nan"),
-        limit=problem.path.spacing,
-        unit="m",
-        where="from here to the next waypoint" if drawn else "",
-        moment=interval if drawn else float("nan"),
-    )
-    start = _start_checks(problem, trajectory, tips)
     checks = (
-        *start,
+        *ends,
         _row_check(problem, trajectory, tips),
-        between,
+        *_between_check(problem, trajectory, deviation, interval),
         *check_order(problem, trajectory),
         *check_coverage(problem, share),
     )
     return TipReport(checks, deviation, share, undrawn)
+
+
+def _between_check(
+    problem: PlanningProblem, trajectory: Trajectory, deviation: float, interval: int
+) -> tuple[Check, ...]:
+    """Whether the tip stays within one spacing of the path between waypoints.
+
+    The deviation is a bound from above, so one that is larger proves nothing. A path
+    of one point is drawn at a waypoint, so there need not be anything in between.
+    """
+    drawn = int(drawn_intervals(trajectory).size)
+    if not drawn and not problem.path.length > 0.0:
+        return ()
+    near = drawn > 0 and deviation <= problem.path.spacing
+    return (
+        Check(
+            name="tip near the desired path between the waypoints",
+            verdict=Verdict.CERTIFIED if near else Verdict.UNDECIDED,
+            count=drawn,
+            worst=deviation if drawn else float("nan"),
+            limit=problem.path.spacing,
+            unit="m",
+            where="from here to the next waypoint" if drawn else "",
+            moment=interval if drawn else float("nan"),
+        ),
+    )

@@ -19,7 +19,7 @@ from vdsm_pin.verification.verify import verify
 
 
 def planned(task: PlanningProblem, order: Order) -> tuple[PlanningProblem, Plan]:
-    task = replace(task, path=replace(task.path, order=order))
+    task = replace(task, tip_path=replace(task.path, order=order))
     return task, plan_fewest(task, link_clearance(task), 0.0)
 
 

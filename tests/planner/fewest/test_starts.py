@@ -47,7 +47,7 @@ def starting(
     joints = np.concatenate([[0.2], np.stack([alpha, theta], axis=1).ravel()])
     task = problem(*obstacles, points=POINTS)
     path = replace(task.path, start=centres[-1], start_joints=joints)
-    return replace(task, manipulator=arm, path=path)
+    return replace(task, manipulator=arm, tip_path=path)
 
 
 def judged(task: PlanningProblem) -> Verification:
@@ -107,7 +107,9 @@ def test_unbending_keeps_limits_and_clearance_and_gives_up_where_it_cannot() -> 
     assert clearance(centres).min() >= task.required_clearance
     psi = link_angles(fine[:, 1::2], fine[:, 2::2])
     assert psi.max() <= arm.max_link_angle
-    assert leans_ahead(replace(task, path=replace(task.path, start_joints=rows[-1])))
+    assert leans_ahead(
+        replace(task, tip_path=replace(task.path, start_joints=rows[-1]))
+    )
 
     def never(centres: FloatArray) -> FloatArray:
         room = np.full(centres[:, 1:, 0].shape, -1.0)

@@ -43,7 +43,7 @@ def short(name: str) -> PlanningProblem:
     """A paper scene with a short piece of its path, to keep the test quick."""
     task = read_problem(f"paper/{name}").problem
     points = np.array([[3.126, 0.9, 0.9], [3.126, 1.0, 1.0]])
-    return replace(task, path=replace(task.path, points=points, closed=False))
+    return replace(task, tip_path=replace(task.path, points=points, closed=False))
 
 
 def test_a_lever_is_how_far_the_end_of_a_link_moves_as_all_joints_turn() -> None:

@@ -177,7 +177,7 @@ def test_undrawn_stretches_are_told() -> None:
     assert any("from 2.2000 m" in stretch for stretch in plan.undrawn)
     failing = replace(plan.problem.path, blocked=Blocked.FAIL)
     with pytest.raises(PathBlocked, match="blocked: fail"):
-        planned(replace(plan.problem, path=failing))
+        planned(replace(plan.problem, tip_path=failing))
 
 
 def test_a_margin_is_kept_at_every_waypoint() -> None:
@@ -199,7 +199,7 @@ def test_an_approach_that_ends_on_the_danger_region_is_straight() -> None:
     """The path begins behind the pillar; its first drawable point is in front of it."""
     problem = with_obstacles(pillar(-0.243, 1.2008, 0.34))
     path = replace(problem.path, approach=Approach.NEAREST_EQUIDISTANT)
-    plan = planned(replace(problem, path=path))
+    plan = planned(replace(problem, tip_path=path))
     check_plan(plan)
     assert (len(plan.undrawn), len(plan.notes)) == (1, 0)
     joined = int(np.argmax(plan.trajectory.on_path))
@@ -238,7 +238,7 @@ def random_problem(axis: str, seed: int) -> PlanningProblem:
     rng = np.random.default_rng(seed)
     problem = with_obstacles(random_obstacle(rng, axis))
     approach = list(Approach)[int(rng.integers(3))]
-    return replace(problem, path=replace(problem.path, approach=approach))
+    return replace(problem, tip_path=replace(problem.path, approach=approach))
 
 
 def outcome(problem: PlanningProblem) -> bool:
@@ -271,14 +271,14 @@ def test_a_start_in_an_obstacle_is_refused() -> None:
     problem = with_obstacles(pillar(0.4, 0.4, 0.1))
     start = replace(problem.path, start=np.array([3.126, 0.45, 0.4]))
     with pytest.raises(StartBlocked, match="pillar"):
-        planned(replace(problem, path=start))
+        planned(replace(problem, tip_path=start))
 
 
 def test_path_wholly_in_the_danger_region_is_refused() -> None:
     problem = with_obstacles(pillar(0.8, 0.0, 0.3))
     points = np.array([[3.126, 0.7, 0.0], [3.126, 0.9, 0.0], [3.126, 0.8, 0.1]])
     with pytest.raises(PathBlocked, match="no point of the path"):
-        planned(replace(problem, path=replace(problem.path, points=points)))
+        planned(replace(problem, tip_path=replace(problem.path, points=points)))
 
 
 def test_scenes_the_rule_does_not_cover_are_refused() -> None:
@@ -303,14 +303,14 @@ def test_a_path_out_of_reach_is_refused_before_anything_else() -> None:
     problem = with_obstacles(pillar(0.7, 0.6, 0.2))
     points = np.array([[3.126, 0.0, 2.2]])
     with pytest.raises(OutOfReach):
-        planned(replace(problem, path=replace(problem.path, points=points)))
+        planned(replace(problem, tip_path=replace(problem.path, points=points)))
 
 
 def test_an_open_path_is_drawn_from_its_first_corner_and_not_left() -> None:
     problem = with_obstacles(pillar(0.7, 0.6, 0.2))
     points = np.array([[3.126, -0.5, 1.0], [3.126, 0.3, 1.2], [3.126, 0.8, 1.3]])
     path = replace(problem.path, points=points, closed=False)
-    plan = planned(replace(problem, path=path))
+    plan = planned(replace(problem, tip_path=path))
     check_plan(plan)
     tip = plan.tip_path.points
     np.testing.assert_allclose(tip[-1], points[-1], atol=1e-12)
@@ -337,7 +337,7 @@ def test_a_single_point_is_drawn_by_resting_there(
 ) -> None:
     task = with_obstacles(*obstacles)
     path = replace(task.path, points=np.array([[3.126, 0.6, 0.6]]), closed=closed)
-    task = replace(task, path=path)
+    task = replace(task, tip_path=path)
     plan = planned(task)
     on_path = plan.trajectory.on_path
     assert on_path.sum() == 2

@@ -145,7 +145,9 @@ def unbend(
 def from_there(problem: PlanningProblem, joints: FloatArray) -> PlanningProblem:
     """The same problem from other joint values, shape (1 + 2N,); [m], [rad]."""
     tip = _centres(problem.manipulator, joints[None])[0, -1]
-    return replace(problem, path=replace(problem.path, start=tip, start_joints=joints))
+    return replace(
+        problem, tip_path=replace(problem.path, start=tip, start_joints=joints)
+    )
 
 
 def with_unbending(problem: PlanningProblem, rows: FloatArray, plan: Plan) -> Plan:

@@ -10,7 +10,7 @@ function unpack(text, Type) {
 class Motion {
   constructor(data, lengths) {
     this.rows = unpack(data.rows, Int32Array);
-    this.onPath = unpack(data.onPath, Uint8Array);
+    this.onPath = unpack(data.onPath, Uint8Array); // empty without a desired path
     this.pathM = unpack(data.pathM, Float32Array);
     this.x0 = unpack(data.x0, Float32Array);
     this.alpha = unpack(data.alpha, Float32Array);
@@ -94,7 +94,7 @@ class Motion {
   // Stretches of time off the desired path, as [from, to].
   detours() {
     const found = [];
-    for (let k = 0; k + 1 < this.rows.length; k++) {
+    for (let k = 0; this.onPath.length && k + 1 < this.rows.length; k++) {
       if (this.onPath[k] && this.onPath[k + 1]) continue;
       const last = found[found.length - 1];
       if (last && last[1] === this.rows[k]) last[1] = this.rows[k + 1];
@@ -128,9 +128,9 @@ function bindControls(motion, root) {
     slider.value = time;
     const [k] = motion.place(time);
     const where = motion.onPath[k]
-      ? `at ${(motion.pathM[k] * 1000).toFixed(0)} mm of the path`
-      : "off the path";
-    const text = `waypoint ${time.toFixed(1)} of ${motion.end}, ${where}`;
+      ? `, at ${(motion.pathM[k] * 1000).toFixed(0)} mm of the path`
+      : ", off the path";
+    const text = `waypoint ${time.toFixed(1)} of ${motion.end}${motion.onPath.length ? where : ""}`;
     readout.textContent = text;
     slider.setAttribute("aria-valuetext", text);
     button.textContent = motion.playing ? "❚❚ Pause" : "▶ Play";

@@ -1,0 +1,131 @@
+"""Starts and goals of a problem file to a `Posture` in the base frame."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io import problem_schema as schema
+from vdsm_pin.io.frames import Frame, radians
+from vdsm_pin.io.yaml_reader import Location, YamlDocument
+from vdsm_pin.kinematics import joint_centres, link_angles
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.problem import Posture
+from vdsm_pin.tolerances import TOLERANCES
+
+
+@dataclass(frozen=True)
+class PostureBuilder:
+    """Converts where the arm begins and ends, and refuses where it cannot stand."""
+
+    document: YamlDocument
+    frame: Frame
+    arm: Manipulator
+
+    def start(
+        self, model: list[float] | schema.StartJointsModel, at: Location
+    ) -> Posture:
+        """Where a motion begins: the tip of the straight arm, or joint values.
+
+        Raises:
+            InvalidFile: If the arm cannot stand there.
+        """
+        if isinstance(model, schema.StartJointsModel):
+            return self._posture(model.joints, (*at, "joints"))
+        tip = self.frame.point(model)
+        self._check_straight(tip, at)
+        return Posture(tip)
+
+    def goal(self, model: schema.GoalModel, at: Location) -> Posture:
+        """Where a motion ends: the tip, or joint values.
+
+        Raises:
+            InvalidFile: If both or neither are given, or the arm cannot stand there.
+        """
+        if (model.tip is None) == (model.joints is None):
+            count = "both" if model.joints else "neither"
+            problem = f"has {count} of tip and joints, expected one of them"
+            raise self.document.invalid(at, problem)
+        if model.joints is not None:
+            return self._posture(model.joints, (*at, "joints"))
+        tip = self.frame.point(model.tip)
+        self._check_reach(tip, (*at, "tip"))
+        return Posture(tip)
+
+    def _posture(self, model: schema.JointsModel, at: Location) -> Posture:
+        joints = self._joints(model, at)
+        return Posture(self._tip(joints), joints)
+
+    def _joints(self, model: schema.JointsModel, at: Location) -> FloatArray:
+        n, x0 = self.arm.n_links, float(self.frame.metres(model.x0))
+        if not self._on_rail(x0):
+            problem = f"is {self.frame.shown(x0)}, expected {self._rail()}"
+            raise self.document.invalid((*at, "x0"), problem)
+        angles = {"alpha_deg": model.alpha_deg, "theta_deg": model.theta_deg}
+        limit = np.rad2deg(self.arm.max_joint_angle)
+        for name, values in angles.items():
+            if len(values) != n:
+                problem = f"has {len(values)} values, expected {n}, one per joint"
+                raise self.document.invalid((*at, name), problem)
+            for i, value in enumerate(values):
+                if not abs(value) <= limit + np.rad2deg(TOLERANCES.joint_limit):
+                    problem = f"is {value:g} deg, the joint's limit is {limit:g} deg"
+                    raise self.document.invalid((*at, name, i), problem)
+        alpha, theta = radians([model.alpha_deg, model.theta_deg])
+        psi = link_angles(alpha, theta)
+        worst = int(np.argmax(psi))
+        if not psi[worst] <= self.arm.max_link_angle + TOLERANCES.joint_limit:
+            problem = (
+                f"has a link angle psi of {np.rad2deg(psi[worst]):.4g} deg at joint "
+                f"{worst + 1}, the limit is {np.rad2deg(self.arm.max_link_angle):.4g}"
+            )
+            raise self.document.invalid(at, problem)
+        return np.concatenate([[x0], np.column_stack([alpha, theta]).reshape(-1)])
+
+    def _tip(self, joints: FloatArray) -> FloatArray:
+        alpha, theta = joints[None, 1::2], joints[None, 2::2]
+        tip: FloatArray = joint_centres(self.arm, joints[:1], alpha, theta)[0, -1]
+        return tip
+
+    def _check_reach(self, tip: FloatArray, at: Location) -> None:
+        length, away = self.arm.total_length, float(np.hypot(tip[1], tip[2]))
+        if not away < length:
+            problem = (
+                f"lies {self.frame.shown(away)} from the rail, the arm is "
+                f"{self.frame.shown(length)} long"
+            )
+            raise self.document.invalid(at, problem)
+
+    def _check_straight(self, start: FloatArray, at: Location) -> None:
+        """A start given by the tip alone stands for the straight arm."""
+        self._check_reach(start, at)
+        advice = "; give start as {joints: ...} instead"
+        length, away = self.arm.total_length, float(np.hypot(start[1], start[2]))
+        along = float(np.sqrt(length**2 - away**2))
+        angles = {
+            "link angle psi": (np.arctan2(away, along), self.arm.max_link_angle),
+            "yaw alpha": (np.arctan2(start[1], along), self.arm.max_joint_angle),
+            "pitch theta": (np.arcsin(-start[2] / length), self.arm.max_joint_angle),
+        }
+        for name, (angle, limit) in angles.items():
+            if not abs(angle) <= limit + TOLERANCES.joint_limit:
+                problem = (
+                    f"needs a {name} of {np.rad2deg(abs(angle)):.4g} deg of the "
+                    f"straight arm, the limit is {np.rad2deg(limit):.4g} deg{advice}"
+                )
+                raise self.document.invalid(at, problem)
+        x0 = float(start[0]) - along
+        if not self._on_rail(x0):
+            problem = (
+                f"puts the base of the straight arm at x0 = {self.frame.shown(x0)}, "
+                f"expected {self._rail()}{advice}"
+            )
+            raise self.document.invalid(at, problem)
+
+    def _on_rail(self, x0: float) -> bool:
+        low, high = self.arm.base_range
+        return low - TOLERANCES.base_limit <= x0 <= high + TOLERANCES.base_limit
+
+    def _rail(self) -> str:
+        low, high = self.arm.base_range
+        return f"{self.frame.shown(low)} to {self.frame.shown(high)}, the rail's range"
