@@ -153,6 +153,7 @@ def write_report(result: Verification, path: str | Path) -> None:
         >>> write_report(verify(problem, made.trajectory), "out/api/report.html")
     """
     from vdsm_pin.report.facts import verification_file
+    from vdsm_pin.report.folder import check_kept
     from vdsm_pin.report.html import write_report as write
     from vdsm_pin.report.run_record import RunRecord
 
@@ -163,6 +164,7 @@ def write_report(result: Verification, path: str | Path) -> None:
         problem_sha256=source.sha256 if source else "",
         urdf_sha256=load_robot(result.problem.manipulator).urdf_sha256,
     )
+    check_kept([Path(path)], source.files if source else ())
     with atomic_path(path) as temporary:
         write(temporary, result, verification_file(result, record))
 
@@ -192,6 +194,7 @@ def write_certificate(
         >>> write_certificate(result, "out/api/free.certificate", "out/api/free.csv")
     """
     from vdsm_pin.io.source import sha256_of_file
+    from vdsm_pin.report.folder import check_kept
     from vdsm_pin.verification import certificate_writer
 
     problem, source = result.problem, result.problem.source
@@ -201,6 +204,7 @@ def write_certificate(
     if not _same(read_trajectory(trajectory, problem), result.trajectory):
         message = f"{trajectory}: is another motion than the verified one"
         raise InvalidInput(message)
+    check_kept([Path(path)], [*source.files, Path(trajectory)])
     hashes = certificate_writer.Hashes(
         problem=source.sha256,
         trajectory=sha256_of_file(Path(trajectory)),

@@ -166,6 +166,11 @@ class ProblemSource:
     sha256: str
     meshes: tuple[Path, ...] = ()
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Everything that was read."""
+        return (self.path, *self.meshes)
+
 
 @dataclass(frozen=True)
 class Posture:

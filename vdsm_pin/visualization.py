@@ -23,7 +23,7 @@ from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.kinematics import straight_joints
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.facts import straight_arm
-from vdsm_pin.report.folder import check_output_file
+from vdsm_pin.report.folder import check_kept, check_output_file
 from vdsm_pin.report.html import message_page, view_page
 from vdsm_pin.trajectory import Trajectory
 
@@ -68,7 +68,10 @@ def write_page(path: Path, problem: str, trajectory: Path | None) -> None:
         InvalidInput: If a file is bad or the page cannot be written.
     """
     check_output_file(path)
-    write_text(path, page(read_problem(problem).problem, trajectory))
+    file = read_problem(problem)
+    motion = () if trajectory is None else (trajectory,)
+    check_kept([path], [*file.source.files, *motion])
+    write_text(path, page(file.problem, trajectory))
 
 
 class ViewServer(ThreadingHTTPServer):
@@ -118,10 +121,10 @@ class ViewServer(ThreadingHTTPServer):
 
     def _read(self) -> PlanningProblem:
         """Read the problem; from now on its files are watched."""
-        source = read_problem(self._problem)
+        file = read_problem(self._problem)
         motion = () if self._trajectory is None else (self._trajectory,)
-        self._files = (source.path, *source.meshes, *motion)
-        return source.problem
+        self._files = (*file.source.files, *motion)
+        return file.problem
 
     def current_page(self) -> str:
         """The page of the files as they are now, or what is wrong with them."""

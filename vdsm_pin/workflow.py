@@ -21,7 +21,12 @@ from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.report.facts import plan_file, verification_file
 from vdsm_pin.report.files import PlanFile, VerificationFile
-from vdsm_pin.report.folder import check_output_file, check_output_folder, staged
+from vdsm_pin.report.folder import (
+    check_kept,
+    check_output_file,
+    check_output_folder,
+    staged,
+)
 from vdsm_pin.report.pdf import find_browser, print_page
 from vdsm_pin.report.run_record import RunRecord
 from vdsm_pin.report.tables import ClearanceCsv, write_cables, write_link_angles
@@ -35,6 +40,15 @@ TRAJECTORY: Final = "trajectory.csv"
 PLAN: Final = "plan.json"
 VERIFICATION: Final = "verification.json"
 REPORT: Final = "report.html"
+CLEARANCE: Final = "clearance.csv"
+LINK_ANGLES: Final = "link_angles.csv"
+CABLES: Final = "cables.csv"
+
+PLANNED: Final = TRAJECTORY, PLAN
+"""What planning writes to its folder."""
+
+JUDGED: Final = VERIFICATION, REPORT, CLEARANCE, LINK_ANGLES, CABLES
+"""What verifying writes to its folder."""
 
 AGAIN: Final = 0.5
 """A time limit is raised again after this, should the first have come where Python can
@@ -124,6 +138,7 @@ def plan_to_folder(
 
     _check_plannable(source)
     check_output_folder(folder)
+    check_kept([folder / name for name in PLANNED], source.source.files)
     robot = load_robot(source.problem.manipulator)
     refinement = plan_and_verify(source.problem, strategy, robot)
     with staged(folder) as aside:
@@ -172,7 +187,7 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
     record = _record(order, robot)
     with staged(order.folder) as aside:
         pairs = all_pairs(problem)
-        with ClearanceCsv(aside / "clearance.csv", problem, pairs) as clearance:
+        with ClearanceCsv(aside / CLEARANCE, problem, pairs) as clearance:
             verification = verify(
                 problem,
                 trajectory,
@@ -181,8 +196,8 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
                 sinks=(clearance,),
                 joint_error=True,
             )
-        write_link_angles(aside / "link_angles.csv", verification)
-        write_cables(aside / "cables.csv", verification)
+        write_link_angles(aside / LINK_ANGLES, verification)
+        write_cables(aside / CABLES, verification)
         file = verification_file(verification, record)
         (aside / VERIFICATION).write_text(file.text(), encoding="utf-8")
         write_report(aside / REPORT, verification, file, planned_by(order.trajectory))
@@ -197,9 +212,12 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
 def _check_outputs(order: VerifyOrder) -> None:
     """Refuse what cannot be written before any work is done."""
     check_output_folder(order.folder)
-    for file in (order.certificate, order.pdf):
-        if file is not None:
-            check_output_file(file)
+    alone = [file for file in (order.certificate, order.pdf) if file is not None]
+    for file in alone:
+        check_output_file(file)
+    outputs = [*(order.folder / name for name in JUDGED), *alone]
+    beside = order.trajectory.with_name(PLAN)
+    check_kept(outputs, [*order.source.source.files, order.trajectory, beside])
     if order.pdf is not None:
         find_browser()
 

@@ -17,6 +17,7 @@ from vdsm_pin.batch.task import (
     ALL,
     MANIFEST,
     TIMING,
+    WRITTEN,
     Done,
     Task,
     failed_row,
@@ -31,7 +32,7 @@ from vdsm_pin.io.problem_file import built_in_names
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.report.columns import COLUMNS, write_columns
 from vdsm_pin.report.files import BatchRow
-from vdsm_pin.report.folder import check_output_folder
+from vdsm_pin.report.folder import check_kept, check_output_folder
 from vdsm_pin.report.html import write_index
 from vdsm_pin.report.junit import junit_text
 from vdsm_pin.report.tables import SummaryCsv, write_summary
@@ -40,8 +41,14 @@ SUMMARY: Final = "summary.csv"
 RUNNING: Final = "running.csv"
 """The same while the batch is at work: its rows as they come."""
 
+JUNIT: Final = "junit.xml"
+INDEX: Final = "index.html"
+SECONDS: Final = "timing.js"
 _ASIDE: Final = ".unfinished"
 _LOCK: Final = ".lock"
+
+OWN: Final = SUMMARY, RUNNING, COLUMNS, JUNIT, INDEX, SECONDS, _ASIDE, _LOCK
+"""What a batch writes beside the folders of its problems."""
 
 
 @dataclass(frozen=True)
@@ -144,19 +151,35 @@ def _tasks(batch: Batch) -> list[Task]:
     Raises:
         InvalidFile: If a folder to be written holds something else.
     """
-    names = folder_names(expanded(batch.problems))
+    names = folder_names(expanded(batch.problems), OWN)
+    check_kept([batch.folder / name for name in OWN], map(Path, names))
     tasks = []
     for problem, name in names.items():
         final = batch.folder / name
-        if final.exists() and not (final / MANIFEST).is_file():
-            what = "exists and is not a result of a batch; nothing was overwritten"
-            raise InvalidFile(file=final, problem=what)
+        _check_replaceable(final)
         aside = batch.folder / _ASIDE / name
         task = Task(
             problem, batch.strategy, name, final, aside, batch.resume, batch.keep
         )
         tasks.append(task)
     return tasks
+
+
+def _check_replaceable(final: Path) -> None:
+    """Refuse to replace a folder in which something is that no batch wrote.
+
+    Raises:
+        InvalidFile: If there is something.
+    """
+    if not final.exists():
+        return
+    if not (final / MANIFEST).is_file():
+        what = "exists and is not a result of a batch; nothing was overwritten"
+        raise InvalidFile(file=final, problem=what)
+    foreign = sorted({path.name for path in final.iterdir()} - WRITTEN)
+    if foreign:
+        what = f"holds {foreign[0]!r}, which no batch wrote; nothing was overwritten"
+        raise InvalidFile(file=final, problem=what)
 
 
 def _settle(ended: Ended[Task, Done]) -> Done:
@@ -180,15 +203,15 @@ def _write_summaries(batch: Batch, rows: list[BatchRow]) -> None:
     with atomic_path(folder / SUMMARY) as path:
         write_summary(path, ordered)
     write_columns(folder / COLUMNS, ordered)
-    write_text(folder / "junit.xml", junit_text(ordered))
-    with atomic_path(folder / "index.html") as path:
+    write_text(folder / JUNIT, junit_text(ordered))
+    with atomic_path(folder / INDEX) as path:
         write_index(
             path, ordered, {r.folder for r in rows if keeps_files(batch.keep, r)}
         )
     seconds = {row.folder: _seconds(folder / row.folder) for row in ordered}
     known = {name: value for name, value in seconds.items() if value is not None}
     script = f"window.vdsmTiming = {json.dumps(known, indent=1)};\n"
-    write_text(folder / "timing.js", script)
+    write_text(folder / SECONDS, script)
 
 
 def _seconds(folder: Path) -> float | None:

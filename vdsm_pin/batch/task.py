@@ -1,16 +1,19 @@
 """One problem of a batch inside a worker: plan, verify, write its folder aside."""
 
 import hashlib
+import os
 import shlex
 import shutil
 import time
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from pydantic import ValidationError
 
-from vdsm_pin.errors import Infeasible, VdsmError
+from vdsm_pin.errors import Infeasible, InvalidFile, VdsmError
 from vdsm_pin.io.problem_file import ProblemFile, read_problem
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.report.facts import batch_row
@@ -19,12 +22,27 @@ from vdsm_pin.report.picture import picture
 from vdsm_pin.report.run_record import versions
 from vdsm_pin.report.words import outcome
 from vdsm_pin.text import printable
-from vdsm_pin.workflow import TRAJECTORY, VerifyOrder, plan_to_folder, verify_to_folder
+from vdsm_pin.workflow import (
+    JUDGED,
+    PLANNED,
+    TRAJECTORY,
+    VerifyOrder,
+    plan_to_folder,
+    verify_to_folder,
+)
 
 MANIFEST: Final = "manifest.json"
 TIMING: Final = "timing.json"
 """Seconds of one problem; the only file that differs from run to run."""
 
+PICTURE: Final = "picture.svg"
+
+WRITTEN: Final = frozenset({*PLANNED, *JUDGED, PICTURE, MANIFEST, TIMING})
+"""Every file of a problem's folder."""
+
+
+LONGEST_NAME: Final = 100
+"""Characters of a folder's name that come from the problem's."""
 
 ALL: Final = "all"
 FAILED: Final = "failed"
@@ -87,6 +105,7 @@ def perform(task: Task) -> Done:
     try:
         source = read_problem(task.problem)
         digest = source.sha256
+        _check_apart(task, source)
         if task.resume:
             kept = finished(task, digest)
             if kept is not None:
@@ -104,6 +123,19 @@ def perform(task: Task) -> Done:
     timing = TimingFile(seconds=round(time.perf_counter() - started, 3))
     (task.aside / TIMING).write_text(timing.text(), encoding="utf-8")
     return Done(row, kept=False)
+
+
+def _check_apart(task: Task, source: ProblemFile) -> None:
+    """Refuse a problem with files in the folder that its results replace.
+
+    Raises:
+        InvalidFile: If there is one.
+    """
+    final = task.final.resolve()
+    for file in source.source.files:
+        if final in file.resolve().parents:
+            problem = f"lies in {task.final}, which the results would replace"
+            raise InvalidFile(file=file, problem=problem)
 
 
 def keeps_files(keep: str, row: BatchRow) -> bool:
@@ -150,25 +182,37 @@ def finished(task: Task, digest: str) -> BatchRow | None:
     return manifest.row if intact and same and wanted else None
 
 
-def folder_names(problems: tuple[str, ...]) -> dict[str, str]:
-    """A folder name for each problem, whatever order they come in."""
+def folder_names(
+    problems: tuple[str, ...], taken: Iterable[str] = ()
+) -> dict[str, str]:
+    """A folder name for each problem, whatever order they come in.
+
+    Args:
+        problems: Each once.
+        taken: Names of other files there.
+    """
     plain = {problem: _plain_name(problem) for problem in problems}
-    names = list(plain.values())
-    return {
-        problem: name if names.count(name) == 1 else f"{name}-{_short_hash(problem)}"
-        for problem, name in plain.items()
-    }
+    count = Counter([*plain.values(), *taken])
+    names: dict[str, str] = {}
+    for digits in (8, 64):  # more where short ones meet a name or each other
+        names = {
+            problem: name if count[name] == 1 else f"{name}-{_hash(problem)[:digits]}"
+            for problem, name in plain.items()
+        }
+        if len(set(names.values())) == len(names):
+            break
+    return names
 
 
 def _plain_name(problem: str) -> str:
     path = Path(problem)
     stem = path.stem if path.suffix in (".yaml", ".yml") else problem.strip("/")
     kept = "".join(c if c.isalnum() or c in "-_." else "-" for c in stem).strip(".-")
-    return kept or "problem"
+    return kept[:LONGEST_NAME] or "problem"
 
 
-def _short_hash(problem: str) -> str:
-    return hashlib.sha256(problem.encode()).hexdigest()[:8]
+def _hash(problem: str) -> str:
+    return hashlib.sha256(os.fsencode(problem)).hexdigest()
 
 
 def _plan_and_verify(task: Task, source: ProblemFile) -> BatchRow:
@@ -176,7 +220,7 @@ def _plan_and_verify(task: Task, source: ProblemFile) -> BatchRow:
     order = VerifyOrder(source, task.aside / TRAJECTORY, task.aside, task.command)
     verified = verify_to_folder(order)
     drawing = picture(verified.records)
-    (task.aside / "picture.svg").write_text(drawing, encoding="utf-8")
+    (task.aside / PICTURE).write_text(drawing, encoding="utf-8")
     row = batch_row(task.folder, task.strategy, verified.file)
     # The planner knows why it left something out, the verification does not.
     same = plan.verdict == verified.file.verdict == "incomplete"

@@ -3,7 +3,7 @@
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -34,6 +34,41 @@ def check_output_file(path: Path) -> None:
     if path.is_dir():
         raise InvalidFile(file=path, problem="is a folder, expected a file")
     check_output_folder(path.parent)
+
+
+def check_kept(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
+    """Refuse to write over a file that is read, or two files to one place.
+
+    Paths are compared as the file system does: a link to an input is the input.
+
+    Args:
+        outputs: Files that will be written; they need not exist.
+        inputs: Files that are read.
+
+    Raises:
+        InvalidFile: If one output is an input or another output.
+    """
+    places: dict[str, Path] = {}
+    for output in outputs:
+        first = places.setdefault(os.path.realpath(output), output)
+        if first is not output:
+            problem = f"is where {first} goes too; nothing was written"
+            raise InvalidFile(file=output, problem=problem)
+    there = {identity(output): output for output in outputs}
+    for one in inputs:
+        known = identity(one)
+        if known is not None and known in there:
+            problem = f"is an input, read as {one}; nothing was written"
+            raise InvalidFile(file=there[known], problem=problem)
+
+
+def identity(path: Path) -> tuple[int, int] | None:
+    """What tells a file from every other, whatever it is called; None for no file."""
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_dev, status.st_ino
 
 
 @contextmanager

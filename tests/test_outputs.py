@@ -1,0 +1,203 @@
+"""Whatever a command writes, it leaves alone what it reads, under any name.
+
+Oracle: the bytes of the inputs before and after.
+"""
+
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from vdsm_pin import api
+from vdsm_pin.batch.run import OWN, Batch, run_batch
+from vdsm_pin.batch.task import folder_names
+from vdsm_pin.cli import main
+from vdsm_pin.errors import InvalidFile
+
+PROBLEM = """\
+vdsm_problem: 1
+length_unit: m
+manipulator: {link_lengths: [1, 1], link_radius: 0.05,
+  max_link_angle_deg: 45, max_joint_angle_deg: 45}
+obstacles: [{name: part, shape: mesh, file: part.stl, center: [1, 1, 0]}]
+tip_path: {start: [2, 0, 0], points: [[2, 0, 0], [2.01, 0, 0]]}
+required_clearance: 0
+"""
+PART = """\
+solid part
+facet normal 0 0 1
+outer loop
+vertex 0 0 0
+vertex 1 0 0
+vertex 0 1 0
+endloop
+endfacet
+endsolid part
+"""
+INPUTS = ("problem.yaml", "part.stl", "motion.csv", "plan.json")
+
+
+def run(*words: object) -> int:
+    with pytest.raises(SystemExit) as ended:
+        main([str(word) for word in words])
+    return int(ended.value.code or 0)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("made")
+    (folder / "problem.yaml").write_text(PROBLEM)
+    (folder / "part.stl").write_text(PART)
+    assert run("plan", folder / "problem.yaml", "--out", folder) == 0
+    (folder / "trajectory.csv").rename(folder / "motion.csv")
+    return folder
+
+
+@pytest.fixture
+def here(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the inputs to work in."""
+    for name in INPUTS:
+        shutil.copy(made / name, tmp_path / name)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def itself(target: Path, name: Path) -> Path:
+    return target
+
+
+def roundabout(target: Path, name: Path) -> Path:
+    return target.parent / ".." / target.parent.name / target.name
+
+
+def symbolic(target: Path, name: Path) -> Path:
+    name.symlink_to(target)
+    return name
+
+
+def hard(target: Path, name: Path) -> Path:
+    os.link(target, name)
+    return name
+
+
+READ = {
+    "certificate": INPUTS,
+    "pdf": INPUTS[:1],
+    "view": INPUTS[:3],
+    "report": INPUTS[:2],
+    "proof": INPUTS[:3],
+}
+"""What each way of writing a file reads; the last two are the package's own."""
+
+CASES = [
+    *(("certificate", target, way) for target in INPUTS for way in (roundabout, hard)),
+    *(("certificate", "motion.csv", way) for way in (itself, symbolic)),
+    *((command, target, itself) for command, read in READ.items() for target in read),
+]
+
+
+@pytest.mark.parametrize(("command", "target", "way"), CASES)
+def test_no_output_is_an_input(
+    command: str,
+    target: str,
+    way: Callable[[Path, Path], Path],
+    here: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    before = {name: (here / name).read_bytes() for name in INPUTS}
+    output = way(here / target, here / "other.name")
+    if command in ("report", "proof"):
+        problem = api.read_problem("problem.yaml")
+        motion = api.read_trajectory("motion.csv", problem)
+        result = api.verify(problem, motion)
+        with pytest.raises(InvalidFile, match="is an input"):
+            if command == "report":
+                api.write_report(result, output)
+            else:
+                api.write_certificate(result, output, "motion.csv")
+    else:
+        words = ["problem.yaml", "--trajectory", "motion.csv"]
+        if command == "view":
+            words = ["view", *words, "--html", str(output)]
+        else:
+            words = ["verify", *words, "--out", "out", f"--{command}", str(output)]
+        assert run(*words) == 2
+        said = capsys.readouterr()
+        assert "is an input, read as" in said.err
+        assert not (here / "out").exists()
+    assert before == {name: (here / name).read_bytes() for name in INPUTS}
+
+
+@pytest.mark.parametrize("way", [symbolic, hard])
+def test_no_file_of_a_folder_is_an_input(
+    way: Callable[[Path, Path], Path], here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "out").mkdir()
+    way(here / "part.stl", here / "out" / "cables.csv")
+    way(here / "part.stl", here / "out" / "plan.json")
+    assert run("plan", "problem.yaml", "--out", "out") == 2
+    verify = ["verify", "problem.yaml", "--trajectory", "motion.csv", "--out", "out"]
+    assert run(*verify) == 2
+    assert capsys.readouterr().err.count("is an input") == 2
+    assert (here / "part.stl").read_text() == PART
+
+
+def test_two_outputs_do_not_share_a_place(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    verify = ["verify", "problem.yaml", "--trajectory", "motion.csv", "--out", "out"]
+    for output in ("out/report.html", "out/../out/cables.csv"):
+        assert run(*verify, "--certificate", output) == 2
+        assert "goes too; nothing was written" in capsys.readouterr().err
+    assert run(*verify, "--certificate", "proof") == 0
+
+
+def test_a_problem_may_have_the_name_of_any_file_of_a_batch(here: Path) -> None:
+    (here / "summary.csv.yaml").write_text(PROBLEM)
+    (row,) = run_batch(Batch(("summary.csv.yaml",), here / "out", "fewest"))
+    assert row.outcome == "certified"
+    assert (here / "out" / "summary.csv").is_file()
+    assert (here / "out" / row.folder / "report.html").is_file()
+    names = folder_names(tuple(f"{name}.yaml" for name in OWN), OWN)
+    assert not set(names.values()) & set(OWN)
+
+
+def test_names_that_meet_a_hash_stay_apart() -> None:
+    twins = ("a/x.yaml", "b/x.yaml")
+    met = folder_names(twins)["a/x.yaml"]
+    assert len(set(folder_names((*twins, f"{met}.yaml")).values())) == 3
+
+
+def test_a_batch_leaves_its_inputs_alone(here: Path) -> None:
+    out = here / "out"
+    batch = Batch(("problem.yaml",), out, "fewest")
+    run_batch(batch)
+    # A file of the batch that is read as a problem.
+    shutil.copy("problem.yaml", out / ".lock")
+    with pytest.raises(InvalidFile, match="is an input"):
+        run_batch(Batch((str(out / ".lock"),), out, "fewest"))
+    assert (out / ".lock").read_text() == PROBLEM
+    # A file beside results that would be replaced.
+    (out / "problem" / "notes.txt").write_text("mine")
+    with pytest.raises(InvalidFile, match=r"holds 'notes.txt', which no batch wrote"):
+        run_batch(batch)
+    (out / "problem" / "notes.txt").unlink()
+    # A mesh there under a name that the batch uses.
+    inside = out / "problem" / "cables.csv"
+    inside.write_text(PART)
+    (here / "part.stl").unlink()
+    (here / "part.stl").symlink_to(inside)
+    (row,) = run_batch(batch)
+    assert row.outcome == "error"
+    assert "which the results would replace" in row.reason
+
+
+def test_long_and_odd_names_have_folders_of_their_own(here: Path) -> None:
+    names = ["a" * 230, "b", "summary.csv", os.fsdecode(b"\xff\x1b[31m")]
+    for name in names:
+        (here / f"{name}.yaml").write_text(PROBLEM)
+    rows = run_batch(Batch(tuple(f"{n}.yaml" for n in names), here / "out", "fewest"))
+    assert [row.outcome for row in rows] == 4 * ["certified"]
+    assert len({row.folder for row in rows}) == 4
