@@ -262,12 +262,17 @@ class Mesh:
         vertices: Shape (n, 3), in the base frame; [m].
         triangles: Vertex indices, shape (m, 3), m >= 1.
         watertight: Whether the triangles enclose an inside.
+        assumed_size: Its size in words where neither its file nor the problem states
+            a unit; else empty.
+        notes: What else its file had, one phrase each.
     """
 
     name: str
     vertices: FloatArray
     triangles: IntArray
     watertight: bool
+    assumed_size: str = ""
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check the indices."""

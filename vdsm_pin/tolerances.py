@@ -110,6 +110,12 @@ class Tolerances:
     mesh_size_high: float = _held(30.0, "-")
     """Mesh diagonal over arm length above which the unit is taken to be wrong; [-]."""
 
+    flat_face: float = _held(1e-6, "-")
+    """How far a face's corners may be off its plane, over the mesh's diagonal; [-].
+
+    Files have six digits or more; what is off by less is their rounding.
+    """
+
     straight_slope: float = _held(1e-10, "-")
     """Change of a link's slope dy/dL or dz/dL that counts as none; [-].
 

@@ -25,6 +25,7 @@ class Trajectory(Summarised):
         x0: Base position on the rail, shape (n_samples,); [m].
         alpha: Yaw angles, shape (n_samples, N); [rad].
         theta: Pitch angles, shape (n_samples, N); [rad].
+        notes: What its file had besides, one phrase each.
 
     Raises:
         InvalidInput: If shapes disagree, a value is not finite, a path_m goes beyond
@@ -36,6 +37,7 @@ class Trajectory(Summarised):
     x0: FloatArray
     alpha: FloatArray
     theta: FloatArray
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check their shapes."""

@@ -131,7 +131,7 @@ def test_trailing_bytes_and_counts_of_streaming_programs_are_read(
     tmp_path: Path,
 ) -> None:
     for content, note in (
-        (binary_stl(TETRAHEDRON) + b"\n", "1 bytes behind the last triangle"),
+        (binary_stl(TETRAHEDRON) + b"\n", "bytes behind the last triangle: 1"),
         (with_count(0), "its header counts 0 triangles, 4 are there"),
         (with_count(0xFFFFFFFF), "its header counts 4294967295 triangles, 4 are there"),
     ):
@@ -170,7 +170,7 @@ def test_lines_and_points_of_an_obj_have_no_surface_and_are_counted(
     text = "v 0 0 0 0.5 0.5 0.5\nv 1 0 0 1\nv 0 1 0\nf 1 2 3\nl 1 2\np 1\n"
     mesh = read_mesh(write(tmp_path, "a.obj", text))
     assert len(mesh.triangles) == 1
-    assert mesh.notes == ("2 lines and points left out",)
+    assert mesh.notes == ("lines and points left out: 2",)
 
 
 def test_vertices_that_no_face_uses_do_not_count(tmp_path: Path) -> None:

@@ -160,6 +160,9 @@ def test_both_read_every_shape_in_any_pose_alike(tmp_path: Path, seed: int) -> N
     ):
         text = edited(text, location, rng.uniform(-size, size, 3).tolist())
     text = edited(text, ("obstacles", 0, "axis"), "xyz"[seed % 3])
+    if seed % 2:
+        text = edited(text, ("obstacles", 6, "length_unit"), "m")
+        text = edited(text, ("obstacles", 6, "scale"), 0.5)
     text = edited(text, ("obstacles", 1, "axis"), "xyz"[seed % 3])
     polygon = [[0, 0], [900, 0], [900, 900], [450, 100 + 10 * seed], [0, 900]]
     text = edited(text, ("obstacles", 1, "polygon"), polygon)

@@ -314,7 +314,8 @@ class Problem:
         corners = _read_mesh(content, is_obj=path.suffix.lower() == ".obj")
         good = corners.size and np.isfinite(corners).all()
         require(good, f"{path.name} has no triangles or a number that is not finite")
-        scale = _real(data.pop("scale", "1")) * self._unit
+        units = {"mm": arb(1) / 1000, "m": arb(1), None: self._unit}
+        scale = _real(data.pop("scale", "1")) * units[data.pop("length_unit", None)]
         rotation = self._inward(_rotation(data.pop("rpy_deg", ZERO)))
         return Triangles(
             corners, rotation * scale, self._point(data.pop("center", ZERO))

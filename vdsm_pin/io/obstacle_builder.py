@@ -15,6 +15,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import obstacle_schema as schema
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.mesh_file import read_mesh
+from vdsm_pin.io.mesh_size import MeshSize
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
 from vdsm_pin.tolerances import TOLERANCES
@@ -181,28 +182,20 @@ class ObstacleBuilder:
             place = f" {error.where}:" if error.where else ""
             problem = f"{model.file!r}:{place} {error.problem}"
             raise self.document.invalid((*at, "file"), problem) from None
+        size = MeshSize.of(mesh, model, self.frame)
         if model.check_size:
-            self._check_size(mesh.vertices, model, at)
+            size.check(self.arm_length, self.document, at)
         corners = self.frame.placed(
-            mesh.vertices, model.scale, model.rpy_deg, model.center
+            mesh.vertices, size.scale, model.rpy_deg, model.center
         )
-        return scene.Mesh(model.name, corners, mesh.triangles, mesh.watertight)
-
-    def _check_size(
-        self, vertices: FloatArray, model: schema.MeshModel, at: Location
-    ) -> None:
-        diagonal = np.linalg.norm(np.ptp(vertices, axis=0)) * model.scale
-        size = float(self.frame.metres(diagonal))
-        ratio = size / self.arm_length
-        if TOLERANCES.mesh_size_low <= ratio <= TOLERANCES.mesh_size_high:
-            return
-        factor = 1e-3 if ratio > 1.0 else 1e3
-        problem = (
-            f"makes {model.file!r} {self.frame.shown(size)} large beside an arm of "
-            f"{self.frame.shown(self.arm_length)}; if the file is in another unit, try "
-            f"scale: {model.scale * factor:g}, else set check_size: false"
+        return scene.Mesh(
+            model.name,
+            corners,
+            mesh.triangles,
+            mesh.watertight,
+            assumed_size="" if size.stated else size.shown,
+            notes=(*mesh.notes, *size.bent(mesh.bend)),
         )
-        raise self.document.invalid((*at, "scale"), problem)
 
     def _unit(self, vector: list[float], at: Location) -> FloatArray:
         unit = unit_vector(np.array(vector))

@@ -96,8 +96,13 @@ class MeshModel(_Named):
     file: Annotated[str, Field(min_length=1, max_length=4096)] = Field(
         description="Path, relative to this file."
     )
+    length_unit: Literal["mm", "m"] | None = Field(
+        default=None,
+        description="Unit of the mesh. Default: what its file states; else that of "
+        "this file, and the verdict names the size so assumed.",
+    )
     scale: Positive = Field(
-        default=1.0, description="Length units of this file per unit of the mesh."
+        default=1.0, description="Factor on the coordinates of the mesh."
     )
     center: Vector = Field(
         default=[0.0, 0.0, 0.0],

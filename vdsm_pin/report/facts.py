@@ -26,6 +26,7 @@ from vdsm_pin.report.files import (
     ToleranceRow,
     VerificationFile,
 )
+from vdsm_pin.report.inputs import assumed_sizes, assumption, input_notes
 from vdsm_pin.report.run_record import RunRecord, machine, versions
 from vdsm_pin.report.words import check_title, percent, place, quantity
 from vdsm_pin.tolerances import TOLERANCES, UNITS
@@ -270,6 +271,8 @@ def verification_file(
         problem=problem.name,
         verdict=verification.verdict.value,
         reason=reason(verification),
+        assumed_sizes=assumed_sizes(verification.problem),
+        notes=input_notes(verification.problem, verification.trajectory),
         checks=tuple(check_row(check) for check in verification.checks),
         min_clearance=min_clearance(verification),
         required_clearance_m=problem.required_clearance,
@@ -314,7 +317,8 @@ def plan_file(refinement: "Refinement", record: RunRecord) -> PlanFile:
         verdict=verification.verdict.value,
         reason=plan_reason(plan, verification),
         undrawn=plan.undrawn,
-        notes=plan.notes,
+        assumed_sizes=assumed_sizes(plan.problem),
+        notes=(*plan.notes, *input_notes(plan.problem, plan.trajectory)),
         rounds=len(refinement.rounds),
         adjustments=tuple(
             AdjustmentRow(
@@ -356,7 +360,7 @@ def batch_row(folder: str, strategy: str, file: VerificationFile) -> BatchRow:
         x0_min_m=motion.x0_min_m,
         x0_max_m=motion.x0_max_m,
         waypoints=motion.waypoints,
-        reason=file.reason,
+        reason="; ".join(filter(None, (file.reason, assumption(file.assumed_sizes)))),
     )
 
 

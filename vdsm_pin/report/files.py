@@ -33,6 +33,8 @@ _COVERAGE: Final = (
 )
 _CHANGED: Final = "mean number of changed link angles on the path"
 _JOINT_ERROR: Final = "largest joint error still certified; null where not sought"
+_ASSUMED: Final = "meshes whose unit nobody states, with the size assumed"
+_NOTES: Final = "what was left out or odd in meshes and trajectory"
 _PROBLEM: Final = "name of the problem"
 _STRATEGY: Final = "how it was planned"
 _VERSIONS: Final = "of everything a number may depend on"
@@ -169,6 +171,8 @@ class VerificationFile(FileModel):
     problem: str = Field(description=_PROBLEM)
     verdict: VerdictWord
     reason: str = Field(description="the verdict in one sentence")
+    assumed_sizes: tuple[str, ...] = Field(description=_ASSUMED)
+    notes: tuple[str, ...] = Field(description=_NOTES)
     checks: tuple[CheckRow, ...] = Field(description="every check, in a fixed order")
     min_clearance: MinClearance | None = Field(
         description="smallest clearance from an obstacle; null where there is none"
@@ -229,7 +233,10 @@ class PlanFile(FileModel):
     undrawn: tuple[str, ...] = Field(
         description="stretches of the desired path not drawn, and why"
     )
-    notes: tuple[str, ...] = Field(description="what the strategy has to say")
+    assumed_sizes: tuple[str, ...] = Field(description=_ASSUMED)
+    notes: tuple[str, ...] = Field(
+        description=f"what the strategy has to say; {_NOTES}"
+    )
     rounds: int = Field(description="rounds of plan, measure, verify, larger margins")
     adjustments: tuple[AdjustmentRow, ...] = Field(
         default=(), description="margins raised between rounds, and what asked for it"

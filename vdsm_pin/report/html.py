@@ -17,6 +17,7 @@ from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.facts import failing, nearest_to_obstacle
 from vdsm_pin.report.files import BatchRow, PlanFile, Point, VerificationFile
+from vdsm_pin.report.inputs import assumption
 from vdsm_pin.report.page_data import report_data, view_data
 from vdsm_pin.report.words import (
     MISSING,
@@ -84,6 +85,7 @@ def _environment() -> jinja2.Environment:
         "css_text": _css_text,
         "term": term,
         "place": place,
+        "assumption": assumption,
     }
     environment.globals |= {
         "asset": _asset,

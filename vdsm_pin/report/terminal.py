@@ -6,6 +6,7 @@ from pathlib import Path
 import typer
 
 from vdsm_pin.report.files import CheckRow, PlanFile, VerificationFile
+from vdsm_pin.report.inputs import assumption
 from vdsm_pin.report.words import (
     check_title,
     limit,
@@ -23,7 +24,7 @@ from vdsm_pin.text import printable
 def show_plan(file: PlanFile, folder: Path) -> None:
     """One plan in a few lines."""
     motion = file.motion
-    typer.echo(_headline(file.verdict, f"{file.problem}, planned by {file.strategy}"))
+    typer.echo(_headline(file, f"{file.problem}, planned by {file.strategy}"))
     if not outcome(file.verdict).passed:
         typer.echo(f"  {file.reason}")
     changed = motion.changed_angles_mean_on_path
@@ -59,7 +60,7 @@ def show_verification(
         folder: Where it stands.
         more: Names and values of further lines.
     """
-    typer.echo(_headline(file.verdict, file.problem))
+    typer.echo(_headline(file, file.problem))
     typer.echo(f"  {printable(file.reason)}")
     if sys.stdout.isatty():
         _rich_checks(file)
@@ -72,7 +73,8 @@ def show_verification(
         if file.refuted_joint_error_rad is not None:
             error += f", lost at {lost(file.refuted_joint_error_rad)}"
         more = ((term("max_joint_error_rad"), error), *more)
-    _facts(*more, ("report", str(folder / "report.html")))
+    notes = (("note", note) for note in file.notes)
+    _facts(*more, *notes, ("report", str(folder / "report.html")))
 
 
 def _facts(*rows: tuple[str, str]) -> None:
@@ -82,11 +84,13 @@ def _facts(*rows: tuple[str, str]) -> None:
         typer.echo(f"  {name:<{width}}  {printable(value)}")
 
 
-def _headline(word: str, subject: str) -> str:
-    known = outcome(word)
+def _headline(file: PlanFile | VerificationFile, subject: str) -> str:
+    """Verdict, problem, and what the verdict rests on that nobody stated."""
+    known = outcome(file.verdict)
     colour = known.colour if sys.stdout.isatty() else None
-    shown = printable(subject)
-    return typer.style(f"{known.mark} {word}", fg=colour, bold=True) + f"  {shown}"
+    verdict = typer.style(f"{known.mark} {known.word}", fg=colour, bold=True)
+    rests_on = assumption(file.assumed_sizes)
+    return f"{verdict}  {printable(', '.join(filter(None, (subject, rests_on))))}"
 
 
 def _cells(check: CheckRow) -> tuple[str, str, str, str, str]:

@@ -60,7 +60,7 @@ def _mesh(faces: _Faces, stream: MeshStream) -> RawMesh:
     stream.check_count(len(corners) - 2 * len(sizes))
     stream.check_numbers(vertices, "vertex", used=corners)
     cut = cut_faces(vertices, corners, sizes)
-    lines = (f"{faces.lines} lines and points left out",) if faces.lines else ()
+    lines = (f"lines and points left out: {faces.lines}",) if faces.lines else ()
     return RawMesh(vertices, cut.triangles, bend=cut.bend, notes=(*cut.notes, *lines))
 
 

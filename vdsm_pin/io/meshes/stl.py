@@ -60,7 +60,7 @@ def _count(stream: MeshStream, promised: int) -> tuple[int, tuple[str, ...]]:
     size = stream.size - _START
     there, rest = divmod(size, _RECORD.itemsize)
     if promised == there:
-        notes = (f"{rest} bytes behind the last triangle",) if rest else ()
+        notes = (f"bytes behind the last triangle: {rest}",) if rest else ()
         return there, notes
     if promised in _UNKNOWN and not rest:
         return there, (f"its header counts {promised} triangles, {there} are there",)

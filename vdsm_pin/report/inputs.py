@@ -1,0 +1,38 @@
+"""What was assumed, left out or odd in the files that a verdict is about."""
+
+from collections.abc import Sequence
+from typing import Final
+
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.scene import Mesh
+from vdsm_pin.trajectory import Trajectory
+
+_NAMED: Final = 3
+"""Sizes that one line names; the JSON files have all of them."""
+
+
+def assumed_sizes(problem: PlanningProblem) -> tuple[str, ...]:
+    """The meshes whose unit nobody states, with the size they were taken to have."""
+    return tuple(
+        f"{mesh.name!r} is {mesh.assumed_size}"
+        for mesh in problem.scene.obstacles
+        if isinstance(mesh, Mesh) and mesh.assumed_size
+    )
+
+
+def assumption(sizes: Sequence[str]) -> str:
+    """The same in one phrase; empty where nothing was assumed."""
+    if not sizes:
+        return ""
+    more = len(sizes) - _NAMED
+    named = ", ".join(sizes[:_NAMED]) + (f" and {more} more" if more > 0 else "")
+    return f"assuming that {named}; no unit is stated"
+
+
+def input_notes(problem: PlanningProblem, trajectory: Trajectory) -> tuple[str, ...]:
+    """What the readers of meshes and trajectory have to say, one sentence each."""
+    meshes = (mesh for mesh in problem.scene.obstacles if isinstance(mesh, Mesh))
+    of_meshes = (
+        f"mesh {mesh.name!r}: {note}" for mesh in meshes for note in mesh.notes
+    )
+    return (*of_meshes, *(f"trajectory: {note}" for note in trajectory.notes))
