@@ -61,3 +61,9 @@ NINE: Final = (
     made("n40", np.ones(40), 0.030, 20.0),
 )
 """Arms of 3 to 40 links."""
+
+SMALL: Final = tuple(scaled(arm, 0.096) for arm in (PAPER, EQUAL_12, TAPERED_16))
+"""Endoscopes of 0.3 m."""
+
+LARGE: Final = tuple(scaled(arm, 6.4) for arm in (PAPER, EQUAL_12, TAPERED_16))
+"""Booms of 20 m."""

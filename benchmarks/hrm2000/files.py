@@ -9,9 +9,9 @@ import trimesh
 import yaml
 
 from benchmarks.hrm2000.arms import PAPER
-from benchmarks.hrm2000.carving import required_clearance, scale
-from benchmarks.hrm2000.families import Draft
+from benchmarks.hrm2000.drafts import Draft
 from benchmarks.hrm2000.motions import Witness
+from benchmarks.hrm2000.sweeps import required_clearance, scale
 from vdsm_pin import scene
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.trajectory_file import write_trajectory

@@ -1,7 +1,8 @@
 """Writes problems: python -m benchmarks.hrm2000.generate --family port --out DIR.
 
 Problem n of a family depends on the family, n and VERSION alone. Beside every problem
-lies its witness, a motion that the verifier has certified; no planner reads it.
+lies its witness, a motion that the verifier has certified; no planner reads it. Beside
+an infeasible one lies what solves its feasible twin; the verifier has refused it.
 """
 
 import argparse
@@ -13,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.hrm2000.families import FAMILIES, arm_of
+from benchmarks.hrm2000.families import FAMILIES
 from benchmarks.hrm2000.files import write
 from benchmarks.hrm2000.motions import DraftRejected
 from vdsm_pin.io.problem_file import read_problem
@@ -75,19 +76,19 @@ def generate(folder: Path, family: str, number: int) -> Generated:
         RuntimeError: If no draft is accepted.
     """
     rng = np.random.default_rng([VERSION, zlib.crc32(family.encode()), number])
-    arm, verify_s = arm_of(family, number), 0.0
+    arms, verify_s = FAMILIES[family].arms, 0.0
     begin = time.process_time()
     for drafts in range(1, DRAFTS + 1):
         try:
-            draft = FAMILIES[family](rng, arm)
+            draft = FAMILIES[family].draft(rng, arms[number % len(arms)])
         except DraftRejected:
             continue
         note = f"-{draft.note}" if draft.note else ""
         path = write(folder, f"{family}-{number:04d}{note}", draft)
         before = time.process_time()
-        verdict = verified(path).verdict
+        solved = verified(path).verdict is Verdict.CERTIFIED
         verify_s += time.process_time() - before
-        if verdict is Verdict.CERTIFIED:
+        if solved == draft.feasible:
             make_s = time.process_time() - begin - verify_s
             return Generated(path, drafts, make_s, verify_s)
         _remove(path)

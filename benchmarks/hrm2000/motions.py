@@ -13,6 +13,7 @@ from benchmarks.hrm2000.curves import TipCurve, follow_the_leader
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_angles, joint_centres, link_angles
 from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.problem import DesiredPath
 from vdsm_pin.trajectory import Trajectory
 
 ROW: Final = 1.6e-3
@@ -126,45 +127,51 @@ def fed(arm: Manipulator, curve: TipCurve, tips: FloatArray) -> Trajectory:
     return motion
 
 
-def stations_of(points: FloatArray, closed: bool, step: float) -> FloatArray:
-    """Arc lengths of a polyline's corners and of places between them; [m]."""
-    corners = np.vstack([points, points[:1]]) if closed else points
-    sides = np.linalg.norm(np.diff(corners, axis=0), axis=1)
-    at = np.concatenate([[0.0], np.cumsum(sides)])
+def swing(arm: Manipulator, joints: FloatArray) -> Trajectory:
+    """From straight at x0 = 0 to joint values, on a straight line in joint space.
+
+    Args:
+        arm: The arm.
+        joints: q = (x0, alpha1, theta1, ..), shape (1 + 2N,); [m], [rad].
+
+    Raises:
+        DraftRejected: If a joint would pass a limit.
+    """
+    count = int(np.ceil(np.abs(joints[1:]).max() / np.deg2rad(0.5))) + 1
+    rows = np.linspace(0.0, 1.0, count)[:, None] * joints
+    off = np.zeros(count)
+    motion = Trajectory(off > 0.0, off, rows[:, 0], rows[:, 1::2], rows[:, 2::2])
+    check_limits(arm, motion)
+    return motion
+
+
+def stations(path: DesiredPath, step: float) -> FloatArray:
+    """Arc lengths of a path's corners and of places between them; [m]."""
     parts = [
         np.linspace(a, b, int(np.ceil((b - a) / step)) + 1)[:-1]
-        for a, b in itertools.pairwise(at)
+        for a, b in itertools.pairwise(path.corner_stations)
     ]
-    return np.concatenate([*parts, at[-1:]])
-
-
-def along(points: FloatArray, closed: bool, stations: FloatArray) -> FloatArray:
-    """Places of a polyline, shape (n, 3); [m]."""
-    corners = np.vstack([points, points[:1]]) if closed else points
-    sides = np.linalg.norm(np.diff(corners, axis=0), axis=1)
-    at = np.concatenate([[0.0], np.cumsum(sides)])
-    return np.stack([np.interp(stations, at, column) for column in corners.T], axis=1)
+    return np.concatenate([*parts, path.corner_stations[-1:]])
 
 
 def drawing(
-    arm: Manipulator, joints: FloatArray, path: tuple[FloatArray, bool], free: int
+    arm: Manipulator, joints: FloatArray, path: DesiredPath, free: int
 ) -> Trajectory:
     """The path drawn by the joints nearest to the tip (resolved rates, Newton steps).
 
     Args:
         arm: The arm.
         joints: Where it begins, its tip at the path's first corner, shape (1 + 2N,).
-        path: Corners, shape (k, 3), [m], and whether the last joins the first.
+        path: What it draws.
         free: How many links may move, from the tip; all of them: the base too.
 
     Raises:
         DraftRejected: If it does not get round, or a joint would pass a limit.
     """
-    points, closed = path
-    stations = stations_of(points, closed, ROW * arm.total_length)
+    places = stations(path, ROW * arm.total_length)
     moving = slice(1 + 2 * (arm.n_links - free) if free < arm.n_links else 0, None)
     rows, now = [], joints.copy()
-    for target in along(points, closed, stations):
+    for target in path.at(places):
         pull = np.zeros(joints.size)
         pull[moving] = PULL * (joints - now)[moving]
         for _ in range(NEWTON_STEPS):
@@ -182,7 +189,7 @@ def drawing(
         rows.append(now)
     table = np.array(rows)
     drawn = np.ones(len(rows), dtype=np.bool_)
-    motion = Trajectory(drawn, stations, table[:, 0], table[:, 1::2], table[:, 2::2])
+    motion = Trajectory(drawn, places, table[:, 0], table[:, 1::2], table[:, 2::2])
     check_limits(arm, motion)
     if np.abs(np.diff(motion.joints[:, 1:], axis=0)).max() > np.deg2rad(2.0):
         raise DraftRejected
