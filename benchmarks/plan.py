@@ -4,7 +4,7 @@
     python -m benchmarks.plan --compare OLD.json NEW.json
 
 Processor time on one thread. The peer is damped least squares on Pinocchio with
-avoidance by Coal's distances (`benchmarks/hrm1000/references`). By itself it finds no
+avoidance by Coal's distances (`benchmarks/hrm2000/references`). By itself it finds no
 way round an obstacle that the arm must change sides of. So it is given the way of the
 tip that each of our plans takes, waypoint by waypoint, and has only the joints to find;
 the time we took to find that way is in our figure, not in its. The same verifier judges
@@ -18,8 +18,8 @@ import time
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from benchmarks.common import MICRO, Results, command, timed
-from benchmarks.hrm1000.references.arm import Wanted
-from benchmarks.hrm1000.references.damped_least_squares import along
+from benchmarks.hrm2000.references.arm import Wanted
+from benchmarks.hrm2000.references.damped_least_squares import along
 from vdsm_pin.errors import VdsmError
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.records import Plan

@@ -39,7 +39,7 @@ rebuilt by `python -m benchmarks.report --save reports/performance`, one part of
 ## Planning
 
 The peer is damped least squares on Pinocchio with avoidance by Coal's distances
-(`benchmarks/hrm1000/references`, written in Python), timed in the same run. By itself
+(`benchmarks/hrm2000/references`, written in Python), timed in the same run. By itself
 it finds no way round obs1 or obs2. So it is given the way of the tip that each of our
 plans takes, waypoint by waypoint, and has only the joints to find; the time we took to
 find that way is in our figure, not in its. `certified` says whether the verifier passes

@@ -10,7 +10,7 @@ from benchmarks.hrm2000.curves import TipCurve
 from benchmarks.hrm2000.motions import ROW, DraftRejected, Witness
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.scene import Obstacle, Scene
 from vdsm_pin.verification.link_clearance import link_clearance
 
@@ -75,8 +75,7 @@ class Sweep:
 
     @cached_property
     def _alone(self) -> PlanningProblem:
-        path = DesiredPath(start=np.zeros(3), points=np.zeros((1, 3)))
-        return PlanningProblem("sweep", self.arm, Scene(()), path, 0.0, np.eye(4))
+        return PlanningProblem("sweep", self.arm, Scene(()), None, 0.0, np.eye(4))
 
     @cached_property
     def _few(self) -> FloatArray:

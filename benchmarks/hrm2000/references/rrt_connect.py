@@ -7,8 +7,8 @@ is drawn by chance and RRTConnect brings the arm there off the path.
 import numpy as np
 from ompl import base, geometric, util
 
-from benchmarks.hrm1000.references.arm import Arm, Rows, wanted
-from benchmarks.hrm1000.references.damped_least_squares import reach
+from benchmarks.hrm2000.references.arm import Arm, Rows, wanted
+from benchmarks.hrm2000.references.damped_least_squares import reach
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance

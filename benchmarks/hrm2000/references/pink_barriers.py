@@ -6,7 +6,7 @@ import pinocchio as pin
 from pink.barriers import Barrier, SelfCollisionBarrier
 from pink.tasks import FrameTask
 
-from benchmarks.hrm1000.references.arm import Arm, Rows, wanted
+from benchmarks.hrm2000.references.arm import Arm, Rows, wanted
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance

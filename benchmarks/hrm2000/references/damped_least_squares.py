@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from benchmarks.hrm1000.references.arm import Arm, Rows, Wanted, wanted
+from benchmarks.hrm2000.references.arm import Arm, Rows, Wanted, wanted
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance

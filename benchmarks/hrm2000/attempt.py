@@ -1,0 +1,194 @@
+"""One problem, one method: plan, judge, look again densely."""
+
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import FrameType
+from typing import Final
+
+import numpy as np
+
+from benchmarks.hrm2000.references import REFERENCES, reference
+from benchmarks.hrm2000.sampling import sample
+from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
+from vdsm_pin.geometry.compiled import is_compiling
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.kinematics import link_angles
+from vdsm_pin.planner.strategies import strategy
+from vdsm_pin.problem import Blocked, PlanningProblem
+from vdsm_pin.refinement import plan_and_verify
+from vdsm_pin.robot_model import RobotModel, load_robot
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.verify import verify
+
+AGAIN: Final = 0.5
+"""Processor time after which a limit that was not heard is raised again; [s]."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One problem, one method; None where there is no motion to measure.
+
+    Args:
+        problem: Name of the problem.
+        family: Its family.
+        number: Its number.
+        method: A strategy or a reference.
+        answer: A verdict; or "infeasible", "not found", "out of time", "error".
+        reason: In words.
+        plan_s: Processor time of planning; [s].
+        total_s: With the proof; [s].
+        coverage: Part of the path that is drawn.
+        knees: Mean number of changed angles by path length.
+        most_knees: The largest one.
+        psi_deg: Largest link angle.
+        clearance_m: Least clearance proved.
+        faults: What is wrong with a plan that the verifier certified, as seen by
+            dense sampling; must be empty.
+    """
+
+    problem: str
+    family: str
+    number: int
+    method: str
+    answer: str
+    reason: str
+    plan_s: float
+    total_s: float
+    coverage: float = 0.0
+    knees: float | None = None
+    most_knees: int | None = None
+    psi_deg: float | None = None
+    clearance_m: float | None = None
+    faults: str = ""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A motion, what the judge said, and the processor time of planning [s]."""
+
+    trajectory: Trajectory
+    verification: Verification
+    plan_s: float
+
+
+@contextmanager
+def processor_time(seconds: float) -> Iterator[None]:
+    """End what is inside after so much processor time, between two calls of Python.
+
+    Raises:
+        OutOfTime: When the time is over.
+    """
+    end = time.process_time() + seconds
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        left = end - time.process_time()
+        if left > 0.0:  # the timer counts in ticks
+            signal.setitimer(signal.ITIMER_PROF, left, AGAIN)
+        elif not is_compiling():  # else it is raised again
+            raise OutOfTime(seconds)
+
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds, AGAIN)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+
+
+def by_strategy(
+    problem: PlanningProblem, robot: RobotModel, name: str, limit: float
+) -> Judged:
+    """One of this package's strategies, refined where the first plan is not certified.
+
+    The proof of the first plan is not counted as planning, later ones are.
+    """
+    begin = time.process_time()
+    with processor_time(limit):
+        plan = strategy(name)(problem, link_clearance(problem), 0.0)
+    plan_s = time.process_time() - begin
+    verification = verify(problem, plan.trajectory, robot)
+    if verification.verdict is not Verdict.CERTIFIED:
+        begin = time.process_time()
+        with processor_time(limit):
+            result = plan_and_verify(problem, name, robot)
+        plan_s = time.process_time() - begin
+        plan, verification = result.plan, result.verification
+    return Judged(plan.trajectory, verification, plan_s)
+
+
+def by_reference(
+    problem: PlanningProblem, robot: RobotModel, name: str, limit: float
+) -> Judged:
+    """One of the references, judged as it comes."""
+    follow = reference(name)
+    begin = time.process_time()
+    with processor_time(limit):
+        trajectory = follow(problem, robot, link_clearance(problem))
+    plan_s = time.process_time() - begin
+    return Judged(trajectory, verify(problem, trajectory, robot), plan_s)
+
+
+def whole_or_nothing(problem: PlanningProblem) -> PlanningProblem:
+    """The same problem for which a part of the path is no answer."""
+    return replace(problem, tip_path=replace(problem.path, blocked=Blocked.FAIL))
+
+
+def attempt(file: Path, key: tuple[str, int], name: str, limit: float) -> Outcome:
+    """Plan and judge one problem; times are of the processor.
+
+    Args:
+        file: What is asked.
+        key: Its family and number.
+        name: A strategy or a reference.
+        limit: Processor time of planning; [s].
+    """
+    problem = whole_or_nothing(read_problem(file).problem)
+    robot = load_robot(problem.manipulator)
+    plan = by_reference if name in REFERENCES else by_strategy
+    begin = time.process_time()
+    try:
+        judged = plan(problem, robot, name, limit)
+    except Exception as error:  # noqa: BLE001 - a crash is an outcome to be counted
+        spent = time.process_time() - begin
+        reason = str(error) or type(error).__name__
+        return Outcome(problem.name, *key, name, answer_of(error), reason, spent, spent)
+    total_s = time.process_time() - begin
+    outcome = measured(problem, judged)
+    return replace(outcome, family=key[0], number=key[1], method=name, total_s=total_s)
+
+
+def answer_of(error: Exception) -> str:
+    """A word for how a planner ended without a plan."""
+    if isinstance(error, OutOfTime):
+        return "out of time"
+    if isinstance(error, NoPlanFound):
+        return "not found"
+    return "infeasible" if isinstance(error, Infeasible) else "error"
+
+
+def measured(problem: PlanningProblem, judged: Judged) -> Outcome:
+    """A motion in numbers; one that is certified is sampled densely besides."""
+    trajectory, verification = judged.trajectory, judged.verification
+    angles = link_angles(trajectory.alpha, trajectory.theta)
+    changed = (angles > TOLERANCES.changed_angle).sum(axis=1)[trajectory.on_path]
+    near = [item.lower for item in verification.approaches if item.pair.obstacle]
+    failed = [c.name for c in verification.checks if c.verdict is not Verdict.CERTIFIED]
+    faults: tuple[str, ...] = ()
+    if verification.verdict is Verdict.CERTIFIED:
+        faults = sample(problem, trajectory).faults
+    return Outcome(
+        problem.name, "", 0, "", str(verification.verdict), "; ".join(failed),
+        judged.plan_s, judged.plan_s, verification.coverage,
+        float(changed.mean()) if changed.size else None,
+        int(changed.max()) if changed.size else None,
+        float(np.rad2deg(angles.max())), float(min(near)) if near else None,
+        "; ".join(faults),
+    )  # fmt: skip
