@@ -59,7 +59,7 @@ def ours() -> set[str]:
 @pytest.mark.parametrize(
     ("folder", "extras"),
     [
-        ("vdsm_pin", ("cluster", "parquet")),
+        ("vdsm_pin", ("cluster", "parquet", "simulation")),
         ("tests", ("dev",)),
         ("analysis", ("dev",)),
         ("benchmarks", ("dev", "references")),

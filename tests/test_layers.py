@@ -38,6 +38,7 @@ LAYERS = {
     "refinement": 11,
     "report": 12,
     "visualization": 12,
+    "simulation": 13,
     "workflow": 13,
     "batch": 13,
     "certificate_checker": 13,

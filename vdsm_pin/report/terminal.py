@@ -35,7 +35,7 @@ def show_plan(file: PlanFile, folder: Path) -> None:
     if motion.on_path_waypoints is not None:
         waypoints += f", {motion.on_path_waypoints} on the path"
         path = [(term("coverage"), percent(file.coverage))]
-    _facts(
+    show_facts(
         (term("waypoints"), waypoints),
         *path,
         (term("max_link_angle_rad"), measured(max(motion.max_link_angle_rad), "rad")),
@@ -74,10 +74,10 @@ def show_verification(
             error += f", lost at {lost(file.refuted_joint_error_rad)}"
         more = ((term("max_joint_error_rad"), error), *more)
     notes = (("note", note) for note in file.notes)
-    _facts(*more, *notes, ("report", str(folder / "report.html")))
+    show_facts(*more, *notes, ("report", str(folder / "report.html")))
 
 
-def _facts(*rows: tuple[str, str]) -> None:
+def show_facts(*rows: tuple[str, str]) -> None:
     """Names and values in two columns."""
     width = max(len(name) for name, _ in rows)
     for name, value in rows:

@@ -1,0 +1,114 @@
+"""The loop follows its plan, recovers from a kick, and says what it cannot do."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import vdsm_pin as vp
+from vdsm_pin.errors import InvalidInput, VerificationFailed
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.manipulator import built_in
+from vdsm_pin.simulation.closed_loop import Simulation, simulate
+from vdsm_pin.simulation.folder import SUMMARY, SimulationOrder, simulate_to_folder
+from vdsm_pin.simulation.settings import Controller, Kick, Sensors, Settings, Speed
+from vdsm_pin.simulation.time_law import row_times
+
+pytest.importorskip("mujoco")
+HRM8 = built_in("hrm8")
+CALM = Sensors(resolution_deg=0.0, noise_deg=0.0)
+
+
+def bending(rows: int = 40, angle: float = 0.1) -> vp.Trajectory:
+    """Joint 3 lifts the arm, joint 5 turns it."""
+    share = np.linspace(0.0, 1.0, rows)
+    alpha, theta = np.zeros((2, rows, 8))
+    theta[:, 2], alpha[:, 4] = -angle * share, angle * share
+    off = np.zeros(rows, bool)
+    return vp.Trajectory(off, np.zeros(rows), 0.05 * share, alpha, theta)
+
+
+def run(**changed: object) -> Simulation:
+    return simulate(HRM8, bending(), Settings(sensors=CALM).model_copy(update=changed))
+
+
+@pytest.mark.parametrize("rows", [2, 3, 40])
+def test_rates_and_accelerations_keep_their_limits(rows: int) -> None:
+    speed = Speed(joint_deg_s=5.0, joint_deg_s2=20.0, tip_m_s=10.0)
+    motion = bending(rows)
+    times = row_times(HRM8, motion, speed)
+    assert times[0] == 0.0
+    rates = np.abs(np.diff(motion.joints[:, 1:], axis=0)) / np.diff(times)[:, None]
+    assert np.rad2deg(rates.max()) <= 5.0 * (1.0 + 1e-9)
+    # 0.1 rad with 20 deg/s^2 up and down, 5 deg/s between: never less than that.
+    assert times[-1] >= 0.1 / np.deg2rad(5.0)
+
+
+def test_rows_that_do_not_move_take_no_time() -> None:
+    still = bending(5, angle=0.0)
+    rest = vp.Trajectory(
+        still.on_path, still.path_m, np.zeros(5), still.alpha, still.theta
+    )
+    assert row_times(HRM8, rest, Speed())[-1] == 0.0
+
+
+def test_the_arm_follows_within_a_tenth_of_a_degree_or_so() -> None:
+    found = run()
+    assert np.rad2deg(found.largest_error) < 0.5
+    settled = found.errors[-10:]
+    assert np.rad2deg(np.abs(settled).max()) < 0.15
+    assert (found.tensions >= 0.0).all()
+
+
+def test_without_gravity_feed_forward_it_sags() -> None:
+    blind = run(controller=Controller(gravity_feed_forward=False))
+    assert blind.largest_error > 5.0 * run().largest_error
+
+
+def test_a_kick_is_felt_at_its_joint_and_recovered_from() -> None:
+    kick = Kick(axis="alpha", joint=5, share=0.5, torque_nm=10.0, duration_s=0.2)
+    calm, kicked = run(), run(kicks=(kick,))
+    more = np.abs(kicked.errors - calm.errors).max(axis=0)
+    assert 2.0 < np.rad2deg(more.max()) < 8.0  # the paper saw about 4 deg
+    assert np.argmax(more) in (8, 10, 6)  # alpha5, or its neighbours in the chain
+    assert np.rad2deg(np.abs(kicked.errors[-5:]).max()) < 0.3
+
+
+def test_half_the_step_changes_angles_by_less_than_a_hundredth_of_a_degree() -> None:
+    coarse, fine = run(), run(step_s=0.00025)
+    change = np.abs(coarse.executed[:, 1:] - fine.executed[:, 1:]).max()
+    assert np.rad2deg(change) < 0.01
+
+
+def test_the_same_seed_gives_the_same_motion() -> None:
+    noisy = Settings(seed=3)
+    one, two = (simulate(HRM8, bending(), noisy) for _ in range(2))
+    np.testing.assert_array_equal(one.executed, two.executed)
+
+
+def test_a_kick_at_no_joint_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="joint 9"):
+        run(kicks=(Kick(axis="theta", joint=9, share=0.1, torque_nm=1.0),))
+
+
+def test_a_step_at_which_it_diverges_is_told() -> None:
+    with pytest.raises(VerificationFailed, match="diverges"):
+        run(step_s=0.02)
+
+
+def test_a_folder_holds_what_the_verifier_takes(tmp_path: Path) -> None:
+    source = read_problem("paper/obs3")
+    file = tmp_path / "t.csv"
+    vp.write_trajectory(file, bending())
+    order = SimulationOrder(source, file, tmp_path / "out", Settings())
+    told = simulate_to_folder(order)
+    executed = vp.read_trajectory(tmp_path / "out" / "executed.csv", source.problem)
+    assert executed.n_links == 8
+    assert told.executed.verdict == "certified"
+    assert told.executed.min_clearance_m is not None
+    content = json.loads((tmp_path / "out" / SUMMARY).read_text())
+    assert content["settings"]["cables"]["stiffness_ea_n"] == 3.5e5
+    record = (tmp_path / "out" / "simulation.csv").read_text().splitlines()
+    assert len(record[0].split(",")) == 1 + 17 + 17 + 24
+    assert len(record) == executed.n_samples + 1

@@ -1,0 +1,256 @@
+"""A planned motion run by the simulated arm, its controller and its motors.
+
+Commands are our cable lengths: the controller corrects the planned angles by a PID of
+the measured error, the cable kinematics turns them into lengths, and the tensions that
+gravity asks for are taken off as stretch.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidInput, VerificationFailed
+from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.simulation.feed_forward import Statics
+from vdsm_pin.simulation.plant import free_ends, plant_xml, stiffnesses
+from vdsm_pin.simulation.settings import Kick, Settings
+from vdsm_pin.simulation.time_law import row_times
+from vdsm_pin.trajectory import Trajectory
+
+SLACK = 1.0
+"""A cable with less tension counts as slack; [N]."""
+
+SETTLE = 1.0
+"""The arm is held so long at the start and again at the end of the motion; [s]."""
+
+KNOTS = 200
+"""Most rows at which tensions are solved for; they are interpolated between; [-]."""
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """What was commanded and what happened, at the recorded times.
+
+    Args:
+        times: Shape (m,); [s].
+        planned: x0, alpha1, theta1, .. as planned, shape (m, 1 + 2N); [m], [rad].
+        executed: The same as executed.
+        tensions: Of the cables, shape (m, 3N); [N].
+        on_path: Whether the planned tip is on the path, shape (m,).
+        path_m: Its arc length along the path, shape (m,); [m].
+        least_stiffness: Least joint stiffness at some times, shape (k, 2): time and
+            value; [s], [N m/rad].
+    """
+
+    times: FloatArray
+    planned: FloatArray
+    executed: FloatArray
+    tensions: FloatArray
+    on_path: FloatArray
+    path_m: FloatArray
+    least_stiffness: FloatArray
+
+    @property
+    def errors(self) -> FloatArray:
+        """Executed less planned angles, shape (m, 2N); [rad]."""
+        return self.executed[:, 1:] - self.planned[:, 1:]
+
+    @property
+    def largest_error(self) -> float:
+        """Largest error of any angle at any time; [rad]."""
+        return float(np.abs(self.errors).max())
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The executed motion, for the verifier. It claims to draw nothing."""
+        off = np.zeros(len(self.times), dtype=np.bool_)
+        angles = self.executed[:, 1:]
+        return Trajectory(
+            off, self.path_m, self.executed[:, 0], angles[:, ::2], angles[:, 1::2]
+        )
+
+
+def simulate(
+    manipulator: Manipulator, trajectory: Trajectory, settings: Settings
+) -> Simulation:
+    """Run a planned motion in closed loop.
+
+    Args:
+        manipulator: The arm.
+        trajectory: The plan.
+        settings: What is assumed.
+
+    Returns:
+        Planned and executed motion at the recorded times.
+
+    Raises:
+        InvalidInput: If a kick names a joint that is not there.
+        VerificationFailed: If MuJoCo is not installed, or the simulation diverges.
+    """
+    for kick in settings.kicks:
+        if kick.joint > manipulator.n_links:
+            known = f"expected 1 to {manipulator.n_links}"
+            message = f"a kick names joint {kick.joint}, {known}"
+            raise InvalidInput(message)
+    return _Loop(manipulator, trajectory, settings).run()
+
+
+def _mujoco() -> Any:
+    try:
+        import mujoco
+    except ImportError as error:
+        message = "mujoco is not installed: pip install 'vdsm-pin[simulation]'"
+        raise VerificationFailed(message) from error
+    return mujoco
+
+
+class _Loop:
+    """One run: the plant, the plan over time, the controller's state."""
+
+    def __init__(
+        self, manipulator: Manipulator, trajectory: Trajectory, settings: Settings
+    ) -> None:
+        self._mujoco = _mujoco()
+        self._settings = settings
+        self._statics = Statics(manipulator, settings)
+        self._model = self._mujoco.MjModel.from_xml_string(
+            plant_xml(manipulator, settings)
+        )
+        self._data = self._mujoco.MjData(self._model)
+        self._row_times = SETTLE + row_times(manipulator, trajectory, settings.speed)
+        self._trajectory = trajectory
+        self._stiffness = stiffnesses(manipulator, settings)
+        self._ends = free_ends(manipulator)
+        self._rng = np.random.default_rng(settings.seed)
+        self._knots, self._knot_tensions = self._tensions_along()
+
+    def _tensions_along(self) -> tuple[FloatArray, FloatArray]:
+        """Times and the tensions then: what gravity asks for, or the pretension."""
+        n_rows = self._trajectory.n_samples
+        chosen = np.unique(np.linspace(0, n_rows - 1, min(KNOTS, n_rows)).astype(int))
+        angles = self._trajectory.joints[chosen, 1:]
+        if self._settings.controller.gravity_feed_forward:
+            found = np.array([self._statics.tensions(row) for row in angles])
+        else:
+            even = self._settings.cables.pretension_n
+            found = np.full((len(chosen), len(self._stiffness)), even)
+        return self._row_times[chosen], found
+
+    def _planned(self, times: FloatArray) -> FloatArray:
+        """The plan at times, shape (k, 1 + 2N); [m], [rad]."""
+        columns = self._trajectory.joints.T
+        return np.stack([np.interp(times, self._row_times, c) for c in columns], axis=1)
+
+    def _feed_forward(self, time: float) -> FloatArray:
+        columns = self._knot_tensions.T
+        return np.array([np.interp(time, self._knots, c) for c in columns])
+
+    def run(self) -> Simulation:
+        """Step the plant, its motors and the controller to the end of the plan."""
+        settings, data = self._settings, self._data
+        period, lag = settings.controller.period_s, settings.controller.derivative_lag_s
+        substeps = max(1, round(period / settings.step_s))
+        count = int(np.ceil((self._row_times[-1] + SETTLE) / period)) + 1
+        times = frozen(period * np.arange(count))
+        planned = self._planned(times)
+        every = max(1, round(settings.record_s / period))
+        data.qpos[:] = planned[0]
+        integral, smoothed = np.zeros((2, planned.shape[1] - 1))
+        paid = self._rest(planned[0, 1:], 0.0)
+        data.act[:] = paid
+        rows, tensions = [], []
+        for k in range(count):
+            error = planned[k, 1:] - self._measured()
+            integral += period * error
+            turning = (error - smoothed) / lag
+            smoothed += min(1.0, period / lag) * (error - smoothed)
+            paid = self._commanded(
+                times[k], planned[k], (error, integral, turning), paid
+            )
+            data.ctrl[0], data.ctrl[1:] = planned[k, 0], paid
+            data.qfrc_applied[:] = self._kicks(float(times[k]))
+            self._mujoco.mj_step(self._model, data, substeps)
+            if not np.isfinite(data.qpos).all() or np.abs(data.qpos[1:]).max() > np.pi:
+                message = f"the simulation diverges at {times[k]:.3f} s"
+                raise VerificationFailed(message)
+            if k % every == 0:
+                rows.append((k, data.qpos.copy()))
+                tensions.append(-data.actuator_force[1:])
+        return self._recorded(frozen(times + period), rows, tensions)
+
+    def _measured(self) -> FloatArray:
+        """What the encoders say, shape (2N,); [rad]."""
+        sensors, angles = self._settings.sensors, self._data.qpos[1:]
+        noisy = angles + np.deg2rad(sensors.noise_deg) * self._rng.normal(
+            size=angles.size
+        )
+        grain = np.deg2rad(sensors.resolution_deg)
+        return np.asarray(np.round(noisy / grain) * grain if grain > 0.0 else noisy)
+
+    def _rest(self, angles: FloatArray, time: float) -> FloatArray:
+        """Lengths to pay out for these angles under the tensions of a time; [m]."""
+        lengths = self._statics.lengths(angles[None])[0] - self._ends
+        return np.asarray(lengths - self._feed_forward(time) / self._stiffness)
+
+    def _commanded(
+        self,
+        time: float,
+        planned: FloatArray,
+        terms: tuple[FloatArray, FloatArray, FloatArray],
+        before: FloatArray,
+    ) -> FloatArray:
+        """What the motors are told to pay out, within their rate; shape (3N,); [m]."""
+        error, integral, turning = terms
+        control, motors = self._settings.controller, self._settings.motors
+        aimed = planned[1:] + (
+            control.proportional * error
+            + control.integral_per_s * integral
+            + control.derivative_s * turning
+        )
+        wanted = self._rest(aimed, time)
+        most = motors.largest_rate_m_s * control.period_s
+        return before + np.clip(wanted - before, -most, most)
+
+    def _kicks(self, time: float) -> FloatArray:
+        """Disturbing torques at a time, shape (1 + 2N,); [N m]."""
+        torque = np.zeros(self._model.nv)
+        for kick in self._settings.kicks:
+            begins = self._kick_time(kick)
+            if begins <= time < begins + kick.duration_s:
+                torque[2 * kick.joint - (kick.axis == "alpha")] += kick.torque_nm
+        return torque
+
+    def _kick_time(self, kick: Kick) -> float:
+        return SETTLE + kick.share * float(self._row_times[-1] - SETTLE)
+
+    def _recorded(
+        self,
+        times: FloatArray,
+        rows: list[tuple[int, FloatArray]],
+        tensions: list[FloatArray],
+    ) -> Simulation:
+        kept = times[[k for k, _ in rows]]
+        plan = self._trajectory
+        nearest = np.searchsorted(self._row_times, kept).clip(0, plan.n_samples - 1)
+        at = np.linspace(0, len(rows) - 1, min(24, len(rows))).astype(int)
+        planned = self._planned(kept)
+        stiffness = [
+            (
+                kept[k],
+                self._statics.least_stiffness(
+                    planned[k, 1:], self._feed_forward(float(kept[k]))
+                ),
+            )
+            for k in at
+        ]
+        return Simulation(
+            times=kept,
+            planned=planned,
+            executed=np.array([row for _, row in rows]),
+            tensions=np.array(tensions),
+            on_path=plan.on_path[nearest],
+            path_m=plan.path_m[nearest],
+            least_stiffness=np.array(stiffness),
+        )

@@ -1,0 +1,112 @@
+"""Tensions that hold the arm: bounded least squares, and how stiff the cables make it.
+
+With J = dL/dq of the cable lengths the tensions T act on the joints by -J^T T. Held
+against gravity g(q) they solve J^T T = -g with 0 <= T <= T_max, as near to the
+pretension as that leaves free (Stark and Parker's bounded least squares).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdsm_pin.cables import cable_lengths
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.simulation.plant import stiffnesses
+from vdsm_pin.simulation.settings import Settings
+
+STEP = 1e-5
+"""Of the central differences; [rad]."""
+
+EVENNESS = 1e-4
+"""Weight of the pretension against the torque that is left over; [m]."""
+
+
+@dataclass(frozen=True)
+class Statics:
+    """The arm at rest, held by its cables.
+
+    Args:
+        manipulator: The arm.
+        settings: Masses, gravity, cables.
+    """
+
+    manipulator: Manipulator
+    settings: Settings
+
+    def lengths(self, angles: FloatArray) -> FloatArray:
+        """Cable lengths at alpha1, theta1, .., shape (n, 2N) to (n, 3N); [m]."""
+        found = cable_lengths(self.manipulator, angles[:, ::2], angles[:, 1::2])
+        return found.reshape(len(angles), -1)
+
+    def slopes(self, angles: FloatArray) -> FloatArray:
+        """J = dL/dq at one configuration (2N,), shape (3N, 2N); [m/rad]."""
+        steps = STEP * np.eye(angles.size)
+        ahead, behind = self.lengths(angles + steps), self.lengths(angles - steps)
+        return (ahead - behind).T / (2.0 * STEP)
+
+    def gravity(self, angles: FloatArray) -> FloatArray:
+        """dV/dq of the weight at configurations (n, 2N), shape (n, 2N); [N m]."""
+        steps = STEP * np.eye(angles.shape[1])
+        ahead = self._potential(angles[:, None] + steps)
+        behind = self._potential(angles[:, None] - steps)
+        return np.asarray((ahead - behind) / (2.0 * STEP))
+
+    def _potential(self, angles: FloatArray) -> FloatArray:
+        """Potential energy of the links, shape (.., 2N) to (..); [J]."""
+        alpha, theta = angles[..., ::2], angles[..., 1::2]
+        directions = _directions_z(alpha, theta)
+        lengths = self.manipulator.link_lengths
+        heights = np.cumsum(directions * lengths, axis=-1) - 0.5 * directions * lengths
+        bodies = self.settings.bodies
+        weights = bodies.gravity_m_s2 * bodies.mass_per_length_kg_m * lengths
+        return np.asarray((heights * weights).sum(axis=-1))
+
+    def tensions(self, angles: FloatArray) -> FloatArray:
+        """Tensions that hold one configuration (2N,), shape (3N,); [N]."""
+        from scipy.optimize import lsq_linear
+
+        cables = self.settings.cables
+        slopes, torque = self.slopes(angles), self.gravity(angles[None])[0]
+        even = np.full(len(slopes), cables.pretension_n)
+        rows = np.vstack([slopes.T, EVENNESS * np.eye(len(slopes))])
+        aims = np.concatenate([-torque, EVENNESS * even])
+        bounds = (0.0, cables.largest_tension_n)
+        return np.asarray(lsq_linear(rows, aims, bounds, tol=1e-10).x)
+
+    def least_stiffness(self, angles: FloatArray, tensions: FloatArray) -> float:
+        """Least eigenvalue of the joint stiffness, motors held; [N m/rad].
+
+        Below 0 the arm buckles: pretension pushes a straight chain of joints out.
+        """
+        k = stiffnesses(self.manipulator, self.settings)
+        rest = self.lengths(angles[None])[0] - tensions / k
+
+        def torque(at: FloatArray) -> FloatArray:
+            pull = np.maximum(k * (self.lengths(at[None])[0] - rest), 0.0)
+            return np.asarray(self.slopes(at).T @ pull + self.gravity(at[None])[0])
+
+        steps = 1e-4 * np.eye(angles.size)
+        columns = [(torque(angles + h) - torque(angles - h)) / 2e-4 for h in steps]
+        matrix = np.stack(columns, axis=1)
+        return float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[0])
+
+
+def _directions_z(alpha: FloatArray, theta: FloatArray) -> FloatArray:
+    """Z of every link's direction, shape (.., N); [-].
+
+    R_i = R_{i-1} Rz(alpha_i) Ry(theta_i): only the last row of R_i is carried along.
+    """
+    row = np.zeros((*alpha.shape[:-1], 3))
+    row[..., 2] = 1.0
+    found = np.zeros(alpha.shape)
+    for i in range(alpha.shape[-1]):
+        ca, sa = np.cos(alpha[..., i]), np.sin(alpha[..., i])
+        ct, st = np.cos(theta[..., i]), np.sin(theta[..., i])
+        x, y, z = row[..., 0].copy(), row[..., 1].copy(), row[..., 2].copy()
+        along = x * ca + y * sa
+        row[..., 0] = along * ct - z * st
+        row[..., 1] = y * ca - x * sa
+        row[..., 2] = along * st + z * ct
+        found[..., i] = row[..., 0]
+    return found

@@ -1,0 +1,175 @@
+"""One simulation from files to a result folder."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+from pydantic import Field
+
+from vdsm_pin.io.problem_file import ProblemFile
+from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.proof.layouts import LOW
+from vdsm_pin.report.facts import finite
+from vdsm_pin.report.files import FileModel, VerdictWord
+from vdsm_pin.report.folder import check_output_folder, staged
+from vdsm_pin.report.run_record import versions
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.simulation.closed_loop import SLACK, Simulation, simulate
+from vdsm_pin.simulation.plant import cable_name
+from vdsm_pin.simulation.settings import Settings
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.clearance import prove_clearance
+from vdsm_pin.verification.clearance_check import check_clearance
+from vdsm_pin.verification.inside import check_inside
+from vdsm_pin.verification.records import ErrorBox, combine
+
+EXECUTED: Final = "executed.csv"
+RECORD: Final = "simulation.csv"
+SUMMARY: Final = "simulation.json"
+
+BAND: Final = float(np.deg2rad(0.3))
+"""The paper's main range of joint errors (Fig. 21); [rad]."""
+
+
+class Cleared(FileModel):
+    """A motion and what is proved of its clearance from obstacles and itself."""
+
+    verdict: VerdictWord
+    min_clearance_m: float | None = Field(description="proved; null: no obstacle")
+
+
+class SimulationFile(FileModel):
+    """simulation.json."""
+
+    vdsm_simulation: Literal[1] = Field(default=1, description="version of this format")
+    problem: str = Field(description="name of the problem")
+    trajectory_sha256: str = Field(description="of the planned trajectory")
+    settings: Settings = Field(description="everything that was assumed")
+    duration_s: float = Field(description="of the simulated motion")
+    largest_error_rad: float = Field(description="of any joint angle at any time")
+    largest_errors_rad: tuple[float, ...] = Field(
+        description="of each angle: alpha1, theta1, alpha2, .."
+    )
+    within_band_share: float = Field(
+        description="of all angles and times with an error of 0.3 deg or less"
+    )
+    largest_tension_n: float = Field(description="of any cable")
+    slack_share: float = Field(description="of all cables and times below 1 N")
+    least_stiffness_nm_rad: float = Field(
+        description="of the joints along the motion; at 0 or below the arm buckles"
+    )
+    planned: Cleared
+    executed: Cleared
+    within_error_box: Cleared = Field(
+        description="the planned motion with every joint off by the largest error"
+    )
+    versions: dict[str, str] = Field(description="of everything a number depends on")
+
+
+@dataclass(frozen=True)
+class SimulationOrder:
+    """What to simulate and where the results go.
+
+    Args:
+        source: The problem as it was read.
+        trajectory: The planned trajectory file.
+        folder: Where the results go.
+        settings: What is assumed.
+    """
+
+    source: ProblemFile
+    trajectory: Path
+    folder: Path
+    settings: Settings
+
+
+def simulate_to_folder(order: SimulationOrder) -> SimulationFile:
+    """Run a plan in closed loop and write executed.csv, simulation.csv and .json.
+
+    Raises:
+        InvalidInput: If a file is bad or the folder cannot be written.
+        VerificationFailed: If MuJoCo is missing or the simulation diverges.
+    """
+    check_output_folder(order.folder)
+    problem = order.source.problem
+    planned = read_trajectory(order.trajectory, problem.manipulator)
+    found = simulate(problem.manipulator, planned, order.settings)
+    file = summary(
+        problem, planned, found, order.settings, sha256_of_file(order.trajectory)
+    )
+    with staged(order.folder) as aside:
+        write_trajectory(aside / EXECUTED, found.trajectory)
+        _write_record(aside / RECORD, found)
+        (aside / SUMMARY).write_text(file.text(), encoding="utf-8")
+    return file
+
+
+def summary(
+    problem: PlanningProblem,
+    planned: Trajectory,
+    found: Simulation,
+    settings: Settings,
+    digest: str,
+) -> SimulationFile:
+    """The simulation in numbers, and what is proved of it."""
+    errors = np.abs(found.errors)
+    robot = load_robot(problem.manipulator)
+    return SimulationFile(
+        problem=problem.name,
+        trajectory_sha256=digest,
+        settings=settings,
+        duration_s=float(found.times[-1]),
+        largest_error_rad=found.largest_error,
+        largest_errors_rad=tuple(errors.max(axis=0).tolist()),
+        within_band_share=float((errors <= BAND).mean()),
+        largest_tension_n=float(found.tensions.max()),
+        slack_share=float((found.tensions < SLACK).mean()),
+        least_stiffness_nm_rad=float(found.least_stiffness[:, 1].min()),
+        planned=cleared(problem, planned, ErrorBox()),
+        executed=cleared(problem, found.trajectory, ErrorBox()),
+        within_error_box=cleared(problem, planned, ErrorBox(joint=found.largest_error)),
+        versions=versions() | {"mujoco": _mujoco_version(), "urdf": robot.urdf_sha256},
+    )
+
+
+def _mujoco_version() -> str:
+    from importlib import metadata
+
+    return metadata.version("mujoco")
+
+
+def cleared(
+    problem: PlanningProblem, trajectory: Trajectory, errors: ErrorBox
+) -> Cleared:
+    """What is proved of a motion's clearance over continuous time."""
+    proof = prove_clearance(problem, trajectory, errors)
+    rows = [
+        *check_clearance(problem, proof, ()),
+        *check_inside(problem, trajectory),
+    ]
+    verdict = combine(tuple(row.verdict for row in rows))
+    near = [
+        float(row[LOW])
+        for pair, row in zip(proof.pairs, proof.best, strict=True)
+        if pair.obstacle
+    ]
+    least = finite(min(near, default=float("inf")))
+    return Cleared(verdict=verdict.value, min_clearance_m=least)
+
+
+def _write_record(path: Path, found: Simulation) -> None:
+    """Planned and executed joints and tensions over time as CSV."""
+    n_links = (found.planned.shape[1] - 1) // 2
+    joints = ["x0_m", *(f"{a}{i}_rad" for i in range(1, n_links + 1)
+                        for a in ("alpha", "theta"))]  # fmt: skip
+    cables = [f"{cable_name(i, k)}_n" for i in range(1, n_links + 1) for k in range(3)]
+    names = ["time_s", *(f"planned_{n}" for n in joints),
+             *(f"executed_{n}" for n in joints), *cables]  # fmt: skip
+    table = np.column_stack(
+        [found.times, found.planned, found.executed, found.tensions]
+    )
+    lines = (",".join(map(repr, row)) for row in table.tolist())
+    path.write_text("\n".join([",".join(names), *lines]) + "\n", encoding="utf-8")

@@ -1,0 +1,138 @@
+"""What a simulation assumes: masses, cables, motors, sensors, controller, disturbances.
+
+The paper gives none of these numbers. The defaults are assumptions, each with its
+reason, to be changed in a file and swept; none was fitted to a result.
+"""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.io.source import decode, read_bytes
+from vdsm_pin.io.yaml_reader import read_yaml
+
+MAX_BYTES = 1 << 20
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+
+
+class Part(BaseModel):
+    """Common rules: no unknown keys, nothing changes after it is built."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Bodies(Part):
+    """The links."""
+
+    mass_per_length_kg_m: Positive = Field(
+        default=4.0, description="assumed: aluminium tube of 123 mm with joints, cables"
+    )
+    joint_damping_nm_s: NotNegative = Field(
+        default=2.0, description="viscous, of every joint axis; assumed"
+    )
+    joint_friction_nm: NotNegative = Field(
+        default=0.2, description="Coulomb friction of every joint axis; assumed"
+    )
+    gravity_m_s2: NotNegative = Field(default=9.81, description="along -z of the base")
+
+
+class Cables(Part):
+    """The cables; tension is uniform along each (no capstan friction)."""
+
+    stiffness_ea_n: Positive = Field(
+        default=3.5e5, description="EA of a cable: steel rope 7x19 of about 3 mm"
+    )
+    to_motor_m: NotNegative = Field(
+        default=0.5, description="of each cable between the base and its motor; assumed"
+    )
+    damping_n_s_m: NotNegative = Field(default=200.0, description="assumed")
+    largest_tension_n: Positive = Field(
+        default=4000.0, description="of a cable; below the rope's breaking load"
+    )
+    pretension_n: NotNegative = Field(
+        default=50.0, description="aimed at where gravity asks for no more"
+    )
+
+
+class Motors(Part):
+    """What winds the cables and moves the base."""
+
+    lag_s: NotNegative = Field(default=0.005, description="first-order; assumed")
+    largest_rate_m_s: Positive = Field(default=0.25, description="of a cable; assumed")
+    base_stiffness_n_m: Positive = Field(default=2e6, description="of the rail's drive")
+
+
+class Sensors(Part):
+    """Joint encoders."""
+
+    resolution_deg: NotNegative = Field(default=360.0 / 2**16, description="16 bits")
+    noise_deg: NotNegative = Field(default=0.005, description="standard deviation")
+
+
+class Controller(Part):
+    """PID on the joint angles; its output goes through the cable kinematics."""
+
+    period_s: Positive = Field(default=0.005, description="200 Hz; assumed")
+    proportional: NotNegative = Field(
+        default=0.3, description="radians commanded per radian of error"
+    )
+    integral_per_s: NotNegative = Field(default=1.0, description="the same, per second")
+    derivative_s: NotNegative = Field(default=0.03, description="per radian a second")
+    derivative_lag_s: Positive = Field(
+        default=0.02, description="first-order filter of the derivative"
+    )
+    gravity_feed_forward: bool = Field(
+        default=True, description="tensions that hold the planned arm against gravity"
+    )
+
+
+class Speed(Part):
+    """Limits of the time law."""
+
+    tip_m_s: Positive = Field(default=0.05, description="of the tip; assumed")
+    joint_deg_s: Positive = Field(default=5.0, description="of every angle; assumed")
+    joint_deg_s2: Positive = Field(default=20.0, description="acceleration; assumed")
+
+
+class Kick(Part):
+    """A torque pulse at one joint axis."""
+
+    axis: Literal["alpha", "theta"]
+    joint: int = Field(ge=1, description="joints count from 1 at the base")
+    share: float = Field(ge=0.0, le=1.0, description="when, as part of the duration")
+    torque_nm: float = Field(allow_inf_nan=False)
+    duration_s: Positive = 0.2
+
+
+class Settings(Part):
+    """Everything a simulation assumes."""
+
+    bodies: Bodies = Bodies()
+    cables: Cables = Cables()
+    motors: Motors = Motors()
+    sensors: Sensors = Sensors()
+    controller: Controller = Controller()
+    speed: Speed = Speed()
+    kicks: tuple[Kick, ...] = ()
+    seed: int = Field(default=0, ge=0, description="of the noise")
+    step_s: Positive = Field(default=0.0005, description="of the integrator")
+    record_s: Positive = Field(default=0.02, description="between recorded rows")
+
+
+def read_settings(path: Path) -> Settings:
+    """Settings of a YAML file; what it does not name keeps its default.
+
+    Raises:
+        InvalidFile: If the file or a value breaks the contract.
+    """
+    document = read_yaml(decode(read_bytes(path, limit=MAX_BYTES), path), file=path)
+    data: Any = document.data if document.data is not None else {}
+    try:
+        return Settings.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise InvalidFile(file=path, where=where, problem=first["msg"]) from None
