@@ -19,7 +19,7 @@ from vdsm_pin.planner.fewest.bounds import (
     least_changed,
 )
 from vdsm_pin.planner.fewest.explore import Outcome
-from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.planner.fewest.motion import Intervals, Knots
 from vdsm_pin.planner.fewest.passage import narrowest
 from vdsm_pin.planner.fewest.poses import bends_of
 from vdsm_pin.planner.fewest.route import PathRows
@@ -67,8 +67,8 @@ def _drawn(problem: PlanningProblem, outcome: Outcome) -> float:
     """Length of the path that the motion found draws; [m]."""
     if outcome.found is None:
         return 0.0
-    stations = outcome.found.roadmap.route.stations
-    skipped = outcome.found.sequence.skipped
+    stations = outcome.found.route.stations
+    skipped = outcome.found.skipped
     undrawn = sum(float(stations[k] - stations[k - 1]) for k in skipped)
     return problem.path.length - undrawn
 
@@ -130,10 +130,10 @@ def _cut_off(problem: PlanningProblem, rows: PathRows, proof: TipProof) -> Infea
 def how_far(problem: PlanningProblem, outcome: Outcome) -> str:
     """Where the search came to an end, in words; not a proof."""
     drawn = _drawn(problem, outcome)
-    route = None if outcome.found is None else outcome.found.roadmap.route
+    route = None if outcome.found is None else outcome.found.route
     station, tip = 0.0, outcome.rows.tips[0]
     if outcome.found is not None and route is not None:
-        skipped = [k for k in outcome.found.sequence.skipped if not route.closed[k]]
+        skipped = [k for k in outcome.found.skipped if not route.closed[k]]
         if skipped:
             station = float(route.stations[skipped[0] - 1])
             tip = route.tips[route.layers[skipped[0]]]
@@ -230,22 +230,36 @@ def _farthest_back(
 def _order(outcome: Outcome) -> list[str]:
     """In which order and directions the pieces are drawn, where it is not as given."""
     assert outcome.found is not None
-    stations = outcome.found.roadmap.route.stations
-    runs = [leg for leg in outcome.found.sequence.legs if leg.drawn]
-    ends = [(stations[run.layers[0]], stations[run.layers[-1]]) for run in runs]
+    ends = _pieces(outcome.found.knots)
     if all(np.diff(np.array(ends).ravel()) >= 0.0):
         return []
     pieces = ", then ".join(f"from {a:.4f} m to {b:.4f} m" for a, b in ends)
     return [f"drawn in another order than given, as the problem allows: {pieces}"]
 
 
+def _pieces(knots: Knots) -> list[tuple[float, float]]:
+    """Stations between which the path is drawn in one direction, piece by piece."""
+    pieces: list[tuple[float, float]] = []
+    going, way = False, 0.0
+    for k, drawn in enumerate(knots.drawn.tolist()):
+        a, b = float(knots.stations[k]), float(knots.stations[k + 1])
+        if drawn and going and (b - a) * way >= 0.0:
+            pieces[-1] = (pieces[-1][0], b)
+            way = way or b - a
+        elif drawn:
+            pieces.append((a, b))
+            way = b - a
+        going = drawn
+    return pieces
+
+
 def undrawn(problem: PlanningProblem, outcome: Outcome) -> tuple[str, ...]:
     """Each stretch that is not drawn, and why."""
     assert outcome.found is not None
-    route = outcome.found.roadmap.route
+    route = outcome.found.route
     stretches = []
     stretch: list[int] = []
-    skipped = outcome.found.sequence.skipped
+    skipped = outcome.found.skipped
     for k, after in itertools.zip_longest(skipped, skipped[1:]):
         stretch.append(k)
         if after == k + 1 and route.closed[after] == route.closed[k]:

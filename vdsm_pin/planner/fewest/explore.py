@@ -17,6 +17,7 @@ from vdsm_pin.planner.fewest.graft import fill
 from vdsm_pin.planner.fewest.home import largest_start_angle, with_start
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.last_link import hemmed_in
+from vdsm_pin.planner.fewest.levels import FULL, SEED, Effort, Insert, Level
 from vdsm_pin.planner.fewest.nearby import Nearby
 from vdsm_pin.planner.fewest.passage import cut_off
 from vdsm_pin.planner.fewest.roadmap import (
@@ -26,92 +27,19 @@ from vdsm_pin.planner.fewest.roadmap import (
     link_limit,
 )
 from vdsm_pin.planner.fewest.route import PathRows, path_rows, tip_route
-from vdsm_pin.planner.fewest.search import Found, nothing_blocked, search
+from vdsm_pin.planner.fewest.search import (
+    Found,
+    Searched,
+    nothing_blocked,
+    search,
+)
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes
 from vdsm_pin.planner.fewest.taper import kept_by_links
+from vdsm_pin.planner.fewest.ways_in import ways_in
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
 LOG: Final = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Level:
-    """How finely to look.
-
-    Args:
-        step: Lattice step of the directions; [-].
-        coarse: Distance of the tips over the arm's length; [-].
-        places: Largest number of joints at which a knee is tried.
-        rounds: Sequences to try.
-        back: How far tips are tried behind the path, over the arm's length; [-].
-        grow: Rounds of growing shapes into what is not drawn.
-        slack: Clearance kept for what happens between two rows; [m].
-        finest: Way of the body between two looks at the clearance; [m].
-        ease: Part of the largest link angle that may be used; [-].
-        around: Bent arms are tried up to this many tips from where the straight arm
-            does not do; None for everywhere.
-    """
-
-    step: float
-    coarse: float
-    places: int
-    rounds: int
-    back: float
-    grow: int
-    slack: float = 3e-4
-    finest: float = 2e-3
-    ease: float = 1.0
-    around: int | None = None
-
-
-SEED: Final = 0
-"""Seed of the growth of shapes; the same problem gives the same plan."""
-
-THOROUGH: Final = (
-    Level(
-        step=0.08, coarse=0.026, places=8, rounds=20, back=0.0, grow=1,
-        ease=0.79, around=4,
-    ),
-    Level(step=0.08, coarse=0.026, places=8, rounds=40, back=0.0, grow=2, around=4),
-    Level(step=0.08, coarse=0.013, places=8, rounds=40, back=0.0, grow=3, around=4),
-    Level(step=0.08, coarse=0.0065, places=8, rounds=40, back=0.0, grow=4, around=8),
-    Level(step=0.08, coarse=0.026, places=8, rounds=40, back=1.0, grow=2),
-    Level(step=0.08, coarse=0.013, places=8, rounds=40, back=1.0, grow=3),
-    Level(
-        step=0.05, coarse=0.013, places=10, rounds=60, back=1.0, grow=3,
-        slack=3e-5, finest=5e-4,
-    ),
-)  # fmt: skip
-
-
-"""Each is for what the ones before leave undrawn.
-
-The first keeps link angles to a part of the limit, 33.6 of the 42.5 deg of hrm8, since
-who bends less has more in hand; the second allows all of it. Then the tips come closer
-together, twice and four times; then there are tips behind and beside the path too; the
-last has finer directions and rows, and hardly any slack. The numbers were found by
-trial on the paper's problems and HRM-1000.
-"""
-
-
-@dataclass(frozen=True)
-class Effort:
-    """How much is done for a plan.
-
-    Args:
-        levels: How finely to look, in this order.
-        proves: Whether what the first level leaves is looked at for a proof that it
-            cannot be done.
-    """
-
-    levels: tuple[Level, ...]
-    proves: bool
-
-
-FULL: Final = Effort(THOROUGH, proves=True)
-QUICK: Final = Effort(THOROUGH[:2], proves=False)
-"""For plans that are only better than one there is already."""
 
 
 @dataclass(frozen=True)
@@ -140,8 +68,8 @@ class Outcome:
         """Rows of the desired path that are drawn, shape (r,)."""
         drawn = np.full(len(self.rows.tips), self.found is not None)
         if self.found is not None:
-            stations = self.found.roadmap.route.stations
-            for k in self.found.sequence.skipped:
+            stations = self.found.route.stations
+            for k in self.found.skipped:
                 first, last = np.searchsorted(
                     self.rows.stations, stations[k - 1 : k + 1]
                 )
@@ -185,7 +113,7 @@ def explore(
     unreached, kept = False, kept_by_links(problem.manipulator, taste.taper)
     stuck: NoWayOut | None = None
     for level in effort.levels:
-        if unreached and level.back == 0.0:
+        if unreached and isinstance(level, Level) and level.back == 0.0:
             continue
         ease = max(level.ease, least_ease)
         worth = problem.required_clearance + margin + level.slack + taste.room
@@ -194,10 +122,16 @@ def explore(
             problem, clearance, margin, level.slack, level.finest, ease,
             clearance.up_to(worth), kept,
         )  # fmt: skip
+        found: Found | None = None
         try:
-            found = _look(judge, level, rows, best.proof, taste)
+            if isinstance(level, Insert):
+                found = ways_in(judge, clearance, rows, best.proof.closed, level)
+            else:
+                found = _look(judge, level, rows, best.proof, taste)
+                unreached |= level.ease == 1.0 and _unreached(found)
         except NoWayOut as error:
-            found, stuck = None, error
+            stuck = error
+            unreached |= level.ease == 1.0
         now = Outcome(judge, found, rows, best.proof)
         LOG.debug("%s: %.4f m missing", level, now.missing)
         if now.missing < best.missing:
@@ -205,7 +139,6 @@ def explore(
             yield best
         if not best.missing > 0.0:
             return
-        unreached |= level.ease == 1.0 and (found is None or _unreached(found))
         if level is first and effort.proves:
             # Seldom needed, so only now: can it be done at all?
             for proof in _proofs(problem, clearance, best):
@@ -233,7 +166,7 @@ def _proofs(
 
 def _look(
     judge: Judge, level: Level, rows: PathRows, proof: TipProof, taste: Taste
-) -> Found | None:
+) -> Searched | None:
     """One level: a roadmap, a search, and growth where it falls short."""
     problem = judge.problem
     arm = problem.manipulator
@@ -251,7 +184,7 @@ def _look(
     for _ in range(level.grow):
         if found is None or not found.missing > 0.0:
             break
-        skipped = tuple(k for k in found.sequence.skipped if not route.closed[k])
+        skipped = tuple(k for k in found.skipped if not route.closed[k])
         if back == 0.0 and _unreached(found):
             break
         more = fill(judge, found.roadmap, found.ways, skipped, rng, taste)
@@ -266,10 +199,12 @@ def _look(
     return found
 
 
-def _unreached(found: Found) -> bool:
+def _unreached(found: Searched | None) -> bool:
     """Whether there are nodes in the stretches not drawn that no way leads to."""
+    if found is None:
+        return True
     roadmap = found.roadmap
-    for k in found.sequence.skipped:
+    for k in found.skipped:
         if roadmap.route.closed[k]:
             continue
         tip = roadmap.route.layers[k]

@@ -36,6 +36,22 @@ def start_offsets(problem: PlanningProblem) -> FloatArray:
     return np.asarray(offsets)
 
 
+def checked_start(judge: Judge, tip: FloatArray) -> FloatArray:
+    """Offsets of the arm at the start, shape (N + 1, 2); [m].
+
+    Args:
+        judge: Knows the limits.
+        tip: Of the arm at the start, shape (1, 3); [m].
+
+    Raises:
+        LimitExceeded: If it breaks a limit.
+        NoPlanFound: If it bends more than may be used, or a link leans backwards.
+    """
+    offsets = start_offsets(judge.problem)
+    _check_limits(judge, tip, offsets[None])
+    return offsets
+
+
 def with_start(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, int]:
     """The roadmap with the start as a node, tied to what can be reached from it.
 
@@ -45,9 +61,8 @@ def with_start(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, i
     """
     if judge.problem.path.start_joints is None and roadmap.index[0] >= 0:
         return roadmap, int(roadmap.index[0])
-    offsets = start_offsets(judge.problem)[None]
     tip = roadmap.route.tips[:1]
-    _check_limits(judge, tip, offsets)
+    offsets = checked_start(judge, tip)[None]
     room, _, _ = judge.look(tip, offsets)
     shapes = roadmap.shapes
     nodes = roadmap.nodes_at(0)

@@ -10,18 +10,38 @@ from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Knots, knots_of
 from vdsm_pin.planner.fewest.order import reordered
 from vdsm_pin.planner.fewest.roadmap import Roadmap
-from vdsm_pin.planner.fewest.sequence import Planner, Sequence
+from vdsm_pin.planner.fewest.route import TipRoute
+from vdsm_pin.planner.fewest.sequence import Planner
 from vdsm_pin.problem import Order
 
 
 @dataclass(frozen=True)
 class Found:
-    """What one search came to.
+    """A motion that draws what it can.
+
+    Args:
+        route: The tips along the path.
+        knots: The motion, every interval clear.
+        skipped: Layers k whose stretch from layer k - 1 is not drawn.
+    """
+
+    route: TipRoute
+    knots: Knots
+    skipped: tuple[int, ...]
+
+    @property
+    def missing(self) -> float:
+        """Length of the path not drawn and not proved impossible to draw; [m]."""
+        gaps = np.diff(self.route.stations)
+        return float(sum(gaps[k - 1] for k in self.skipped if not self.route.closed[k]))
+
+
+@dataclass(frozen=True)
+class Searched(Found):
+    """What a search of a roadmap came to.
 
     Args:
         roadmap: The graph searched.
-        sequence: The sequence of nodes.
-        knots: Its knots, every interval clear.
         home: The node the motion starts from.
         ways: Length of the way from there to each node, inf if there is none known not
             to be blocked, shape (v,); [m].
@@ -29,24 +49,14 @@ class Found:
     """
 
     roadmap: Roadmap
-    sequence: Sequence
-    knots: Knots
     home: int
     ways: FloatArray
     blocked: IntArray
 
-    @property
-    def missing(self) -> float:
-        """Length of the path not drawn and not proved impossible to draw; [m]."""
-        route = self.roadmap.route
-        gaps = np.diff(route.stations)
-        skipped = self.sequence.skipped
-        return float(sum(gaps[k - 1] for k in skipped if not route.closed[k]))
-
 
 def search(
     judge: Judge, roadmap: Roadmap, home: int, rounds: int, blocked: IntArray
-) -> Found | None:
+) -> Searched | None:
     """The cheapest sequence whose every interval is clear.
 
     Args:
@@ -72,7 +82,10 @@ def search(
         good = judge.clear(knots.pick(fresh)) if fresh.size else np.ones(0, bool)
         bad = fresh[~good]
         if not bad.size:
-            return Found(roadmap, sequence, knots, home, planner.from_home, blocked)
+            return Searched(
+                roadmap.route, knots, sequence.skipped, roadmap, home,
+                planner.from_home, blocked,
+            )  # fmt: skip
         known.update(_keys(knots.edges[fresh]))
         more = alike(roadmap, knots.edges[bad])
         more = more[[key not in known for key in _keys(more)]]

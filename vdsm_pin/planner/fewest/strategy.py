@@ -17,7 +17,8 @@ from vdsm_pin.planner.fewest.explain import (
     refuse_proved,
     undrawn,
 )
-from vdsm_pin.planner.fewest.explore import FULL, QUICK, Effort, Outcome, explore
+from vdsm_pin.planner.fewest.explore import Outcome, explore
+from vdsm_pin.planner.fewest.levels import FULL, QUICK, Effort
 from vdsm_pin.planner.fewest.motion import Knots, Rows, dense_rows
 from vdsm_pin.planner.fewest.nearby import FAR, Nearby, nearby
 from vdsm_pin.planner.fewest.roadmap import Taste

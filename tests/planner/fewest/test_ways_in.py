@@ -1,0 +1,241 @@
+"""Ways in through openings: of the tip, of the arm that follows, of the motion."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scenes_for_fewest import problem
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.manipulator import built_in
+from vdsm_pin.planner.fewest.follow import followed
+from vdsm_pin.planner.fewest.insertion import Insertion, Layers
+from vdsm_pin.planner.fewest.judge import Judge
+from vdsm_pin.planner.fewest.levels import Insert
+from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.planner.fewest.nearby import FAR, nearby
+from vdsm_pin.planner.fewest.route import path_rows
+from vdsm_pin.planner.fewest.strategy import plan_fewest
+from vdsm_pin.planner.fewest.tip_ways import TipSpace, resampled
+from vdsm_pin.planner.fewest.ways_in import ways_in
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.scene import Box, Cylinder, Obstacle
+from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.verify import verify
+
+ARM = built_in("hrm8")
+START = (-0.3, 0.0, 0.0)
+LOOP = np.array([[1.75, -0.2, 0.05], [1.75, -0.25, 0.15], [1.75, -0.2, 0.2]])
+
+
+def wall(x: float, y: float, z: float, half: float) -> list[Obstacle]:
+    """A wall across the rail at x with a square window about (y, z)."""
+    far, thick = 3.0, 0.03
+    spans = [
+        ((-far, y - half), (-far, far)),
+        ((y + half, far), (-far, far)),
+        ((y - half, y + half), (-far, z - half)),
+        ((y - half, y + half), (z + half, far)),
+    ]
+    return [
+        Box(
+            f"wall{x}-{n}", np.array([x, sum(ys) / 2, sum(zs) / 2]), np.eye(3),
+            np.array([thick, ys[1] - ys[0], zs[1] - zs[0]]) / 2,
+        )
+        for n, (ys, zs) in enumerate(spans)
+    ]  # fmt: skip
+
+
+def two_windows(half: float) -> PlanningProblem:
+    """Two walls whose windows stand at different places."""
+    walls = [*wall(0.65, -0.06, 0.05, half), *wall(1.3, -0.15, 0.12, half)]
+    return problem(*walls, points=LOOP, start=START)
+
+
+def judge_of(task: PlanningProblem) -> Judge:
+    clearance = nearby(task, link_clearance(task)).up_to(FAR)
+    return Judge(task, clearance, 0.0, 3e-4, 2e-3)
+
+
+def space_of(task: PlanningProblem) -> TipSpace:
+    return TipSpace(judge_of(task), link_clearance(task))
+
+
+def length_of(way: FloatArray) -> float:
+    return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+
+
+def bent_arms(rng: np.random.Generator, count: int) -> FloatArray:
+    """Joint centres of arms bent at every joint, shape (count, N + 1, 3)."""
+    alpha, theta = rng.uniform(-0.25, 0.25, (2, count, ARM.n_links))
+    return joint_centres(ARM, rng.uniform(-1.0, 1.0, count), alpha, theta)
+
+
+def off_curve(points: FloatArray, curve: FloatArray) -> float:
+    """Largest distance of points from a polyline."""
+    worst = []
+    for p in points:
+        gaps = []
+        for a, b in itertools.pairwise(curve):
+            t = np.clip((p - a) @ (b - a) / max((b - a) @ (b - a), 1e-300), 0.0, 1.0)
+            gaps.append(np.linalg.norm(a + t * (b - a) - p))
+        worst.append(min(gaps))
+    return float(max(worst))
+
+
+def test_arms_that_follow_keep_their_links_and_the_curve() -> None:
+    rng = np.random.default_rng(4)
+    before = bent_arms(rng, 200)
+    ahead = before[:, -1] - before[:, -2]
+    tips = before[:, -1] + 0.2 * ahead + rng.normal(size=(200, 3)) * 0.005
+    after = followed(before, tips, ARM.link_lengths)
+    assert np.isfinite(after).all(axis=(1, 2)).mean() > 0.9
+    for old, tip, new in zip(before, tips, after, strict=True):
+        if not np.isfinite(new).all():
+            continue
+        links = np.linalg.norm(np.diff(new, axis=0), axis=1)
+        np.testing.assert_allclose(links, ARM.link_lengths, atol=1e-12)
+        np.testing.assert_array_equal(new[-1], tip)
+        np.testing.assert_array_equal(new[0, 1:], 0.0)
+        rail = old[0] - np.array([9.0, 0.0, 0.0])
+        curve = np.vstack([rail, old, tip])
+        assert off_curve(new[1:], curve) < 1e-12
+
+
+def test_a_straight_arm_that_follows_along_the_rail_stays_straight() -> None:
+    x = np.append(0.0, np.cumsum(ARM.link_lengths))
+    before = np.stack([x, 0.0 * x, 0.0 * x], axis=1)[None]
+    for step in (0.1, -0.1):
+        move = np.array([step, 0.0, 0.0])
+        after = followed(before, before[:, -1] + move, ARM.link_lengths)
+        np.testing.assert_allclose(after, before + move, atol=1e-12)
+
+
+def test_an_arm_that_cannot_follow_is_not_a_number() -> None:
+    before = bent_arms(np.random.default_rng(5), 1)
+    after = followed(before, before[:, -1] + [0.0, 50.0, 0.0], ARM.link_lengths)
+    assert np.isnan(after).all() or np.isfinite(after).all()
+    # With the last joint far from the rail no first link reaches it.
+    high = before + np.array([0.0, 5.0, 0.0])
+    assert np.isnan(followed(high, high[:, -1], ARM.link_lengths)).all()
+
+
+def test_points_along_a_way_are_even_and_keep_its_ends() -> None:
+    way = np.array([[0.0, 0, 0], [0.0, 0, 0], [1.0, 0, 0], [1.0, 1.05, 0]])
+    points = resampled(way, 0.1)
+    gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    assert gaps.max() <= 0.1 + 1e-12
+    np.testing.assert_array_equal(points[[0, -1]], way[[0, -1]])
+    assert len(resampled(way[:2], 0.1)) == 1
+
+
+@pytest.mark.parametrize("half", [0.085, 0.075, 0.07])
+def test_the_tip_finds_windows_and_no_way_where_they_are_shut(half: float) -> None:
+    task = two_windows(half)
+    goal = task.path.points[0]
+    (way, *_) = space_of(task).ways(np.array(START), goal, 1, 0.06)
+    room = link_clearance(task)(np.stack([way[:-1], way[1:]], axis=1))[:, 0]
+    assert room.min() >= task.required_clearance
+    np.testing.assert_array_equal(way[[0, -1]], [START, goal])
+    shut = two_windows(ARM.link_radius + 0.003)
+    assert not list(space_of(shut).ways(np.array(START), goal, 1, 0.06))
+
+
+def test_a_second_way_takes_the_other_window() -> None:
+    spans = ((-3.0, -0.4), (-0.2, 0.25), (0.45, 3.0))
+    bars = [
+        Box(f"bar{n}", np.array([1.0, (a + b) / 2, 0.0]), np.eye(3),
+            np.array([0.02, (b - a) / 2, 3.0]))
+        for n, (a, b) in enumerate(spans)
+    ]  # fmt: skip
+    lintels = [
+        Box(f"lintel{z}", np.array([1.0, 0.0, z]), np.eye(3), np.array([0.02, 3, 2.9]))
+        for z in (-3.0, 3.0)
+    ]
+    ends = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    task = problem(
+        *bars, *lintels, points=ends[1:], start=(0.0, 0.0, 0.0), closed=False
+    )
+    one, other = space_of(task).ways(*ends, 2, 0.05)
+    sides = [way[np.abs(way[:, 0] - 1.0).argmin(), 1] for way in (one, other)]
+    assert sorted(np.sign(sides)) == [-1.0, 1.0]
+    assert length_of(one) < length_of(other) + 0.2
+
+
+def test_what_is_inserted_keeps_clearance_limits_and_layers() -> None:
+    task = two_windows(0.08)
+    judge = judge_of(task)
+    (way, *_) = space_of(task).ways(np.array(START), task.path.points[0], 1, 0.06)
+    play = np.full(len(way), 0.02)
+    play[[0, -1]] = 0.0
+    rng = np.random.default_rng(0)
+    root = np.zeros((ARM.n_links + 1, 2))
+    chain = Insertion(judge, Layers(way, play), rng, 24).grow(root)
+    assert chain.layer[-1] == len(way) - 1
+    assert (np.diff(chain.layer) >= 0).all()
+    np.testing.assert_array_equal(chain.tips[[0, -1]], way[[0, -1]])
+    lines = Intervals(
+        chain.tips[:-1], chain.tips[1:], chain.offsets[:-1], chain.offsets[1:]
+    )
+    assert judge.clear(lines).all()
+
+
+def test_nothing_is_inserted_through_a_wall() -> None:
+    task = two_windows(ARM.link_radius + 0.003)
+    judge = judge_of(task)
+    tips = np.linspace(START, task.path.points[0], 30)
+    layers = Layers(tips, np.zeros(30))
+    root = np.zeros((ARM.n_links + 1, 2))
+    chain = Insertion(judge, layers, np.random.default_rng(0), 24).grow(root)
+    assert chain.tips[-1, 0] < 0.65
+
+
+def test_a_path_behind_a_pipe_is_drawn_in_visits_that_come_home() -> None:
+    """No arm encircles the pipe's whole length: the tip goes out and in again."""
+    pipe = Cylinder("pipe", np.array([1.2, 0.0, 0.0]), np.array([0.0, 0, 1]), 3.0, 0.3)
+    points = np.array([[2.4, -0.6, 0.0], [2.4, 0.6, 0.0]])
+    task = problem(
+        pipe, *wall(0.4, 0.0, 0.0, 0.16), points=points, closed=False, start=START
+    )
+    judge, rows = judge_of(task), path_rows(task.path)
+    clearance = nearby(task, link_clearance(task)).up_to(FAR)
+    closed = np.zeros(len(rows.tips), dtype=np.bool_)
+    effort = Insert(step=0.02, population=24, ways=2, seed=0)
+    found = ways_in(judge, clearance, rows, closed, effort)
+    assert found is not None
+    assert judge.clear(found.knots.pick(np.arange(len(found.knots.drawn)))).all()
+    drawn = found.knots.drawn
+    way = np.linalg.norm(np.diff(found.knots.tips, axis=0), axis=1)
+    assert way[drawn].sum() == pytest.approx(task.path.length - found.missing)
+    on_line = found.knots.tips[:-1][drawn]
+    np.testing.assert_allclose(on_line[:, [0, 2]] - [2.4, 0.0], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("half", [0.09, 0.075])
+def test_two_windows_are_passed_and_the_same_plan_comes_again(half: float) -> None:
+    task = two_windows(half)
+    one, two = (plan_fewest(task, link_clearance(task), 0.0) for _ in range(2))
+    np.testing.assert_array_equal(one.trajectory.joints, two.trajectory.joints)
+    result = verify(task, one.trajectory, load_robot(task.manipulator))
+    assert result.verdict is Verdict.CERTIFIED
+    assert result.coverage == pytest.approx(1.0, abs=1e-9)
+
+
+def test_an_arm_bent_through_two_windows_goes_on_from_where_it_is() -> None:
+    task = two_windows(0.09)
+    plan = plan_fewest(task, link_clearance(task), 0.0)
+    rows = plan.trajectory
+    half = int(np.flatnonzero(rows.on_path)[0] * 0.8)
+    joints = rows.joints[half]
+    tip = plan.tip_path.points[half]
+    bent = problem(
+        *task.scene.obstacles, points=LOOP, start=tuple(tip), start_joints=joints
+    )
+    again = plan_fewest(bent, link_clearance(bent), 0.0)
+    np.testing.assert_allclose(again.trajectory.joints[0], joints, atol=1e-9)
+    result = verify(bent, again.trajectory, load_robot(bent.manipulator))
+    assert result.verdict is Verdict.CERTIFIED
+    assert result.coverage == pytest.approx(1.0, abs=1e-9)

@@ -1,0 +1,85 @@
+"""Compiled: follow-the-leader, the arm laid on the curve that its tip has run along."""
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.compiled import compiled
+
+
+@compiled
+def _beyond(
+    curve: FloatArray, at: int, place: FloatArray, length: float, found: FloatArray
+) -> int:
+    """The next place on a polyline at a distance from a place on it.
+
+    Args:
+        curve: Its corners, shape (k, 3); [m].
+        at: Corner that comes next after the place.
+        place: Shape (3,); [m].
+        length: The distance; [m].
+        found: Set to what is found, shape (3,); [m].
+
+    Returns:
+        The corner that comes next after it, or the number of corners if there is none.
+    """
+    begin = place.copy()
+    for k in range(at, curve.shape[0]):
+        a = b = c = 0.0
+        for i in range(3):
+            side, off = curve[k, i] - begin[i], begin[i] - place[i]
+            a += side * side
+            b += side * off
+            c += off * off
+        square = b * b - a * (c - length * length)
+        if a > 0.0 and square >= 0.0:
+            t = (-b + np.sqrt(square)) / a
+            if 0.0 <= t <= 1.0:
+                for i in range(3):
+                    found[i] = begin[i] + t * (curve[k, i] - begin[i])
+                return k
+        begin = curve[k].copy()
+    return int(curve.shape[0])
+
+
+@compiled
+def followed(centres: FloatArray, tips: FloatArray, lengths: FloatArray) -> FloatArray:
+    """Arms whose joints have moved along the arm's own curve after the tip.
+
+    The curve runs from the new tip over the old joint centres and along the rail. Where
+    the tip draws back, the old tip is left out of it.
+
+    Args:
+        centres: Joint centres before, shape (n, N + 1, 3); [m].
+        tips: Where the tips come to be, shape (n, 3); [m].
+        lengths: Of the links, shape (N,); [m].
+
+    Returns:
+        Joint centres, shape (n, N + 1, 3), NaN where an arm cannot follow; [m].
+    """
+    count = lengths.size
+    result = np.full(centres.shape, np.nan)
+    total = lengths.sum()
+    for r in range(centres.shape[0]):
+        curve = np.zeros((count + 2, 3))
+        ahead = 0.0
+        for i in range(count + 1):
+            curve[i] = centres[r, count - i]
+        curve[count + 1] = curve[count]
+        curve[count + 1, 0] -= 2.0 * total + np.abs(tips[r] - curve[0]).sum()
+        for i in range(3):
+            ahead += (tips[r, i] - curve[0, i]) * (curve[0, i] - curve[1, i])
+        at, place = 0 if ahead >= 0.0 else 1, tips[r].copy()
+        result[r, count] = place
+        for joint in range(count - 1, 0, -1):
+            found = np.zeros(3)
+            at = _beyond(curve, at, place, lengths[joint], found)
+            if at == curve.shape[0]:
+                break
+            result[r, joint], place = found, found
+        square = lengths[0] ** 2 - place[1] ** 2 - place[2] ** 2
+        if at < curve.shape[0] and square >= 0.0:
+            result[r, 0, 0] = place[0] - np.sqrt(square)
+            result[r, 0, 1] = result[r, 0, 2] = 0.0
+        else:
+            result[r] = np.nan
+    return result

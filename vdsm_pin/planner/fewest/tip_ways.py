@@ -1,0 +1,270 @@
+"""Ways of the tip through the openings of a scene, the widest first.
+
+Space is cut into the cells of an octree. A cell costs its size, and more the narrower
+it is there for the body; where nobody knows yet, it is thought wide. Dijkstra's
+cheapest way is halved cell by cell until all of it is known to be clear. It is then
+pulled to the middle of the openings. A second way avoids the narrowest place of the
+first. These are proposals for the search of the arm's motion: nothing is proved here.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.planner.feasibility import curled_reach
+from vdsm_pin.planner.fewest.cells import (
+    DEPTH,
+    adjoining,
+    doubt_to,
+    holders,
+    places,
+)
+from vdsm_pin.planner.fewest.judge import Judge
+from vdsm_pin.planner.records import LinkClearance
+
+FIRST_LEVEL: Final = 4
+"""Level of the cells begun with."""
+MOST_CELLS: Final = 60_000
+"""Cells at which a search ends."""
+LEAST: Final = 0.05
+"""Cells smaller than this part of the body's radius are not halved; [-]."""
+NARROW: Final = 0.3
+"""Room below this part of the body's radius makes a way costly; [-]."""
+DETOUR: Final = 1.05
+"""Doubtful cells on ways that cost so much more than the best are halved too; [-]."""
+AVOIDED: Final = 30.0
+"""Cost of the cells near the narrowest place of a way before, in their own; [-]."""
+CAP: Final = 0.5
+"""Room below this part of what is narrow costs no more; [-]."""
+PULLS: Final = 30
+"""Rounds of pulling a way to the middle of its openings."""
+SHIFTS: Final = 8
+"""Places tried for each point in a round by chance."""
+SIZES: Final = (0.5, 0.2, 0.1)
+"""How far away they are, round after round, over the body's radius; [-]."""
+
+
+@dataclass
+class _Cells:
+    """Cells over all places a tip can be, halved on demand.
+
+    Args:
+        clearance: The clearance function.
+        required: Clearance that the tip must keep; [m].
+        radius: Of the body; [m].
+        corner: Lowest corner of the whole, shape (3,); [m].
+        side: Side of the whole; [m].
+        reach: Largest distance of a tip from the rail; [m].
+    """
+
+    clearance: LinkClearance
+    required: float
+    radius: float
+    corner: FloatArray
+    side: float
+    reach: float
+
+    def __post_init__(self) -> None:
+        """Begin with cells of one size."""
+        count = 8**FIRST_LEVEL
+        self.codes = np.arange(count) << (3 * (DEPTH - FIRST_LEVEL))
+        self.levels = np.full(count, FIRST_LEVEL)
+        self.room = self._rooms(self.codes, self.levels)
+        self.avoided: list[FloatArray] = []
+
+    def boxes(self, codes: IntArray, levels: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Centres, shape (n, 3), and half sides, shape (n,), of cells; [m]."""
+        half = self.side / 2.0 ** (levels + 1.0)
+        low = self.corner + self.side / 2.0**DEPTH * places(codes)
+        return np.asarray(low + half[:, None]), np.asarray(half)
+
+    def _rooms(self, codes: IntArray, levels: IntArray) -> FloatArray:
+        """What the tip has to spare at the centre of each cell, shape (n,); [m]."""
+        centre, half = self.boxes(codes, levels)
+        room = self.clearance(np.stack([centre, centre], axis=1))[:, 0] - self.required
+        # From within a solid a tip that is clear is at least so far away.
+        room = np.maximum(room, -self.radius - self.required)
+        out = np.hypot(centre[:, 1], centre[:, 2]) - self.reach
+        room[out > np.sqrt(2.0) * half] = -np.inf
+        return np.asarray(room)
+
+    def costs(self) -> tuple[FloatArray, BoolArray]:
+        """Cost of passing each cell, inf where it is shut; whether it is in doubt."""
+        centre, half = self.boxes(self.codes, self.levels)
+        radius = np.sqrt(3.0) * half
+        shut = self.room + radius < 0.0
+        doubt = ~shut & (self.room < half) & (half > LEAST * self.radius)
+        shut |= ~doubt & (self.room < 0.0)
+        # A cell in doubt is taken for as wide as it may be.
+        room = np.where(doubt, self.room + radius, self.room)
+        narrow = NARROW * self.radius
+        cost = 2.0 * half * (1.0 + (narrow / np.maximum(room, CAP * narrow)) ** 2)
+        for place in self.avoided:
+            near = np.linalg.norm(centre - place, axis=1) < 2.0 * self.radius + half
+            cost[near & ~doubt] *= AVOIDED
+        return np.where(shut, np.inf, cost), doubt
+
+    def holders(self, points: FloatArray) -> IntArray:
+        """Cells that hold points within the whole, shape (n,)."""
+        place = (points - self.corner) / self.side * 2.0**DEPTH
+        return holders(self.codes, np.clip(place, 0, 2**DEPTH - 1).astype(np.int64))
+
+    def split(self, chosen: IntArray) -> None:
+        """Put the eight children of cells in their place."""
+        count = np.ones(self.codes.size, dtype=np.int64)
+        count[chosen] = 8
+        begin = np.cumsum(count) - count
+        kids = (begin[chosen, None] + np.arange(8)).ravel()
+        codes, levels, room = (
+            np.repeat(values, count) for values in (self.codes, self.levels, self.room)
+        )
+        levels[kids] += 1
+        codes[kids] += np.tile(np.arange(8), len(chosen)) << (
+            3 * (DEPTH - levels[kids])
+        )
+        room[kids] = self._rooms(codes[kids], levels[kids])
+        self.codes, self.levels, self.room = codes, levels, room
+
+    def cheapest(self, start: FloatArray, goal: FloatArray) -> FloatArray | None:
+        """Points on the cheapest way that is clear, shape (k, 3); None without one."""
+        while True:
+            cost, doubt = self.costs()
+            ends = self.holders(np.stack([start, goal]))
+            open_ = np.isfinite(cost)
+            open_[ends] = True
+            cost[ends] = np.where(np.isfinite(cost[ends]), cost[ends], 0.0)
+            first, neighbours = adjoining(self.codes, self.levels, open_)
+            there = doubt_to(ends[:1], first, neighbours, cost)
+            best = float(there[ends[1]])
+            if not np.isfinite(best):
+                return None
+            back = doubt_to(ends[1:], first, neighbours, cost)
+            good = doubt & (there + back <= DETOUR * best + cost)
+            way = self._traced(int(ends[1]), int(ends[0]), there, first, neighbours)
+            if not doubt[way].any():
+                return np.vstack([start, self._through(way), goal])
+            if self.codes.size > MOST_CELLS:
+                return None
+            self.split(np.flatnonzero(good))
+
+    def _through(self, way: IntArray) -> FloatArray:
+        """Centres of the faces that a way passes, shape (k - 1, 3); [m]."""
+        centre, half = self.boxes(self.codes[way], self.levels[way])
+        low = np.maximum((centre - half[:, None])[:-1], (centre - half[:, None])[1:])
+        high = np.minimum((centre + half[:, None])[:-1], (centre + half[:, None])[1:])
+        return np.asarray((low + high) / 2.0)
+
+    @staticmethod
+    def _traced(
+        at: int, to: int, there: FloatArray, first: IntArray, neighbours: IntArray
+    ) -> IntArray:
+        """Cells of the way that a search found, from its source on."""
+        way = [at]
+        while way[-1] != to:
+            near = neighbours[first[way[-1]] : first[way[-1] + 1]]
+            way.append(int(near[np.argmin(there[near])]))
+        return np.array(way[::-1])
+
+
+class TipSpace:
+    """Where the tip can be, and ways through it.
+
+    Args:
+        judge: Says what is clear.
+        clearance: The clearance function, exact also where it is too small.
+    """
+
+    def __init__(self, judge: Judge, clearance: LinkClearance) -> None:
+        self.judge, self.clearance = judge, clearance
+        self.arm = judge.problem.manipulator
+
+    def ways(
+        self, start: FloatArray, goal: FloatArray, most: int, spacing: float
+    ) -> Iterator[FloatArray]:
+        """Ways of the tip from start to goal, the best first.
+
+        Args:
+            start: Where they begin, shape (3,); [m].
+            goal: Where they end, shape (3,); [m].
+            most: Largest number of ways.
+            spacing: Largest distance of their points; [m].
+
+        Yields:
+            Points, shape (k, 3), both ends included; [m].
+        """
+        if not (start != goal).any():
+            yield start[None]
+            return
+        cells = self._cells(np.stack([start, goal]))
+        for _ in range(most):
+            way = cells.cheapest(start, goal)
+            if way is None:
+                return
+            way = self._pulled(resampled(way, spacing))
+            yield resampled(way, spacing)
+            cells.avoided.append(self._narrowest(way))
+
+    def _cells(self, ends: FloatArray) -> _Cells:
+        """Cells over the places a tip can be that may be worth a way between these."""
+        low, high = self.arm.base_range
+        reach, length = curled_reach(self.arm), self.arm.total_length
+        low = max(low - length, float(ends[:, 0].min()) - length)
+        high = min(high + length, float(ends[:, 0].max()) + length)
+        side = max(high - low, 2.0 * reach)
+        corner = np.array([low, -side / 2.0, -side / 2.0])
+        return _Cells(
+            self.clearance, self.judge.required, self.arm.link_radius, corner, side,
+            reach,
+        )  # fmt: skip
+
+    def _spare(self, points: FloatArray) -> FloatArray:
+        """What the tip has to spare at points, shape (n,); [m]."""
+        room = self.clearance(np.stack([points, points], axis=1))[:, 0]
+        return room - self.judge.required
+
+    def _narrowest(self, way: FloatArray) -> FloatArray:
+        """The place of a way, its ends left out, with the least room, shape (3,)."""
+        inner = way[1:-1] if len(way) > 2 else way
+        return np.asarray(inner[int(np.argmin(self._spare(inner)))])
+
+    def _pulled(self, way: FloatArray) -> FloatArray:
+        """A way straightened, and in the middle where it is narrow (elastic band).
+
+        Args:
+            way: Shape (k, 3), its ends stay; [m].
+        """
+        rng, way = np.random.default_rng(len(way)), way.copy()
+        for round_ in range(PULLS):
+            size = self.arm.link_radius * SIZES[round_ % len(SIZES)]
+            for parity in (1, 2):
+                inner = np.arange(parity, len(way) - 1, 2)
+                if len(inner):
+                    shifts = rng.normal(size=(len(inner), SHIFTS, 3)) * size
+                    way[inner] = self._better(way, inner, shifts)
+        return way
+
+    def _better(
+        self, way: FloatArray, inner: IntArray, shifts: FloatArray
+    ) -> FloatArray:
+        """The best of some places for every other point of a way, shape (n, 3)."""
+        middle = (way[inner - 1] + way[inner + 1])[:, None] / 2.0
+        own, radius = way[inner][:, None], self.arm.link_radius
+        tried = np.concatenate([own, (own + middle) / 2.0, middle, own + shifts], 1)
+        spare = self._spare(tried.reshape(-1, 3)).reshape(tried.shape[:2])
+        wide = np.minimum(spare / (NARROW * radius), 1.0)
+        bend = np.linalg.norm(tried - middle, axis=2) / radius
+        score = np.where(spare > 0.0, 2.0 * wide, 10.0 * (wide - 1.0)) - bend
+        return np.asarray(tried[np.arange(len(inner)), score.argmax(axis=1)])
+
+
+def resampled(way: FloatArray, spacing: float) -> FloatArray:
+    """Points along a polyline, evenly at most `spacing` apart, ends kept; [m]."""
+    way = way[np.append(True, np.linalg.norm(np.diff(way, axis=0), axis=1) > 0.0)]
+    if len(way) < 2:
+        return way
+    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1)))
+    marks = np.linspace(0.0, along[-1], 1 + max(1, int(np.ceil(along[-1] / spacing))))
+    return np.stack([np.interp(marks, along, column) for column in way.T], axis=1)

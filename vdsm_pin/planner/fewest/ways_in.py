@@ -1,0 +1,160 @@
+"""Motions in by the openings of a scene, along the path, and out again.
+
+The tip's way from the start to the path is sought alone (`tip_ways`); the arm is grown
+along it and on along the path (`insertion`). Where it gets stuck, it draws back the way
+it came, and goes in again to where it left the path, by another way or in another
+posture. What cannot be drawn at all is skipped.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import BoolArray
+from vdsm_pin.planner.fewest.home import checked_start
+from vdsm_pin.planner.fewest.insertion import Chain, Insertion, Layers
+from vdsm_pin.planner.fewest.judge import Judge
+from vdsm_pin.planner.fewest.levels import Insert
+from vdsm_pin.planner.fewest.motion import Knots
+from vdsm_pin.planner.fewest.nearby import Nearby
+from vdsm_pin.planner.fewest.route import PathRows, TipRoute, tip_route
+from vdsm_pin.planner.fewest.search import Found
+from vdsm_pin.planner.fewest.tip_ways import TipSpace
+
+PLAY: Final = 0.3
+"""How far the tip may be from its way off the path, over the body's radius; [-]."""
+FAILURES: Final = 3
+"""Places of the path at which the arm is not got in before the search gives up."""
+
+
+@dataclass(frozen=True)
+class _Visit:
+    """A motion from the start to the path and along it.
+
+    Args:
+        first: Layer of the path at which it begins to draw.
+        before: Layers of the chain that come before that one.
+        chain: The motion.
+    """
+
+    first: int
+    before: int
+    chain: Chain
+
+    @property
+    def last(self) -> int:
+        """Layer of the path up to which it draws, -1 if it does not come there."""
+        drawn = int(self.chain.layer[-1]) - self.before
+        return self.first + drawn if drawn >= 0 else -1
+
+
+def ways_in(
+    judge: Judge, clearance: Nearby, rows: PathRows, closed: BoolArray, effort: Insert
+) -> Found | None:
+    """A motion that draws what it can, going in as often as it takes.
+
+    Args:
+        judge: Says what is clear.
+        clearance: The clearance function.
+        rows: The desired path row by row.
+        closed: Rows that nobody can reach, shape (r,).
+        effort: How thoroughly to look.
+
+    Returns:
+        None if nothing is drawn.
+
+    Raises:
+        LimitExceeded: If the start breaks a limit.
+    """
+    step = effort.step * judge.problem.manipulator.total_length
+    route = tip_route(judge.problem, rows, closed, step, 0.0)
+    search = _Search(judge, clearance, route, effort, step)
+    return search.found()
+
+
+class _Search:
+    """The visits of one route."""
+
+    def __init__(
+        self,
+        judge: Judge,
+        clearance: Nearby,
+        route: TipRoute,
+        effort: Insert,
+        step: float,
+    ) -> None:
+        self.judge, self.route, self.effort, self.step = judge, route, effort, step
+        self.tips = route.tips[route.layers]
+        # How far a blocked place is from a clear one tells where to look for a hole.
+        self.space = TipSpace(judge, replace(clearance, floor=-np.inf))
+        self.root = checked_start(judge, route.tips[:1])
+        self.rng = np.random.default_rng(effort.seed)
+
+    def found(self) -> Found | None:
+        """Visits until the path's end is reached or too many are in vain."""
+        visits: list[_Visit] = []
+        skipped: list[int] = []
+        k, failures, last = 0, 0, len(self.tips) - 1
+        while k < last:
+            if self.route.closed[k + 1] or failures == FAILURES:
+                k += 1
+                skipped.append(k)
+                continue
+            visit = self._visit(k)
+            if visit is None or visit.last <= k:
+                failures += 1
+                k += 1
+                skipped.append(k)
+                continue
+            visits.append(visit)
+            k = visit.last
+        if not visits:
+            return None
+        return Found(self.route, self._knots(visits), tuple(skipped))
+
+    def _visit(self, k: int) -> _Visit | None:
+        """The visit that draws most from layer k on."""
+        shut = np.flatnonzero(self.route.closed[k + 1 :])
+        end = k + 1 + int(shut[0]) if len(shut) else len(self.tips)
+        best: _Visit | None = None
+        start, path = self.route.tips[0], self.tips[k:end]
+        for way in self.space.ways(start, path[0], self.effort.ways, self.step):
+            before = len(way) - 1
+            play = np.zeros(before + len(path))
+            play[1:before] = PLAY * self.judge.problem.manipulator.link_radius
+            layers = Layers(np.vstack([way, path[1:]]), play)
+            grown = Insertion(self.judge, layers, self.rng, self.effort.population)
+            visit = _Visit(k, before, grown.grow(self.root))
+            if best is None or visit.last > best.last:
+                best = visit
+            if best.last == end - 1:
+                break
+        return best
+
+    def _knots(self, visits: list[_Visit]) -> Knots:
+        """The visits one after the other, out by the way in after all but the last."""
+        stations, first = self.route.stations, visits[0]
+        tips, offsets = [first.chain.tips[:1]], [first.chain.offsets[:1]]
+        at, drawn = [stations[first.first : first.first + 1]], [np.zeros(0, np.bool_)]
+        left = first.first
+        for visit in visits:
+            chain = visit.chain
+            place = visit.first + chain.layer - visit.before
+            on = place >= visit.first
+            tips.append(chain.tips[1:])
+            offsets.append(chain.offsets[1:])
+            at.append(stations[np.where(on, place, left)][1:])
+            drawn.append(on[:-1] & on[1:])
+            left = visit.last
+            if visit is not visits[-1]:
+                tips.append(chain.tips[-2::-1])
+                offsets.append(chain.offsets[-2::-1])
+                at.append(np.full(len(on) - 1, stations[left]))
+                drawn.append(np.zeros(len(on) - 1, dtype=np.bool_))
+        every = np.concatenate(drawn)
+        edges = np.full((len(every), 2), -1)
+        return Knots(
+            np.concatenate(tips), np.concatenate(offsets), np.concatenate(at), every,
+            edges,
+        )  # fmt: skip
