@@ -5,20 +5,22 @@ drawn, dense sampling finds no fault and planning took no more processor time th
 limit, at which it is stopped. One without a solution is right if it is refused.
 Strategies of this package and the references of `references/` get the same problems,
 the same limit and the same judge. Results are saved after every problem; `--resume`
-goes on where a run ended.
+goes on where a run of the same code ended.
 """
 
 import argparse
+import hashlib
 import json
 import os
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import vdsm_pin
 from benchmarks.common import surroundings
 from benchmarks.hrm2000.attempt import Outcome, attempt
 from benchmarks.hrm2000.catalogue import FAMILIES, problem_file
@@ -41,23 +43,33 @@ def one(
     return [attempt(path, (family, number), name, limit) for name in names]
 
 
+def fingerprint() -> str:
+    """What tells one state of the package's code from another."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(vdsm_pin.__file__).parent.rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def terms(limit: float) -> dict[str, Any]:
+    """What two runs must have in common to be one."""
+    return {"benchmark": VERSION, "time_limit_s": limit, "code": fingerprint()}
+
+
 def known(base: Path | None, limit: float) -> list[Outcome]:
-    """What an earlier run with the same limit and version came to."""
+    """What an earlier run of the same code with the same limit came to."""
     if base is None or not base.with_suffix(".json").exists():
         return []
     data = json.loads(base.with_suffix(".json").read_text(encoding="utf-8"))
-    settings = data["settings"]
-    if (settings["benchmark"], settings["time_limit_s"]) != (VERSION, limit):
+    asked = terms(limit)
+    if {name: data["settings"].get(name) for name in asked} != asked:
         return []
     return [Outcome(**row) for row in data["outcomes"]]
 
 
 def save(base: Path, outcomes: list[Outcome], limit: float, jobs: int) -> None:
     """The results as JSON and as a Markdown page."""
-    settings = {
-        "benchmark": VERSION, "time_limit_s": limit, "processes": jobs,
-        **surroundings(),
-    }  # fmt: skip
+    settings = {**terms(limit), "processes": jobs, **surroundings()}
     ordered = sorted(outcomes, key=lambda o: (o.method, o.family, o.number))
     data = {"settings": settings, "outcomes": [asdict(o) for o in ordered]}
     base.parent.mkdir(parents=True, exist_ok=True)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.hrm2000 import attempt as attempts
+from benchmarks.hrm2000 import run
 from benchmarks.hrm2000.arms import PAPER
 from benchmarks.hrm2000.attempt import Outcome, answer_of, attempt, processor_time
 from benchmarks.hrm2000.generate import generate, witness_of
@@ -73,6 +74,18 @@ def test_the_page_names_what_was_missed_and_what_was_not_run() -> None:
     assert "| port | fewest | 1/2 (50%) |" in page
     assert "* port-0000: not found" in page
     assert "Not run: prismatic_x" in page
+
+
+def test_a_run_goes_on_only_with_the_same_code_and_limit(
+    tmp_path: Path, monkeypatch
+) -> None:
+    base = tmp_path / "results"
+    run.save(base, [GOOD], 60.0, 1)
+    assert run.known(base, 60.0) == [GOOD]
+    assert run.known(base, 10.0) == []
+    assert run.known(None, 60.0) == []
+    monkeypatch.setattr(run, "fingerprint", lambda: "another")
+    assert run.known(base, 60.0) == []
 
 
 def test_a_crash_is_an_outcome(tmp_path: Path, monkeypatch) -> None:
