@@ -213,6 +213,32 @@ def test_a_tip_off_the_path_is_rejected(tmp_path: Path) -> None:
     assert "off the path" in refused(off)
 
 
+@pytest.mark.parametrize(("off", "good"), [(0.9e-5, True), (1.1e-5, False)])
+def test_the_tip_is_held_to_the_tolerance_of_the_problem(
+    off: float, good: bool, tmp_path: Path
+) -> None:
+    data = STRAIGHT | {"tip_tolerance": 1e-5}
+    rows = straight_rows([0.0, 0.1 + off])
+    drawn = {"on_path": [1, 1], "path_m": [0.0, 0.1]}
+    case = Case(tmp_path, data, rows, NO_ERRORS, **drawn)
+    if good:
+        assert judge(case).accepted
+    else:
+        assert "off the path" in refused(case)
+
+
+def test_a_fixed_base_is_certified_where_it_stands(tmp_path: Path) -> None:
+    arm = STRAIGHT["manipulator"] | {"base_range": [0.1, 0.1]}
+    data = {key: value for key, value in STRAIGHT.items() if key != "tip_path"}
+    data["manipulator"] = arm
+    for x0, good in ((0.1, True), (0.1 + 2e-9, False)):
+        case = Case(tmp_path, data, straight_rows([x0, x0]), NO_ERRORS)
+        if good:
+            assert judge(case).accepted
+        else:
+            assert "x0_max_m" in refused(case)
+
+
 def test_a_tip_that_strays_between_rows_is_rejected(tmp_path: Path) -> None:
     """The arm swings out and back to the path, farther than one spacing."""
     q = straight_rows([0.0, 0.1])

@@ -175,3 +175,17 @@ def test_only_the_link_that_coal_names_gets_a_margin() -> None:
     assert set(np.flatnonzero(raised[:, 0]) + 1) == links
     for one in found:
         assert one.margin > tight.required_clearance - one.distance > 0.0
+
+
+def test_plans_keep_their_change_per_row_and_less_where_the_problem_says_so() -> None:
+    problem = short("obs3")
+    robot = load_robot(problem.manipulator)
+    for limit, most in ((None, 5.0), (10.0, 5.0), (1.0, 1.0)):
+        change = None if limit is None else np.deg2rad(limit)
+        asked = replace(problem, max_row_change=change)
+        result = refinement.plan_and_verify(asked, "fewest", robot)
+        (row,) = [c for c in result.verification.checks if "change of a" in c.name]
+        assert row.verdict is Verdict.CERTIFIED
+        assert row.limit == pytest.approx(np.deg2rad(most))
+        steps = np.abs(np.diff(result.plan.trajectory.joints[:, 1:], axis=0))
+        assert steps.max() <= np.deg2rad(most)

@@ -190,6 +190,13 @@ def test_a_document_of_another_arm_is_refused(text: str, message: str) -> None:
         read_robot(HRM8, text)
 
 
+def test_a_base_that_stands_still_is_a_rail_of_no_length() -> None:
+    fixed = replace(HRM8, base_range=(0.25, 0.25))
+    robot = read_robot(fixed, urdf_text(fixed))
+    assert robot.model.lowerPositionLimit[0] == robot.model.upperPositionLimit[0]
+    assert robot.model.lowerPositionLimit[0] == 0.25
+
+
 def test_a_broken_document_is_refused_before_pinocchio_sees_it() -> None:
     text = urdf_text(HRM8).replace('<parent link="base" />', '<parent link="b" />')
     with pytest.raises(InvalidInput, match="parent link 'b' does not exist"):

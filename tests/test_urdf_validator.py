@@ -55,7 +55,7 @@ BROKEN = {
     ),
     "lower above upper": (
         replaced('lower="-5.0"', 'lower="6.0"'),
-        "joint 'x0': lower limit 6.0 is not below upper limit 5.0",
+        "joint 'x0': lower limit 6.0 is above upper limit 5.0",
     ),
     "loop": (before_end(LOOP), "is its own ancestor: a loop"),
     "not XML": (TEXT[:-20], "URDF is not XML"),

@@ -76,7 +76,7 @@ class Manipulator:
         link_radius: Radius of the body, round ends; [m].
         max_link_angle: Largest link angle psi_i, the cone; [rad].
         max_joint_angle: Largest absolute theta_i and alpha_i, the box; [rad].
-        base_range: Smallest and largest x0; [m].
+        base_range: Smallest and largest x0, the same for a fixed base; [m].
         cables: Cable holes.
 
     Raises:
@@ -113,8 +113,8 @@ class Manipulator:
                 message = f"{name} is {value} deg, expected above 0 and below 90"
                 raise InvalidInput(message)
         low, high = self.base_range
-        if not (np.isfinite(low) and np.isfinite(high) and low < high):
-            message = f"base_range is {self.base_range} m, expected low < high"
+        if not (np.isfinite(low) and np.isfinite(high) and low <= high):
+            message = f"base_range is {self.base_range} m, expected low <= high"
             raise InvalidInput(message)
         if self.cables.hole_angles.shape[0] != lengths.size:
             count = self.cables.hole_angles.shape[0]

@@ -208,13 +208,18 @@ class PlanningProblem(Summarised):
             its last column; readers and writers apply it, nobody else needs it.
         required_self_clearance: Least distance between the surfaces of two links that
             are not neighbours; [m].
+        tip_tolerance: How far the tip may be off its start, its goal and, at waypoints,
+            the path; [m].
+        max_row_change: Largest change of a joint angle from row to row; None where none
+            is asked for; [rad].
         start: Where a motion without tip path begins; None where anywhere will do.
         goal: Where a motion without tip path ends; None where anywhere will do.
         source: Where it was read; None where it was built in Python or changed since.
 
     Raises:
-        InvalidInput: If a required clearance is negative or not finite, joint values
-            do not fit the arm, or a start or goal stands beside a tip path.
+        InvalidInput: If a required clearance is negative, a tolerance or limit not
+            above 0, or one of them not finite, joint values do not fit the arm, or a
+            start or goal stands beside a tip path.
     """
 
     name: str
@@ -224,6 +229,8 @@ class PlanningProblem(Summarised):
     required_clearance: float
     T_world_base: FloatArray
     required_self_clearance: float = 0.0
+    tip_tolerance: float = TOLERANCES.tip_on_path
+    max_row_change: float | None = None
     start: Posture | None = None
     goal: Posture | None = None
     source: ProblemSource | None = field(default=None, init=False, compare=False)
@@ -236,6 +243,12 @@ class PlanningProblem(Summarised):
             if not 0.0 <= value < np.inf:
                 message = f"{name} is {value} m, expected 0 or more"
                 raise InvalidInput(message)
+        if not 0.0 < self.tip_tolerance < np.inf:
+            message = f"tip_tolerance is {self.tip_tolerance} m, expected above 0"
+            raise InvalidInput(message)
+        if self.max_row_change is not None and not 0.0 < self.max_row_change < np.inf:
+            message = f"max_row_change is {self.max_row_change} rad, expected above 0"
+            raise InvalidInput(message)
         if self.tip_path is not None and (self.start or self.goal):
             message = "start and goal belong to problems without tip_path"
             raise InvalidInput(message)
@@ -267,6 +280,15 @@ class PlanningProblem(Summarised):
         if self.tip_path is None:
             return self.start
         return Posture(self.tip_path.start, self.tip_path.start_joints)
+
+    @property
+    def planned_row_change(self) -> float:
+        """Largest change of a joint angle from row to row in a plan; [rad].
+
+        A little below the limit, as a CSV rounds, and never above what plans promise.
+        """
+        limit = min(self.max_row_change or np.inf, TOLERANCES.row_change)
+        return TOLERANCES.planned_step / TOLERANCES.row_change * limit
 
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Arm, scene, path and what is required."""

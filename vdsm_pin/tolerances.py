@@ -22,7 +22,8 @@ class Tolerances:
     """
 
     tip_on_path: float = _held(1e-6, "m")
-    """Tip against the desired path at a waypoint marked on_path; [m]."""
+    """Tip against its start, its goal and, at a waypoint marked on_path, the desired
+    path, where the problem states no `tip_tolerance`; [m]."""
 
     cable_round_trip: float = _held(1e-9, "rad")
     """Angles recovered from cable lengths; [rad]."""
@@ -50,10 +51,10 @@ class Tolerances:
     """A link angle above this counts as changed: 0.05 deg; [rad]."""
 
     row_change: float = _held(8.726646259971648e-2, "rad")
-    """Largest change of a joint angle from row to row: 5 deg; [rad]."""
+    """Largest change of a joint angle from row to row of a plan: 5 deg; [rad]."""
 
     start_joints: float = _held(1e-9, "m or rad")
-    """Joint values of the first row against those of the problem; [m] and [rad]."""
+    """Joint values of a start up to which the arm counts as straight; [m] and [rad]."""
 
     coverage: float = _held(1e-9, "-")
     """Coverage below the required one that counts as rounding of a CSV; [-]."""

@@ -107,8 +107,8 @@ def _joint_problems(joint: ET.Element) -> Iterator[str]:
     high = _numbers(joint, "limit", "upper", 1)
     if low is None or high is None:
         yield f"{where}: limit needs numbers lower and upper"
-    elif not low[0] < high[0]:
-        yield f"{where}: lower limit {low[0]} is not below upper limit {high[0]}"
+    elif not low[0] <= high[0]:
+        yield f"{where}: lower limit {low[0]} is above upper limit {high[0]}"
     for name in ("effort", "velocity"):
         bound = _numbers(joint, "limit", name, 1)
         if bound is None or not bound[0] >= 0.0:

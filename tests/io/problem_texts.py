@@ -62,6 +62,8 @@ tip_path:
   order: free
 required_clearance: 3.5
 required_self_clearance: 2
+tip_tolerance: 0.01
+max_change_per_row_deg: 3
 """
 
 

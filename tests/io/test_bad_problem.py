@@ -107,6 +107,13 @@ ONE_VALUE: list[tuple[tuple[Any, ...], Any, str]] = [
         [PILLAR, PILLAR | {"center": [0, 0, 900]}],
         "obstacles[1].name (line 15): is 'pillar', which obstac",
     ),
+    (("tip_tolerance",), 0, "tip_tolerance (line 43): is 0, expected above 0"),
+    (("tip_tolerance",), 11, "is 11 mm, expected at most the spacing of the path, 10"),
+    (
+        ("max_change_per_row_deg",),
+        0,
+        "max_change_per_row_deg (line 43): is 0, expected",
+    ),
     (("tip_path",), 3, "tip_path (line 15): is 3, expected a mapping"),
     (
         ("start",),

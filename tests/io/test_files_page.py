@@ -28,6 +28,8 @@ def test_the_defaults_shown_are_the_defaults(tmp_path: Path) -> None:
         *(("tip_path", key) for key in ("blocked", "required_coverage", "order")),
         ("base",),
         ("required_self_clearance",),
+        ("tip_tolerance",),
+        ("max_change_per_row_deg",),
     ):
         text = edited(text, location)
     (tmp_path / "short.yaml").write_text(text)

@@ -95,6 +95,7 @@ def test_minimal_file_gets_the_stated_defaults(tmp_path: Path) -> None:
     assert problem.name == "my_scene"
     assert problem.scene.obstacles == ()
     assert problem.required_self_clearance == 0.0
+    assert (problem.tip_tolerance, problem.max_row_change) == (1e-6, None)
     path = problem.path
     assert (path.closed, path.spacing, path.retreat) == (False, 0.01, 0.0)
     assert (path.approach, path.blocked) == (Approach.SHORTEST, Blocked.DETOUR)
@@ -118,6 +119,8 @@ def test_every_field_arrives_in_si(tmp_path: Path) -> None:
     assert (path.spacing, path.retreat) == (0.005, 0.1)
     assert problem.required_clearance == 0.0035
     assert problem.required_self_clearance == 0.002
+    assert problem.tip_tolerance == 1e-5
+    assert problem.max_row_change == np.deg2rad(3.0)
     assert problem.scene.names == (
         "pillar", "bar", "ball", "rod", "crate", "wall", "part"
     )  # fmt: skip

@@ -168,6 +168,10 @@ def _without_repeats(points: list[Any], *, cyclic: bool) -> list[Any]:
     return kept[:-1] if cyclic and len(kept) > 1 and kept[-1] == kept[0] else kept
 
 
+FREE = ("tip_tolerance", "max_change_per_row_deg", "start", "goal")
+"""Keys of a problem that need no working out."""
+
+
 def _use_up(data: dict[str, Any], kind: str, *ignored: str) -> None:
     unknown = sorted(set(data) - set(ignored))
     require(not unknown, f"{kind} has unknown keys {unknown}")
@@ -203,7 +207,7 @@ class Problem:
             self._read_path(data.pop("tip_path"))
         self.clearance = self._length(data.pop("required_clearance"))
         self.self_clearance = self._length(data.pop("required_self_clearance", "0"))
-        _use_up(data, "the problem", "vdsm_problem", "name")
+        _use_up(data, "the problem", "vdsm_problem", "name", *FREE)
         self.sha256 = self._hash.hexdigest()
 
     def _length(self, text: Any) -> Ball:

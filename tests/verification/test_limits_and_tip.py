@@ -49,6 +49,69 @@ def test_a_drawn_square_passes_and_is_covered() -> None:
     assert {check.verdict for check in limits} == {Verdict.CERTIFIED}
 
 
+def test_the_change_per_row_is_judged_only_where_it_is_limited() -> None:
+    problem, motion = drawing(9)
+    change = float(np.abs(np.diff(motion.alpha, axis=0)).max())
+    names = [check.name for check in check_limits(problem, motion)]
+    assert not [name for name in names if "change" in name]
+    for limit, verdict in (
+        (change * 1.001, Verdict.CERTIFIED),
+        (change * 0.999, Verdict.REFUTED),
+    ):
+        limited = replace(problem, max_row_change=limit)
+        row = named(check_limits(limited, motion), "change")
+        assert (row.verdict, row.limit) == (verdict, limit)
+        assert row.worst == pytest.approx(change)
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-5, 1e-3])
+def test_the_tip_may_be_off_by_its_tolerance_and_no_farther(tolerance: float) -> None:
+    problem, motion = drawing()
+    problem = replace(problem, tip_tolerance=tolerance)
+    for part, verdict in ((0.999, Verdict.CERTIFIED), (1.001, Verdict.REFUTED)):
+        off = motion.x0 + np.where(np.arange(161) == 50, part * tolerance, 0.0)
+        row = named(check_tip(problem, replace(motion, x0=off)).checks, "at the way")
+        assert (row.verdict, row.moment) == (verdict, 50)
+        assert row.limit == tolerance
+        off = motion.x0 + np.where(np.arange(161) == 0, part * tolerance, 0.0)
+        row = named(check_tip(problem, replace(motion, x0=off)).checks, "tip at its st")
+        assert row.verdict is verdict
+
+
+def test_stations_within_the_tolerance_are_the_same_place() -> None:
+    problem, motion = drawing()
+    stations = motion.path_m.copy()
+    stations[80] = stations[79] - 2e-5
+    back = replace(motion, path_m=stations)
+    for tolerance, verdict in ((3e-5, Verdict.CERTIFIED), (1e-5, Verdict.REFUTED)):
+        (row,) = check_order(replace(problem, tip_tolerance=tolerance), back)
+        assert row.verdict is verdict
+
+
+def test_start_joints_are_held_to_the_tolerance_by_the_way_they_move_the_tip() -> None:
+    problem, motion = drawing()
+    joints = motion.part(0, 1).joints[0]
+    for column, most in ((0, 1e-5), (3, 1e-5 / ARM.total_length)):
+        for part, verdict in ((0.99, Verdict.CERTIFIED), (1.01, Verdict.REFUTED)):
+            given = joints.copy()
+            given[column] += part * most
+            path = replace(problem.path, start_joints=given)
+            asked = replace(problem, tip_path=path, tip_tolerance=1e-5)
+            row = named(check_tip(asked, motion).checks, "joints at their start")
+            assert row.verdict is verdict
+
+
+def test_a_fixed_base_is_kept_to_a_nanometre() -> None:
+    problem, motion = drawing()
+    fixed = replace(ARM, base_range=(0.1, 0.1))
+    still = replace(motion, x0=np.full(161, 0.1))
+    for shift, verdict in ((5e-10, Verdict.CERTIFIED), (-2e-9, Verdict.REFUTED)):
+        moved = replace(still, x0=still.x0 + np.where(np.arange(161) == 7, shift, 0.0))
+        row = named(check_limits(replace(problem, manipulator=fixed), moved), "base")
+        assert row.verdict is verdict
+    assert row.moment == 7
+
+
 def test_the_deviation_bounds_the_tip_between_the_rows() -> None:
     problem, motion = drawing(41)
     bound = check_tip(problem, motion).deviation
@@ -163,8 +226,9 @@ def test_base_and_steps_are_judged() -> None:
     assert (rail.worst, rail.limit) == (-5.1, -5.0)
     alpha = motion.alpha.copy()
     alpha[4:, 0] += np.deg2rad(5.5)
+    limited = replace(problem, max_row_change=np.deg2rad(5.0))
     step = named(
-        check_limits(problem, replace(motion, alpha=alpha)), "between waypoints"
+        check_limits(limited, replace(motion, alpha=alpha)), "between waypoints"
     )
     assert step.verdict is Verdict.REFUTED
     assert (step.moment, step.where) == (3.0, "joint 1")

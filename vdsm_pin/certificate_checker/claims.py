@@ -19,7 +19,6 @@ from vdsm_pin.trajectory import Trajectory
 
 VERSION: Final = 2
 SLACK: Final = 1e-9  # claims may understate by this, limits be passed; [m], [rad], [-]
-TIP: Final = 1e-6  # tip off the path at a row with on_path 1; [m]
 KEYS: Final = set(
     "vdsm_certificate problem_sha256 trajectory_sha256 urdf_sha256 versions n_rows "
     "required_clearance_m required_self_clearance_m errors pairs pieces limits "
@@ -173,7 +172,8 @@ class Check:
         on_path = self.rows.on_path[list(rows)]
         for on, tip, station in zip(on_path, tips, stations, strict=True):
             away = norm(tip - drawing.point(station))
-            claim(not on or away <= TIP, "the tip is {} m off the path", away)
+            near = away <= self.problem.tip_tolerance
+            claim(not on or near, "the tip is {} m off the path", away)
         drawing.touched |= bool(on_path.any())
         if on_path.all():
             drawing.draw(stations, tips, self.motion.bounds(0)[-1][0] / 8)

@@ -49,7 +49,7 @@ class ArmBuilder:
         low, high = -stroke, stroke
         if model.base_range is not None:
             low, high = (float(x) for x in self.frame.metres(model.base_range))
-            if not low < high:
+            if not low <= high:
                 problem = f"is {model.base_range}, expected the smaller value first"
                 raise self.document.invalid(("manipulator", "base_range"), problem)
         self._check_extent(float(lengths.sum()), max(-low, high))

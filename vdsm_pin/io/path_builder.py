@@ -20,6 +20,13 @@ DEFAULT_SPACING: Final = 0.010
 """The paper's spacing of waypoints; [m]."""
 
 
+def spacing_of(model: schema.TipPathModel, frame: Frame) -> float:
+    """The spacing of a path, or the default one; [m]."""
+    if model.spacing is None:
+        return DEFAULT_SPACING
+    return float(frame.metres(model.spacing))
+
+
 @dataclass(frozen=True)
 class PathBuilder:
     """Converts the tip path and refuses spacings that make no sense."""
@@ -43,7 +50,7 @@ class PathBuilder:
             start.tip,
             without_repeats(points, closed=model.closed),
             model.closed,
-            self._spacing(model.spacing),
+            spacing_of(model, self.frame),
             Approach(model.approach),
             float(self.frame.metres(model.retreat)),
             Blocked(model.blocked),
@@ -53,9 +60,6 @@ class PathBuilder:
         )
         self._check_rows(path)
         return path
-
-    def _spacing(self, spacing: float | None) -> float:
-        return DEFAULT_SPACING if spacing is None else float(self.frame.metres(spacing))
 
     def _check_extent(self, points: FloatArray) -> None:
         reach, limit = np.linalg.norm(points, axis=1), TOLERANCES.scene_extent

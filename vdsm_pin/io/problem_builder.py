@@ -9,12 +9,13 @@ from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.arm_builder import ArmBuilder
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
-from vdsm_pin.io.path_builder import PathBuilder
+from vdsm_pin.io.path_builder import PathBuilder, spacing_of
 from vdsm_pin.io.posture_builder import PostureBuilder
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
 
 
 def build_problem(
@@ -57,6 +58,8 @@ def build_problem(
         required_clearance=float(frame.metres(model.required_clearance)),
         T_world_base=T_world_base,
         required_self_clearance=self_clearance,
+        tip_tolerance=_tip_tolerance(model, frame, document),
+        max_row_change=_row_change(model),
         start=postures.start(model.start, ("start",)) if model.start else None,
         goal=postures.goal(model.goal, ("goal",)) if model.goal else None,
     )
@@ -68,6 +71,30 @@ def _frame(model: schema.ProblemModel) -> tuple[Frame, FloatArray]:
     T_world_base = np.eye(4)
     T_world_base[:3, :3], T_world_base[:3, 3] = rotation, frame.metres(frame.origin)
     return frame, T_world_base
+
+
+def _tip_tolerance(
+    model: schema.ProblemModel, frame: Frame, document: YamlDocument
+) -> float:
+    """How far the tip may be off; no farther than between two waypoints; [m]."""
+    if model.tip_tolerance is None:
+        return TOLERANCES.tip_on_path
+    tolerance = float(frame.metres(model.tip_tolerance))
+    if model.tip_path is not None:
+        spacing = spacing_of(model.tip_path, frame)
+        if not tolerance <= spacing:
+            problem = (
+                f"is {frame.shown(tolerance)}, expected at most the spacing of the "
+                f"path, {frame.shown(spacing)}: so far may the tip stray between "
+                "waypoints"
+            )
+            raise document.invalid(("tip_tolerance",), problem)
+    return tolerance
+
+
+def _row_change(model: schema.ProblemModel) -> float | None:
+    change = model.max_change_per_row_deg
+    return None if change is None else float(np.deg2rad(change))
 
 
 def _check_ends(model: schema.ProblemModel, document: YamlDocument) -> None:

@@ -72,8 +72,8 @@ class ManipulatorModel(FileModel):
     )
     base_range: Range | None = Field(
         default=None,
-        description="Smallest and largest x0 on the rail [length_unit]. Default: twice "
-        "the arm's length either way.",
+        description="Smallest and largest x0 on the rail [length_unit], the same for "
+        "a fixed base. Default: twice the arm's length either way.",
     )
     cables: CablesModel | None = Field(
         default=None,
@@ -211,6 +211,16 @@ class ProblemModel(FileModel):
     )
     required_clearance: NotNegative = Field(
         description="Between the surfaces of arm and obstacles [length_unit]."
+    )
+    tip_tolerance: Positive | None = Field(
+        default=None,
+        description="How far the tip may be off its start, its goal and, at waypoints, "
+        "the desired path [length_unit]. Default: 1 um.",
+    )
+    max_change_per_row_deg: Positive | None = Field(
+        default=None,
+        description="Largest change of a joint angle from row to row [deg]. Default: "
+        "not asked for; plans keep 5.",
     )
     required_self_clearance: NotNegative = Field(
         default=0.0,

@@ -14,9 +14,6 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import Check, Verdict
 
-SAME_PLACE: Final = TOLERANCES.tip_on_path
-"""Stations so near each other are the same place: no nearer is the tip known; [m]."""
-
 HALF_LAP: Final = 1e-9
 """Steps so near to half a lap are decided in exact arithmetic; [-]."""
 
@@ -121,25 +118,28 @@ def coverage(path: DesiredPath, trajectory: Trajectory) -> tuple[float, FloatArr
     return min(1.0, max(0.0, share - ulps)), frozen(gaps)
 
 
-def progress(path: DesiredPath, trajectory: Trajectory) -> FloatArray:
+def progress(problem: PlanningProblem, trajectory: Trajectory) -> FloatArray:
     """How far each waypoint on the path lies beyond the one before it; [m].
 
     Between neighbours as the interval runs; where the tip has left the path in between,
     on a closed one the way forward.
 
     Args:
-        path: The desired path.
+        problem: With the desired path, and how far the tip may be off: stations no
+            farther apart are the same place.
         trajectory: With the waypoints.
 
     Returns:
         Shape (m - 1,), for the m waypoints on the path.
     """
-    on = np.flatnonzero(trajectory.on_path)
+    path, on = problem.path, np.flatnonzero(trajectory.on_path)
     steps = np.diff(wrapped(path, trajectory.path_m[on]))
     if path.closed and path.length > 0.0:
         ahead = np.mod(steps, path.length)
         # A hair backwards is not once round.
-        steps = np.where(path.length - ahead <= SAME_PLACE, ahead - path.length, ahead)
+        steps = np.where(
+            path.length - ahead <= problem.tip_tolerance, ahead - path.length, ahead
+        )
     neighbours = np.diff(on) == 1
     run = runs(path, trajectory.path_m)[on[:-1][neighbours]]
     steps[neighbours] = run
@@ -162,17 +162,17 @@ def check_order(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Check
     path, on = problem.path, np.flatnonzero(trajectory.on_path)
     if path.order is Order.FREE:
         return ()
-    steps = progress(path, trajectory)
+    steps, same = progress(problem, trajectory), problem.tip_tolerance
     back, moment = max(0.0, float(-steps.min(initial=0.0))), 0
     if steps.size:
         moment = int(on[int(np.argmin(steps)) + 1])
     left = bool((np.diff(on) > 1).any())
-    if path.closed and left and back <= SAME_PLACE:
+    if path.closed and left and back <= same:
         total = np.cumsum(steps)
         back = max(back, float(total[-1]) - path.length)
-        beyond = np.flatnonzero(total > path.length + SAME_PLACE)
+        beyond = np.flatnonzero(total > path.length + same)
         moment = int(on[beyond[0] + 1]) if beyond.size else moment
-    kept = back <= SAME_PLACE
+    kept = back <= same
     verdict = Verdict.CERTIFIED if kept else Verdict.REFUTED
     return (
         Check(
@@ -180,7 +180,7 @@ def check_order(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Check
             verdict=verdict if on.size else Verdict.UNDECIDED,
             count=int(on.size),
             worst=back if on.size else float("nan"),
-            limit=SAME_PLACE,
+            limit=same,
             unit="m",
             where="" if kept else "drawn backwards or again from here",
             moment=float("nan") if kept else float(moment),

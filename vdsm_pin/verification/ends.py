@@ -3,7 +3,7 @@
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.problem import PlanningProblem, Posture
+from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import Check, Verdict
@@ -15,7 +15,8 @@ def check_ends(
     """The first row at the start, the last one at the goal.
 
     Args:
-        problem: With start and goal, where it states them.
+        problem: With start and goal, where it states them, and how far the tip may be
+            off.
         trajectory: What is judged.
         tips: The tip at every row, shape (n_samples, 3); [m].
 
@@ -27,42 +28,34 @@ def check_ends(
         (problem.begin, 0, "start"),
         (problem.goal, trajectory.n_samples - 1, "goal"),
     ):
-        if posture is not None:
-            checks.append(_tip_check(posture, tips[row], row, end))
-            checks += _joint_checks(posture, trajectory, row, end)
+        if posture is None:
+            continue
+        gap = float(np.linalg.norm(tips[row] - posture.tip))
+        checks.append(_check(problem, f"tip at its {end}", gap, row))
+        if posture.joints is not None:
+            ways = _ways(problem, posture.joints, trajectory.part(row, row + 1))
+            name = f"joints at their {end}"
+            checks.append(_check(problem, name, float(ways.max()), row, ways.size))
     return tuple(checks)
 
 
-def _tip_check(posture: Posture, tip: FloatArray, row: int, end: str) -> Check:
-    gap = float(np.linalg.norm(tip - posture.tip))
-    kept = gap <= TOLERANCES.tip_on_path
+def _ways(problem: PlanningProblem, joints: FloatArray, row: Trajectory) -> FloatArray:
+    """How far each joint value is off, as the way that it may move the tip; [m]."""
+    levers = np.full(joints.size, problem.manipulator.total_length)
+    levers[0] = 1.0
+    return np.asarray(levers * np.abs(row.joints[0] - joints))
+
+
+def _check(
+    problem: PlanningProblem, name: str, off: float, row: int, count: int = 1
+) -> Check:
+    kept = off + TOLERANCES.arithmetic <= problem.tip_tolerance
     return Check(
-        name=f"tip at its {end}",
+        name=name,
         verdict=Verdict.CERTIFIED if kept else Verdict.REFUTED,
-        count=1,
-        worst=gap,
-        limit=TOLERANCES.tip_on_path,
+        count=count,
+        worst=off,
+        limit=problem.tip_tolerance,
         unit="m",
         moment=row,
-    )
-
-
-def _joint_checks(
-    posture: Posture, trajectory: Trajectory, row: int, end: str
-) -> tuple[Check, ...]:
-    if posture.joints is None:
-        return ()
-    off = np.abs(trajectory.part(row, row + 1).joints[0] - posture.joints)
-    worst = float(off.max())
-    kept = worst <= TOLERANCES.start_joints
-    return (
-        Check(
-            name=f"joints at their {end}",
-            verdict=Verdict.CERTIFIED if kept else Verdict.REFUTED,
-            count=posture.joints.size,
-            worst=worst,
-            limit=TOLERANCES.start_joints,
-            unit="-",
-            moment=row,
-        ),
     )

@@ -100,7 +100,7 @@ def _base_check(problem: PlanningProblem, trajectory: Trajectory) -> Check:
 
 
 def check_limits(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Check, ...]:
-    """Box of theta and alpha, cone of psi, rail, and the change between waypoints.
+    """Box of theta and alpha, cone of psi, rail, and the change if it is limited.
 
     Args:
         problem: Names the arm and its limits.
@@ -116,7 +116,7 @@ def check_limits(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Chec
         steps = np.diff(alpha[rows], axis=0), np.diff(theta[rows], axis=0)
         return np.maximum(np.abs(steps[0]), np.abs(steps[1]))
 
-    box, step = arm.max_joint_angle, TOLERANCES.row_change
+    box, step = arm.max_joint_angle, problem.max_row_change
     checks = [
         _angle_check(
             "alpha in its box",
@@ -141,7 +141,7 @@ def check_limits(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Chec
         ),
         _base_check(problem, trajectory),
     ]
-    if trajectory.n_samples > 1:
+    if step is not None and trajectory.n_samples > 1:
         checks.append(
             _angle_check(
                 "change of a joint angle between waypoints",

@@ -123,14 +123,14 @@ def _row_check(
         gap = np.linalg.norm(tips[on] - goal, axis=1)
         at = int(np.argmax(gap))
         worst, moment = float(gap[at]), float(on[at])
-        kept = worst <= TOLERANCES.tip_on_path
+        kept = worst + TOLERANCES.arithmetic <= problem.tip_tolerance
     verdict = Verdict.CERTIFIED if kept else Verdict.REFUTED
     return Check(
         name="tip on the desired path at the waypoints",
         verdict=verdict if on.size else Verdict.UNDECIDED,
         count=int(on.size),
         worst=worst,
-        limit=TOLERANCES.tip_on_path,
+        limit=problem.tip_tolerance,
         unit="m",
         moment=moment,
     )

@@ -320,7 +320,8 @@ def test_tips_are_proved_out_of_reach_on_the_right_side_of_both_limits() -> None
     ball = Sphere("ball", np.array([3.126, 0.5, 0.0]), 0.1)
     task = problem(ball)
     margin = 0.1 + ARM.link_radius + task.required_clearance
-    y = [0.5 + margin + 1e-6, 0.5 + margin - 1e-6, 2.966, 2.967]
+    off = task.tip_tolerance  # the tip may be so far beside its place
+    y = [0.5 + margin - 0.5 * off, 0.5 + margin - 1.5 * off, 2.966, 2.967]
     tips = np.column_stack([np.full(4, 3.126), y, np.zeros(4)])
     proof = prove_tips(task, link_clearance(task), tips)
     assert proof.buried.tolist() == [False, True, False, False]

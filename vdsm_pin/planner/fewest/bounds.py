@@ -55,12 +55,14 @@ def prove_tips(
         tips: Shape (n, 3); [m].
     """
     reach = curled_reach(problem.manipulator)
-    far = np.hypot(tips[:, 1], tips[:, 2]) > reach + TOLERANCES.tip_on_path
+    far = np.hypot(tips[:, 1], tips[:, 2]) > reach + problem.tip_tolerance
     points = np.stack([tips, tips], axis=1)
     buried = clearance(points)[:, 0] < problem.required_clearance
     near = np.flatnonzero(buried)
     upper = upper_clearance(problem, points[near]).min(axis=1, initial=np.inf)
-    buried[near] = upper < problem.required_clearance - TOLERANCES.bracket_gap
+    # The tip may be a little beside its place, and nearer by as much.
+    reserve = TOLERANCES.bracket_gap + problem.tip_tolerance
+    buried[near] = upper < problem.required_clearance - reserve
     none = np.zeros(len(tips), dtype=np.bool_)
     return TipProof(far, buried, none, none)
 

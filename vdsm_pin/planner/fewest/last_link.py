@@ -66,11 +66,11 @@ def hemmed_in(
     proved[:] = True
     tip, cells = _first_cells(arm, len(tips))
     for _ in range(HALVINGS):
-        possible = _within_limits(arm, tips[tip], cells)
+        possible = _within_limits(problem, tips[tip], cells)
         tip, cells = tip[possible], cells[possible]
         links = _links(tips[tip], cells, arm.link_lengths[-1])
         middle = np.repeat(cells.mean(axis=2, keepdims=True), 2, axis=2)
-        likely = np.flatnonzero(_within_limits(arm, tips[tip], middle))
+        likely = np.flatnonzero(_within_limits(problem, tips[tip], middle))
         open_ = clearance(links[likely])[:, 0] >= problem.required_clearance
         proved[tip[likely[open_]]] = False
         proved[np.bincount(tip, minlength=len(tips)) > MOST] = False
@@ -123,14 +123,17 @@ def _least_along(arm: Manipulator, leans: FloatArray) -> FloatArray:
     return np.asarray(along)
 
 
-def _within_limits(arm: Manipulator, tips: FloatArray, cells: FloatArray) -> BoolArray:
+def _within_limits(
+    problem: PlanningProblem, tips: FloatArray, cells: FloatArray
+) -> BoolArray:
     """Where the limits may leave the last link some direction of a cell, shape (m,)."""
+    arm = problem.manipulator
     share = _least_along(arm, cells[:, 0])
     # The tip is at most so far out along any e of the cell.
     low, high = cells[:, 1].T
     off, at = np.hypot(tips[:, 1], tips[:, 2]), np.arctan2(tips[:, 2], tips[:, 1])
     out = off * (np.cos((low + high) / 2.0 - at) + (high - low) / 2.0)
-    reserve = TOLERANCES.tip_on_path + TOLERANCES.bracket_gap
+    reserve = problem.tip_tolerance + TOLERANCES.bracket_gap
     bent = arm.n_links * (arm.max_link_angle + TOLERANCES.joint_limit)
     possible = out + reserve >= share @ arm.link_lengths
     return np.asarray(possible & (cells[:, 0, 0] <= bent))
@@ -154,7 +157,7 @@ def _turned(cells: FloatArray) -> FloatArray:
 def _shut(problem: PlanningProblem, links: FloatArray, turned: FloatArray) -> BoolArray:
     """Whether links stay too close to some obstacle however they turn so far."""
     shut = np.zeros(len(links), dtype=np.bool_)
-    need = problem.required_clearance - TOLERANCES.bracket_gap - TOLERANCES.tip_on_path
+    need = problem.required_clearance - TOLERANCES.bracket_gap - problem.tip_tolerance
     for part in PARTS:
         left = np.flatnonzero(~shut)
         ends = links[left]

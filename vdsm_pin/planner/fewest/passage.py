@@ -55,10 +55,13 @@ class _Cells:
         solids = [obstacle.pieces for obstacle in problem.scene.obstacles]
         self.pieces = [*(pack_pieces([solid]) for solid in solids), pack_pieces(solids)]
         self.convex = np.array([len(solid) == 1 for solid in solids], dtype=np.bool_)
-        keep = arm.link_radius + problem.required_clearance
+        # A way may begin and end beside its tips, and keep as much less near them.
+        beside = problem.tip_tolerance
+        keep = arm.link_radius + problem.required_clearance - beside
         self.inside = TOLERANCES.bracket_gap - keep
-        self.reach = curled_reach(arm) + TOLERANCES.tip_on_path
-        self.x_low, self.x_high = low - arm.total_length, high + arm.total_length
+        self.reach = curled_reach(arm) + beside
+        ahead = arm.total_length + beside
+        self.x_low, self.x_high = low - ahead, high + ahead
         self.side = max(self.x_high - self.x_low, 2.0 * self.reach)
         self.corner = np.array([self.x_low, -self.side / 2.0, -self.side / 2.0])
         count = 8**FIRST_LEVEL

@@ -221,7 +221,7 @@ def _written(
     judge, arm = outcome.judge, problem.manipulator
     knots = smooth(judge, outcome.found.knots, taste)
     knots = lifted(judge, straightened(knots))
-    turn = TOLERANCES.planned_step
+    turn = problem.planned_row_change
     rows = dense_rows(arm, knots, problem.path.spacing, turn, judge.slack)
     alpha, theta = joint_angles(arm, rows.centres)
     # Proofs of what is needed ask no more than whether there is the clearance required.

@@ -66,19 +66,19 @@ def _targets(arm: Manipulator, start: FloatArray) -> Iterator[FloatArray]:
 
 
 def _line(
-    arm: Manipulator,
+    problem: PlanningProblem,
     clearance: LinkClearance,
     begin: FloatArray,
     end: FloatArray,
     need: float,
 ) -> FloatArray | None:
     """Rows from begin to end if every place in between is clear, shape (r, 1 + 2N)."""
-    turn = np.abs(end - begin)
+    arm, turn = problem.manipulator, np.abs(end - begin)
     # No point is farther from a joint than the arm is long from there.
     lever = np.repeat(arm.total_length - arm.stations[:-1], 2)
     way = float(turn[0] + turn[1:] @ lever)
     count = FEWEST
-    while count * TOLERANCES.planned_step < turn[1:].max():
+    while count * problem.planned_row_change < turn[1:].max():
         count *= 2
     while count <= MOST:
         share = np.arange(count + 1)[:, None] / count
@@ -122,7 +122,7 @@ def unbend(
     need = max(need, problem.required_clearance)
     targets = list(_targets(arm, start))
     for target in targets:
-        rows = _line(arm, clearance, start, target, need)
+        rows = _line(problem, clearance, start, target, need)
         if rows is not None:
             return rows
     rng = np.random.default_rng(SEED)
@@ -132,8 +132,10 @@ def unbend(
         middle = middle + rng.normal(0.0, 0.3, middle.shape)
         if not _within(arm, middle):
             continue
-        first = _line(arm, clearance, start, middle, need)
-        rest = None if first is None else _line(arm, clearance, middle, target, need)
+        first = _line(problem, clearance, start, middle, need)
+        rest = (
+            None if first is None else _line(problem, clearance, middle, target, need)
+        )
         if first is not None and rest is not None:
             return np.concatenate([first, rest[1:]])
     message = (

@@ -163,7 +163,7 @@ def _motion(problem: PlanningProblem, avoidance: Avoidance, route: Route) -> Mot
         trajectory = solve(manipulator, route, centres)  # Step 7
         steps, strays = row_steps(manipulator, trajectory.alpha, trajectory.theta)
         drawn = trajectory.on_path[1:] & trajectory.on_path[:-1]
-        turns = steps / TOLERANCES.planned_step
+        turns = steps / problem.planned_row_change
         # Halving an interval leaves a quarter of the way by which the tip strays. A
         # jump is not filled with rows for the tip's sake.
         bows = np.sqrt(np.where(drawn, strays, 0.0) / TOLERANCES.planned_stray)
