@@ -136,3 +136,25 @@ def test_results_show_themselves_in_a_few_lines() -> None:
         assert "<b>" not in page
     assert "169.999 mm" in repr(result)  # proved: rounded down
     assert "&lt;b&gt;&amp;" in result._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("scene", "strategy", "depth_mm"),
+    [
+        ("obs1", "paper", -61.5),
+        ("obs2", "paper", -40.2),
+        ("obs2-small", "paper", -16.0),
+        ("obs3", "paper", -27.7),
+        ("obs3", "fewest", -12.2),
+    ],
+)
+def test_the_papers_joint_error_touches(
+    scene: str, strategy: str, depth_mm: float
+) -> None:
+    """The table of docs/paper.md: every joint off by 0.3 deg, in the worst case."""
+    problem = vp.read_problem(f"paper/{scene}")
+    plan = vp.plan(problem, strategy)
+    result = vp.verify(problem, plan.trajectory, errors=vp.error_box(joint_deg=0.3))
+    assert result.verdict is vp.Verdict.REFUTED
+    worst = min(found.clearance for found in result.counterexamples)
+    assert 1e3 * worst == pytest.approx(depth_mm, abs=0.1)
