@@ -264,18 +264,27 @@ def schema(
     typer.echo(schema_text(schema(name)), nl=False)
 
 
-@app.command(epilog=_examples("vdsm urdf hrm8 --out hrm8.urdf"))
+@app.command(
+    epilog=_examples(
+        "vdsm urdf hrm8 --out hrm8.urdf", "vdsm urdf mine.yaml --out a.urdf"
+    )
+)
 def urdf(
-    name: Annotated[str, typer.Argument(help="A built-in arm.")],
+    name: Annotated[
+        str,
+        typer.Argument(metavar="ARM", help="A built-in arm, or a problem for its arm."),
+    ],
     out: Annotated[Path, typer.Option("--out", help="The URDF file.")],
 ) -> None:
-    """Write the URDF of a built-in arm."""
+    """Write the URDF of an arm."""
     from vdsm_pin.io.atomic import atomic_path
-    from vdsm_pin.manipulator import built_in
+    from vdsm_pin.io.problem_file import read_problem
+    from vdsm_pin.manipulator import BUILT_IN
     from vdsm_pin.report.folder import check_output_file
     from vdsm_pin.urdf_writer import urdf_text
 
-    text = urdf_text(built_in(name))
+    arm = BUILT_IN.get(name) or read_problem(name).problem.manipulator
+    text = urdf_text(arm)
     check_output_file(out)
     with atomic_path(out) as path:
         path.write_text(text, encoding="utf-8")

@@ -157,19 +157,19 @@ class ProblemSource:
 
     Args:
         path: The problem file.
-        sha256: Of its bytes followed by those of its meshes, in the order of the
+        sha256: Of its bytes followed by those of the files it names.
+        named: The files it names: the arm's URDF, then meshes in the order of the
             obstacles.
-        meshes: The mesh files it names, in the same order.
     """
 
     path: Path
     sha256: str
-    meshes: tuple[Path, ...] = ()
+    named: tuple[Path, ...] = ()
 
     @property
     def files(self) -> tuple[Path, ...]:
         """Everything that was read."""
-        return (self.path, *self.meshes)
+        return (self.path, *self.named)
 
 
 @dataclass(frozen=True)

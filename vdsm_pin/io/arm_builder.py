@@ -1,11 +1,14 @@
 """The arm of a problem file to a `Manipulator`, in metres and radians."""
 
 from dataclasses import dataclass
-from typing import Final
+from pathlib import Path
+from typing import Final, TypeAlias
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.frames import Frame, radians
+from vdsm_pin.io.source import Digest
+from vdsm_pin.io.urdf_arm import read_urdf_arm
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.manipulator import (
     BUILT_IN,
@@ -15,6 +18,7 @@ from vdsm_pin.manipulator import (
     paper_hole_angles,
 )
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.units import UNITS_PER_METRE
 
 DEFAULT_HOLE_RADIUS: Final = 0.8
 """Radius of the circle of cable holes over the body radius; [-]."""
@@ -26,15 +30,20 @@ DEFAULT_STROKE: Final = 2.0
 """Stroke of the rail either way over the arm's length; [-]."""
 
 
+ArmModel: TypeAlias = str | schema.ManipulatorModel | schema.UrdfManipulatorModel
+
+
 @dataclass(frozen=True)
 class ArmBuilder:
     """Converts the arm."""
 
     document: YamlDocument
     frame: Frame
+    folder: Path
+    digest: Digest
 
-    def build(self, model: str | schema.ManipulatorModel) -> Manipulator:
-        """The arm by name or by its numbers.
+    def build(self, model: ArmModel) -> Manipulator:
+        """The arm by name, by its numbers, or from a URDF.
 
         Raises:
             InvalidFile: If the name is unknown or the numbers do not fit together.
@@ -44,6 +53,8 @@ class ArmBuilder:
                 problem = f"is {model!r}; known: {', '.join(BUILT_IN)}, or a mapping"
                 raise self.document.invalid(("manipulator",), problem)
             return built_in(model)
+        if isinstance(model, schema.UrdfManipulatorModel):
+            return self._from_urdf(model)
         lengths = self.frame.metres(model.link_lengths)
         stroke = DEFAULT_STROKE * float(lengths.sum())
         low, high = -stroke, stroke
@@ -61,10 +72,31 @@ class ArmBuilder:
                 float(radians(model.max_link_angle_deg)),
                 float(radians(model.max_joint_angle_deg)),
                 (low, high),
-                self._cables(model),
+                self._cables(model.cables, model.link_lengths, model.link_radius),
             )
         except InvalidInput as error:
             raise self.document.invalid(("manipulator",), str(error)) from None
+
+    def _from_urdf(self, model: schema.UrdfManipulatorModel) -> Manipulator:
+        """The arm of a URDF; its bytes belong to the problem as those of meshes do."""
+        found = read_urdf_arm(self.folder / model.urdf)
+        self.digest.update(found.content)
+        low, high = found.base_range
+        self._check_extent(float(found.link_lengths.sum()), max(-low, high))
+        unit = UNITS_PER_METRE[self.frame.unit]
+        lengths = (unit * found.link_lengths).tolist()
+        try:
+            return Manipulator(
+                found.name,
+                found.link_lengths,
+                found.link_radius,
+                float(radians(model.max_link_angle_deg)),
+                found.max_joint_angle,
+                found.base_range,
+                self._cables(model.cables, lengths, unit * found.link_radius),
+            )
+        except InvalidInput as error:
+            raise self.document.invalid(("manipulator", "urdf"), str(error)) from None
 
     def _check_extent(self, length: float, stroke: float) -> None:
         """Distances are proved within a stated extent only, so the arm stays there."""
@@ -77,18 +109,23 @@ class ArmBuilder:
             )
             raise self.document.invalid(("manipulator",), problem)
 
-    def _cables(self, model: schema.ManipulatorModel) -> CableLayout:
-        count, shortest = len(model.link_lengths), min(model.link_lengths)
-        hole_radius = DEFAULT_HOLE_RADIUS * model.link_radius
+    def _cables(
+        self,
+        cables: schema.CablesModel | None,
+        link_lengths: list[float],
+        radius: float,
+    ) -> CableLayout:
+        """Cable holes; lengths in the file's unit."""
+        count, shortest = len(link_lengths), min(link_lengths)
+        hole_radius = DEFAULT_HOLE_RADIUS * radius
         half_gap = DEFAULT_HALF_GAP * shortest
         angles = paper_hole_angles(count)
-        if (cables := model.cables) is not None:
+        if cables is not None:
             at = ("manipulator", "cables")
             hole_radius, half_gap = cables.hole_radius, cables.half_gap
-            if not hole_radius < model.link_radius:
+            if not hole_radius < radius:
                 problem = (
-                    f"is {hole_radius:g}, expected below the body radius "
-                    f"{model.link_radius:g}"
+                    f"is {hole_radius:g}, expected below the body radius {radius:g}"
                 )
                 raise self.document.invalid((*at, "hole_radius"), problem)
             if not 2.0 * half_gap < shortest:

@@ -33,7 +33,8 @@ def build_problem(
         document: The same with line numbers, for messages.
         name: Name of the problem where the file gives none.
         folder: Where relative mesh paths start.
-        digest: Gets the bytes of the mesh files, in the order of the obstacles.
+        digest: Gets the bytes of the arm's URDF, if one is named, then those of the
+            mesh files in the order of the obstacles.
 
     Returns:
         The problem, in the base frame; [m], [rad].
@@ -42,7 +43,7 @@ def build_problem(
         InvalidFile: If values that are each in range make no sense together.
     """
     frame, T_world_base = _frame(model)
-    arm = ArmBuilder(document, frame).build(model.manipulator)
+    arm = ArmBuilder(document, frame, folder, digest).build(model.manipulator)
     self_clearance = float(frame.metres(model.required_self_clearance))
     _check_links_apart(arm, self_clearance, frame, document)
     obstacles = ObstacleBuilder(document, folder, frame, arm.total_length, digest)

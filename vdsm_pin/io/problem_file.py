@@ -11,7 +11,7 @@ from vdsm_pin.errors import InvalidFile, UnknownName
 from vdsm_pin.io.obstacle_schema import MeshModel
 from vdsm_pin.io.problem_builder import build_problem
 from vdsm_pin.io.problem_errors import first_error
-from vdsm_pin.io.problem_schema import ProblemModel
+from vdsm_pin.io.problem_schema import ProblemModel, UrdfManipulatorModel
 from vdsm_pin.io.source import check_is_file, decode, read_bytes
 from vdsm_pin.io.yaml_reader import read_yaml
 from vdsm_pin.problem import PlanningProblem, ProblemSource
@@ -42,13 +42,8 @@ class ProblemFile:
 
     @property
     def sha256(self) -> str:
-        """Of the problem file and its meshes."""
+        """Of the problem file and the files it names."""
         return self.source.sha256
-
-    @property
-    def meshes(self) -> tuple[Path, ...]:
-        """The mesh files it names."""
-        return self.source.meshes
 
 
 def read_problem(name_or_path: str | Path) -> ProblemFile:
@@ -75,13 +70,16 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
     problem = build_problem(
         model, document, name=stem, folder=path.parent, digest=digest
     )
-    named = (one for one in model.obstacles if isinstance(one, MeshModel))
-    source = ProblemSource(
-        path,
-        digest.hexdigest(),
-        tuple(path.parent / mesh.file for mesh in named),
-    )
+    named = tuple(path.parent / name for name in _files_named(model))
+    source = ProblemSource(path, digest.hexdigest(), named)
     return ProblemFile(problem.read_from(source), source)
+
+
+def _files_named(model: ProblemModel) -> list[str]:
+    """The arm's URDF and the meshes, in the order in which the hash takes them."""
+    arm = model.manipulator
+    urdf = [arm.urdf] if isinstance(arm, UrdfManipulatorModel) else []
+    return urdf + [one.file for one in model.obstacles if isinstance(one, MeshModel)]
 
 
 def find_problem(name_or_path: str | Path) -> Path:

@@ -31,6 +31,12 @@ def _not_bool(value: Any) -> Any:
     return str(value).lower() if isinstance(value, bool) else value
 
 
+def _kind_of_arm(value: Any) -> str:
+    if isinstance(value, dict) and "urdf" in value:
+        return "urdf"
+    return "urdf" if hasattr(value, "urdf") else text_or_not(value)
+
+
 def _list_or_not(value: Any) -> str:
     return "point" if isinstance(value, list) else "joints"
 
@@ -82,6 +88,22 @@ class ManipulatorModel(FileModel):
     )
 
 
+class UrdfManipulatorModel(FileModel):
+    """An arm from a URDF: a rail along x, then links on universal joints."""
+
+    urdf: str = Field(
+        min_length=1, description="The URDF, relative to this file; lengths in metres."
+    )
+    max_link_angle_deg: float = Field(
+        gt=0.0, lt=90.0, description="Largest link angle psi, a cone [deg]."
+    )
+    cables: CablesModel | None = Field(
+        default=None,
+        description="Cable holes. Default: on 0.8 of the body radius, half gap 0.1 of "
+        "the shortest link.",
+    )
+
+
 class BasePoseModel(FileModel):
     """Where the rail is: the base frame in the frame of this file."""
 
@@ -95,8 +117,10 @@ class BasePoseModel(FileModel):
 
 
 ManipulatorField: TypeAlias = Annotated[
-    Annotated[str, Tag("name")] | Annotated[ManipulatorModel, Tag("value")],
-    Discriminator(text_or_not),
+    Annotated[str, Tag("name")]
+    | Annotated[ManipulatorModel, Tag("value")]
+    | Annotated[UrdfManipulatorModel, Tag("urdf")],
+    Discriminator(_kind_of_arm),
 ]
 
 

@@ -1,0 +1,111 @@
+"""Section 7 in simulation: plans run by elastic cables and motors, Fig. 19 to 21.
+
+    python analysis/closed_loop.py --out reports/paper
+
+Every plan runs once as it is and, for the figures of obs3, once with a kick at alpha5
+and alpha6. What is assumed stands in `vdsm_pin/simulation/settings.py`; nothing was
+fitted.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from closed_loop_figures import actual_and_planned, errors, poses
+from paper_figures import style
+from result_files import output_folder, write_table
+
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.refinement import plan_and_verify
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.simulation.closed_loop import Simulation, simulate
+from vdsm_pin.simulation.folder import Cleared, SimulationFile, summary
+from vdsm_pin.simulation.settings import Kick, Settings
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.units import MM_PER_M
+
+SCENES = ("free", "obs1", "obs2", "obs2-small", "obs3")
+STRATEGIES = ("paper", "fewest", "sturdiest")
+KICKS = (
+    Kick(axis="alpha", joint=5, share=0.35, torque_nm=6.0),
+    Kick(axis="alpha", joint=6, share=0.65, torque_nm=12.0),
+)
+"""Disturbances of the size that the paper's Fig. 21 shows: about 4 deg."""
+
+
+@dataclass(frozen=True)
+class Ran:
+    """One plan and what came of it."""
+
+    problem: PlanningProblem
+    trajectory: Trajectory
+    simulation: Simulation
+    file: SimulationFile
+
+
+def run(scene: str, strategy: str, settings: Settings) -> Ran:
+    """Plan, simulate, prove."""
+    problem = read_problem(f"paper/{scene}").problem
+    robot = load_robot(problem.manipulator)
+    trajectory = plan_and_verify(problem, strategy, robot).plan.trajectory
+    found = simulate(problem.manipulator, trajectory, settings)
+    file = summary(problem, trajectory, found, settings, "")
+    return Ran(problem, trajectory, found, file)
+
+
+def row(scene: str, strategy: str, file: SimulationFile) -> dict[str, str]:
+    """One line of the table."""
+    return {
+        "scene": scene,
+        "strategy": strategy,
+        "planned": _clearance(file.planned),
+        "executed": _clearance(file.executed),
+        "largest error [deg]": f"{np.rad2deg(file.largest_error_rad):.2f}",
+        "within 0.3 deg": f"{100 * file.within_band_share:.1f} %",
+        "any motion within that error": file.within_error_box.verdict,
+        "tension [N]": f"{file.largest_tension_n:.0f}",
+        "least stiffness [Nm/rad]": f"{file.least_stiffness_nm_rad:.0f}",
+    }
+
+
+def _clearance(found: Cleared) -> str:
+    if found.min_clearance_m is None:
+        return f"{found.verdict}, no obstacle"
+    return f"{found.verdict}, {found.min_clearance_m * MM_PER_M:.2f} mm"
+
+
+def markdown(rows: list[dict[str, str]]) -> str:
+    """The table for reading."""
+    names = list(rows[0])
+    lines = ["# Plans in closed loop", "", "Made by `python analysis/closed_loop.py`; "
+             "what is assumed: [docs/simulation.md](../../docs/simulation.md).", "",
+             "| " + " | ".join(names) + " |", "|" + "---|" * len(names)]  # fmt: skip
+    lines += ["| " + " | ".join(one.values()) + " |" for one in rows]
+    for name in ("fig19", "fig20-paper", "fig20-fewest", "fig21-paper", "fig21-fewest"):
+        lines += ["", f'<img src="{name}.png" width="800" alt="{name}">']
+    return "\n".join(lines) + "\n"
+
+
+def main(folder: Path) -> None:
+    """Run everything, write table and figures."""
+    rows = []
+    for scene in SCENES:
+        for strategy in STRATEGIES:
+            ran = run(scene, strategy, Settings())
+            rows.append(row(scene, strategy, ran.file))
+            print(rows[-1], flush=True)
+    write_table(folder, "closed_loop", rows, markdown(rows))
+    for strategy in ("paper", "fewest"):
+        ran = run("obs3", strategy, Settings(kicks=KICKS))
+        figures = {
+            f"fig20-{strategy}": actual_and_planned(ran.simulation),
+            f"fig21-{strategy}": errors(ran.simulation),
+        }
+        if strategy == "paper":
+            figures["fig19"] = poses(ran.problem, ran.simulation)
+        style.save_all(figures, folder)
+
+
+if __name__ == "__main__":
+    main(output_folder(__doc__))
