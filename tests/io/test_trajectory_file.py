@@ -1,5 +1,6 @@
 """The trajectory CSV: exact round trips, and every kind of damage named."""
 
+import csv as standard_csv
 import tracemalloc
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from vdsm_pin.errors import InvalidFile
-from vdsm_pin.io import trajectory_file
+from vdsm_pin.io import tables, trajectory_file
 from vdsm_pin.io.trajectory_file import column_names, read_trajectory, write_trajectory
 from vdsm_pin.manipulator import Manipulator, built_in
 from vdsm_pin.trajectory import Trajectory
@@ -57,25 +58,26 @@ def test_file_is_text_as_stated(tmp_path: Path) -> None:
     )
 
 
-finite = st.floats(allow_nan=False, allow_infinity=False)
+angle = st.floats(-np.pi, np.pi)
+place = st.floats(-100.0, 100.0)
 
 
 @settings(max_examples=60, deadline=None)
 @given(
-    angles=arrays(np.float64, (3, 4), elements=finite),
-    stations=arrays(np.float64, 3, elements=st.floats(0.0, 1e300)),
+    angles=arrays(np.float64, (3, 4), elements=angle),
+    x0=arrays(np.float64, 3, elements=place),
+    stations=arrays(np.float64, 3, elements=st.floats(0.0, 1e4)),
     on_path=arrays(np.bool_, 3),
 )
 def test_every_double_comes_back_to_the_last_bit(
     tmp_path_factory: pytest.TempPathFactory,
     angles: np.ndarray,
+    x0: np.ndarray,
     stations: np.ndarray,
     on_path: np.ndarray,
 ) -> None:
     path = tmp_path_factory.mktemp("round") / "t.csv"
-    trajectory = Trajectory(
-        on_path, np.abs(stations), angles[:, 0], angles[:, :2], angles[:, 2:]
-    )
+    trajectory = Trajectory(on_path, np.abs(stations), x0, angles[:, :2], angles[:, 2:])
     write_trajectory(path, trajectory)
     assert same(read_trajectory(path, short_arm()), trajectory)
 
@@ -123,16 +125,15 @@ def refused(folder: Path, content: str | bytes) -> str:
 @pytest.mark.parametrize(
     ("line", "text", "expected"),
     [
-        (0, "", "line 1: column 1 is missing, expected 'waypoint'"),
-        (0, "x" + csv()[0], "line 1: column 1 is 'xwaypoint', expected 'waypoint'"),
-        (0, csv()[0].replace("x0_m", "x0_mm"), "column 4 is 'x0_mm', expected 'x0_m'"),
-        (
-            0,
-            csv()[0] + ",alpha3_rad",
-            "has 9 columns, expected 8 for an arm of 2 links",
-        ),
-        (0, csv()[0][: csv()[0].rindex(",")], "column 8 is missing, expected 'theta2"),
-        (0, "\u2460", "line 1: column 1 is '\u2460', expected 'waypoint'"),
+        (0, "", "line 1: has no column 'waypoint'"),
+        (0, "x" + csv()[0], "has no column 'waypoint'; found 'xwaypoint'"),
+        (0, csv()[0].replace("x0_m", "x0_mm"), "'x0_m', but 'x0_mm'; expected in m"),
+        (0, csv()[0].replace("1_rad", "1_deg"), "'alpha1_rad', but 'alpha1_deg'; exp"),
+        (0, csv()[0] + ",alpha3_rad", "'alpha3_rad', but the arm has 2 links"),
+        (0, csv()[0] + ",x0_m", "line 1: has the column 'x0_m' 2 times"),
+        (0, csv()[0][: csv()[0].rindex(",")], "has no column 'theta2_rad'"),
+        (0, "\u2460", "line 1: has no column 'waypoint'; found '\u2460'"),
+        (0, csv()[0].replace(",", "|"), "line 1: has no column 'waypoint'; found 'way"),
         (2, "1,1,0,0,0,0,0", "line 3: has 7 values, expected 8"),
         (2, "1,1,0,0,0,0,0,0,0", "line 3: has 9 values, expected 8"),
         (2, "1,1,0,0,0,abc,0,0", "line 3: theta1_rad is 'abc', expected a number"),
@@ -143,14 +144,22 @@ def refused(folder: Path, content: str | bytes) -> str:
         (2, "1,1,0,0,0,0,1_0,0", "line 3: alpha2_rad is '1_0', expected a number"),
         (2, "1,1,0,0,0,0,0x1,0", "line 3: alpha2_rad is '0x1', expected a number"),
         (2, "1,1,0,0,0,0,\u0661,0", "line 3: alpha2_rad is '\u0661', expected a num"),
-        (2, '1,1,0,0,0,0,"0",0', "line 3: alpha2_rad is '\"0\"', expected a number"),
+        (2, '1,1,0,0,0,0,"0,5",0', "line 3: alpha2_rad is '0,5', but numbers before"),
+        (2, "1,1,0,0,0,0,+-1,0", "line 3: alpha2_rad is '+-1', expected a number"),
+        (2, "1,1,0,0,0,0,infinity,0", "alpha2_rad is infinity, expected a finite"),
+        (2, "1,1,0,0,0,0,30,0", "alpha2_rad is 30, expected radians, at most pi eith"),
+        (2, "1,1,0,0,0,0,0,-3.15", "theta2_rad is -3.15, expected radians, at most"),
+        (2, "1,1,0,3126,0,0,0,0", "x0_m is 3126, expected metres, at most 100 either"),
         (2, "# a remark", "line 3: waypoint is '# a remark', expected a number"),
-        (2, "", "line 3: waypoint is '', expected a number"),
+        (2, "", "line 3: is blank, and rows follow; expected none in between"),
+        (2, ",,,,,,,", "line 3: is blank, and rows follow; expected none in between"),
+        (2, "1;1;0;0;0;0;0;0", "line 3: waypoint is '1;1;0;0;0;0;0;0', expected a num"),
+        (2, "1,1,0,0,0,0,0,0,5", "has 9 values, expected 8; decimal commas need semi"),
         (2, "0,1,0,0,0,0,0,0", "line 3: waypoint is 0, expected a whole number above"),
         (2, "1.5,1,0,0,0,0,0,0", "line 3: waypoint is 1.5, expected a whole number"),
         (1, "-1,1,0,0,0,0,0,0", "line 2: waypoint is -1, expected a whole number"),
         (2, "1,2,0,0,0,0,0,0", "line 3: on_path is 2, expected 0 or 1"),
-        (2, "1,1,-0.1,0,0,0,0,0", "line 3: path_m is -0.1, expected 0 or more"),
+        (2, "1,1,-0.1,0,0,0,0,0", "line 3: path_m is -0.1, expected 0 to 10000 m"),
         (3, csv()[0], "line 4: waypoint is 'waypoint', expected a number"),
     ],
 )
@@ -165,7 +174,7 @@ def test_damage_is_named_by_line_and_column(
 def test_damage_far_down_is_named_by_its_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(trajectory_file, "CHUNK_ROWS", 7)
+    monkeypatch.setattr(tables, "CHUNK_ROWS", 7)
     lines = csv(50)
     lines[40] = lines[40].replace(",0.3,", ",O.3,")
     assert "line 41: alpha2_rad is 'O.3'" in refused(tmp_path, "\n".join(lines) + "\n")
@@ -194,17 +203,17 @@ def test_what_is_no_table_is_refused(tmp_path: Path) -> None:
     assert refusal(tmp_path / "none.csv") == "does not exist"
     assert refused(tmp_path, "") == "is empty"
     assert refused(tmp_path, csv()[0] + "\n") == "has no row"
-    assert "column 1 is 'steps'" in refused(tmp_path, "steps,x\n")
+    assert "found 'steps', 'x'" in refused(tmp_path, "steps,x\n")
     assert "cut short" in refused(tmp_path, b"\0" * 1000)
-    assert "column 1 is" in refused(tmp_path, bytes(range(256)) * 100 + b"\n\n")
-    assert "line 2: waypoint is" in refused(tmp_path, csv()[0] + "\n" + "\n" * 20_000)
+    assert "no column" in refused(tmp_path, bytes(range(256)) * 100 + b"\n\n")
+    assert refused(tmp_path, csv()[0] + "\n" + "\n" * 20_000) == "has no row"
 
 
 def test_more_rows_than_any_trajectory_has_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(trajectory_file, "MAX_ROWS", 2)
-    assert refused(tmp_path, "\n".join(csv()) + "\n") == "has 3 rows, the most is 2"
+    assert refused(tmp_path, "\n".join(csv()) + "\n") == "has more than 2 rows"
 
 
 def test_one_endless_line_is_refused_without_reading_it_at_once(tmp_path: Path) -> None:
@@ -214,8 +223,97 @@ def test_one_endless_line_is_refused_without_reading_it_at_once(tmp_path: Path) 
     message = refusal(tmp_path / "t.csv")
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert message == "line 2: has 32769 values, expected 8"
+    assert message == "line 2: is longer than 65536 characters"
     assert peak < 40e6
+
+
+def test_a_second_row_behind_blanks_on_one_line_is_not_a_row(tmp_path: Path) -> None:
+    """A line is cut where it is longest: what is left of it is no line of its own."""
+    lines = csv()
+    for padding in (65_536, 65_535, 65_500, 200_000):
+        joined = lines[2].ljust(padding) + lines[3]
+        message = refused(tmp_path, "\n".join([*lines[:2], joined, ""]))
+        assert message.startswith("line 3: ")
+
+
+WHOLE = "\n".join(csv()) + "\n"
+SEMICOLONS = WHOLE.replace(",", ";").replace(".", ",")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        WHOLE.encode("utf-8-sig"),
+        WHOLE.encode("utf-16"),
+        WHOLE.encode("utf-16-le"),
+        WHOLE.encode("utf-16-be"),
+        b"\xfe\xff" + WHOLE.encode("utf-16-be"),
+        WHOLE.replace("\n", "\r\n").encode(),
+        WHOLE.replace("\n", "\r").encode(),
+        (WHOLE + "\n\n").encode(),
+        (WHOLE + " ,,,,,,,\r\n").encode(),
+        WHOLE.replace(",", "\t").encode(),
+        WHOLE.replace(",", ";").encode(),
+        SEMICOLONS.encode(),
+        SEMICOLONS.replace(";", "\t").encode("utf-16"),
+        WHOLE.replace(",", " , ").encode(),
+        "\n".join(f'"{line}"'.replace(",", '","') for line in WHOLE.splitlines())
+        .encode() + b"\n",
+        "\n".join(f'"{line}"'.replace(";", '";"') for line in SEMICOLONS.splitlines())
+        .encode() + b"\n",
+    ],
+    ids=range(16),
+)  # fmt: skip
+def test_every_programs_table_gives_the_same_numbers(
+    tmp_path: Path, content: bytes
+) -> None:
+    (tmp_path / "plain.csv").write_text(WHOLE)
+    (tmp_path / "t.csv").write_bytes(content)
+    expected = read_trajectory(tmp_path / "plain.csv", short_arm())
+    found = read_trajectory(tmp_path / "t.csv", short_arm())
+    assert same(found, expected)
+    assert not found.notes
+
+
+@pytest.mark.parametrize("text", ["0.1", "12:30:05.5", "grün, alt", "", "nan", "1e999"])
+def test_other_columns_anywhere_are_left_out_and_named(
+    tmp_path: Path, text: str
+) -> None:
+    """Oracle: the csv module of the standard library writes them."""
+    rows = [line.split(",") for line in csv()]
+    expected = tmp_path / "plain.csv"
+    expected.write_text(WHOLE)
+    for place in (0, 3, 8):
+        for between in (",", ";"):
+            with (tmp_path / "t.csv").open("w", newline="", encoding="utf-8") as file:
+                writer = standard_csv.writer(file, delimiter=between)
+                for row in rows:
+                    extra = "t_s" if row is rows[0] else text
+                    writer.writerow([*row[:place], extra, *row[place:]])
+            found = read_trajectory(tmp_path / "t.csv", short_arm())
+            assert same(found, read_trajectory(expected, short_arm()))
+            assert found.notes == ("columns that are not read: 't_s'",)
+
+
+def test_columns_stand_in_any_order(tmp_path: Path) -> None:
+    order = np.random.default_rng(0).permutation(8)
+    lines = [",".join(np.array(line.split(","))[order]) for line in csv()]
+    (tmp_path / "t.csv").write_text("\n".join([*lines, ""]))
+    (tmp_path / "plain.csv").write_text(WHOLE)
+    found = read_trajectory(tmp_path / "t.csv", short_arm())
+    assert same(found, read_trajectory(tmp_path / "plain.csv", short_arm()))
+
+
+def test_a_table_has_decimal_points_or_decimal_commas(tmp_path: Path) -> None:
+    rows = [line.replace(",", ";") for line in csv()]
+    for first, second, third in (("0.5", "0,5", "2"), ("0,5", "0.5", "2")):
+        rows[2] = f"1;1;0;{first};0;0;0;0"
+        rows[1] = "0;1;0;0;0;0;0;0"
+        rows[3] = f"{third};1;0;{second};0;0;0;0"
+        message = refused(tmp_path, "\n".join([*rows, ""]))
+        assert message.startswith(f"line 4: x0_m is {second!r}, but numbers before it")
+    rows[3] = "2;1;0;1.234,5;0;0;0;0"
+    assert "line 4: x0_m is '1.234,5'" in refused(tmp_path, "\n".join([*rows, ""]))
 
 
 def test_failed_writing_leaves_the_old_file(tmp_path: Path) -> None:
@@ -242,6 +340,6 @@ def test_memory_stays_near_that_of_the_arrays(tmp_path: Path) -> None:
     reading = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     # One chunk of rows: a Python number, a slot and a few copies of 20 letters each.
-    chunk = trajectory_file.CHUNK_ROWS * 20 * 150
+    chunk = tables.CHUNK_ROWS * 20 * 150
     assert writing < chunk
     assert reading < 2 * arrays_size + chunk

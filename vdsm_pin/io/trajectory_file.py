@@ -6,12 +6,11 @@ Numbers are the shortest decimals that read back as the same double. Every line 
 a line end, so that a file cut short anywhere but between two lines is recognised.
 """
 
-from collections.abc import Iterator
-from contextlib import suppress
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
-from typing import BinaryIO, Final
+from typing import Final, TextIO
 
 import numpy as np
 import pydantic_core
@@ -20,21 +19,13 @@ from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.io.source import check_is_file
+from vdsm_pin.io.tables import CHUNK_ROWS, Table, listed, open_text
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import MAX_ROWS, Trajectory
 
-CHUNK_ROWS: Final = 5_000
-"""Rows held as text at one time."""
-
-MAX_LINE: Final = 1 << 16
-"""Longest line looked at; [bytes]. A row of 40 links has below 2,000."""
-
 _FIXED: Final = ("waypoint", "on_path", "path_m", "x0_m")
-PLAIN: Final = b"0123456789+-.eE, \r\n"
-"""Bytes that rows of numbers are made of."""
-
-_BOM: Final = b"\xef\xbb\xbf"
+_JOINT: Final = re.compile(r"(alpha|theta)[0-9]+_rad")
 
 
 def column_names(n_links: int) -> tuple[str, ...]:
@@ -85,165 +76,88 @@ def read_trajectory(path: str | Path, manipulator: Manipulator) -> Trajectory:
         manipulator: The arm that it is for; fixes the columns.
 
     Returns:
-        The trajectory; numbers as in the file to the last bit.
+        The trajectory; numbers as in the file to the last bit. Its notes name the
+        columns that were not read.
 
     Raises:
-        InvalidFile: If a column is wrong or missing, a row is cut short or has a word
-            where a number is meant, a number is not finite, `waypoint` does not rise
-            by whole numbers, or `on_path` is neither 0 nor 1. Names line and column.
+        InvalidFile: If a column is missing, a row is cut short or has a word where a
+            number is meant, a number is not finite, `waypoint` does not rise by whole
+            numbers, `on_path` is neither 0 nor 1, or an angle or a length is so large
+            that its unit must be wrong. Names line and column.
     """
     file = Path(path)
     check_is_file(file)
     try:
-        with file.open("rb") as stream:
-            return _Reader(file, stream, column_names(manipulator.n_links)).read()
+        with open_text(file) as text:
+            return _read(file, text, manipulator)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InvalidFile(file=path, problem=f"cannot be read: {reason}") from None
 
 
+def _read(file: Path, text: TextIO, arm: Manipulator) -> Trajectory:
+    columns = column_names(arm.n_links)
+    table = Table(file, text, columns)
+    _check_arm(file, table.ignored, arm)
+    tables: list[FloatArray] = []
+    count, previous = 0, -1.0
+    for rows in table.rows():
+        _check_values(_Rows(file, columns, rows, count), previous)
+        count, previous = count + len(rows), float(rows[-1, 0])
+        if count > MAX_ROWS:
+            raise InvalidFile(file=file, problem=f"has more than {MAX_ROWS} rows")
+        tables.append(rows)
+    if not tables:
+        raise InvalidFile(file=file, problem="has no row")
+    note = f"columns that are not read: {listed(table.ignored)}"
+    return Trajectory(
+        np.concatenate([rows[:, 1] != 0.0 for rows in tables]),
+        np.concatenate([rows[:, 2] for rows in tables]),
+        np.concatenate([rows[:, 3] for rows in tables]),
+        np.concatenate([rows[:, 4::2] for rows in tables]),
+        np.concatenate([rows[:, 5::2] for rows in tables]),
+        (note,) if table.ignored else (),
+    )
+
+
+def _check_arm(file: Path, ignored: Sequence[str], arm: Manipulator) -> None:
+    """Columns of joints that the arm has not are not to be left out."""
+    for name in ignored:
+        if _JOINT.fullmatch(name):
+            problem = f"has the column {name!r}, but the arm has {arm.n_links} links"
+            raise InvalidFile(file=file, where="line 1", problem=problem)
+
+
 @dataclass(frozen=True)
-class _Reader:
+class _Rows:
+    """Some rows and where they stand in the file."""
+
     file: Path
-    stream: BinaryIO
     columns: tuple[str, ...]
+    table: FloatArray
+    first: int
 
-    def read(self) -> Trajectory:
-        count = self._count_rows()
-        self._check_header(self.stream.readline(MAX_LINE))
-        if count == 0:
-            raise InvalidFile(file=self.file, problem="has no row")
-        n_links = (len(self.columns) - len(_FIXED)) // 2
-        on_path = np.zeros(count, dtype=np.bool_)
-        path_m, x0 = np.zeros(count), np.zeros(count)
-        alpha, theta = np.zeros((count, n_links)), np.zeros((count, n_links))
-        first, previous = 0, -1.0
-        for table in self._tables():
-            part = slice(first, first + len(table))
-            self._check_values(table, first, previous)
-            on_path[part], path_m[part], x0[part] = table[:, 1:4].T
-            alpha[part], theta[part] = table[:, 4::2], table[:, 5::2]
-            first, previous = part.stop, float(table[-1, 0])
-        return Trajectory(on_path, path_m, x0, alpha, theta)
-
-    def _count_rows(self) -> int:
-        """Number of rows, after a look at how the file ends."""
-        count, last = 0, b""
-        while block := self.stream.read(1 << 20):
-            count += block.count(b"\n")
-            last = block[-1:]
-        self.stream.seek(0)
-        if not last:
-            raise InvalidFile(file=self.file, problem="is empty")
-        if last != b"\n":
-            problem = "does not end in a line end: the file is cut short"
-            raise self._invalid(count + 1, problem)
-        if count - 1 > MAX_ROWS:
-            problem = f"has {count - 1} rows, the most is {MAX_ROWS}"
-            raise InvalidFile(file=self.file, problem=problem)
-        return count - 1
-
-    def _check_header(self, line: bytes) -> None:
-        found = line.removeprefix(_BOM).decode("utf-8", "replace").strip().split(",")
-        for number, expected in enumerate(self.columns, 1):
-            name = found[number - 1].strip() if number <= len(found) else ""
-            if name != expected:
-                shown = repr(name[:40]) if name else "missing"
-                problem = f"column {number} is {shown}, expected {expected!r}"
-                raise self._invalid(1, problem)
-        if len(found) > len(self.columns):
-            problem = (
-                f"has {len(found)} columns, expected {len(self.columns)} "
-                f"for an arm of {(len(self.columns) - len(_FIXED)) // 2} links"
-            )
-            raise self._invalid(1, problem)
-
-    def _tables(self) -> Iterator[FloatArray]:
-        """The rows as numbers, some thousand at a time."""
-        number = 2
-        lines = iter(lambda: self.stream.readline(MAX_LINE), b"")
-        while chunk := list(islice(lines, CHUNK_ROWS)):
-            yield self._parsed(chunk, number)
-            number += len(chunk)
-
-    def _parsed(self, chunk: list[bytes], number: int) -> FloatArray:
-        """Fast for good rows; where that fails, row by row to say what is wrong."""
-        table = _numbers(chunk, len(self.columns))
-        if not np.isfinite(table).all():
-            rows = [self._row(line, number + i) for i, line in enumerate(chunk)]
-            table = np.array(rows)
-        return table
-
-    def _row(self, line: bytes, number: int) -> list[float]:
-        words = line.decode("utf-8", "replace").strip().split(",")
-        values = []
-        for name, word in zip(self.columns, words, strict=False):
-            try:
-                value = float(_plain_number(word))
-            except ValueError:
-                problem = f"{name} is {word[:40]!r}, expected a number"
-                raise self._invalid(number, problem) from None
-            if not np.isfinite(value):
-                problem = f"{name} is {word.strip()}, expected a finite number"
-                raise self._invalid(number, problem)
-            values.append(value)
-        if len(words) != len(self.columns):
-            problem = f"has {len(words)} values, expected {len(self.columns)}"
-            raise self._invalid(number, problem)
-        return values
-
-    def _check_values(self, table: FloatArray, first: int, previous: float) -> None:
-        waypoint, on_path, path_m = table[:, 0], table[:, 1], table[:, 2]
-        rises = np.diff(waypoint, prepend=previous) > 0.0
-        self._check(
-            rises & (waypoint == np.floor(waypoint)),
-            first,
-            waypoint,
-            "waypoint",
-            "a whole number above that of the row before",
-        )
-        self._check(
-            (on_path == 0.0) | (on_path == 1.0), first, on_path, "on_path", "0 or 1"
-        )
-        most = TOLERANCES.path_extent
-        good = (path_m >= 0.0) & (path_m <= most)
-        self._check(good, first, path_m, "path_m", f"0 to {most:g} m")
-
-    def _check(
-        self, good: BoolArray, first: int, values: FloatArray, name: str, expected: str
-    ) -> None:
+    def check(self, good: BoolArray, column: int, expected: str) -> None:
+        """Refuse the first row whose value in a column is not good."""
         if not good.all():
             row = int(np.argmin(good))
-            problem = f"{name} is {values[row]:g}, expected {expected}"
-            raise self._invalid(first + row + 2, problem)
-
-    def _invalid(self, line: int, problem: str) -> InvalidFile:
-        return InvalidFile(file=self.file, where=f"line {line}", problem=problem)
-
-
-def _numbers(lines: list[bytes], n_columns: int) -> FloatArray:
-    """Rows of plain numbers as a table; of infinities where they are anything else.
-
-    Numbers in JSON's notation only, which is that of nearly every program's CSV: its
-    reader is twice as fast as numpy's, and as exact.
-    """
-    table = np.full((len(lines), n_columns), np.inf)
-    text = b",".join(lines)
-    commas = n_columns - 1
-    if text.translate(None, PLAIN) or any(x.count(b",") != commas for x in lines):
-        return table
-    with suppress(ValueError, OverflowError):
-        numbers = pydantic_core.from_json(b"[%b]" % text)
-        table = np.array(numbers, dtype=np.float64).reshape(table.shape)
-    return table
+            value = f"{self.columns[column]} is {self.table[row, column]:g}"
+            where = f"line {self.first + row + 2}"
+            problem = f"{value}, expected {expected}"
+            raise InvalidFile(file=self.file, where=where, problem=problem)
 
 
-def _plain_number(word: str) -> str:
-    """The word, unless Python alone would take it for a number: 1_000 and the like.
-
-    Raises:
-        ValueError: If it has a sign that no decimal number has.
-    """
-    if "_" in word or not word.isascii():
-        raise ValueError(word)
-    return word
+def _check_values(rows: _Rows, previous: float) -> None:
+    waypoint, on_path, path_m, x0 = rows.table[:, :4].T
+    rises = np.diff(waypoint, prepend=previous) > 0.0
+    whole = "a whole number above that of the row before"
+    rows.check(rises & (waypoint == np.floor(waypoint)), 0, whole)
+    rows.check((on_path == 0.0) | (on_path == 1.0), 1, "0 or 1")
+    most = TOLERANCES.path_extent
+    rows.check((path_m >= 0.0) & (path_m <= most), 2, f"0 to {most:g} m")
+    reach = TOLERANCES.scene_extent
+    metres = f"metres, at most {reach:g} either way; is it in millimetres?"
+    rows.check(np.abs(x0) <= reach, 3, metres)
+    radians = "radians, at most pi either way; is it in degrees?"
+    for column in range(len(_FIXED), len(rows.columns)):
+        rows.check(np.abs(rows.table[:, column]) <= np.pi, column, radians)

@@ -1,0 +1,241 @@
+"""Columns of numbers from the CSV of any program, some thousand rows at a time.
+
+Values stand between commas, semicolons or tabs, quoted or not, with a decimal point or
+a decimal comma; the text is UTF-8 or UTF-16, with a byte order mark or without, and its
+lines end in any way. Columns are found by name; what is not asked for is not read.
+"""
+
+import csv
+import math
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from typing import Final, TextIO
+
+import numpy as np
+import pydantic_core
+
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.geometry.arrays import FloatArray
+
+CHUNK_ROWS: Final = 5_000
+"""Rows held as text at one time."""
+
+MAX_LINE: Final = 1 << 16
+"""Longest line looked at; [characters]. A row of 40 links has below 2,000."""
+
+PLAIN: Final = b"0123456789+-.eE, \r\n"
+"""Bytes that rows of numbers are made of."""
+
+_BETWEEN: Final = (",", ";", "\t")
+_NUMBER: Final = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*", re.ASCII)
+_BLANK: Final = ' \t\n;,"'
+_NAMES_SHOWN: Final = 8
+
+
+@dataclass(frozen=True)
+class Row:
+    """Where a row or header stands, for messages."""
+
+    file: Path
+    line: int
+
+    def invalid(self, problem: str) -> InvalidFile:
+        """The error that names file and line."""
+        return InvalidFile(file=self.file, where=f"line {self.line}", problem=problem)
+
+
+class Table:
+    """A CSV file of numbers that is being read.
+
+    Args:
+        file: The file, for messages.
+        text: Its text, from the start.
+        columns: Names of the columns that are wanted.
+
+    Attributes:
+        ignored: Names of the other columns.
+
+    Raises:
+        InvalidFile: If the file is empty or a column is missing or there twice.
+    """
+
+    def __init__(self, file: Path, text: TextIO, columns: Sequence[str]) -> None:
+        self._file, self._text, self._columns = file, text, tuple(columns)
+        self._decimal = ""  # the sign of the first number that has one
+        line = text.readline(MAX_LINE)
+        if not line:
+            raise InvalidFile(file=file, problem="is empty")
+        self._check_ends([line], 1)
+        self._between, names = max(
+            ((sign, _split(line, sign)) for sign in _BETWEEN),
+            key=lambda found: len(set(found[1]) & set(columns)),
+        )
+        self._width = len(names)
+        self.ignored = tuple(name for name in names if name not in columns)
+        self._places = self._found(names)
+
+    def _found(self, names: list[str]) -> list[int]:
+        head = Row(self._file, 1)
+        for name in self._columns:
+            if names.count(name) > 1:
+                problem = f"has the column {name!r} {names.count(name)} times"
+                raise head.invalid(problem)
+            if name not in names:
+                problem = f"has no column {name!r}{self._instead(name)}"
+                raise head.invalid(problem)
+        return [names.index(name) for name in self._columns]
+
+    def _instead(self, name: str) -> str:
+        """What stands there that may be meant."""
+        stem, _, unit = name.rpartition("_")
+        near = [
+            other for other in self.ignored if stem and other.startswith(f"{stem}_")
+        ]
+        if near:
+            return f", but {near[0][:40]!r}; expected in {unit}"
+        return f"; found {listed(self.ignored)}" if self.ignored else ""
+
+    def rows(self) -> Iterator[FloatArray]:
+        """The wanted columns of all rows, shape (k, n_columns), in order.
+
+        Raises:
+            InvalidFile: If a row is cut short, or has no finite number where one is
+                wanted; names line and column.
+        """
+        lines_left = iter(partial(self._text.readline, MAX_LINE), "")
+        number, blank = 2, 0
+        while lines := list(islice(lines_left, CHUNK_ROWS)):
+            self._check_ends(lines, number)
+            table = self._fast(lines)
+            if blank or not np.isfinite(table).all():
+                blank = self._blank(lines, number, blank)
+                rows = lines[: max(blank - number, 0)] if blank else lines
+                table = np.array(
+                    [self._row(row, number + i) for i, row in enumerate(rows)]
+                )
+            if len(table):
+                yield table
+            number += len(lines)
+
+    def _check_ends(self, lines: list[str], number: int) -> None:
+        open_ended = [i for i, line in enumerate(lines) if line[-1] != "\n"]
+        if open_ended:
+            problem = "does not end in a line end: the file is cut short, or lacks it"
+            if len(lines[open_ended[0]]) == MAX_LINE:
+                problem = f"is longer than {MAX_LINE} characters"
+            raise Row(self._file, number + open_ended[0]).invalid(problem)
+
+    def _blank(self, lines: list[str], number: int, before: int) -> int:
+        """Number of the first blank line, or 0; no row may follow one."""
+        blank = before
+        for i, line in enumerate(lines):
+            if not line.strip(_BLANK):
+                blank = blank or number + i
+            elif blank:
+                problem = "is blank, and rows follow; expected none in between"
+                raise Row(self._file, blank).invalid(problem)
+        return blank
+
+    def _fast(self, lines: list[str]) -> FloatArray:
+        """Rows of plain numbers as a table; of infinities where they are anything else.
+
+        Numbers in JSON's notation only, which is that of nearly every program's CSV:
+        its reader is twice as fast as numpy's, and as exact.
+        """
+        table = np.full((len(lines), self._width), np.inf)
+        if {line.count(self._between) for line in lines} != {self._width - 1}:
+            return table
+        text = self._between.join(lines)
+        if self._between != "," and "," in text:
+            if "." in text or self._decimal == ".":
+                return table
+            self._decimal, text = ",", text.replace(",", ".")
+        elif "." in text:
+            if self._decimal == ",":
+                return table
+            self._decimal = "."
+        plain = text.replace(self._between, ",").encode("utf-8", "replace")
+        if not plain.translate(None, PLAIN):
+            with suppress(ValueError, OverflowError):
+                numbers = pydantic_core.from_json(b"[%b]" % plain)
+                table = np.array(numbers, dtype=np.float64).reshape(table.shape)
+        return np.asarray(table[:, self._places])
+
+    def _row(self, line: str, number: int) -> list[float]:
+        row, words = Row(self._file, number), _split(line, self._between)
+        values = []
+        for name, place in zip(self._columns, self._places, strict=True):
+            if place < len(words):
+                values.append(self._number(words[place], name, row))
+        if len(words) != self._width:
+            problem = f"has {len(words)} values, expected {self._width}"
+            if self._between == "," and len(words) > self._width:
+                problem += "; decimal commas need semicolons between the values"
+            raise row.invalid(problem)
+        return values
+
+    def _number(self, word: str, name: str, row: Row) -> float:
+        plain = word.replace(",", ".")
+        for sign in ",.":
+            if sign in word and (self._decimal or sign) != sign:
+                problem = (
+                    f"{name} is {word[:40]!r}, but numbers before it have a decimal "
+                    f"{self._decimal!r}"
+                )
+                raise row.invalid(problem)
+            if sign in word:
+                self._decimal = sign
+        if not _NUMBER.fullmatch(plain):
+            if plain.strip().lower().lstrip("+-") in ("nan", "inf", "infinity"):
+                problem = f"{name} is {word.strip()}, expected a finite number"
+            else:
+                problem = f"{name} is {word[:40]!r}, expected a number"
+            raise row.invalid(problem)
+        value = float(plain)
+        if not math.isfinite(value):
+            problem = f"{name} is {word.strip()[:40]}, expected a finite number"
+            raise row.invalid(problem)
+        return value
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in one phrase, the first few of many."""
+    more = len(names) - _NAMES_SHOWN
+    shown = ", ".join(repr(name[:40]) for name in names[:_NAMES_SHOWN])
+    return f"{shown} and {more} more" if more > 0 else shown
+
+
+def _split(line: str, between: str) -> list[str]:
+    """The values of a line, without quotes and without blanks around them."""
+    try:
+        (words,) = csv.reader([line.strip("\n")], delimiter=between)
+    except (csv.Error, ValueError):
+        words = line.split(between)
+    return [word.strip() for word in words]
+
+
+def open_text(file: Path) -> TextIO:
+    """A file as text, whatever it is encoded in and however its lines end.
+
+    Raises:
+        OSError: If it cannot be opened.
+    """
+    with file.open("rb") as stream:
+        encoding = _encoding(stream.read(4))
+    return file.open(encoding=encoding, errors="replace")
+
+
+def _encoding(head: bytes) -> str:
+    """UTF-16 by its mark or by the zeros between the letters, else UTF-8."""
+    if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "utf-16"
+    if len(head) == 4 and head[1] == head[3] == 0 != head[0]:
+        return "utf-16-le"
+    if len(head) == 4 and head[0] == head[2] == 0 != head[1]:
+        return "utf-16-be"
+    return "utf-8-sig"
