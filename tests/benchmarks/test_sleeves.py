@@ -58,7 +58,7 @@ def test_no_proof_denies_any_of_many_postures() -> None:
 
 
 def test_proofs_whose_limits_are_cut_to_60_percent_are_caught() -> None:
-    tally = fuzz(np.random.default_rng(3), 30, with_cut_limits)
+    tally = fuzz(np.random.default_rng(3), 50, with_cut_limits)
     assert all(tally.false[name] > 0 for name in PROOFS), tally.false
 
 
