@@ -128,6 +128,7 @@ def verdicts(batch: Batch, errors: ErrorBox = NOMINAL) -> Any:
         goal=TOLERANCES.bracket_gap,
         gap=TOLERANCES.least_bracket,
         slack=SLACK,
+        until=np.inf,
     )
     own = batch.frame == BASE
     obstacle = np.where(own, np.arange(n), batch.frame).astype(np.int64)

@@ -15,6 +15,7 @@ PACKAGE = Path(__file__).parents[1] / "vdsm_pin"
 # Lower number: lower layer. A module may import from its own number or below.
 LAYERS = {
     "errors": 0,
+    "time_limit": 0,
     "tolerances": 0,
     "units": 0,
     "kept": 0,

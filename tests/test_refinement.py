@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import load_robot
+from vdsm_pin.time_limit import NO_LIMIT
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_clearance, coal_missing
 from vdsm_pin.verification.coal_clearance import CoalDistances, coal_distances
@@ -114,8 +116,8 @@ def test_of_rivals_the_one_that_is_proved_to_survive_most_is_taken(
 def off_by(error: float) -> Callable[..., Iterator[CoalDistances]]:
     """Coal, with an error on every distance."""
 
-    def measured(*words: object) -> Iterator[CoalDistances]:
-        for found in coal_distances(*words):  # type: ignore[arg-type]
+    def measured(*words: Any, **named: Any) -> Iterator[CoalDistances]:
+        for found in coal_distances(*words, **named):
             yield replace(found, distance=found.distance + error)
 
     return measured
@@ -165,9 +167,9 @@ def test_only_the_link_that_coal_names_gets_a_margin() -> None:
     robot = load_robot(problem.manipulator)
     plan = plan_paper(problem, link_clearance(problem), 0.0)
     margins = np.zeros((8, 1))
-    assert refinement._by_coal(robot, plan, margins) == ()
+    assert refinement._by_coal(robot, plan, margins, NO_LIMIT) == ()
     tight = replace(problem, required_clearance=0.0037)
-    found = refinement._by_coal(robot, replace(plan, problem=tight), margins)
+    found = refinement._by_coal(robot, replace(plan, problem=tight), margins, NO_LIMIT)
     links = {one.link for one in found}
     assert links
     assert links < set(range(1, 9))

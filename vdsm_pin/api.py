@@ -19,6 +19,7 @@ from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import load_robot
+from vdsm_pin.time_limit import Deadline
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.records import ErrorBox, Verification
@@ -57,7 +58,7 @@ def plan(
     Args:
         problem: What is asked.
         strategy: `fewest`, `clearest`, `sturdiest` or `paper`.
-        time_limit: For planning; None for none; [s].
+        time_limit: Until there is a plan that is proved; None for none; [s].
 
     Returns:
         A certified plan: `trajectory`, joint `centres` of shape (n_samples, N + 1, 3)
@@ -68,6 +69,7 @@ def plan(
     Raises:
         UnknownName: If there is no such strategy.
         Infeasible: If no certified plan was found.
+        OutOfTime: If none was found in time.
 
     Example:
         >>> made = plan(read_problem("paper/free"), strategy="paper")
@@ -76,8 +78,8 @@ def plan(
     """
     from vdsm_pin.refinement import plan_and_verify
 
-    robot = load_robot(problem.manipulator)
-    return plan_and_verify(problem, strategy, robot, time_limit=time_limit).plan
+    deadline, robot = Deadline.after(time_limit), load_robot(problem.manipulator)
+    return plan_and_verify(problem, strategy, robot, deadline=deadline).plan
 
 
 def error_box(
@@ -107,6 +109,7 @@ def verify(
     *,
     errors: ErrorBox | None = None,
     joint_error: bool = False,
+    time_limit: float | None = None,
 ) -> Verification:
     """Judge a trajectory over continuous time, whoever made it.
 
@@ -115,6 +118,7 @@ def verify(
         trajectory: Rows of joint values, joined by straight lines in joint space.
         errors: The clearance is proved for every motion within it.
         joint_error: Whether to look for the largest joint error that is certified.
+        time_limit: What is not judged by then is undecided; None for none; [s].
 
     Returns:
         `verdict`, `min_clearance` in metres, `closest(count)`, `checks`.
@@ -134,7 +138,14 @@ def verify(
     from vdsm_pin.verification.verify import verify as judge
 
     robot = load_robot(problem.manipulator)
-    return judge(problem, trajectory, robot, errors=errors, joint_error=joint_error)
+    return judge(
+        problem,
+        trajectory,
+        robot,
+        errors=errors,
+        joint_error=joint_error,
+        deadline=Deadline.after(time_limit),
+    )
 
 
 def write_report(result: Verification, path: str | Path) -> None:

@@ -16,6 +16,7 @@ from vdsm_pin.errors import InvalidInput, NoPlanFound, OutOfTime, VdsmError
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY, STRATEGIES
 from vdsm_pin.startup import live_briefly
 from vdsm_pin.text import printable, show_everything
+from vdsm_pin.time_limit import Deadline
 
 PASSED: Final = 0
 NOT_PASSED: Final = 1
@@ -41,7 +42,8 @@ OutFolder = Annotated[Path, typer.Option("--out", help="Folder for the results."
 Strategy = Annotated[str, typer.Option(help=f"How to plan: {', '.join(STRATEGIES)}.")]
 Trajectory = Annotated[Path, typer.Option(help="A trajectory.csv.")]
 TimeLimit = Annotated[
-    float | None, typer.Option(min=0.001, help="Seconds for each problem.")
+    float | None,
+    typer.Option(min=0.001, help="Time limit in seconds, for each problem."),
 ]
 
 
@@ -67,16 +69,19 @@ def plan(
     from vdsm_pin.io.problem_file import read_problem
     from vdsm_pin.report.terminal import show_plan
     from vdsm_pin.report.words import outcome
-    from vdsm_pin.workflow import plan_to_folder, within
+    from vdsm_pin.workflow import plan_to_folder
 
-    source, begin = read_problem(problem), time.monotonic()
+    deadline, begin = Deadline.after(time_limit), time.monotonic()
     try:
-        with within(time_limit):
-            file = plan_to_folder(source, strategy, out, context.obj)
+        file = plan_to_folder(
+            read_problem(problem), strategy, out, context.obj, deadline
+        )
+    except OutOfTime as error:  # which tells its time itself
+        error.args = (f"no plan found: {error}",)
+        raise
     except NoPlanFound as error:
-        if not isinstance(error, OutOfTime):  # which tells its time itself
-            spent = time.monotonic() - begin
-            error.args = (f"no plan found: {error}; searched for {spent:.1f} s",)
+        spent = time.monotonic() - begin
+        error.args = (f"no plan found: {error}; searched for {spent:.1f} s",)
         raise
     show_plan(file, out)
     raise typer.Exit(PASSED if outcome(file.verdict).passed else NOT_PASSED)
@@ -110,6 +115,7 @@ def verify(
         Path | None,
         typer.Option(help="Print the report to this file; needs Chromium or Chrome."),
     ] = None,
+    time_limit: TimeLimit = None,
 ) -> None:
     """Verify a trajectory of any planner.
 
@@ -120,6 +126,7 @@ def verify(
     from vdsm_pin.report.words import outcome
     from vdsm_pin.workflow import VerifyOrder, error_box, verify_to_folder
 
+    deadline = Deadline.after(time_limit)
     errors = error_box(joint_error_deg, base_error_mm, obstacle_error_mm)
     verified = verify_to_folder(
         VerifyOrder(
@@ -130,17 +137,20 @@ def verify(
             errors=errors,
             certificate=certificate,
             pdf=pdf,
+            deadline=deadline,
         )
     )
     file = verified.file
     written: list[tuple[str, str]] = []
     if certificate is not None:
-        proof = str(certificate) if file.verdict == "certified" else "none: no proof"
-        written.append(("certificate", proof))
+        none = verified.no_certificate
+        written.append(("certificate", f"none: {none}" if none else str(certificate)))
     if pdf is not None:
         written.append(("report on paper", str(pdf)))
     show_verification(file, out, *written)
-    raise typer.Exit(PASSED if outcome(file.verdict).passed else NOT_PASSED)
+    complete = certificate is None or not verified.no_certificate
+    passed = outcome(file.verdict).passed and complete
+    raise typer.Exit(PASSED if passed else NOT_PASSED)
 
 
 @app.command(

@@ -14,8 +14,8 @@
     │   ├── CutOff            proved: no way for the tip is wide enough
     │   ├── HemmedIn          proved: the last link has no room at the tip
     │   └── NoPlanFound       the search ended without a plan; not a proof
-    │       ├── NoWayOut      of the start, as finely as it was looked for
-    │       └── OutOfTime     the time limit ended it
+    │       └── NoWayOut      of the start, as finely as it was looked for
+    ├── OutOfTime             exit 1: the time limit ended the work
     └── VerificationFailed    exit 1: a check could not be carried out
 
 Messages say what, where, how much and against what; the same facts are attributes.
@@ -209,17 +209,17 @@ class NoWayOut(NoPlanFound):
         super().__init__("no way out of the start was found")
 
 
-class OutOfTime(NoPlanFound):
-    """The time limit ended the search.
+class OutOfTime(VdsmError):
+    """The time limit ended the work; this proves nothing about the problem.
 
     Args:
         limit: The time limit; [s].
-        reached: How far the search had come, in words; empty if nobody knows.
+        reached: How far the work had come, in words; empty if nobody knows.
     """
 
     def __init__(self, limit: float, reached: str = "") -> None:
         self.limit, self.reached = limit, reached
-        message = f"no plan within the time limit of {limit:g} s"
+        message = f"the time limit of {limit:g} s came first"
         super().__init__(f"{message}; {reached}" if reached else message)
 
 

@@ -14,13 +14,14 @@ from typing import Final, Literal
 
 import numpy as np
 
-from vdsm_pin.errors import Infeasible, NoPlanFound
+from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.planner.time_limit import within_time
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.coal_missing import coal_missing
 from vdsm_pin.verification.link_clearance import link_clearance
@@ -108,7 +109,7 @@ def plan_and_verify(
     strategy_name: str,
     robot: RobotModel,
     *,
-    time_limit: float | None = None,
+    deadline: Deadline = NO_LIMIT,
 ) -> Refinement:
     """Plan by a strategy until the verification has nothing against the plan.
 
@@ -116,34 +117,35 @@ def plan_and_verify(
         problem: What is asked.
         strategy_name: A name in `STRATEGIES`.
         robot: The arm as Pinocchio and Coal see it.
-        time_limit: For planning in all rounds, without the last proof; None for none;
-            [s].
+        deadline: When planning and proving must have ended.
 
     Returns:
         The plan; incomplete where it draws less of the path than required.
 
     Raises:
         UnknownName: If there is no such strategy.
-        Infeasible: If the strategy has no plan, or none that is proved;
-            `OutOfTime` if the limit ended the planning.
+        Infeasible: If the strategy has no plan, or none that is proved.
+        OutOfTime: If the time is over.
     """
     plan_with = strategy(strategy_name)
-    clearance = within_time(link_clearance(problem), time_limit)
+    clearance = within_time(link_clearance(problem), deadline)
     rounds: list[Round] = []
     margins = np.zeros((problem.manipulator.n_links, len(problem.scene.obstacles)))
     promised = _promised(problem)
     while True:
         try:
-            plan = _chosen(plan_with(problem, clearance, margins.copy()))
-        except Infeasible as error:
+            plan = _chosen(plan_with(problem, clearance, margins.copy()), deadline)
+        except (Infeasible, OutOfTime) as error:
             if rounds:
                 error.args = (f"{error}; before that {_story(rounds)}",)
             raise
-        adjustments = _by_coal(robot, plan, margins)
+        adjustments = _by_coal(robot, plan, margins, deadline)
         if adjustments:
             rounds.append(_measured(margins, adjustments))
         else:
-            verification = verify(promised, plan.trajectory, robot)
+            verification = verify(promised, plan.trajectory, robot, deadline=deadline)
+            if deadline.passed and verification.verdict not in HANDED_OUT:
+                raise OutOfTime(deadline.limit, "a motion was found, but not proved")
             adjustments = _by_proof(verification, margins)
             rounds.append(_proved(margins, verification, adjustments))
         LOG.info("margin %.6f m: %s", rounds[-1].margin, rounds[-1].reason)
@@ -162,7 +164,7 @@ def _promised(problem: PlanningProblem) -> PlanningProblem:
 
 
 def _by_coal(
-    robot: RobotModel, plan: Plan, margins: FloatArray
+    robot: RobotModel, plan: Plan, margins: FloatArray, deadline: Deadline
 ) -> tuple[Adjustment, ...]:
     """What Coal finds missing at the waypoints of a plan."""
     problem = plan.problem
@@ -171,7 +173,7 @@ def _by_coal(
             problem, margins, float(one.waypoint), one.link, one.obstacle,
             ("Coal", one.distance),
         )
-        for one in coal_missing(robot, problem, plan.trajectory)
+        for one in coal_missing(robot, problem, plan.trajectory, deadline)
     )  # fmt: skip
 
 
@@ -217,19 +219,24 @@ def _raised(
     return raised
 
 
-def _chosen(plan: Plan) -> Plan:
-    """Of a plan and its rivals the one that is proved to survive the most."""
+def _chosen(plan: Plan, deadline: Deadline) -> Plan:
+    """Of a plan and its rivals the one that is proved to survive the most.
+
+    Raises:
+        OutOfTime: If the time is over.
+    """
     if not plan.rivals:
         return plan
     plans, problem, none = (*plan.rivals, plan), plan.problem, ErrorBox()
-    best, error = sturdiest(problem, [one.trajectory for one in plans])
+    motions = [one.trajectory for one in plans]
+    best, error = sturdiest(problem, motions, deadline)
     note = (
         f"every joint may be off by {np.rad2deg(error):.3f} deg at once (proved); of "
         f"{len(plans)} plans that draw as much none was proved to survive more"
     )
     start = plan.trajectory.part(0, 1)
-    survived = largest_joint_error(problem, start, none)
-    lost = refuted_joint_error(problem, start, none, survived)
+    survived = largest_joint_error(problem, start, none, deadline)
+    lost = refuted_joint_error(problem, start, none, survived, deadline)
     if np.isfinite(lost):
         note += (
             f"; the start itself does not survive {np.rad2deg(lost):.3f} deg (proved)"

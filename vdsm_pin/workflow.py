@@ -4,18 +4,13 @@ Nothing is judged here: problems are read, planned, verified and written down.
 """
 
 import math
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import FrameType
 from typing import Final
 
 from pydantic import ValidationError
 
 from vdsm_pin.errors import InvalidFile, OutOfTime
-from vdsm_pin.geometry.compiled import is_compiling
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
@@ -31,6 +26,7 @@ from vdsm_pin.report.pdf import find_browser, print_page
 from vdsm_pin.report.run_record import RunRecord
 from vdsm_pin.report.tables import ClearanceCsv, write_cables, write_link_angles
 from vdsm_pin.robot_model import RobotModel, load_robot
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.records import ErrorBox, Verdict, Verification
 from vdsm_pin.verification.task import all_pairs
@@ -50,10 +46,6 @@ PLANNED: Final = TRAJECTORY, PLAN
 JUDGED: Final = VERIFICATION, REPORT, CLEARANCE, LINK_ANGLES, CABLES
 """What verifying writes to its folder."""
 
-AGAIN: Final = 0.5
-"""A time limit is raised again after this, should the first have come where Python can
-only print it, such as at the end of a generator; [s]."""
-
 
 @dataclass(frozen=True)
 class VerifyOrder:
@@ -67,6 +59,7 @@ class VerifyOrder:
         errors: The error box the proof shall cover.
         certificate: Where the certificate of a certified motion goes; None for none.
         pdf: Where the report on paper goes; None for none.
+        deadline: When to give up what is left; it is then undecided.
     """
 
     source: ProblemFile
@@ -76,40 +69,22 @@ class VerifyOrder:
     errors: ErrorBox = field(default_factory=ErrorBox)
     certificate: Path | None = None
     pdf: Path | None = None
+    deadline: Deadline = NO_LIMIT
 
 
 @dataclass(frozen=True)
 class Verified:
-    """A verification as records and as what verification.json says."""
+    """A verification as records and as what verification.json says.
+
+    Args:
+        file: What verification.json says.
+        records: What was found.
+        no_certificate: Why there is none, in words; empty where there is.
+    """
 
     file: VerificationFile
     records: Verification
-
-
-@contextmanager
-def within(seconds: float | None) -> Iterator[None]:
-    """End what is inside after a time, as soon as Python is between two calls.
-
-    Raises:
-        OutOfTime: When the time is over.
-    """
-    if seconds is None:
-        yield
-        return
-    limit = seconds
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        if is_compiling():
-            return  # it is raised again
-        raise OutOfTime(limit)  # a strategy that hears it adds how far it came
-
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds, AGAIN)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+    no_certificate: str = ""
 
 
 def error_box(joint_deg: float, base_mm: float, obstacle_mm: float) -> ErrorBox:
@@ -122,7 +97,11 @@ def error_box(joint_deg: float, base_mm: float, obstacle_mm: float) -> ErrorBox:
 
 
 def plan_to_folder(
-    source: ProblemFile, strategy: str, folder: Path, command: str
+    source: ProblemFile,
+    strategy: str,
+    folder: Path,
+    command: str,
+    deadline: Deadline = NO_LIMIT,
 ) -> PlanFile:
     """Plan, and write trajectory.csv and plan.json.
 
@@ -131,6 +110,7 @@ def plan_to_folder(
     Raises:
         UnknownName: If there is no such strategy.
         Infeasible: If there is no such plan; nothing is written.
+        OutOfTime: If there is none in time; nothing is written.
         InvalidInput: If the folder cannot be written.
     """
     # Whoever has a trajectory verified needs no planner.
@@ -140,7 +120,7 @@ def plan_to_folder(
     check_output_folder(folder)
     check_kept([folder / name for name in PLANNED], source.source.files)
     robot = load_robot(source.problem.manipulator)
-    refinement = plan_and_verify(source.problem, strategy, robot)
+    refinement = plan_and_verify(source.problem, strategy, robot, deadline=deadline)
     with staged(folder) as aside:
         write_trajectory(aside / TRAJECTORY, refinement.plan.trajectory)
         record = RunRecord(
@@ -195,6 +175,7 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
                 errors=order.errors,
                 sinks=(clearance,),
                 joint_error=True,
+                deadline=order.deadline,
             )
         write_link_angles(aside / LINK_ANGLES, verification)
         write_cables(aside / CABLES, verification)
@@ -202,11 +183,10 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
         (aside / VERIFICATION).write_text(file.text(), encoding="utf-8")
         write_report(aside / REPORT, verification, file, planned_by(order.trajectory))
         # Last inside: a certificate that cannot be written leaves no half of a result.
-        if order.certificate is not None and verification.verdict is Verdict.CERTIFIED:
-            _certify(order.certificate, verification, record)
+        missing = _certify(order, verification, record)
     if order.pdf is not None:
         print_page(order.folder / REPORT, order.pdf)
-    return Verified(file, verification)
+    return Verified(file, verification, missing)
 
 
 def _check_outputs(order: VerifyOrder) -> None:
@@ -233,8 +213,12 @@ def planned_by(trajectory: Path) -> PlanFile | None:
     return plan if same else None
 
 
-def _certify(file: Path, verification: Verification, record: RunRecord) -> None:
-    """Write the proof down."""
+def _certify(order: VerifyOrder, verification: Verification, record: RunRecord) -> str:
+    """Write the proof down, or say why not."""
+    if order.certificate is None:
+        return "not asked for"
+    if verification.verdict is not Verdict.CERTIFIED:
+        return "no proof"
     # Imported by those who ask for one: its schema takes a while to build.
     from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
 
@@ -243,7 +227,11 @@ def _certify(file: Path, verification: Verification, record: RunRecord) -> None:
         trajectory=record.trajectory_sha256,
         urdf=record.urdf_sha256,
     )
-    write_certificate(file, verification, hashes)
+    try:
+        write_certificate(order.certificate, verification, hashes, order.deadline)
+    except OutOfTime as error:
+        return str(error)
+    return ""
 
 
 def _record(order: VerifyOrder, robot: RobotModel) -> RunRecord:

@@ -20,7 +20,7 @@ def test_every_task_ends_once_whatever_the_others_do(jobs: int) -> None:
         assert outcomes[word] == (f"{word}, 1", "done")
     assert outcomes["crash"] == (None, "error")
     assert outcomes["leave"] == (None, "error")
-    assert outcomes["hang"] == (None, "timeout")
+    assert outcomes["hang"] == (None, "time-limit")
     reasons = {one.task: one.reason for one in ended}
     assert "SIGSEGV" in reasons["crash"]
     assert "exit code 7" in reasons["leave"]

@@ -213,7 +213,8 @@ def test_ctrl_c_is_heard_even_where_python_loses_it(
 def test_a_time_limit_makes_a_row(problems: Path, tmp_path: Path) -> None:
     file = str(problems / "good.yaml")
     (row,) = run_batch(Batch((file,), tmp_path, "paper", time_limit=0.01))
-    assert (row.outcome, row.folder) == ("timeout", "good")
+    assert (row.outcome, row.folder) == ("time-limit", "good")
+    assert "0.01 s came first" in row.reason
     assert (tmp_path / "good" / "manifest.json").is_file()
 
 

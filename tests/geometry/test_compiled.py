@@ -1,10 +1,10 @@
 """Machine code kept on disk: found again, never stale, never for other arguments."""
 
 import itertools
-import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -18,12 +18,11 @@ from vdsm_pin import kept
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry import compiled, compiling, machine_code
 from vdsm_pin.geometry.machine_code import MachineCode, Unusable
-from vdsm_pin.workflow import within
 
 SOURCE = """
 from typing import NamedTuple
 import numpy as np
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.compiled import clock, compiled
 
 class Pair(NamedTuple):
     first: np.ndarray
@@ -45,6 +44,17 @@ def refuse(value):
     if value < 0.0:
         raise ValueError("below zero", value)
     return value
+
+@compiled
+def now():
+    return clock()
+
+@compiled
+def count_until(end):
+    count = 0
+    while clock() < end:
+        count += 1
+    return count
 
 FACTOR = 2.0
 """
@@ -164,22 +174,18 @@ def test_what_a_signal_raises_is_not_lost(tmp_path: Path) -> None:
     assert later.communicate()[0] == f"{ANSWER}False\n50\n"
 
 
-def test_time_limit_waits_for_the_compiler(
-    folder: Path,
+def test_compiled_code_reads_the_clock_that_python_reads(
     kernels: Callable[..., ModuleType],
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """It calls back from C, where an exception is printed and gone."""
-    ask = compiling.machine_code
-
-    def late(function: Callable[..., Any], arguments: tuple[Any, ...]) -> MachineCode:
-        signal.raise_signal(signal.SIGALRM)
-        return ask(function, arguments)
-
-    monkeypatch.setattr(compiling, "machine_code", late)
-    with within(1e6), pytest.raises(OutOfTime):
-        assert kernels().twice(np.ones(2)) == 2.0
-        signal.raise_signal(signal.SIGALRM)
+    """Oracle: Python's own clock, before and after."""
+    module = kernels()
+    module.now()  # makes the code
+    before = time.monotonic()
+    inside = module.now()
+    assert before <= inside <= time.monotonic()
+    assert module.count_until(inside) == 0
+    assert module.count_until(time.monotonic() + 0.01) > 0
+    assert time.monotonic() > inside + 0.01
 
 
 def test_what_a_signal_raises_where_numba_hides_it_comes_out(

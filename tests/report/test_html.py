@@ -115,7 +115,7 @@ def test_the_index_links_every_finished_problem(tmp_path: Path) -> None:
     file = verification_file(made_up.verification(), made_up.RECORD)
     good = batch_row("a-b", "paper", file)
     lost = BatchRow.model_validate(
-        {"folder": "c", "problem": "<c>", "strategy": "paper", "outcome": "timeout"}
+        {"folder": "c", "problem": "<c>", "strategy": "paper", "outcome": "time-limit"}
     )
     write_index(tmp_path / "index.html", [good, lost])
     text = (tmp_path / "index.html").read_text(encoding="utf-8")

@@ -27,7 +27,7 @@ ROWS = [
     row("b", "refuted", "too <near> & \x00 broken"),
     row("c", "infeasible", "no"),
     row("d", "error", "bad file"),
-    row("e", "timeout", "late"),
+    row("e", "time-limit", "late"),
     row("f", "undecided", "neither"),
     row("g", "incomplete", "13.2 % drawn"),
 ]

@@ -59,7 +59,7 @@ def test_every_key_is_described(name: str) -> None:
 def test_every_length_and_angle_says_its_unit(name: str) -> None:
     for key, field in keys(name):
         if holds_numbers(field) and key not in WITHOUT_UNIT:
-            assert re.search(r"_(m|rad)$|^seconds$", key), key
+            assert re.search(r"_(m|rad|s)$|^seconds$", key), key
 
 
 def test_the_words_in_the_docs_are_the_keys_of_the_files(tmp_path: Path) -> None:

@@ -156,7 +156,7 @@ def test_the_crude_growth_is_above_every_exact_one() -> None:
         first, joint = sorted(rng.choice(n_links + 1, 2, replace=False))
         n, error = rng.normal(size=3), rng.uniform(0.0, 0.1)
         n /= np.linalg.norm(n)
-        rules = Rules(lengths, 0.0, error, 0.0, 0.0, 0.0, 1e-9, 1e-6, 0.02)
+        rules = Rules(lengths, 0.0, error, 0.0, 0.0, 0.0, 1e-9, 1e-6, 0.02, np.inf)
         ends, body = new_ends(n_links), new_body(4, room_of(n_links))
         ends.centres[0], ends.frames[0] = centres, frames
         load_errors(rules, ends, body, joint - 1, first - 1, 0.0)

@@ -23,7 +23,8 @@ LINK = 6
 
 
 def rules_of(joint: float, base: float) -> Rules:
-    return Rules(LENGTHS, ARM.link_radius, joint, base, 0.0, 1e-11, 1e-9, 1e-6, 0.02)
+    pads = 1e-11, 1e-9, 1e-6, 0.02
+    return Rules(LENGTHS, ARM.link_radius, joint, base, 0.0, *pads, np.inf)
 
 
 def motion(rng: np.random.Generator, size: float) -> tuple[FloatArray, ...]:

@@ -13,7 +13,9 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, Final, Generic, TypeVar
 
-from vdsm_pin.errors import VdsmError
+from vdsm_pin.errors import OutOfTime, VdsmError
+from vdsm_pin.report.words import TIME_LIMIT
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -25,6 +27,9 @@ _ONE_THREAD: Final = (
     "NUMBA_NUM_THREADS",
 )
 _LOOK: Final = 0.5  # seconds between looks at deadlines and memory
+GRACE: Final = 0.9
+"""A task that has heard of its time limit ends by itself within this; [s]."""
+
 _MEMORY_SHARE: Final = 0.85  # of the machine's memory, split between the workers
 _READY: Final = "ready"
 
@@ -36,7 +41,7 @@ class Ended(Generic[Task, Result]):
     Args:
         task: The task.
         result: What its function returned; None if its process had to be given up.
-        outcome: "done", "error" or "timeout".
+        outcome: "done", "error" or "time-limit".
         reason: Why the process was given up; empty if it was not.
     """
 
@@ -54,7 +59,7 @@ class _Worker(Generic[Task]):
     pipe: Connection
     task: Task | None = None
     ready: bool = False
-    deadline: float = float("inf")
+    deadline: Deadline = NO_LIMIT
 
     def give_up(self) -> None:
         self.process.kill()
@@ -79,7 +84,8 @@ def run_tasks(
         tasks: Picklable.
         perform: A function of a module; importing it is what warms a process.
         jobs: Number of processes.
-        time_limit: For each task, from the moment a warm process receives it; [s].
+        time_limit: For each task, from the moment a warm process receives it: one that
+            has not ended `GRACE` later is given up; [s].
 
     Yields:
         Each task when it ends, in any order.
@@ -172,14 +178,14 @@ def _feed(workers: list[_Worker[Task]], waiting: list[Task], limit: float) -> No
     for worker in workers:
         if worker.ready and worker.task is None and waiting:
             worker.task = waiting.pop()
-            worker.deadline = time.monotonic() + limit
+            worker.deadline = Deadline(limit, time.monotonic() + limit + GRACE)
             # A worker that just died is found out when it is looked at.
             with contextlib.suppress(BrokenPipeError):
                 worker.pipe.send(worker.task)
 
 
 def _pause(workers: list[_Worker[Task]]) -> float:
-    soonest = min((worker.deadline for worker in workers), default=float("inf"))
+    soonest = min((worker.deadline.end for worker in workers), default=float("inf"))
     return max(0.0, min(_LOOK, soonest - time.monotonic()))
 
 
@@ -192,7 +198,7 @@ def _look_at(worker: _Worker[Task], most: float) -> Ended[Task, Any] | None:
             if not worker.ready:
                 worker.ready = message == _READY
                 return None
-            worker.task, worker.deadline = None, float("inf")
+            worker.task, worker.deadline = None, NO_LIMIT
             assert task is not None
             return Ended(task, message, "done")
     except (EOFError, ConnectionError):
@@ -205,9 +211,10 @@ def _look_at(worker: _Worker[Task], most: float) -> Ended[Task, Any] | None:
         return Ended(task, None, "error", f"the process crashed: {_died_of(code)}")
     if task is None:
         return None
-    if time.monotonic() > worker.deadline:
+    if worker.deadline.passed:
         worker.give_up()
-        return Ended(task, None, "timeout", "no result within the time limit")
+        late = OutOfTime(worker.deadline.limit, "the process did not end by itself")
+        return Ended(task, None, TIME_LIMIT, str(late))
     if _memory_of(worker.process.pid) > most:
         worker.give_up()
         return Ended(task, None, "error", f"used more than {most / 2**30:.1f} GiB")

@@ -159,7 +159,14 @@ def _tasks(batch: Batch) -> list[Task]:
         _check_replaceable(final)
         aside = batch.folder / _ASIDE / name
         task = Task(
-            problem, batch.strategy, name, final, aside, batch.resume, batch.keep
+            problem,
+            batch.strategy,
+            name,
+            final,
+            aside,
+            batch.resume,
+            batch.keep,
+            batch.time_limit,
         )
         tasks.append(task)
     return tasks

@@ -13,15 +13,17 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from vdsm_pin.errors import Infeasible, InvalidFile, VdsmError
+from vdsm_pin.errors import Infeasible, InvalidFile, OutOfTime, VdsmError
 from vdsm_pin.io.problem_file import ProblemFile, read_problem
 from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.refinement import HANDED_OUT
 from vdsm_pin.report.facts import batch_row
 from vdsm_pin.report.files import BatchRow, ManifestFile, TimingFile
 from vdsm_pin.report.picture import picture
 from vdsm_pin.report.run_record import versions
-from vdsm_pin.report.words import outcome
+from vdsm_pin.report.words import TIME_LIMIT, outcome
 from vdsm_pin.text import printable
+from vdsm_pin.time_limit import Deadline
 from vdsm_pin.workflow import (
     JUDGED,
     PLANNED,
@@ -62,6 +64,7 @@ class Task:
         aside: Where the worker writes it.
         resume: Whether a finished and intact folder may stay.
         keep: Which problems keep their files: "all", "failed" or "none".
+        time_limit: From when a worker begins; None for none; [s].
     """
 
     problem: str
@@ -71,6 +74,7 @@ class Task:
     aside: Path
     resume: bool
     keep: str = ALL
+    time_limit: float | None = None
 
     @property
     def settings(self) -> dict[str, str]:
@@ -99,7 +103,7 @@ class Done:
 
 def perform(task: Task) -> Done:
     """Do one problem; whatever goes wrong becomes its row."""
-    started = time.perf_counter()
+    started, deadline = time.monotonic(), Deadline.after(task.time_limit)
     shutil.rmtree(task.aside, ignore_errors=True)
     digest = ""
     try:
@@ -110,9 +114,11 @@ def perform(task: Task) -> Done:
             kept = finished(task, digest)
             if kept is not None:
                 return Done(kept, kept=True)
-        row = _plan_and_verify(task, source)
+        row = _plan_and_verify(task, source, deadline)
     except Infeasible as error:
         row = failed_row(task, "infeasible", str(error))
+    except OutOfTime as error:
+        row = failed_row(task, TIME_LIMIT, str(error))
     except VdsmError as error:
         row = failed_row(task, "error", str(error))
     except Exception as error:  # noqa: BLE001  a batch outlives any one problem
@@ -120,7 +126,7 @@ def perform(task: Task) -> Done:
     if not row.waypoints or not keeps_files(task.keep, row):
         shutil.rmtree(task.aside, ignore_errors=True)
     write_manifest(task, row, digest)
-    timing = TimingFile(seconds=round(time.perf_counter() - started, 3))
+    timing = TimingFile(seconds=round(time.monotonic() - started, 3))
     (task.aside / TIMING).write_text(timing.text(), encoding="utf-8")
     return Done(row, kept=False)
 
@@ -178,7 +184,7 @@ def finished(task: Task, digest: str) -> BatchRow | None:
     except (OSError, ValidationError, UnicodeDecodeError):
         return None
     same = (manifest.problem_sha256, manifest.settings) == (digest, task.settings)
-    wanted = manifest.row.outcome not in ("error", "timeout")
+    wanted = manifest.row.outcome not in ("error", TIME_LIMIT)
     return manifest.row if intact and same and wanted else None
 
 
@@ -215,10 +221,14 @@ def _hash(problem: str) -> str:
     return hashlib.sha256(os.fsencode(problem)).hexdigest()
 
 
-def _plan_and_verify(task: Task, source: ProblemFile) -> BatchRow:
-    plan = plan_to_folder(source, task.strategy, task.aside, task.command)
-    order = VerifyOrder(source, task.aside / TRAJECTORY, task.aside, task.command)
+def _plan_and_verify(task: Task, source: ProblemFile, deadline: Deadline) -> BatchRow:
+    plan = plan_to_folder(source, task.strategy, task.aside, task.command, deadline)
+    order = VerifyOrder(
+        source, task.aside / TRAJECTORY, task.aside, task.command, deadline=deadline
+    )
     verified = verify_to_folder(order)
+    if deadline.passed and verified.records.verdict not in HANDED_OUT:
+        raise OutOfTime(deadline.limit, "a plan was found and proved, but not reported")
     drawing = picture(verified.records)
     (task.aside / PICTURE).write_text(drawing, encoding="utf-8")
     row = batch_row(task.folder, task.strategy, verified.file)

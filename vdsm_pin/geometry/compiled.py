@@ -11,8 +11,9 @@ import hashlib
 import inspect
 import os
 import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+import time
+from collections.abc import Callable
+from contextlib import suppress
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from threading import RLock
@@ -40,24 +41,6 @@ _SCALARS: Final[dict[type, type]] = {
 """What a scalar is to compiled code."""
 
 _one_at_a_time: Final = RLock()
-_being_made: Final[list[str]] = []
-
-
-def is_compiling() -> bool:
-    """Whether machine code is being made, where an exception from outside is lost.
-
-    The compiler calls back from C: what a signal raises there ends up on the terminal.
-    """
-    return bool(_being_made)
-
-
-@contextmanager
-def _making(name: str) -> Iterator[None]:
-    _being_made.append(name)
-    try:
-        yield
-    finally:
-        _being_made.pop()
 
 
 def _kind(value: Any) -> Any:
@@ -150,11 +133,10 @@ class _Compiled:
             return load(read(name), self._function)
         # Only now: there is no code for too few or too many arguments.
         inspect.signature(self._function).bind(*arguments)
-        with _making(name):
-            from vdsm_pin.geometry.compiling import machine_code
+        from vdsm_pin.geometry.compiling import machine_code
 
-            code = machine_code(self._function, arguments)
-            write(name, code)
+        code = machine_code(self._function, arguments)
+        write(name, code)
         return load(code, self._function)
 
     @property
@@ -180,6 +162,20 @@ class _Apart:
         from vdsm_pin.geometry.compiling import apart
 
         return apart()
+
+
+class _Clock:
+    """The monotonic clock, for loops that a deadline ends; [s]."""
+
+    def __call__(self) -> float:
+        """The same, where Python calls it."""
+        return time.monotonic()
+
+    @cached_property
+    def _numba_type_(self) -> Any:
+        from vdsm_pin.geometry.compiling import clock
+
+        return clock()
 
 
 class _Borrowed:
@@ -220,3 +216,4 @@ def compiled(function: F) -> F:
 
 apart: Final = _Apart()
 borrowed: Final = _Borrowed()
+clock: Final = _Clock()

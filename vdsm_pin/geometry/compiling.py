@@ -9,9 +9,11 @@ over. Here that is done for what Python calls, once.
 
 from collections.abc import Callable
 from functools import cache
+from time import CLOCK_MONOTONIC
 from typing import Any, Final, cast
 
 import numba
+from llvmlite import ir
 from numba._dynfunc import make_function
 from numba.core import cgutils, types
 from numba.core.codegen import JITCodeLibrary
@@ -148,6 +150,30 @@ def apart() -> Any:
     template: Any = make_intrinsic_template
     return types.Function(
         template(define, define, "apart", prefer_literal=False, kwargs={})
+    )
+
+
+def clock() -> Any:
+    """The numba type of the function that reads the monotonic clock."""
+
+    def define(typing_context: Any) -> Any:
+        return types.float64(), generate
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        helpers: Any = cgutils
+        whole, real = ir.IntType(64), ir.DoubleType()
+        kind = ir.FunctionType(ir.IntType(32), [ir.IntType(32), whole.as_pointer()])
+        read = helpers.get_or_insert_function(builder.module, kind, "clock_gettime")
+        time = helpers.alloca_once(builder, whole, size=2)  # seconds, nanoseconds
+        builder.call(read, [ir.Constant(ir.IntType(32), CLOCK_MONOTONIC), time])
+        places = time, builder.gep(time, [ir.Constant(whole, 1)])
+        parts = [builder.sitofp(builder.load(place), real) for place in places]
+        fraction = builder.fmul(parts[1], ir.Constant(real, 1e-9))
+        return builder.fadd(parts[0], fraction)
+
+    template: Any = make_intrinsic_template
+    return types.Function(
+        template(define, define, "clock", prefer_literal=False, kwargs={})
     )
 
 

@@ -1,36 +1,42 @@
-"""A time limit for any strategy: the clearance function stops answering.
+"""A deadline for any strategy: the clearance function stops answering.
 
-Every strategy asks for clearances all the time, so this is where a clock can end it. It
-can only stop, never steer: until then every answer is the same as without a limit.
-
-It needs no signal, so that it serves threads and libraries. The command line raises one
-besides (`workflow.within`), which also ends what asks for no clearance.
+Every strategy asks for clearances all the time, so this is where the clock can end it.
+It can only stop, never steer: until then every answer is the same as without a limit.
 """
 
-import time
+from dataclasses import dataclass
 
-from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 
 
-def within_time(clearance: LinkClearance, seconds: float | None) -> LinkClearance:
-    """The same clearance function, for so long from now.
+def within_time(clearance: LinkClearance, deadline: Deadline) -> LinkClearance:
+    """The same clearance function, up to a deadline.
 
     Args:
         clearance: Clearance of links at given joint centres.
-        seconds: How long it shall answer; None for ever; [s].
+        deadline: Until when it shall answer.
 
     Returns:
         A function that raises `OutOfTime` once the time is over.
     """
-    if seconds is None:
-        return clearance
-    end = time.monotonic() + seconds
+    return _Timed(clearance, deadline)
 
-    def timed(centres: FloatArray) -> FloatArray:
-        if time.monotonic() > end:
-            raise OutOfTime(seconds)
-        return clearance(centres)
 
-    return timed
+def deadline_of(clearance: LinkClearance) -> Deadline:
+    """The deadline a clearance function was given, for what asks for no clearance."""
+    deadline: Deadline = getattr(clearance, "deadline", NO_LIMIT)
+    return deadline
+
+
+@dataclass(frozen=True)
+class _Timed:
+    """A clearance function and its deadline."""
+
+    clearance: LinkClearance
+    deadline: Deadline
+
+    def __call__(self, centres: FloatArray) -> FloatArray:
+        self.deadline.check()
+        return self.clearance(centres)

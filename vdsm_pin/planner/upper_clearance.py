@@ -6,7 +6,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import new_body
-from vdsm_pin.geometry.compiled import borrowed, compiled
+from vdsm_pin.geometry.compiled import borrowed, clock, compiled
 from vdsm_pin.geometry.kernels import BRACKET, NORMAL, SCRATCH_ROWS, UPPER
 from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
@@ -18,15 +18,18 @@ GOAL: Final = TOLERANCES.bracket_gap
 
 
 @compiled
-def upper_bounds(pieces: PackedPieces, segments: FloatArray) -> FloatArray:
+def upper_bounds(
+    pieces: PackedPieces, segments: FloatArray, until: float
+) -> FloatArray:
     """Proved upper bounds of the distance of segments to each obstacle.
 
     Args:
         pieces: The scene.
         segments: Shape (n, 2, 3); [m].
+        until: When to stop, by the monotonic clock; [s].
 
     Returns:
-        Shape (n, n_obstacles); [m].
+        Shape (n, n_obstacles), infinite where the time was over; [m].
     """
     pieces = borrowed(pieces)
     count = pieces.root.size
@@ -38,6 +41,8 @@ def upper_bounds(pieces: PackedPieces, segments: FloatArray) -> FloatArray:
     for n in range(segments.shape[0]):
         body.points[:] = segments[n]
         for o in range(count):
+            if clock() > until:
+                return result
             out[NORMAL : NORMAL + 3] = 1.0
             obstacle_bracket(pieces, o, body, GOAL, scratch, stack, trial, out)
             result[n, o] = out[UPPER]
@@ -60,7 +65,7 @@ def upper_clearance(problem: PlanningProblem, segments: FloatArray) -> FloatArra
     if not obstacles:
         return np.full((len(segments), 0), np.inf)
     pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
-    upper = upper_bounds(pieces, np.ascontiguousarray(segments))
+    upper = upper_bounds(pieces, np.ascontiguousarray(segments), np.inf)
     return np.asarray(upper - problem.manipulator.link_radius)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
-from vdsm_pin.geometry.compiled import apart, borrowed, compiled
+from vdsm_pin.geometry.compiled import apart, borrowed, clock, compiled
 from vdsm_pin.proof.coasting import glide, served
 from vdsm_pin.proof.culling import Culling, cull
 from vdsm_pin.proof.desk import Desk
@@ -128,7 +128,11 @@ def sweep(
     last: int,
     hasty: bool,
 ) -> bool:
-    """Judge the intervals [first, last); False where `hasty` and one is not proved.
+    """Judge the intervals [first, last).
+
+    Returns:
+        False where `hasty` and one is not proved, or where the time is over: what is
+        left is then not counted.
 
     Args:
         task: The scene, pairs and rules.
@@ -151,6 +155,8 @@ def sweep(
     limit, steady = results.limit, np.zeros(2, np.bool_)
     before = limit.copy()
     for start in range(first, last, BLOCK):
+        if clock() > task.rules.until:
+            return False
         # A limit that falls is soon out of date: what is below it is looked at later.
         for group in range(2):
             steady[group] = limit[group] >= before[group] - task.rules.gap

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import apart, borrowed, compiled
+from vdsm_pin.geometry.compiled import apart, borrowed, clock, compiled
 from vdsm_pin.proof.desk import Desk
 from vdsm_pin.proof.heaps import push
 from vdsm_pin.proof.layouts import (
@@ -45,6 +45,8 @@ def _look_again(
     row, beyond = np.zeros(SLICE), results.overflow
     row[END], filled = 1.0, -1
     for c in order:
+        if clock() > task.rules.until:
+            break
         if not held.lower[c] < results.limit[group] - task.rules.gap:
             continue
         if results.limit[group] < 0.0:
@@ -92,7 +94,7 @@ def narrow(
 
     Returns:
         Number of slices in the heap: together with `results.overflow` they hold all
-        that is not proved to be above the limit, less the gap.
+        that is not proved to be above the limit, less the gap, unless the time is over.
     """
     task = borrowed(task)
     motion = borrowed(motion)

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.compiled import apart, compiled
+from vdsm_pin.geometry.compiled import apart, clock, compiled
 from vdsm_pin.geometry.kernels import BRACKET, FAR, LOWER, NEAR, NORMAL
 from vdsm_pin.geometry.obstacles import node_support
 from vdsm_pin.proof.coasting import coast
@@ -216,7 +216,11 @@ def sweep_pair(
     closely: bool,
     hasty: bool,
 ) -> bool:
-    """All intervals of a block for one pair; False where `hasty` and one is not proved.
+    """All intervals of a block for one pair.
+
+    Returns:
+        False where `hasty` and one is not proved, or where the time is over: the rest
+        is then neither judged nor counted.
 
     Args:
         task: The scene, pairs and rules.
@@ -240,7 +244,7 @@ def sweep_pair(
     goal = rules.goal if closely else max(rules.goal, ROUGH * rules.slack * required)
     slack = np.inf if hasty else rules.slack
     local, stretch, fresh, proved = 0, count, False, -np.inf
-    while True:
+    while clock() <= rules.until:
         last, bar = min(count, local + stretch), required
         if closely:
             bar = max(bar, limit[group] - rules.gap)
@@ -287,3 +291,4 @@ def sweep_pair(
         if not (nominal or hasty):
             _look_at_row(task, desk, results, local, pair)
         fresh, stretch = True, STRETCH
+    return False

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.compiled import apart, borrowed, compiled
+from vdsm_pin.geometry.compiled import apart, borrowed, clock, compiled
 from vdsm_pin.geometry.kernels import NEAR, NORMAL
 from vdsm_pin.proof.desk import Desk
 from vdsm_pin.proof.layouts import (
@@ -164,8 +164,9 @@ def record(
         records: Result, shape (room, RECORD).
 
     Returns:
-        Number of planes written, the interval reached (below `last` where the room
-        ended; all its pairs are missing) and the pair that is not proved in it, or -1.
+        Number of planes written, the interval reached (below `last` where the room or
+        the time ended; all its pairs are missing) and the pair that is not proved in
+        it, or -1.
     """
     apart()
     task = borrowed(task)
@@ -176,6 +177,8 @@ def record(
     for k in range(first, last):
         before = count
         for pair in range(task.pairs.link.size):
+            if clock() > task.rules.until:
+                return before, k, -1
             row[INTERVAL], row[PAIR] = k, pair
             count, proved = _record_pair(task, motion, desk, row, records, count)
             if not proved:

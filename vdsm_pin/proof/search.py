@@ -6,7 +6,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arm import bends_and_drifts, place_between
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import apart, compiled
+from vdsm_pin.geometry.compiled import apart, clock, compiled
 from vdsm_pin.geometry.kernels import BRACKET, LOWER, NEAR, UPPER
 from vdsm_pin.proof.heaps import pop, push
 from vdsm_pin.proof.layouts import (
@@ -202,7 +202,7 @@ def resolve(
         if least < required or least - heap[0, KEY] <= rounding:
             verdict = UNDECIDED
             break
-        if count + 2 > heap.shape[0]:
+        if count + 2 > heap.shape[0] or clock() > task.rules.until:
             verdict = UNDECIDED
             break
         count = pop(heap, count, row)
@@ -248,6 +248,8 @@ def tighten(
     least = limit
     while count > 0 and count + 2 <= heap.shape[0]:
         if heap[0, KEY] >= least - task.rules.gap or least < 0.0:
+            break
+        if clock() > task.rules.until:
             break
         count = pop(heap, count, row)
         if row[END] - row[START] <= SHORTEST:

@@ -54,6 +54,8 @@ class Rules(NamedTuple):
         gap: Width of the bracket of the least clearance at which to stop; [m].
         slack: A bracket is renewed where it is wider than this part of the clearance,
             and wider by twice what it was when its plane was found; [-].
+        until: When to stop, by the monotonic clock: what is not judged by then is not
+            counted, or undecided; [s].
     """
 
     lengths: FloatArray
@@ -65,6 +67,7 @@ class Rules(NamedTuple):
     goal: float
     gap: float
     slack: float
+    until: float
 
 
 class Motion(NamedTuple):

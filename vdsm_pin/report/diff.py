@@ -11,13 +11,13 @@ from vdsm_pin.errors import InvalidFile
 from vdsm_pin.report.facts import batch_row
 from vdsm_pin.report.files import BatchRow, VerificationFile
 from vdsm_pin.report.tables import read_summary
-from vdsm_pin.report.words import outcome, quantity, term
+from vdsm_pin.report.words import TIME_LIMIT, outcome, quantity, term
 from vdsm_pin.text import printable
 from vdsm_pin.tolerances import TOLERANCES
 
 _ORDER: Final = (
     "error",
-    "timeout",
+    TIME_LIMIT,
     "refuted",
     "undecided",
     "infeasible",

@@ -289,6 +289,8 @@ def verification_file(
         ),
         max_joint_error_rad=finite(verification.joint_error),
         refuted_joint_error_rad=finite(verification.refuted_joint_error),
+        time_limit_s=finite(verification.time_limit),
+        not_done=verification.not_done,
         counterexamples=tuple(
             counterexample_row(verification, found)
             for found in verification.counterexamples

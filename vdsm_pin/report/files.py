@@ -21,7 +21,7 @@ OutcomeWord = Literal[
     "undecided",
     "infeasible",
     "error",
-    "timeout",
+    "time-limit",
 ]
 
 
@@ -193,6 +193,12 @@ class VerificationFile(FileModel):
     refuted_joint_error_rad: FiniteFloat | None = Field(
         description="smallest joint error found that loses the clearance; null: none"
     )
+    time_limit_s: FiniteFloat | None = Field(
+        description="when the verification had to end; null: there was no limit"
+    )
+    not_done: tuple[str, ...] = Field(
+        description="what the time limit left out besides checks, which have their rows"
+    )
     counterexamples: tuple[CounterexampleRow, ...] = Field(
         description="errors within the box that lose the clearance where it is refuted "
         "for the box alone: one against obstacles, one between links, at most"
@@ -255,7 +261,7 @@ class BatchRow(FileModel):
     problem: str = Field(description=_PROBLEM)
     strategy: str = Field(description=_STRATEGY)
     outcome: OutcomeWord = Field(
-        description="the verdict, or why there is none: infeasible, error, timeout"
+        description="the verdict, or why there is none: infeasible, error, time-limit"
     )
     min_clearance_lower_m: FiniteFloat | None = Field(
         default=None,

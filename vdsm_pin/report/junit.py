@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from xml.etree import ElementTree
 
 from vdsm_pin.report.files import BatchRow
-from vdsm_pin.report.words import outcome
+from vdsm_pin.report.words import TIME_LIMIT, outcome
 
 
 def junit_text(rows: Sequence[BatchRow]) -> str:
@@ -12,7 +12,7 @@ def junit_text(rows: Sequence[BatchRow]) -> str:
 
     Durations are zero: they would differ from run to run, and timing.csv has them.
     """
-    broken = [row for row in rows if row.outcome in ("error", "timeout")]
+    broken = [row for row in rows if row.outcome in ("error", TIME_LIMIT)]
     passed = [row for row in rows if outcome(row.outcome).passed]
     totals = {
         "tests": str(len(rows)),

@@ -73,8 +73,9 @@ def show_verification(
         if file.refuted_joint_error_rad is not None:
             error += f", lost at {lost(file.refuted_joint_error_rad)}"
         more = ((term("max_joint_error_rad"), error), *more)
+    undone = (("not done", what) for what in file.not_done)
     notes = (("note", note) for note in file.notes)
-    show_facts(*more, *notes, ("report", str(folder / "report.html")))
+    show_facts(*undone, *more, *notes, ("report", str(folder / "report.html")))
 
 
 def show_facts(*rows: tuple[str, str]) -> None:

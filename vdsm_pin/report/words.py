@@ -11,6 +11,9 @@ from vdsm_pin.units import MM_PER_M
 MISSING: Final = "not available"
 """What stands where there is no evidence; never a pass."""
 
+TIME_LIMIT: Final = "time-limit"
+"""The outcome of what the time limit ended."""
+
 _SMALLEST_FIXED: Final = 1e-3  # below this, three decimals would print 0.000
 _LARGE: Final = 1e3  # from here on, a tenth is fine enough
 _SHARE_DIGITS: Final = 9
@@ -84,7 +87,7 @@ OUTCOMES: Final[Mapping[str, Outcome]] = MappingProxyType(
             ),
             Outcome("error", "!", "red", False, "The input or the run was broken."),
             Outcome(
-                "timeout", "…", "yellow", False, "The time limit ended before a result."
+                TIME_LIMIT, "…", "yellow", False, "The time limit came before a result."
             ),
         )
     }

@@ -7,6 +7,7 @@ import numpy as np
 from vdsm_pin.cables import angles_from_cables, cable_lengths
 from vdsm_pin.errors import InconsistentCables
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import Check, Verdict
@@ -19,20 +20,27 @@ NAME: Final = "angles recovered from the cable lengths"
 """Name of the row."""
 
 
-def check_cables(problem: PlanningProblem, trajectory: Trajectory) -> Check:
+def check_cables(
+    problem: PlanningProblem, trajectory: Trajectory, deadline: Deadline = NO_LIMIT
+) -> Check:
     """Turn every row into cable lengths and these into angles again.
 
     Args:
         problem: Names the arm and its cable holes.
         trajectory: What is judged.
+        deadline: When to give up.
 
     Returns:
         The largest difference of an angle, in radians. Where the angles leave the
         domain in which lengths determine them, the motion cannot be driven by these
         cables: refuted.
+
+    Raises:
+        OutOfTime: If the time is over.
     """
     worst, where, moment = -np.inf, "", float("nan")
     for first in range(0, trajectory.n_samples, CHUNK):
+        deadline.check()
         rows = slice(first, first + CHUNK)
         planned = np.stack([trajectory.alpha[rows], trajectory.theta[rows]])
         lengths = cable_lengths(problem.manipulator, *planned)

@@ -26,6 +26,7 @@ from vdsm_pin.proof.layouts import FIRST, LAST, PLANE_NORMAL, RECORD
 from vdsm_pin.proof.recording import record
 from vdsm_pin.proof.terms import Motion, Task
 from vdsm_pin.scene import Prism
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.certificate_file import (
     ClaimedLimits,
@@ -61,15 +62,22 @@ class Hashes:
     urdf: str
 
 
-def write_certificate(path: Path, verification: Verification, hashes: Hashes) -> None:
+def write_certificate(
+    path: Path,
+    verification: Verification,
+    hashes: Hashes,
+    deadline: Deadline = NO_LIMIT,
+) -> None:
     """Write the proof of a certified motion.
 
     Args:
         path: The file; it appears whole or not at all.
         verification: Of the same problem and trajectory files.
         hashes: Of the files.
+        deadline: When to give up; there is no file then.
 
     Raises:
+        OutOfTime: If the time is over.
         VerificationFailed: If the motion is not certified: there is nothing to write.
         InvalidFile: If the file cannot be written.
     """
@@ -77,11 +85,12 @@ def write_certificate(path: Path, verification: Verification, hashes: Hashes) ->
         verdict = verification.verdict.value
         message = f"no certificate is written: the verdict is {verdict}"
         raise VerificationFailed(message)
-    task = make_task(verification.problem, verification.errors)
+    task = make_task(verification.problem, verification.errors, deadline=deadline)
     digest = hashlib.sha256()
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         header = _header(verification, hashes, task.pieces)
-        for text in chain([header.model_dump_json()], _lines(verification, task)):
+        lines = _lines(verification, task, deadline)
+        for text in chain([header.model_dump_json()], lines):
             line = text.encode() + b"\n"
             digest.update(line)
             file.write(line)
@@ -164,7 +173,7 @@ def _sense(polygon: FloatArray) -> int:
     return 1 if sum(a[0] * b[1] - a[1] * b[0] for a, b in edges) > 0 else -1
 
 
-def _lines(verification: Verification, task: Task) -> Iterator[str]:
+def _lines(verification: Verification, task: Task, deadline: Deadline) -> Iterator[str]:
     """One line per interval."""
     trajectory = verification.trajectory
     motion = Motion(trajectory.x0, trajectory.alpha, trajectory.theta)
@@ -175,6 +184,7 @@ def _lines(verification: Verification, task: Task) -> Iterator[str]:
     while first < n_intervals:
         last = min(first + CHUNK, n_intervals)
         count, reached, pair = record(task, motion, desk, first, last, records)
+        deadline.check()
         if pair >= 0:
             message = (
                 f"interval {reached}: the proof of pair {pair} was not found again"

@@ -32,8 +32,15 @@ from vdsm_pin.proof.narrowing import narrow
 from vdsm_pin.proof.results import Dense, Results
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.search import Witnesses
-from vdsm_pin.proof.terms import BASE, CERTIFIED, LINKS, OBSTACLES
+from vdsm_pin.proof.terms import (
+    BASE,
+    CERTIFIED,
+    LINKS,
+    OBSTACLES,
+    UNDECIDED,
+)
 from vdsm_pin.proof.witnesses import place_best
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.proving import (
     BUDGET,
@@ -70,6 +77,9 @@ class ClearanceProof:
             shape (n_pairs, BEST); [m].
         profile: Brackets along the motion.
         slices: Slices tried beyond one per interval and pair.
+        n_intervals: Of the motion.
+        late: Whether the time was over before all was judged.
+        sent: Intervals whose brackets the sinks received: all, if there was time.
     """
 
     pairs: tuple[Pair, ...]
@@ -77,6 +87,9 @@ class ClearanceProof:
     best: FloatArray
     profile: ClearanceProfile
     slices: int
+    n_intervals: int
+    late: bool
+    sent: int
 
 
 def _chunk(proving: Proving, dense: Dense, first: int, count: int) -> ClearanceChunk:
@@ -114,6 +127,7 @@ def prove_clearance(
     errors: ErrorBox,
     sinks: Sequence[ClearanceSink] = (),
     pieces: PackedPieces | None = None,
+    deadline: Deadline = NO_LIMIT,
 ) -> ClearanceProof:
     """Bracket the clearance of every pair over every interval.
 
@@ -123,18 +137,20 @@ def prove_clearance(
         errors: The proof covers every motion within it.
         sinks: Receive the brackets in chunks, in order, once all is proved.
         pieces: `pack_scene(problem)`, where it is known already.
+        deadline: What is not judged by then is undecided.
 
     Returns:
-        The proof, its least brackets narrowed.
+        The proof, its least brackets narrowed unless the time ended before.
     """
-    proving = new_proving(problem, trajectory, errors, pieces)
+    proving = new_proving(problem, trajectory, errors, pieces, deadline=deadline)
     results = proving.results
     proving.sweep(results, 0, proving.n_intervals)
+    late = proving.deadline.passed
     _merge_far(problem, trajectory, proving)
+    _own_up(proving)
     for group in (OBSTACLES, LINKS):
         _narrow(proving, group)
-    if sinks:
-        _send(proving, sinks)
+    sent = _send(proving, sinks)
     order = np.lexsort((results.best[:, TIME], results.best[:, AT_UPPER]))
     place_best(proving.task, proving.motion, proving.desk.ends, results.best, order)
     return ClearanceProof(
@@ -143,7 +159,20 @@ def prove_clearance(
         best=frozen(results.best),
         profile=_profile(problem, results),
         slices=int(results.tally[SLICES]),
+        n_intervals=proving.n_intervals,
+        late=late,
+        sent=sent,
     )
+
+
+def _own_up(proving: Proving) -> None:
+    """Call undecided what the time did not allow to judge."""
+    results = proving.results
+    left = proving.n_intervals - results.counts.sum(axis=1)
+    if left.any():
+        results.counts[:, UNDECIDED] += left
+        results.best[left > 0, LOW] = -np.inf
+        results.profile[0] = -np.inf
 
 
 def _merge_far(
@@ -170,6 +199,8 @@ def _merge_far(
 
 def _narrow(proving: Proving, group: int) -> None:
     """Narrow the least bracket over the obstacles or over the links."""
+    if proving.deadline.passed:
+        return
     task, results = proving.task, proving.results
     mine = (task.pairs.frame == BASE) == (group == OBSTACLES)
     held, n = results.candidates, results.tally[HELD]
@@ -192,6 +223,8 @@ def _narrow(proving: Proving, group: int) -> None:
     heap = np.zeros((CANDIDATES + BUDGET, SLICE))
     again = results._replace(counts=np.zeros_like(results.counts))
     count = narrow(task, proving.motion, proving.desk, again, group, order, heap, found)
+    if proving.deadline.passed:
+        return  # not all was looked at again: what was proved before holds
     proved = np.full(n_pairs, results.limit[group] - task.rules.gap)
     np.minimum.at(proved, heap[:count, PAIR].astype(np.int64), heap[:count, KEY])
     proved = np.minimum(proved, results.overflow[group])[mine]
@@ -202,8 +235,14 @@ def _narrow(proving: Proving, group: int) -> None:
         np.maximum(lower, proved.min(), out=lower)
 
 
-def _send(proving: Proving, sinks: Sequence[ClearanceSink]) -> None:
-    """Sweep once more, closely and for the sinks, now that the least is known."""
+def _send(proving: Proving, sinks: Sequence[ClearanceSink]) -> int:
+    """Sweep once more, closely and for the sinks, now that the least is known.
+
+    Returns:
+        Number of intervals sent.
+    """
+    if not sinks:
+        return 0
     n_intervals, n_pairs = proving.n_intervals, proving.task.pairs.link.size
     length = CHUNK_VALUES // max(1, n_pairs) // BLOCK * BLOCK
     length = min(CHUNK, n_intervals, max(BLOCK, length))
@@ -218,6 +257,9 @@ def _send(proving: Proving, sinks: Sequence[ClearanceSink]) -> None:
     for first in range(0, n_intervals, length):
         last = min(first + length, n_intervals)
         proving.sweep(again, first, last)
+        if proving.deadline.passed:
+            return first
         chunk = _chunk(proving, again.dense, first, last - first)
         for sink in sinks:
             sink(chunk)
+    return n_intervals

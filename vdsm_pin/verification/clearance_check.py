@@ -1,14 +1,17 @@
 """What the clearance proof comes to: a row for the obstacles and one for the links."""
 
 from dataclasses import replace
+from math import nan
 
 import numpy as np
 
+from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.layouts import AT_UPPER, LOW, TIME, UP
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.scene import Mesh
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.clearance import ClearanceProof
 from vdsm_pin.verification.records import Check, Counterexample, Verdict
 
@@ -17,6 +20,7 @@ def check_clearance(
     problem: PlanningProblem,
     proof: ClearanceProof,
     counterexamples: tuple[Counterexample, ...],
+    deadline: Deadline = NO_LIMIT,
 ) -> tuple[Check, ...]:
     """One row for the obstacles, one for the links among themselves.
 
@@ -24,7 +28,9 @@ def check_clearance(
         problem: Required clearances.
         proof: Of every motion within the error box.
         counterexamples: Motions within it that refute what the proof left undecided.
+        deadline: When the proof had to end.
     """
+    late = f": {OutOfTime(deadline.limit)}" if proof.late else ""
     of_obstacles = np.array([bool(pair.obstacle) for pair in proof.pairs], dtype=bool)
     rows = []
     for mine, name, needed in (
@@ -32,7 +38,7 @@ def check_clearance(
         (~of_obstacles, "clearance between links", problem.required_self_clearance),
     ):
         if mine.any():
-            row = _row(proof, np.flatnonzero(mine), name, needed)
+            row = _row(proof, np.flatnonzero(mine), name, needed, late)
             against = [
                 found
                 for found in counterexamples
@@ -49,7 +55,9 @@ def check_clearance(
     return tuple(rows)
 
 
-def _row(proof: ClearanceProof, mine: IntArray, name: str, needed: float) -> Check:
+def _row(
+    proof: ClearanceProof, mine: IntArray, name: str, needed: float, late: str
+) -> Check:
     counts = proof.counts[mine].sum(axis=0)
     verdict = Verdict.CERTIFIED
     if counts[REFUTED]:
@@ -62,7 +70,7 @@ def _row(proof: ClearanceProof, mine: IntArray, name: str, needed: float) -> Che
     row = proof.best[pair]
     where = f"link {proof.pairs[pair].link} and {proof.pairs[pair].label}"
     if verdict is Verdict.UNDECIDED:
-        where += f"; {int(counts[UNDECIDED])} of {int(counts.sum())} undecided"
+        where += f"; {int(counts[UNDECIDED])} of {int(counts.sum())} undecided{late}"
     return Check(
         name=name,
         verdict=verdict,
@@ -71,7 +79,7 @@ def _row(proof: ClearanceProof, mine: IntArray, name: str, needed: float) -> Che
         limit=needed,
         unit="m",
         where=where,
-        moment=float(row[AT_UPPER] + row[TIME]),
+        moment=float(row[AT_UPPER] + row[TIME]) if np.isfinite(row[UP]) else nan,
     )
 
 

@@ -23,6 +23,8 @@ from vdsm_pin.geometry.row_bounds import coarse_bounds, row_brackets
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import LinkPoses, RobotModel
+from vdsm_pin.scene import Obstacle
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.coal_bodies import (
@@ -35,6 +37,9 @@ from vdsm_pin.verification.records import Check, Verdict
 
 CHUNK_BOUNDS: Final = 1 << 17
 """Coarse bounds held in memory at a time: rows times links times obstacles."""
+
+CHUNK_PAIRS: Final = 1 << 10
+"""Pairs measured between two looks at the time."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +89,7 @@ def check_coal(
     problem: PlanningProblem,
     trajectory: Trajectory,
     proved: FloatArray | None = None,
+    deadline: Deadline = NO_LIMIT,
 ) -> tuple[Check, ...]:
     """Hold Coal's distances to the obstacles against the proved brackets.
 
@@ -94,16 +100,20 @@ def check_coal(
         proved: Proved lower bounds over the intervals for the pairs of links and
             obstacles, obstacle by obstacle, shape (n_intervals, n_obstacles * N); Coal
             must not fall below them at either end of an interval; [m].
+        deadline: When to give up.
 
     Returns:
         One row of evidence with the largest disagreement; none for an empty scene.
+
+    Raises:
+        OutOfTime: If the time is over.
     """
     scene, n_links = problem.scene, problem.manipulator.n_links
     if not scene.obstacles:
         return ()
     count, worst, where, moment = 0, -np.inf, "", float("nan")
     reach, travel = reach_of(problem), TOLERANCES.coal_travel
-    for found in coal_distances(robot, problem, trajectory, reach, travel):
+    for found in coal_distances(robot, problem, trajectory, reach, travel, deadline):
         excess = found.disagreement
         if proved is not None:
             excess = np.maximum(excess, _below_proof(found, proved, n_links))
@@ -147,6 +157,7 @@ def coal_distances(
     trajectory: Trajectory,
     reach: float,
     travel: float = 0.0,
+    deadline: Deadline = NO_LIMIT,
 ) -> Iterator[CoalDistances]:
     """Measure the pairs within reach, chunk by chunk, then every pair not yet seen.
 
@@ -157,20 +168,25 @@ def coal_distances(
         reach: Measure where the coarse bound is at most this; inf for everything; [m].
         travel: Look at one row of each stretch in which the joint centres move by this
             much; 0 for every row; [m].
+        deadline: When to give up.
 
     Yields:
         Distances in the order of the rows; last the pairs that were not measured, each
         at the row where its coarse bound is least.
+
+    Raises:
+        OutOfTime: If the time is over.
     """
     arm, obstacles = problem.manipulator, problem.scene.obstacles
     pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
-    bodies = [coal_bodies(obstacle) for obstacle in obstacles]
+    bodies = [_bodies_of(obstacle, deadline) for obstacle in obstacles]
     least = np.full((arm.n_links, len(obstacles)), np.inf)
     nearest = np.zeros(least.shape, dtype=np.int64)
     seen = np.zeros(least.shape, dtype=np.bool_)
     moved = _Moved(travel)
     step = max(1, CHUNK_BOUNDS // least.size)
     for first in range(0, trajectory.n_samples, step):
+        deadline.check()
         part = slice(first, first + step)
         joints = trajectory.x0[part], trajectory.alpha[part], trajectory.theta[part]
         centres = joint_centres(arm, *joints)
@@ -184,12 +200,28 @@ def coal_distances(
         close = np.argwhere(within)
         if close.size:
             close[:, 0] += first
-            yield _measured(robot, trajectory, arm.link_radius, pieces, bodies, close)
+            for some in in_turns(close, deadline):
+                yield _measured(
+                    robot, trajectory, arm.link_radius, pieces, bodies, some
+                )
     unseen = np.argwhere(~seen)
     if unseen.size:
         rows = nearest[unseen[:, 0], unseen[:, 1]]
         far = np.column_stack([rows, unseen])
-        yield _measured(robot, trajectory, arm.link_radius, pieces, bodies, far)
+        for some in in_turns(far, deadline):
+            yield _measured(robot, trajectory, arm.link_radius, pieces, bodies, some)
+
+
+def _bodies_of(obstacle: Obstacle, deadline: Deadline) -> tuple[CoalBody, ...]:
+    deadline.check()
+    return coal_bodies(obstacle)
+
+
+def in_turns(pairs: IntArray, deadline: Deadline) -> Iterator[IntArray]:
+    """The same pairs, so many at a time that a deadline is heard in between."""
+    for first in range(0, len(pairs), CHUNK_PAIRS):
+        deadline.check()
+        yield pairs[first : first + CHUNK_PAIRS]
 
 
 class _Moved:

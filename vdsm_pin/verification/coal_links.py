@@ -15,10 +15,11 @@ from vdsm_pin.geometry.row_bounds import link_gaps
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.coal_bodies import CoalBody, distance_request, measure
-from vdsm_pin.verification.coal_clearance import capsule_transforms
+from vdsm_pin.verification.coal_clearance import capsule_transforms, in_turns
 from vdsm_pin.verification.records import Check, Verdict
 
 CHUNK_GAPS: Final = 1 << 20
@@ -57,7 +58,10 @@ NAME: Final = "distances between links by Coal against the closed form"
 
 
 def check_coal_links(
-    robot: RobotModel, problem: PlanningProblem, trajectory: Trajectory
+    robot: RobotModel,
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    deadline: Deadline = NO_LIMIT,
 ) -> tuple[Check, ...]:
     """Hold Coal's distances between links two or more apart against the closed form.
 
@@ -65,11 +69,15 @@ def check_coal_links(
         robot: The arm in Pinocchio and Coal.
         problem: Names the arm and the required self-clearance.
         trajectory: What is judged.
+        deadline: When to give up.
 
     Returns:
         One row of evidence with the largest disagreement; none for an arm of two links.
         Measured are the pairs nearer than the required self-clearance and a link's
         radius past it, and every pair where it is nearest.
+
+    Raises:
+        OutOfTime: If the time is over.
     """
     n_links = problem.manipulator.n_links
     n_pairs = (n_links - 1) * (n_links - 2) // 2
@@ -77,7 +85,7 @@ def check_coal_links(
         return ()
     reach = problem.required_self_clearance + problem.manipulator.link_radius
     count, worst, where, moment = 0, -np.inf, "", float("nan")
-    for found in link_distances(robot, trajectory, reach):
+    for found in link_distances(robot, trajectory, reach, deadline):
         excess = np.where(np.isnan(found.disagreement), np.inf, found.disagreement)
         count += excess.size
         k = int(np.argmax(excess))
@@ -104,7 +112,10 @@ def check_coal_links(
 
 
 def link_distances(
-    robot: RobotModel, trajectory: Trajectory, reach: float
+    robot: RobotModel,
+    trajectory: Trajectory,
+    reach: float,
+    deadline: Deadline = NO_LIMIT,
 ) -> Iterator[LinkDistances]:
     """Measure the pairs of links within reach, then every pair not yet seen.
 
@@ -112,10 +123,14 @@ def link_distances(
         robot: The arm in Pinocchio and Coal.
         trajectory: The rows.
         reach: Measure where the closed form is at most this; inf for everything; [m].
+        deadline: When to give up.
 
     Yields:
         Distances in the order of the rows; last the pairs that never came within
         reach, each at the row where it is nearest.
+
+    Raises:
+        OutOfTime: If the time is over.
     """
     arm = robot.manipulator
     least = np.full((arm.n_links, arm.n_links), np.inf)
@@ -123,6 +138,7 @@ def link_distances(
     apart = np.triu(np.ones(least.shape, dtype=bool), k=2)
     step = max(1, CHUNK_GAPS // least.size)
     for first in range(0, trajectory.n_samples, step):
+        deadline.check()
         part = slice(first, first + step)
         joints = trajectory.x0[part], trajectory.alpha[part], trajectory.theta[part]
         gaps = link_gaps(joint_centres(arm, *joints), arm.link_radius)
@@ -131,10 +147,10 @@ def link_distances(
         nearer = value < least
         least[nearer], nearest[nearer] = value[nearer], here[nearer] + first
         close = np.argwhere((gaps <= reach) & apart)
-        if close.size:
-            expected = gaps[tuple(close.T)]
-            close[:, 0] += first
-            yield _measured(robot, trajectory, close, expected)
+        for some in in_turns(close, deadline):
+            expected = gaps[tuple(some.T)]
+            some[:, 0] += first
+            yield _measured(robot, trajectory, some, expected)
     unseen = np.argwhere((least > reach) & apart)
     if unseen.size:
         rows = nearest[tuple(unseen.T)]

@@ -11,6 +11,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.coal_clearance import CoalDistances, coal_distances
 
@@ -40,7 +41,10 @@ class Missing:
 
 
 def coal_missing(
-    robot: RobotModel, problem: PlanningProblem, trajectory: Trajectory
+    robot: RobotModel,
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    deadline: Deadline = NO_LIMIT,
 ) -> tuple[Missing, ...]:
     """Links that miss the required clearance at a row, as Coal measures it.
 
@@ -48,17 +52,21 @@ def coal_missing(
         robot: The arm in Pinocchio and Coal.
         problem: The scene and the required clearance.
         trajectory: Every row is looked at.
+        deadline: When to give up.
 
     Returns:
         One entry for each link and obstacle that come too near, at their worst row, in
         the order of links and obstacles. A distance that Coal cannot tell is no reason
         to move: the proof decides.
+
+    Raises:
+        OutOfTime: If the time is over.
     """
     if not problem.scene.obstacles:
         return ()
     reach = problem.required_clearance + NEAR * problem.manipulator.link_radius
     worst: dict[tuple[int, int], Missing] = {}
-    for found in coal_distances(robot, problem, trajectory, reach):
+    for found in coal_distances(robot, problem, trajectory, reach, deadline=deadline):
         for k in np.flatnonzero(found.distance < problem.required_clearance):
             if not np.isfinite(found.distance[k]):
                 continue

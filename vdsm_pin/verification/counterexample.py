@@ -18,6 +18,7 @@ from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, TIME
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.scene import Scene
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
@@ -230,6 +231,7 @@ def find_counterexamples(
     trajectory: Trajectory,
     errors: ErrorBox,
     proof: ClearanceProof,
+    deadline: Deadline = NO_LIMIT,
 ) -> tuple[Counterexample, ...]:
     """Motions within the error box that miss what the proof left undecided.
 
@@ -238,10 +240,14 @@ def find_counterexamples(
         trajectory: The nominal motion.
         errors: The box.
         proof: The proof for it.
+        deadline: When to give up.
 
     Returns:
         One against obstacles and one between links, at most; none where the nominal
         motion itself is refuted.
+
+    Raises:
+        OutOfTime: If the time is over.
     """
     if errors == ErrorBox():
         return ()
@@ -253,6 +259,7 @@ def find_counterexamples(
             continue
         among = np.flatnonzero(mine & (proof.counts[:, UNDECIDED] > 0))
         for k in among[np.argsort(proof.best[among, LOW], kind="stable")][:PAIRS]:
+            deadline.check()
             search = Search(problem, trajectory, proof.pairs[k])
             one = search.find(errors, moments_of(proof.best[k]))
             if one:

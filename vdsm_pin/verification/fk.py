@@ -7,6 +7,7 @@ import numpy as np
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import Check, Verdict
@@ -20,7 +21,10 @@ NAME: Final = "joint centres by Pinocchio against the closed form"
 
 
 def check_fk(
-    robot: RobotModel, problem: PlanningProblem, trajectory: Trajectory
+    robot: RobotModel,
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    deadline: Deadline = NO_LIMIT,
 ) -> Check:
     """Compare every joint centre of every row.
 
@@ -28,14 +32,19 @@ def check_fk(
         robot: The arm in Pinocchio.
         problem: Names the arm of the closed form.
         trajectory: What is judged.
+        deadline: When to give up.
 
     Returns:
         The largest distance between the two, in metres. They compute the same thing, so
         a difference refutes one of them and with it every other check. It is often 0 to
         the last bit, because both turn by yaw and pitch in the same order.
+
+    Raises:
+        OutOfTime: If the time is over.
     """
     worst, row, joint = -np.inf, 0, 0
     for first in range(0, trajectory.n_samples, CHUNK):
+        deadline.check()
         part = slice(first, first + CHUNK)
         joints = trajectory.x0[part], trajectory.alpha[part], trajectory.theta[part]
         planned = joint_centres(problem.manipulator, *joints)

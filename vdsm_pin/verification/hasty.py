@@ -7,6 +7,7 @@ import numpy as np
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.blocks import sweep
 from vdsm_pin.proof.desk import forget
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.proving import new_proving
@@ -27,11 +28,19 @@ class HastyProof:
     Args:
         problem: Arm, scene, required clearances.
         trajectory: The motion; one row counts as an interval without motion.
+        deadline: When to give up.
     """
 
-    def __init__(self, problem: PlanningProblem, trajectory: Trajectory) -> None:
+    def __init__(
+        self,
+        problem: PlanningProblem,
+        trajectory: Trajectory,
+        deadline: Deadline = NO_LIMIT,
+    ) -> None:
         # Nobody asks for a profile: all intervals share its one bin.
-        self._proving = new_proving(problem, trajectory, ErrorBox(), values=1)
+        self._proving = new_proving(
+            problem, trajectory, ErrorBox(), values=1, deadline=deadline
+        )
         task = self._proving.task
         pairs = task.pairs._replace(required=task.pairs.required + BEYOND)
         self._task = task._replace(pairs=pairs)
@@ -41,6 +50,9 @@ class HastyProof:
         """Whether every interval from `first` to below `last` is proved.
 
         Stops at the first that is not.
+
+        Raises:
+            OutOfTime: If the time is over.
         """
         known, task = self._proving, with_errors(self._task, errors)
         # Pairs that remember nothing: the answer depends on the question alone.
@@ -48,12 +60,21 @@ class HastyProof:
         # No least clearance is asked for: whatever is proved may be culled.
         known.results.limit[:] = -np.inf
         args = task, known.motion, known.desk, known.results, known.culling
-        return bool(sweep(*args, first, last, True))
+        proved = bool(sweep(*args, first, last, True))
+        known.deadline.check()
+        return proved
 
 
 def is_certified(
-    problem: PlanningProblem, trajectory: Trajectory, errors: ErrorBox
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    errors: ErrorBox,
+    deadline: Deadline = NO_LIMIT,
 ) -> bool:
-    """Whether the clearance proof goes through; stops at the first gap."""
-    proof = HastyProof(problem, trajectory)
+    """Whether the clearance proof goes through; stops at the first gap.
+
+    Raises:
+        OutOfTime: If the time is over.
+    """
+    proof = HastyProof(problem, trajectory, deadline)
     return proof.holds(errors, 0, proof.n_intervals)

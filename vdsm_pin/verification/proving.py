@@ -13,6 +13,7 @@ from vdsm_pin.proof.desk import Desk, new_desk
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, BEST, TALLY, TIME
 from vdsm_pin.proof.results import Candidates, Dense, Results
 from vdsm_pin.proof.terms import Motion, Task
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.task import make_task
@@ -84,9 +85,10 @@ class Proving:
     results: Results
     culling: Culling
     n_intervals: int
+    deadline: Deadline
 
     def sweep(self, results: Results, first: int, last: int) -> None:
-        """Judge some intervals."""
+        """Judge some intervals, all of them unless the time is over."""
         sweep(
             self.task,
             self.motion,
@@ -106,6 +108,7 @@ def new_proving(
     pieces: PackedPieces | None = None,
     values: int = PROFILE_VALUES,
     budget: int = BUDGET,
+    deadline: Deadline = NO_LIMIT,
 ) -> Proving:
     """Everything ready, nothing judged.
 
@@ -116,8 +119,9 @@ def new_proving(
         pieces: `pack_scene(problem)`, where it is known already.
         values: Most values of the profile.
         budget: Most slices of one interval and pair.
+        deadline: When to stop; who sweeps asks it afterwards.
     """
-    task = make_task(problem, errors, pieces)
+    task = make_task(problem, errors, pieces, deadline)
     n_pairs, n_links = task.pairs.link.size, problem.manipulator.n_links
     n_intervals = max(1, trajectory.n_samples - 1)
     n_obstacles = len(problem.scene.obstacles)
@@ -128,4 +132,5 @@ def new_proving(
         results=new_results(n_pairs, n_links + n_obstacles, n_intervals, values),
         culling=new_culling(task.pieces, n_links, n_obstacles, n_pairs),
         n_intervals=n_intervals,
+        deadline=deadline,
     )

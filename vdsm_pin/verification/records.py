@@ -228,6 +228,9 @@ class Verification(Summarised):
             counterexample; NaN if none was looked for or found; [rad].
         counterexamples: Motions within the error box that miss a required clearance:
             one against obstacles, one between links, at most.
+        not_done: What the time limit left out besides checks, which have their rows;
+            in words, one thing each.
+        time_limit: How long all of it was allowed to take; [s].
     """
 
     problem: PlanningProblem
@@ -243,6 +246,8 @@ class Verification(Summarised):
     joint_error: float
     refuted_joint_error: float = nan
     counterexamples: tuple[Counterexample, ...] = ()
+    not_done: tuple[str, ...] = ()
+    time_limit: float = float("inf")
 
     @property
     def verdict(self) -> Verdict:

@@ -17,6 +17,7 @@ import numpy as np
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.proof.terms import UNDECIDED
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.counterexample import Search, moments_of
@@ -48,7 +49,10 @@ LOOKS: Final = 8
 
 
 def largest_joint_error(
-    problem: PlanningProblem, trajectory: Trajectory, errors: ErrorBox
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    errors: ErrorBox,
+    deadline: Deadline = NO_LIMIT,
 ) -> float:
     """The largest joint error for which the clearance proof still goes through.
 
@@ -56,12 +60,16 @@ def largest_joint_error(
         problem: Arm, scene, required clearances.
         trajectory: The motion.
         errors: Base and obstacle errors to assume besides; its joint error is ignored.
+        deadline: When to give up.
 
     Returns:
         A joint error that was proved, within `TOLERANCES.joint_error` of one that was
         not; 0 where not even the nominal motion is certified; [rad].
+
+    Raises:
+        OutOfTime: If the time is over.
     """
-    proof = HastyProof(problem, trajectory)
+    proof = HastyProof(problem, trajectory, deadline)
     end = proof.n_intervals
     largest = LARGEST
     for first in _shuffled(range(0, end, STRETCH)):
@@ -71,23 +79,29 @@ def largest_joint_error(
 
 
 def sturdiest(
-    problem: PlanningProblem, motions: Sequence[Trajectory]
+    problem: PlanningProblem,
+    motions: Sequence[Trajectory],
+    deadline: Deadline = NO_LIMIT,
 ) -> tuple[int, float]:
     """Which of several motions survives the largest joint error.
 
     Args:
         problem: Arm, scene, required clearances.
         motions: At least one; of equals the first is taken.
+        deadline: When to give up.
 
     Returns:
         Its number, and its largest certified joint error; [rad].
+
+    Raises:
+        OutOfTime: If the time is over.
     """
     none = ErrorBox()
-    best, largest = 0, largest_joint_error(problem, motions[0], none)
+    best, largest = 0, largest_joint_error(problem, motions[0], none, deadline)
     for number, motion in enumerate(motions[1:], start=1):
         # Most are told apart by the first gap in the proof of what the best survives.
-        if is_certified(problem, motion, ErrorBox(joint=largest)):
-            error = largest_joint_error(problem, motion, none)
+        if is_certified(problem, motion, ErrorBox(joint=largest), deadline):
+            error = largest_joint_error(problem, motion, none, deadline)
             if error > largest:
                 best, largest = number, error
     return best, largest
@@ -127,6 +141,7 @@ def refuted_joint_error(
     trajectory: Trajectory,
     errors: ErrorBox,
     certified: float,
+    deadline: Deadline = NO_LIMIT,
 ) -> float:
     """A joint error at which the clearance is lost, the smallest that is found.
 
@@ -135,17 +150,23 @@ def refuted_joint_error(
         trajectory: The motion.
         errors: As for `largest_joint_error`.
         certified: What that one found; [rad].
+        deadline: When to give up.
 
     Returns:
         The largest offset of a counterexample; NaN where none was found; [rad].
+
+    Raises:
+        OutOfTime: If the time is over.
     """
-    proof, above = HastyProof(problem, trajectory), certified + TOLERANCES.joint_error
+    proof = HastyProof(problem, trajectory, deadline)
+    above = certified + TOLERANCES.joint_error
     lost = _first_lost(partial(_holds, proof, errors, joint=above), proof.n_intervals)
     if lost is None:
         return nan
     weakest = trajectory.part(max(0, lost - AROUND), lost + AROUND + 2)
     for factor in FACTORS:
-        found = _smallest(problem, weakest, replace(errors, joint=factor * above))
+        box = replace(errors, joint=factor * above)
+        found = _smallest(problem, weakest, box, deadline)
         if found:
             return min(found)
     return nan
@@ -169,17 +190,23 @@ def _first_lost(holds: Callable[[int, int], bool], end: int) -> int | None:
 
 
 def _smallest(
-    problem: PlanningProblem, trajectory: Trajectory, errors: ErrorBox
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    errors: ErrorBox,
+    deadline: Deadline,
 ) -> list[float]:
     """Joint errors of counterexamples of pairs that a few slices leave undecided."""
-    proving = new_proving(problem, trajectory, errors, values=1, budget=LOOKS)
+    proving = new_proving(
+        problem, trajectory, errors, values=1, budget=LOOKS, deadline=deadline
+    )
     proving.sweep(proving.results, 0, proving.n_intervals)
     best, counts = proving.results.best, proving.results.counts
     among = np.flatnonzero(counts[:, UNDECIDED] > 0)
     nearest = among[np.argsort(best[among, LOW], kind="stable")][:SOUGHT]
     pairs = all_pairs(problem)
-    searches = [
-        Search(problem, trajectory, pairs[k]).smallest(errors, moments_of(best[k]))
-        for k in nearest
-    ]
+    searches = []
+    for k in nearest:
+        deadline.check()
+        search = Search(problem, trajectory, pairs[k])
+        searches.append(search.smallest(errors, moments_of(best[k])))
     return [float(np.abs(found.offsets[1:]).max()) for found in searches if found]

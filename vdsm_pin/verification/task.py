@@ -8,6 +8,7 @@ from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.terms import BASE, Pairs, Rules, Task
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import arithmetic_pad
 from vdsm_pin.verification.records import ErrorBox, Pair
@@ -57,7 +58,10 @@ def pack_scene(problem: PlanningProblem) -> PackedPieces:
 
 
 def make_task(
-    problem: PlanningProblem, errors: ErrorBox, pieces: PackedPieces | None = None
+    problem: PlanningProblem,
+    errors: ErrorBox,
+    pieces: PackedPieces | None = None,
+    deadline: Deadline = NO_LIMIT,
 ) -> Task:
     """What the kernels need to know of a problem."""
     arm, packed = problem.manipulator, pieces or pack_scene(problem)
@@ -71,6 +75,7 @@ def make_task(
         goal=TOLERANCES.bracket_gap,
         gap=TOLERANCES.least_bracket,
         slack=SLACK,
+        until=deadline.end,
     )
     return with_errors(Task(packed, _packed_pairs(problem), rules), errors)
 

@@ -1,16 +1,18 @@
 """The judgement of a trajectory: every check, one row each, in a fixed order."""
 
 from collections.abc import Callable, Sequence
-from typing import Final
+from math import nan
+from typing import Final, TypeVar
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidInput, VdsmError
+from vdsm_pin.errors import InvalidInput, OutOfTime, VdsmError
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.layouts import AT_UPPER, LOW, OTHER, OWN, TIME, UP
 from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification import cable_check, coal_clearance, coal_links, fk, inside
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
@@ -22,12 +24,15 @@ from vdsm_pin.verification.records import (
     ClearanceChunk,
     ClearanceSink,
     ClosestApproach,
+    Counterexample,
     ErrorBox,
     Verdict,
     Verification,
 )
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.tip import check_tip
+
+T = TypeVar("T")
 
 CLOSEST: Final = 10
 """Pairs listed as the closest approaches."""
@@ -44,6 +49,7 @@ def verify(
     errors: ErrorBox | None = None,
     sinks: Sequence[ClearanceSink] = (),
     joint_error: bool = False,
+    deadline: Deadline = NO_LIMIT,
 ) -> Verification:
     """Judge a trajectory against a problem.
 
@@ -54,9 +60,11 @@ def verify(
         errors: The clearance proof covers every motion within it.
         sinks: Receive the clearance brackets in chunks, in order.
         joint_error: Whether to find the largest joint error that is still certified.
+        deadline: When to give up what is left.
 
     Returns:
-        All rows of evidence. A check that could not be carried out is an undecided row.
+        All rows of evidence. A check that could not be carried out, or not in time, is
+        an undecided row.
 
     Raises:
         InvalidInput: If the trajectory is of another arm or the errors are negative.
@@ -65,31 +73,43 @@ def verify(
     _check_input(problem, trajectory, box)
     kept = _Lowers(problem, trajectory)
     wanted = [*sinks, kept.keep] if kept.fits else list(sinks)
-    proof = prove_clearance(problem, trajectory, box, wanted)
+    proof = prove_clearance(problem, trajectory, box, wanted, deadline=deadline)
+    besides = _Besides()
+    none: tuple[Counterexample, ...] = ()
+    found = besides.take(
+        "search for counterexamples",
+        lambda: find_counterexamples(problem, trajectory, box, proof, deadline),
+        none,
+    )
+    if sinks and proof.sent < proof.n_intervals:
+        besides.note(f"clearance.csv from interval {proof.sent} on", deadline)
     tip = check_tip(problem, trajectory)
-    found = find_counterexamples(problem, trajectory, box, proof)
+    proved = kept.proved if proof.sent == proof.n_intervals else None
     checks = [
-        *_guarded(fk.NAME, lambda: fk.check_fk(robot, problem, trajectory)),
+        *_guarded(fk.NAME, lambda: fk.check_fk(robot, problem, trajectory, deadline)),
         *check_limits(problem, trajectory),
         *tip.checks,
-        *check_clearance(problem, proof, found),
+        *check_clearance(problem, proof, found, deadline),
         *_guarded(inside.NAME, lambda: inside.check_inside(problem, trajectory)),
+        *_by_coal(robot, problem, trajectory, proved, deadline),
         *_guarded(
-            coal_clearance.NAME,
-            lambda: coal_clearance.check_coal(robot, problem, trajectory, kept.proved),
-        ),
-        *_guarded(
-            coal_links.NAME,
-            lambda: coal_links.check_coal_links(robot, problem, trajectory),
-        ),
-        *_guarded(
-            cable_check.NAME, lambda: cable_check.check_cables(problem, trajectory)
+            cable_check.NAME,
+            lambda: cable_check.check_cables(problem, trajectory, deadline),
         ),
     ]
-    largest = refuted = float("nan")
+    largest = refuted = nan
     if joint_error:
-        largest = largest_joint_error(problem, trajectory, box)
-        refuted = refuted_joint_error(problem, trajectory, box, largest)
+        largest = besides.take(
+            "largest joint error",
+            lambda: largest_joint_error(problem, trajectory, box, deadline),
+            nan,
+        )
+    if not np.isnan(largest):
+        refuted = besides.take(
+            "joint error that loses the clearance",
+            lambda: refuted_joint_error(problem, trajectory, box, largest, deadline),
+            nan,
+        )
     return Verification(
         problem=problem,
         trajectory=trajectory,
@@ -104,6 +124,49 @@ def verify(
         joint_error=largest,
         refuted_joint_error=refuted,
         counterexamples=found,
+        not_done=tuple(besides.not_done),
+        time_limit=deadline.limit,
+    )
+
+
+class _Besides:
+    """What is wanted besides the checks, as far as the time allows it."""
+
+    def __init__(self) -> None:
+        self.not_done: list[str] = []
+
+    def take(self, name: str, run: Callable[[], T], otherwise: T) -> T:
+        """A result, and a note where there is none in time."""
+        try:
+            return run()
+        except OutOfTime as error:
+            self.not_done.append(f"{name}: {error}")
+            return otherwise
+
+    def note(self, name: str, deadline: Deadline) -> None:
+        """Say that something is missing."""
+        self.not_done.append(f"{name}: {OutOfTime(deadline.limit)}")
+
+
+def _by_coal(
+    robot: RobotModel,
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    proved: FloatArray | None,
+    deadline: Deadline,
+) -> tuple[Check, ...]:
+    """The second opinions on distances."""
+    return (
+        *_guarded(
+            coal_clearance.NAME,
+            lambda: coal_clearance.check_coal(
+                robot, problem, trajectory, proved, deadline
+            ),
+        ),
+        *_guarded(
+            coal_links.NAME,
+            lambda: coal_links.check_coal_links(robot, problem, trajectory, deadline),
+        ),
     )
 
 
@@ -148,8 +211,7 @@ def _guarded(
     try:
         rows = run()
     except (VdsmError, ArithmeticError) as error:
-        nan = float("nan")
-        return (Check(name, Verdict.UNDECIDED, 0, nan, nan, "-", f"not run: {error}"),)
+        return (Check(name, Verdict.UNDECIDED, 0, nan, nan, "-", f"not done: {error}"),)
     return rows if isinstance(rows, tuple) else (rows,)
 
 
@@ -182,7 +244,8 @@ def closest_approaches(
     """
     rows = []
     of_links = np.array([not pair.obstacle for pair in proof.pairs])
-    for k in np.lexsort((proof.best[:, UP], of_links))[:CLOSEST]:
+    seen = np.flatnonzero(np.isfinite(proof.best[:, UP]))
+    for k in seen[np.lexsort((proof.best[seen, UP], of_links[seen]))][:CLOSEST]:
         pair, row = proof.pairs[k], proof.best[k]
         points = row[OWN:OTHER], row[OTHER : OTHER + 3]
         # In a pair of links the sweep moves the second one against the first.

@@ -18,6 +18,7 @@ from vdsm_pin.planner.time_limit import within_time
 from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.scene import Box, HalfSpace, Sphere
+from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.hasty import is_certified
 from vdsm_pin.verification.link_clearance import link_clearance
@@ -239,7 +240,7 @@ def test_clearest_keeps_much_more_clearance_and_survives_larger_joint_errors(
 def test_a_time_limit_stops_and_tells_how_far_it_came_and_never_steers() -> None:
     task = random_problem(1, clutter=True)
     clearance = link_clearance(task)
-    limited = plan_fewest(task, within_time(clearance, 1000.0), 0.0)
+    limited = plan_fewest(task, within_time(clearance, Deadline.after(1000.0)), 0.0)
     free = plan_fewest(task, clearance, 0.0)
     np.testing.assert_array_equal(limited.trajectory.joints, free.trajectory.joints)
     calls = 0
@@ -251,7 +252,9 @@ def test_a_time_limit_stops_and_tells_how_far_it_came_and_never_steers() -> None
             raise OutOfTime(0.5)
         return clearance(centres)
 
-    with pytest.raises(OutOfTime, match=r"limit of 0\.5 s; drew 0\.000 m of 6\.000 m"):
+    with pytest.raises(
+        OutOfTime, match=r"limit of 0\.5 s came first; drew 0\.000 m of 6\.000 m"
+    ):
         plan_fewest(task, slow, 0.0)
     with pytest.raises(OutOfTime, match="limit of 0 s"):
-        plan_fewest(task, within_time(clearance, 0.0), 0.0)
+        plan_fewest(task, within_time(clearance, Deadline.after(0.0)), 0.0)

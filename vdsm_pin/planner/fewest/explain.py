@@ -10,6 +10,7 @@ from vdsm_pin.errors import (
     Infeasible,
     NoPlanFound,
     OutOfReach,
+    OutOfTime,
     PathBlocked,
 )
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
@@ -24,8 +25,10 @@ from vdsm_pin.planner.fewest.passage import narrowest
 from vdsm_pin.planner.fewest.poses import bends_of
 from vdsm_pin.planner.fewest.route import PathRows
 from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.planner.time_limit import deadline_of
 from vdsm_pin.planner.upper_clearance import culprit, upper_clearance
 from vdsm_pin.problem import Blocked, PlanningProblem
+from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 
@@ -45,7 +48,7 @@ def refuse_proved(problem: PlanningProblem, outcome: Outcome) -> None:
     shut = _length(rows, _either_end(proof.closed))
     whole = problem.path.blocked is Blocked.FAIL
     if proof.closed.all() or (whole and shut > 0.0):
-        raise _proved(problem, rows, proof)
+        raise _proved(problem, rows, proof, deadline_of(outcome.judge.clearance))
 
 
 def refuse(problem: PlanningProblem, outcome: Outcome) -> None:
@@ -82,7 +85,9 @@ def _length(rows: PathRows, picked: BoolArray) -> float:
     return float(np.diff(rows.stations)[picked].sum())
 
 
-def _proved(problem: PlanningProblem, rows: PathRows, proof: TipProof) -> Infeasible:
+def _proved(
+    problem: PlanningProblem, rows: PathRows, proof: TipProof, deadline: Deadline
+) -> Infeasible:
     if proof.far.any():
         distance = np.hypot(rows.tips[:, 1], rows.tips[:, 2])
         worst = int(np.argmax(distance))
@@ -96,7 +101,7 @@ def _proved(problem: PlanningProblem, rows: PathRows, proof: TipProof) -> Infeas
         first = int(np.flatnonzero(proof.hemmed_in)[0])
         return HemmedIn(station=float(rows.stations[first]))
     if not proof.buried.any():
-        return _cut_off(problem, rows, proof)
+        return _cut_off(problem, rows, proof, deadline)
     first = int(np.flatnonzero(proof.buried)[0])
     tip = rows.tips[first]
     _, name, room = culprit(problem, np.stack([tip, tip]))
@@ -110,9 +115,14 @@ def _proved(problem: PlanningProblem, rows: PathRows, proof: TipProof) -> Infeas
     )
 
 
-def _cut_off(problem: PlanningProblem, rows: PathRows, proof: TipProof) -> Infeasible:
+def _cut_off(
+    problem: PlanningProblem, rows: PathRows, proof: TipProof, deadline: Deadline
+) -> Infeasible:
     first = int(np.flatnonzero(proof.cut_off)[0])
-    place = narrowest(problem, rows.tips[first])
+    try:
+        place = narrowest(problem, rows.tips[first], deadline)
+    except OutOfTime:  # the proof stands without it
+        place = None
     words = ""
     if place is not None:
         room = upper_clearance(problem, np.stack([place, place])[None])[0]
@@ -131,6 +141,8 @@ def how_far(problem: PlanningProblem, outcome: Outcome) -> str:
     """Where the search came to an end, in words; not a proof."""
     drawn = _drawn(problem, outcome)
     route = None if outcome.found is None else outcome.found.route
+    if outcome.found is not None and drawn >= problem.path.length:
+        return "a motion that draws the whole path was found, but not finished"
     station, tip = 0.0, outcome.rows.tips[0]
     if outcome.found is not None and route is not None:
         skipped = [k for k in outcome.found.skipped if not route.closed[k]]

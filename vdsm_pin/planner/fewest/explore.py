@@ -161,7 +161,7 @@ def _proofs(
     hemmed[open_] = hemmed_in(problem, enough, tips[open_])
     proof = replace(proof, hemmed_in=hemmed)
     yield proof
-    yield replace(proof, cut_off=cut_off(problem, tips))
+    yield replace(proof, cut_off=cut_off(problem, tips, clearance.deadline))
 
 
 def _look(

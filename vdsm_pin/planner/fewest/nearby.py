@@ -17,8 +17,10 @@ from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.planner.fewest.cores import blocked_by, cores_of
 from vdsm_pin.planner.fewest.surfaces import STEP, Surfaces, surfaces_of
 from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.planner.time_limit import deadline_of
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.scene import Mesh, Obstacle
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 
 FAR = 0.08
@@ -46,6 +48,7 @@ class Nearby:
         radius: Radius of the links; [m].
         floor: Clearance below which -inf will do; [m].
         far: A bound from boxes above this is left as it is; [m].
+        deadline: When planning must have ended.
     """
 
     clearance: LinkClearance
@@ -56,14 +59,16 @@ class Nearby:
     radius: float
     floor: float
     far: float = FAR
+    deadline: Deadline = NO_LIMIT
 
     def __call__(self, centres: FloatArray) -> FloatArray:
         """Joint centres (n, m + 1, 3) to lower bounds (n, m); [m]."""
+        self.deadline.check()
         ends = np.stack([centres[:, :-1], centres[:, 1:]], axis=2).reshape(-1, 2, 3)
         enough = self.far + self.radius
         room = _box_bounds(ends, self.boxes, self.planes, STRETCHES, enough)
         room -= self.radius
-        mesh = self.surfaces.least(ends, enough) - self.radius
+        mesh = self.surfaces.least(ends, enough, self.deadline) - self.radius
         # A step below the distance will do, but not where it decides.
         near = room < self.far
         near |= mesh < min(self.far, self.floor + STEP)
@@ -101,6 +106,7 @@ def nearby(problem: PlanningProblem, clearance: LinkClearance) -> Nearby:
         surfaces_of(obstacles),
         problem.manipulator.link_radius,
         problem.required_clearance - TOLERANCES.planned_clearance,
+        deadline=deadline_of(clearance),
     )
 
 

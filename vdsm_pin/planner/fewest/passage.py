@@ -27,6 +27,7 @@ from vdsm_pin.planner.fewest.cells import (
 )
 from vdsm_pin.planner.upper_clearance import upper_bounds
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 
 MOST_CELLS: Final = 60_000
@@ -49,7 +50,8 @@ DETOUR: Final = 1.001
 class _Cells:
     """The octree over all places a tip can be."""
 
-    def __init__(self, problem: PlanningProblem) -> None:
+    def __init__(self, problem: PlanningProblem, deadline: Deadline) -> None:
+        self.deadline = deadline
         arm = problem.manipulator
         low, high = arm.base_range
         solids = [obstacle.pieces for obstacle in problem.scene.obstacles]
@@ -88,7 +90,9 @@ class _Cells:
             Shape (n, n_obstacles), or (n, 1) of one obstacle.
         """
         pieces = self.pieces[obstacle]
-        upper = upper_bounds(pieces, np.stack([points, points], axis=1))
+        ends = np.stack([points, points], axis=1)
+        upper = upper_bounds(pieces, ends, self.deadline.end)
+        self.deadline.check()
         return np.asarray(np.maximum(upper, 0.0) + self.inside)
 
     def _states(self, codes: IntArray, levels: IntArray) -> tuple[IntArray, FloatArray]:
@@ -177,23 +181,36 @@ class _Cells:
         self.codes, self.levels, self.state, self.middle = codes, levels, state, middle
 
 
-def cut_off(problem: PlanningProblem, tips: FloatArray) -> BoolArray:
+def cut_off(
+    problem: PlanningProblem, tips: FloatArray, deadline: Deadline = NO_LIMIT
+) -> BoolArray:
     """Which tips no way leads to from the start; proved, but not every such tip found.
 
     Args:
         problem: Arm, scene, start, required clearance.
         tips: Shape (n, 3); [m].
+        deadline: When to give up.
 
     Returns:
         Shape (n,).
+
+    Raises:
+        OutOfTime: If the time is over.
     """
-    return _decided(problem, tips)[1]
+    return _decided(problem, tips, deadline)[1]
 
 
-def _decided(problem: PlanningProblem, tips: FloatArray) -> tuple[_Cells, BoolArray]:
-    """Cells halved until every tip is reached or cut off, or there are too many."""
-    cells = _Cells(problem)
+def _decided(
+    problem: PlanningProblem, tips: FloatArray, deadline: Deadline
+) -> tuple[_Cells, BoolArray]:
+    """Cells halved until every tip is reached or cut off, or there are too many.
+
+    Raises:
+        OutOfTime: If the time is over.
+    """
+    cells = _Cells(problem, deadline)
     while True:
+        deadline.check()
         home, goals = cells.holders(problem.path.start[None]), cells.holders(tips)
         # A cell whose centre is clear hardly ever ends a way.
         light = np.where(cells.middle < 0.0, 1.0, LIGHT)
@@ -213,13 +230,18 @@ def _decided(problem: PlanningProblem, tips: FloatArray) -> tuple[_Cells, BoolAr
         cells.split(cells.closest(np.flatnonzero(good)))
 
 
-def narrowest(problem: PlanningProblem, tip: FloatArray) -> FloatArray | None:
+def narrowest(
+    problem: PlanningProblem, tip: FloatArray, deadline: Deadline = NO_LIMIT
+) -> FloatArray | None:
     """Where the widest way tried to a tip that is cut off is shut, shape (3,); [m].
 
     An answer to show, not a proof: ways are compared cell by cell. None where no
     obstacle is too close to the place found.
+
+    Raises:
+        OutOfTime: If the time is over.
     """
-    cells, _ = _decided(problem, tip[None])
+    cells, _ = _decided(problem, tip[None], deadline)
     place = 0
     for _ in range(CLOSER):
         home, goal = cells.holders(problem.path.start[None]), cells.holders(tip[None])

@@ -117,8 +117,6 @@ def _if_found(plan: Callable[[], Plan]) -> list[Plan]:
     """The plan, nothing where there is none."""
     try:
         return [plan()]
-    except OutOfTime:
-        raise
     except Infeasible:
         return []
 

@@ -13,12 +13,13 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.compiled import borrowed, compiled
+from vdsm_pin.geometry.compiled import borrowed, clock, compiled
 from vdsm_pin.geometry.obstacles import STACK, crossings
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.geometry.segments import squared_gap
 from vdsm_pin.scene import Mesh, Obstacle
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 
 STEP: Final = 1e-6
 """More than rounding takes from a distance, also beside nearly parallel edges; [m]."""
@@ -45,7 +46,9 @@ class Surfaces:
     balls: FloatArray
     solids: PackedPieces
 
-    def least(self, ends: FloatArray, enough: float) -> FloatArray:
+    def least(
+        self, ends: FloatArray, enough: float, deadline: Deadline = NO_LIMIT
+    ) -> FloatArray:
         """Lower bounds of the distance of segments to the meshes, shape (n,); [m].
 
         Each is less than two steps below the distance; -inf within a solid.
@@ -53,11 +56,18 @@ class Surfaces:
         Args:
             ends: Shape (n, 2, 3); [m].
             enough: A bound from which on more need not be known; [m].
+            deadline: When to give up.
+
+        Raises:
+            OutOfTime: If the time is over.
         """
         if not len(self.corners):
             return np.full(len(ends), np.inf)
         reach = enough + STEP
-        bound = nearest_triangles(self.corners, self.first, self.balls, ends, reach)
+        bound = nearest_triangles(
+            self.corners, self.first, self.balls, ends, reach, deadline.end
+        )
+        deadline.check()
         bound -= STEP
         bound[buried(self.solids, ends, bound > 0.0)] = -np.inf
         return bound
@@ -167,6 +177,7 @@ def nearest_triangles(
     balls: FloatArray,
     ends: FloatArray,
     enough: float,
+    until: float,
 ) -> FloatArray:
     """Distance of segments to the nearest of some triangles, or `enough` if it is less.
 
@@ -176,14 +187,17 @@ def nearest_triangles(
         balls: See `Surfaces`.
         ends: Shape (n, 2, 3); [m].
         enough: The largest distance that matters; [m].
+        until: When to stop, by the monotonic clock; [s].
 
     Returns:
-        Shape (n,); [m].
+        Shape (n,), 0 where the time was over; [m].
     """
     corners, balls, ends = borrowed(corners), borrowed(balls), borrowed(ends)
     result = np.zeros(ends.shape[0])
     stack, gaps = np.zeros(STACK, np.int64), np.zeros(STACK)
     for n in range(ends.shape[0]):
+        if clock() > until:
+            break
         a, b = ends[n]
         best = enough
         stack[0], gaps[0], waiting = 1, -np.inf, int(balls.shape[0] > 1)

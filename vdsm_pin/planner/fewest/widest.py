@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.errors import Infeasible, OutOfTime
+from vdsm_pin.errors import Infeasible
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -41,8 +41,6 @@ def widest(
         middle = (low + high) / 2.0
         try:
             plan = plan_with(middle)
-        except OutOfTime:
-            raise
         except Infeasible:
             high = middle
             continue
