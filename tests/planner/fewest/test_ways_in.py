@@ -1,6 +1,7 @@
 """Ways in through openings: of the tip, of the arm that follows, of the motion."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,8 @@ from scenes_for_fewest import problem
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import built_in
+from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
+from vdsm_pin.planner.fewest.charts import Directions, Projections
 from vdsm_pin.planner.fewest.follow import followed
 from vdsm_pin.planner.fewest.insertion import Insertion, Layers
 from vdsm_pin.planner.fewest.judge import Judge
@@ -19,9 +21,10 @@ from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.tip_ways import TipSpace, resampled
 from vdsm_pin.planner.fewest.ways_in import ways_in
+from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Box, Cylinder, Obstacle
+from vdsm_pin.scene import Box, Cylinder, Obstacle, Sphere
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.verify import verify
@@ -29,6 +32,14 @@ from vdsm_pin.verification.verify import verify
 ARM = built_in("hrm8")
 START = (-0.3, 0.0, 0.0)
 LOOP = np.array([[1.75, -0.2, 0.05], [1.75, -0.25, 0.15], [1.75, -0.2, 0.2]])
+
+
+def equal_links(count: int) -> Manipulator:
+    """An arm as long as the paper's, of equal and thinner links."""
+    limit, length = float(np.deg2rad(42.5)), 3.126
+    cables = CableLayout(0.01, 0.005, paper_hole_angles(count))
+    lengths = np.full(count, length / count)
+    return Manipulator("equal", lengths, 0.05, limit, limit, (-5.0, 5.0), cables)
 
 
 def wall(x: float, y: float, z: float, half: float) -> list[Obstacle]:
@@ -173,7 +184,7 @@ def test_what_is_inserted_keeps_clearance_limits_and_layers() -> None:
     play[[0, -1]] = 0.0
     rng = np.random.default_rng(0)
     root = np.zeros((ARM.n_links + 1, 2))
-    chain = Insertion(judge, Layers(way, play), rng, 24).grow(root)
+    chain = Insertion(judge, Layers(way, play), rng, 24, Projections()).grow(root)
     assert chain.layer[-1] == len(way) - 1
     assert (np.diff(chain.layer) >= 0).all()
     np.testing.assert_array_equal(chain.tips[[0, -1]], way[[0, -1]])
@@ -189,7 +200,8 @@ def test_nothing_is_inserted_through_a_wall() -> None:
     tips = np.linspace(START, task.path.points[0], 30)
     layers = Layers(tips, np.zeros(30))
     root = np.zeros((ARM.n_links + 1, 2))
-    chain = Insertion(judge, layers, np.random.default_rng(0), 24).grow(root)
+    rng = np.random.default_rng(0)
+    chain = Insertion(judge, layers, rng, 24, Projections()).grow(root)
     assert chain.tips[-1, 0] < 0.65
 
 
@@ -217,11 +229,8 @@ def test_a_path_behind_a_pipe_is_drawn_in_visits_that_come_home() -> None:
 @pytest.mark.parametrize("half", [0.09, 0.075])
 def test_two_windows_are_passed_and_the_same_plan_comes_again(half: float) -> None:
     task = two_windows(half)
-    one, two = (plan_fewest(task, link_clearance(task), 0.0) for _ in range(2))
+    one, two = plan_and_judge(task), plan_fewest(task, link_clearance(task), 0.0)
     np.testing.assert_array_equal(one.trajectory.joints, two.trajectory.joints)
-    result = verify(task, one.trajectory, load_robot(task.manipulator))
-    assert result.verdict is Verdict.CERTIFIED
-    assert result.coverage == pytest.approx(1.0, abs=1e-9)
 
 
 def test_an_arm_bent_through_two_windows_goes_on_from_where_it_is() -> None:
@@ -234,8 +243,103 @@ def test_an_arm_bent_through_two_windows_goes_on_from_where_it_is() -> None:
     bent = problem(
         *task.scene.obstacles, points=LOOP, start=tuple(tip), start_joints=joints
     )
-    again = plan_fewest(bent, link_clearance(bent), 0.0)
+    again = plan_and_judge(bent)
     np.testing.assert_allclose(again.trajectory.joints[0], joints, atol=1e-9)
-    result = verify(bent, again.trajectory, load_robot(bent.manipulator))
+
+
+def test_directions_and_projections_place_the_same_arms() -> None:
+    rng = np.random.default_rng(7)
+    centres = bent_arms(rng, 100)
+    centres[:, :, 1:] -= centres[:, :1, 1:]
+    tips, number, still = centres[:, -1].copy(), np.arange(100), np.zeros(100)
+    for chart in (Projections(), Directions()):
+        shapes = chart.of_centres(ARM, centres)
+        placed = Intervals(tips, tips, shapes, shapes).centres(ARM, number, still)
+        np.testing.assert_allclose(placed, centres, atol=1e-12)
+
+
+@pytest.mark.parametrize("rail", [(-9.0, 9.0), (-0.001, 0.001), (-0.3, 0.05)])
+def test_between_directions_tip_links_and_rail_are_exact(
+    rail: tuple[float, float],
+) -> None:
+    rng = np.random.default_rng(8)
+    arm = replace(ARM, base_range=rail)
+    alpha, theta = rng.uniform(-0.5, 0.5, (2, 200, ARM.n_links))
+    here = joint_centres(ARM, np.full(200, rail[0]), alpha, theta)
+    turns = rng.uniform(-0.1, 0.1, (2, 200, ARM.n_links))
+    there = joint_centres(ARM, np.full(200, rail[1]), alpha + turns[0], theta)
+    ends = [Directions().of_centres(ARM, centres) for centres in (here, there)]
+    tips = here[:, -1].copy(), there[:, -1].copy()
+    lines = Intervals(*tips, *ends)
+    for share in (0.0, 0.3, 1.0):
+        placed = lines.centres(arm, np.arange(200), np.full(200, share))
+        good = np.isfinite(placed).all(axis=(1, 2))
+        assert good.mean() > 0.97
+        placed, tip = placed[good], (1.0 - share) * tips[0] + share * tips[1]
+        np.testing.assert_array_equal(placed[:, -1], tip[good])
+        np.testing.assert_array_equal(placed[:, 0, 1:], 0.0)
+        assert (placed[:, 0, 0] >= rail[0]).all()
+        assert (placed[:, 0, 0] <= rail[1]).all()
+        links = np.linalg.norm(np.diff(placed, axis=1), axis=2)
+        lengths = np.broadcast_to(ARM.link_lengths, links.shape)
+        np.testing.assert_allclose(links, lengths, atol=1e-12)
+    beyond = Intervals(tips[0] + 50.0, tips[0] + 50.0, ends[0], ends[0])
+    assert np.isnan(beyond.centres(arm, np.arange(200), np.zeros(200))).all()
+
+
+def test_an_interval_whose_base_leaves_a_short_rail_in_between_is_not_clear() -> None:
+    lone, knee = np.zeros((1, 9, 2)), np.zeros((1, 9, 2))
+    knee[0, 1:8, 0] = np.minimum(np.arange(1, 8), 8 - np.arange(1, 8)) * 0.08
+    # Bent to one side and to the other the base is ahead, straight in between behind.
+    tip = np.array([[3.126, 0.0, 0.0]])
+    lines = Intervals(tip, tip, knee, -knee)
+    ends = lines.centres(ARM, np.zeros(2, int), np.array([0.0, 1.0]))[:, 0, 0]
+    middle = lines.centres(ARM, np.zeros(1, int), np.full(1, 0.5))[0, 0, 0]
+    assert middle < ends.min() - 0.01
+    for low, kept in ((middle + 1e-4, False), (middle - 1e-9, True)):
+        task = problem()
+        arm = replace(task.manipulator, base_range=(low, 9.0))
+        judge = judge_of(replace(task, manipulator=arm))
+        assert bool(judge.clear(lines)[0]) is kept
+        assert bool(judge.clear(Intervals(tip, tip, lone, lone))[0]) is kept
+
+
+def test_a_base_that_cannot_move_draws_by_its_joints_alone() -> None:
+    arm = replace(ARM, base_range=(-1e-6, 1e-6))
+    joints = np.zeros(1 + 2 * ARM.n_links)
+    joints[[2, 4, 6]] = 0.2, -0.4, 0.3
+    centres = joint_centres(arm, joints[:1], joints[None, 1::2], joints[None, 2::2])
+    tip = centres[0, -1]
+    points = tip + np.array([[0.0, 0.05, 0.05], [-0.05, 0.15, 0.05]])
+    ball = Sphere("ball", tip + np.array([-0.3, 0.1, 0.5]), 0.2)
+    task = problem(
+        ball, points=points, closed=False, start=tuple(tip), start_joints=joints
+    )
+    plan_and_judge(replace(task, manipulator=arm))
+
+
+def test_a_box_that_opens_away_from_the_base_is_entered_backwards() -> None:
+    arm, half, thick = equal_links(16), 0.15, 0.02
+    middle = np.array([1.2, 0.75, 0.0])
+    plates = []
+    for name, axis, side in (
+        ("left", 1, -1.0), ("right", 1, 1.0), ("low", 2, -1.0), ("high", 2, 1.0),
+        ("bottom", 0, -1.0),
+    ):  # fmt: skip
+        at, size = middle.copy(), np.full(3, half + thick)
+        at[axis] += side * (half + thick / 2.0)
+        size[axis] = thick / 2.0
+        plates.append(Box(name, at, np.eye(3), size))
+    path = np.array([[1.4, 0.75, 0.0], [1.2, 0.77, 0.0]])
+    task = problem(*plates, points=path, closed=False, start=(0.8, 0.0, 0.0))
+    centres = plan_and_judge(replace(task, manipulator=arm)).centres
+    assert (centres[-1, -1, 0] - centres[-1, -2, 0]) < -0.1
+
+
+def plan_and_judge(task: PlanningProblem) -> Plan:
+    """A plan that draws everything, certified."""
+    plan = plan_fewest(task, link_clearance(task), 0.0)
+    result = verify(task, plan.trajectory, load_robot(task.manipulator))
     assert result.verdict is Verdict.CERTIFIED
     assert result.coverage == pytest.approx(1.0, abs=1e-9)
+    return plan

@@ -5,9 +5,11 @@ import numpy as np
 from vdsm_pin.errors import LimitExceeded, NoPlanFound, NoWayOut
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres, link_angles
+from vdsm_pin.planner.fewest.charts import Chart, Projections
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste, extended
+from vdsm_pin.planner.start import start_centres
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -36,20 +38,26 @@ def start_offsets(problem: PlanningProblem) -> FloatArray:
     return np.asarray(offsets)
 
 
-def checked_start(judge: Judge, tip: FloatArray) -> FloatArray:
-    """Offsets of the arm at the start, shape (N + 1, 2); [m].
+def checked_start(judge: Judge, tip: FloatArray, chart: Chart) -> FloatArray:
+    """Shape coordinates of the arm at the start.
 
     Args:
         judge: Knows the limits.
         tip: Of the arm at the start, shape (1, 3); [m].
+        chart: How arms are described.
 
     Raises:
         LimitExceeded: If it breaks a limit.
-        NoPlanFound: If it bends more than may be used, or a link leans backwards.
+        NoPlanFound: If it bends more than may be used, or the chart does not hold it.
     """
-    offsets = start_offsets(judge.problem)
-    _check_limits(judge, tip, offsets[None])
-    return offsets
+    if isinstance(chart, Projections):
+        shape = start_offsets(judge.problem)
+    else:
+        shape = chart.of_centres(
+            judge.problem.manipulator, start_centres(judge.problem)[None]
+        )[0]
+    _check_limits(judge, tip, shape[None])
+    return shape
 
 
 def with_start(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, int]:
@@ -62,7 +70,7 @@ def with_start(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, i
     if judge.problem.path.start_joints is None and roadmap.index[0] >= 0:
         return roadmap, int(roadmap.index[0])
     tip = roadmap.route.tips[:1]
-    offsets = checked_start(judge, tip)[None]
+    offsets = checked_start(judge, tip, Projections())[None]
     room, _, _ = judge.look(tip, offsets)
     shapes = roadmap.shapes
     nodes = roadmap.nodes_at(0)

@@ -13,8 +13,9 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.planner.fewest.charts import Chart
 from vdsm_pin.planner.fewest.follow import followed
-from vdsm_pin.planner.fewest.growth import COPIED, FAMILY, SCALES, vary
+from vdsm_pin.planner.fewest.growth import FAMILY
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 
@@ -50,7 +51,7 @@ class Chain:
     Args:
         layer: Layer of each configuration, shape (c,).
         tips: Shape (c, 3); [m].
-        offsets: D_1..D_{N+1}, shape (c, N + 1, 2); [m].
+        offsets: Shape coordinates, shape (c, N + 1, 2) or (c, N, 3).
     """
 
     layer: IntArray
@@ -85,6 +86,7 @@ class Insertion:
         layers: Where the tip goes.
         rng: Source of chance.
         population: Arms that live on at a layer.
+        chart: How they are described.
     """
 
     def __init__(
@@ -93,17 +95,17 @@ class Insertion:
         layers: Layers,
         rng: np.random.Generator,
         population: int,
+        chart: Chart,
     ) -> None:
         self.judge, self.layers, self.rng = judge, layers, rng
-        self.population = population
+        self.population, self.chart = population, chart
         arm = judge.problem.manipulator
         self.arm, self.radius = arm, arm.link_radius
-        self._clear_records()
 
-    def _clear_records(self) -> None:
-        shape = self.arm.n_links + 1
+    def _forget(self, root: FloatArray) -> None:
+        """Begin with empty records; `root` tells how arms are described."""
         self.layer, self.parent = np.zeros(0, np.int64), np.zeros(0, np.int64)
-        self.tips, self.offsets = np.zeros((0, 3)), np.zeros((0, shape, 2))
+        self.tips, self.offsets = np.zeros((0, 3)), np.zeros((0, *root.shape))
         self.room = np.zeros(0)
 
     def _recorded(
@@ -127,9 +129,9 @@ class Insertion:
         """The motion from a configuration at the first layer that comes farthest.
 
         Args:
-            root: Its offsets, shape (N + 1, 2); [m].
+            root: Its shape coordinates.
         """
-        self._clear_records()
+        self._forget(root)
         tip, none = self.layers.tips[:1], np.full(1, -1)
         room, _, _ = self.judge.look(tip, root[None])
         crowd = self._recorded(0, tip, root[None], room, none)
@@ -200,16 +202,14 @@ class Insertion:
         tips = self.layers.tips[to] + shift
         offsets = crowd.offsets[rows]
         moved = tips[:, 1:] - crowd.tips[rows, 1:]
-        kind = rng.random(n)
         led = np.flatnonzero(rng.random(n) < LED)
         offsets[led], fits = self._led(crowd, rows[led], tips[led])
         led = led[fits]
         moved[led] = 0.0
-        kind[led[rng.random(len(led)) < UNCHANGED]] = 0.5 * COPIED
-        scale = rng.choice(np.array(SCALES), n) * arm.total_length
-        size = rng.normal(size=(n, 2)) * scale[:, None]
-        born = vary(offsets, arm.stations, moved, rng.random(n), kind, size)
-        return rows, tips, born
+        kept = np.zeros(n, dtype=np.bool_)
+        kept[led[rng.random(len(led)) < UNCHANGED]] = True
+        born = self.chart.varied(arm, offsets, moved, kept, rng)
+        return rows, tips, self.chart.settled(arm, tips, born)
 
     def _family(self, crowd: _Crowd) -> int:
         """Children of each arm: a small population has more."""
@@ -218,14 +218,13 @@ class Insertion:
     def _led(
         self, crowd: _Crowd, rows: IntArray, tips: FloatArray
     ) -> tuple[FloatArray, BoolArray]:
-        """Offsets of arms that follow the leader, and which of them can."""
+        """Shapes of arms that follow the leader, and which of them can."""
         arm = self.arm
         still = Intervals(crowd.tips, crowd.tips, crowd.offsets, crowd.offsets)
         number = np.arange(len(crowd.number))
         centres = still.centres(arm, number, np.zeros(len(number)))
         after = followed(centres[rows], np.ascontiguousarray(tips), arm.link_lengths)
-        offsets = after[:, :, 1:] - arm.ratios[:, None] * tips[:, None, 1:]
-        offsets[:, [0, -1]] = 0.0
+        offsets = self.chart.of_centres(arm, after)
         fits = np.asarray(np.isfinite(after).all(axis=(1, 2)))
         return np.where(fits[:, None, None], offsets, crowd.offsets[rows]), fits
 

@@ -6,19 +6,14 @@ look. For the other pieces the interval is cut into as many parts as that seems 
 This is a planner's check; the proof over continuous time is the verifier's.
 """
 
-from dataclasses import dataclass, fields
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.motion import Intervals
-from vdsm_pin.planner.fewest.poses import (
-    bends_of,
-    parts_of_pieces,
-    pieces_of,
-    room_along,
-)
+from vdsm_pin.planner.fewest.parts import Parts
+from vdsm_pin.planner.fewest.poses import bends_of, pieces_of, room_along
 from vdsm_pin.planner.fewest.roadmap import link_limit
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
@@ -26,11 +21,10 @@ from vdsm_pin.tolerances import TOLERANCES
 
 CUTS: Final = 16
 """Times an interval is cut; the body moves 65,536 times less in what is left then."""
-MOST_PARTS: Final = 8
-"""Parts of one cut. More at once takes fewer turns, but looks at more where the first
-would have shown that the way is blocked."""
-LONG_WAY: Final = 0.2
-"""Way of a piece above which the middle is looked at whatever the clearance; [m]."""
+NEAR_LIMIT: Final = 0.9
+"""An interval is looked at for its link angles if an end has so much of the largest."""
+THIRDS: Final = 40
+"""Times the place where the base is farthest back is looked for in two thirds."""
 
 
 class Judge:
@@ -188,7 +182,8 @@ class Judge:
         )
         begin = r0.min(axis=1)
         good = (begin >= need - tol) & (r1.min(axis=1) >= need - tol)
-        parts = _Parts(number, low, high, c0, c1, r0, r1)
+        good &= self._within(intervals, c0, c1, most)
+        parts = Parts(number, low, high, c0, c1, r0, r1)
         for _ in range(CUTS):
             counts = parts.counts(knees, need, self.finest)
             doubtful = (counts > 0).any(axis=1) & good[parts.interval]
@@ -207,64 +202,49 @@ class Judge:
         good[parts.interval] = False
         return good, begin
 
+    def _within(
+        self,
+        intervals: Intervals,
+        begin: FloatArray,
+        end: FloatArray,
+        most: FloatArray,
+    ) -> BoolArray:
+        """Whether intervals whose ends keep rail and cone keep them in between.
 
-@dataclass(frozen=True)
-class _Inner:
-    """Places within parts, in order: the part of each, where it is in the interval."""
+        The base runs convexly, so it is farthest ahead at an end, and where it is
+        farthest back can be found. The cone is looked at where an end comes near it.
 
-    part: IntArray
-    share: FloatArray
+        Args:
+            intervals: Straight lines in the chart.
+            begin: Joint centres where they begin, shape (n, N + 1, 3); [m].
+            end: Joint centres where they end; [m].
+            most: Largest link angle in each interval, shape (n,); [rad].
 
-
-@dataclass(frozen=True)
-class _Parts:
-    """Parts of intervals with both ends looked at: where, joint centres, clearance.
-
-    A piece that is settled has no clearance where its interval was cut (inf).
-    """
-
-    interval: IntArray
-    low: FloatArray
-    high: FloatArray
-    centres: FloatArray
-    next_centres: FloatArray
-    room: FloatArray
-    next_room: FloatArray
-
-    def counts(self, knees: BoolArray, need: FloatArray, finest: float) -> IntArray:
-        """Into how many parts to cut for each piece, 0 where it is clear, shape (n, N).
-
-        A long part may hide a bend or a curve: it is cut anyway.
+        Returns:
+            Shape (n,).
         """
-        return parts_of_pieces(
-            self.centres, self.next_centres, self.room, self.next_room,
-            knees, self.interval, need, finest, LONG_WAY, MOST_PARTS,
-        )  # fmt: skip
+        arm, kept = self.problem.manipulator, np.ones(len(most), dtype=np.bool_)
+        peak = np.maximum(bends_of(begin).max(axis=1), bends_of(end).max(axis=1))
+        near = np.flatnonzero(peak > NEAR_LIMIT * most)
+        for share in (0.25, 0.5, 0.75):
+            inner = intervals.centres(arm, near, np.full(len(near), share))
+            kept[near] &= bends_of(inner).max(axis=1) <= most[near]
+        ahead = np.minimum(begin[:, -1, 0], end[:, -1, 0])
+        near = np.flatnonzero(kept & (ahead - arm.total_length < arm.base_range[0]))
+        kept[near] = self._farthest_back(intervals, near) >= arm.base_range[0]
+        return kept
 
-    def inner(self, counts: IntArray) -> _Inner:
-        """The places that cut every part evenly, shape (n,) counts of 2 and more."""
-        part = np.repeat(np.arange(len(counts)), counts - 1)
-        first = np.cumsum(counts - 1) - (counts - 1)
-        step = (np.arange(len(part)) - first[part] + 1) / counts[part]
-        low, high = self.low[part], self.high[part]
-        return _Inner(part, low + step * (high - low))
-
-    def take(self, kept: BoolArray) -> "_Parts":
-        """Some of the parts."""
-        return _Parts(*(getattr(self, one.name)[kept] for one in fields(self)))
-
-    def cut(self, inner: _Inner, centres: FloatArray, room: FloatArray) -> "_Parts":
-        """The parts between the places, every place of each part in order."""
-        number = np.arange(len(self.interval))
-        # Part by part: its begin, then its places; its places, then its end.
-        begins = np.argsort(np.append(number, inner.part), kind="stable")
-        ends = np.argsort(np.append(inner.part, number), kind="stable")
-        return _Parts(
-            np.append(self.interval, self.interval[inner.part])[begins],
-            np.append(self.low, inner.share)[begins],
-            np.append(inner.share, self.high)[ends],
-            np.concatenate([self.centres, centres])[begins],
-            np.concatenate([centres, self.next_centres])[ends],
-            np.concatenate([self.room, room])[begins],
-            np.concatenate([room, self.next_room])[ends],
-        )
+    def _farthest_back(self, intervals: Intervals, number: IntArray) -> FloatArray:
+        """Least x0 in intervals, found as in any convex function, shape (r,); [m]."""
+        arm = self.problem.manipulator
+        low, high = np.zeros(len(number)), np.ones(len(number))
+        least = np.full(len(number), np.inf)
+        for _ in range(THIRDS):
+            a, b = (2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0
+            left, right = (
+                intervals.centres(arm, number, share)[:, 0, 0] for share in (a, b)
+            )
+            least = np.minimum(least, np.minimum(left, right))
+            ahead = left < right
+            low, high = np.where(ahead, low, a), np.where(ahead, b, high)
+        return least

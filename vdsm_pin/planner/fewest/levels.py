@@ -43,6 +43,8 @@ class Insert:
         population: Arms that live on at a tip.
         ways: Largest number of ways of the tip tried from the start to one place.
         seed: Of the source of chance.
+        directed: Whether arms are described by the directions of their links, which may
+            lean backwards then, and not by their projections.
         slack: Clearance kept for what happens between two rows; [m].
         finest: Way of the body between two looks at the clearance; [m].
         ease: Part of the largest link angle that may be used; [-].
@@ -52,6 +54,7 @@ class Insert:
     population: int
     ways: int
     seed: int
+    directed: bool = False
     slack: float = 3e-4
     finest: float = 2e-3
     ease: float = 1.0
@@ -70,13 +73,19 @@ THOROUGH: Final[tuple[Level | Insert, ...]] = (
     Level(step=0.08, coarse=0.0065, places=8, rounds=40, back=0.0, grow=4, around=8),
     Level(step=0.08, coarse=0.026, places=8, rounds=40, back=1.0, grow=2),
     Insert(step=0.02, population=24, ways=2, seed=0),
+    Insert(step=0.02, population=24, ways=2, seed=0, directed=True),
     Level(step=0.08, coarse=0.013, places=8, rounds=40, back=1.0, grow=3),
     Level(
         step=0.05, coarse=0.013, places=10, rounds=60, back=1.0, grow=3,
         slack=3e-5, finest=5e-4,
     ),
     Insert(step=0.02, population=60, ways=4, seed=1),
+    Insert(step=0.02, population=60, ways=4, seed=1, directed=True),
     Insert(step=0.01, population=120, ways=6, seed=2, slack=3e-5, finest=5e-4),
+    Insert(
+        step=0.01, population=120, ways=6, seed=2, slack=3e-5, finest=5e-4,
+        directed=True,
+    ),
 )  # fmt: skip
 
 
@@ -109,3 +118,9 @@ class Effort:
 FULL: Final = Effort(THOROUGH, proves=True)
 QUICK: Final = Effort(THOROUGH[:2], proves=False)
 """For plans that are only better than one there is already."""
+
+LEANING: Final = Effort(
+    tuple(one for one in THOROUGH if isinstance(one, Insert) and one.directed),
+    proves=True,
+)
+"""For starts that only directions describe."""

@@ -5,6 +5,9 @@ straight arm to that tip has it, P_i = k_i T + D_i. Between knots tip and offset
 along straight lines, so the tip is exact, links keep their length, and an arm that is
 straight at both knots stays straight. An offset with a corner at joint m is a knee
 there; where one knee turns into another, both are bent on the way and no third one.
+
+Where a link leans backwards that chart ends. There the directions of the links stand in
+place of the offsets (`directions.py`), and the base may be held to a short rail.
 """
 
 import itertools
@@ -17,6 +20,7 @@ from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.kinematics import joint_angles, joint_centres
 from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.planner.fewest.directions import placed_between
 from vdsm_pin.planner.fewest.poses import centres_between, knees_between
 from vdsm_pin.planner.fewest.roadmap import Roadmap
 from vdsm_pin.planner.fewest.sequence import Sequence
@@ -33,7 +37,8 @@ class Knots:
 
     Args:
         tips: Shape (n, 3); [m].
-        offsets: D_1..D_{N+1}, shape (n, N + 1, 2), the first and last zero; [m].
+        offsets: D_1..D_{N+1}, shape (n, N + 1, 2), the first and last zero [m], or the
+            directions of the links, shape (n, N, 3) [-].
         stations: Arc length along the desired path, on ways that of the place left,
             shape (n,); [m].
         drawn: Whether the tip draws from knot k to k + 1, shape (n - 1,).
@@ -77,8 +82,9 @@ class Intervals:
     Args:
         tips: Where they begin, shape (n, 3); [m].
         next_tips: Where they end; [m].
-        offsets: D_1..D_{N+1} where they begin, shape (n, N + 1, 2); [m].
-        next_offsets: D_1..D_{N+1} where they end; [m].
+        offsets: D_1..D_{N+1} where they begin, shape (n, N + 1, 2) [m], or the
+            directions of the links, shape (n, N, 3) [-].
+        next_offsets: The same where they end.
     """
 
     tips: FloatArray
@@ -98,10 +104,17 @@ class Intervals:
         Returns:
             Shape (n, N + 1).
         """
+        if self.directed:
+            return np.ones((len(self.tips), manipulator.n_links + 1), dtype=np.bool_)
         return knees_between(
             self.offsets, self.next_offsets, manipulator.link_lengths,
             TOLERANCES.straight_slope,
         )  # fmt: skip
+
+    @property
+    def directed(self) -> bool:
+        """Whether links are given by their directions."""
+        return bool(self.offsets.shape[2] == 3)
 
     def continued(self) -> BoolArray:
         """Whether each interval ends where the next begins, shape (n,)."""
@@ -121,8 +134,14 @@ class Intervals:
             share: Where in its interval, 0 to 1, shape (r,).
 
         Returns:
-            Shape (r, N + 1, 3), NaN where a link is too short; [m].
+            Shape (r, N + 1, 3), NaN where a link is too short or the base is off its
+            rail; [m].
         """
+        if self.directed:
+            return placed_between(
+                self.tips, self.next_tips, self.offsets, self.next_offsets,
+                interval, share, manipulator.link_lengths, *manipulator.base_range,
+            )  # fmt: skip
         return centres_between(
             self.tips, self.next_tips, self.offsets, self.next_offsets,
             interval, share, manipulator.ratios, manipulator.link_lengths,

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.cables import cable_lengths
-from vdsm_pin.errors import Infeasible, OutOfTime
+from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.kinematics import joint_angles
 from vdsm_pin.planner.fewest.explain import (
@@ -18,7 +18,7 @@ from vdsm_pin.planner.fewest.explain import (
     undrawn,
 )
 from vdsm_pin.planner.fewest.explore import Outcome, explore
-from vdsm_pin.planner.fewest.levels import FULL, QUICK, Effort
+from vdsm_pin.planner.fewest.levels import FULL, LEANING, QUICK, Effort
 from vdsm_pin.planner.fewest.motion import Knots, Rows, dense_rows
 from vdsm_pin.planner.fewest.nearby import FAR, Nearby, nearby
 from vdsm_pin.planner.fewest.roadmap import Taste
@@ -187,10 +187,13 @@ def _plan(
 ) -> Plan:
     check_start(problem, clearance)
     if not leans_ahead(problem):
-        rows = unbend(problem, clearance, margin)
-        there = from_there(problem, rows[-1])
-        rest = _plan(there, clearance, margin, name, taste, effort)
-        return with_unbending(problem, rows, rest)
+        try:
+            rows = unbend(problem, clearance, margin)
+            there = from_there(problem, rows[-1])
+            rest = _plan(there, clearance, margin, name, taste, effort)
+            return with_unbending(problem, rows, rest)
+        except NoPlanFound:
+            effort = LEANING
     # What is kept is judged exactly, however much it is.
     most = margin + taste.taper * float(levers(problem.manipulator)[-1])
     quick = nearby(problem, clearance).up_to(FAR + most)

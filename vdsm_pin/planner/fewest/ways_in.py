@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray
+from vdsm_pin.planner.fewest.charts import Chart, Directions, Projections
 from vdsm_pin.planner.fewest.home import checked_start
 from vdsm_pin.planner.fewest.insertion import Chain, Insertion, Layers
 from vdsm_pin.planner.fewest.judge import Judge
@@ -88,7 +89,8 @@ class _Search:
         self.tips = route.tips[route.layers]
         # How far a blocked place is from a clear one tells where to look for a hole.
         self.space = TipSpace(judge, replace(clearance, floor=-np.inf))
-        self.root = checked_start(judge, route.tips[:1])
+        self.chart: Chart = Directions() if effort.directed else Projections()
+        self.root = checked_start(judge, route.tips[:1], self.chart)
         self.rng = np.random.default_rng(effort.seed)
 
     def found(self) -> Found | None:
@@ -124,7 +126,9 @@ class _Search:
             play = np.zeros(before + len(path))
             play[1:before] = PLAY * self.judge.problem.manipulator.link_radius
             layers = Layers(np.vstack([way, path[1:]]), play)
-            grown = Insertion(self.judge, layers, self.rng, self.effort.population)
+            grown = Insertion(
+                self.judge, layers, self.rng, self.effort.population, self.chart
+            )
             visit = _Visit(k, before, grown.grow(self.root))
             if best is None or visit.last > best.last:
                 best = visit
