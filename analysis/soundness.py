@@ -42,6 +42,7 @@ from oracles.adversarial_bodies import pack
 from oracles.adversarial_boxes import Boxed, attacked, make_boxed
 from oracles.adversarial_truth import exact_bracket
 
+from vdsm_pin.arm_bodies import arm_bodies
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.problem import DesiredPath, PlanningProblem
@@ -55,7 +56,7 @@ from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.proving import BUDGET, new_results
 from vdsm_pin.verification.records import ClearanceChunk, ErrorBox
-from vdsm_pin.verification.task import SLACK
+from vdsm_pin.verification.task import SLACK, pack_bodies, with_errors
 
 FAR: Final = 1e-6
 """From here on a query must be decided; [m]."""
@@ -120,31 +121,35 @@ def verdicts(batch: Batch, errors: ErrorBox = NOMINAL) -> Any:
     extent = max(extent, arm.total_length, *np.abs(arm.base_range))
     rules = Rules(
         lengths=np.array(arm.link_lengths),
-        radius=float(arm.link_radius),
-        joint_error=errors.joint,
-        base_error=errors.base,
-        obstacle_error=errors.obstacle,
+        joint_errors=np.zeros((arm.n_links, 2)),
+        base_turn=0.0,
+        joints_err=False,
+        steady=True,
+        nominal=True,
         pad=TOLERANCES.arithmetic * max(1.0, extent / TOLERANCES.scene_extent),
         goal=TOLERANCES.bracket_gap,
         gap=TOLERANCES.least_bracket,
         slack=SLACK,
         until=np.inf,
     )
-    own = batch.frame == BASE
-    obstacle = np.where(own, np.arange(n), batch.frame).astype(np.int64)
+    own, link = batch.frame == BASE, batch.link.astype(np.int64)
     pairs = Pairs(
-        batch.link.astype(np.int64),
-        obstacle,
-        batch.frame.astype(np.int64),
-        batch.required,
+        body=link,
+        link=link,
+        obstacle=np.where(own, np.arange(n), batch.frame).astype(np.int64),
+        frame=batch.frame.astype(np.int64),
+        required=batch.required,
+        lost=np.zeros(n),
+        rise=np.zeros(n),
     )
     rows = np.ascontiguousarray(batch.rows)
     x0, alpha, theta = rows[:, 0].copy(), rows[:, 1::2].copy(), rows[:, 2::2].copy()
     results = new_results(n, arm.n_links + n, 1)
-    desk = new_desk(arm.n_links, n, BUDGET)
+    desk = new_desk(arm.n_links, n, 2, BUDGET)
     # No obstacle is named as such, so that none is culled.
-    culling = new_culling(pieces, arm.n_links, 0, n)
-    task, motion = Task(pieces, pairs, rules), Motion(x0, alpha, theta)
+    culling = new_culling(pieces, pairs, arm.n_links, 0)
+    task = Task(pieces, pack_bodies(arm_bodies(arm)), pairs, rules)
+    task, motion = with_errors(task, errors), Motion(x0, alpha, theta)
     sweep(task, motion, desk, results, culling, 0, 1, False)
     return results.counts.argmax(axis=1)
 

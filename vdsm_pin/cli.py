@@ -103,7 +103,8 @@ def verify(
         float, typer.Option(min=0.0, help="Largest error of every joint angle [deg].")
     ] = 0.0,
     base_error_mm: Annotated[
-        float, typer.Option(min=0.0, help="Largest error of the base [mm].")
+        float,
+        typer.Option(min=0.0, help="Largest shift of the base, any direction [mm]."),
     ] = 0.0,
     obstacle_error_mm: Annotated[
         float, typer.Option(min=0.0, help="Largest error of the obstacles [mm].")

@@ -36,6 +36,26 @@ def joint_centres(
     return centres_of(*values, manipulator.link_lengths)
 
 
+def link_frames(alpha: FloatArray, theta: FloatArray) -> FloatArray:
+    """Orientations R_base_link of every link, R_i = R_{i-1} Rz(alpha_i) Ry(theta_i).
+
+    Args:
+        alpha: Yaw angles, shape (n_samples, N); [rad].
+        theta: Pitch angles, shape (n_samples, N); [rad].
+
+    Returns:
+        Shape (n_samples, N, 3, 3); [-].
+    """
+    ca, sa, ct, st = np.cos(alpha), np.sin(alpha), np.cos(theta), np.sin(theta)
+    zero = np.zeros_like(ca)
+    rows = [[ca * ct, -sa, ca * st], [sa * ct, ca, sa * st], [-st, zero, ct]]
+    steps = np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    frames = np.array(steps)
+    for link in range(1, frames.shape[1]):
+        frames[:, link] = frames[:, link - 1] @ steps[:, link]
+    return frames
+
+
 def joint_angles(
     manipulator: Manipulator, centres: FloatArray
 ) -> tuple[FloatArray, FloatArray]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.scene import Box, Capsule, Cylinder, Mesh, Prism, Sphere
 from vdsm_pin.units import MM_PER_M
 
 MAX_LINKS: Final = 40
@@ -17,6 +18,13 @@ MAX_LINKS: Final = 40
 
 MAX_LENGTH: Final = 1e6
 """Largest length of an arm; far beyond it inertias overflow; [m]."""
+
+
+TOOL: Final = "tool"
+"""Name of the tool among the bodies."""
+
+PART: Final = " part "
+"""Between the name of a body and the number of its convex part."""
 
 
 @dataclass(frozen=True)
@@ -67,17 +75,64 @@ def paper_hole_angles(n_links: int) -> FloatArray:
 
 
 @dataclass(frozen=True)
+class Tool:
+    """A straight extension of the last link; its end draws the path.
+
+    Args:
+        length: From the end of the last link to the tip; [m].
+        radius: Of a capsule about its axis; [m].
+    """
+
+    length: float
+    radius: float
+
+    def __post_init__(self) -> None:
+        """Refuse impossible sizes."""
+        for name in ("length", "radius"):
+            if not 0.0 < getattr(self, name) <= MAX_LENGTH:
+                value = getattr(self, name)
+                message = f"tool: {name} is {value} m, expected above 0"
+                raise InvalidInput(message)
+
+
+@dataclass(frozen=True)
+class LinkBody:
+    """A solid that rides on a link, in its frame: origin at O_i, x along the link.
+
+    Args:
+        link: The link, 1 to N.
+        solid: Any shape but a half-space.
+        parts: Hulls that a mesh is covered by, 1 or more.
+    """
+
+    link: int
+    solid: Sphere | Capsule | Cylinder | Box | Prism | Mesh
+    parts: int = 1
+
+    @property
+    def name(self) -> str:
+        """The solid's."""
+        return self.solid.name
+
+
+@dataclass(frozen=True)
 class Manipulator:
-    """Lengths, body and limits of one arm. A link is a capsule about its axis.
+    """Lengths, bodies and limits of one arm. A link is a capsule about its axis.
 
     Args:
         name: Name for reports and the URDF.
-        link_lengths: L_1..L_N between joint centres, shape (N,); [m].
-        link_radius: Radius of the body, round ends; [m].
+        link_lengths: L_1..L_N between joint centres, the last one to the tip and so
+            with the tool, shape (N,); [m].
+        link_radius: Radius of every link, the largest where they differ; [m].
         max_link_angle: Largest link angle psi_i, the cone; [rad].
         max_joint_angle: Largest absolute theta_i and alpha_i, the box; [rad].
         base_range: Smallest and largest x0, the same for a fixed base; [m].
         cables: Cable holes.
+        radii: Radius of each link where they differ, shape (N,); [m].
+        tool: What is mounted at the end of the last link.
+        bodies: What else rides on the links.
+        ignore_pairs: Names of two bodies, or of a body and an obstacle, that are not
+            held apart.
 
     Raises:
         InvalidInput: If a value breaks its range.
@@ -90,9 +145,13 @@ class Manipulator:
     max_joint_angle: float
     base_range: tuple[float, float]
     cables: CableLayout
+    radii: FloatArray | None = None
+    tool: Tool | None = None
+    bodies: tuple[LinkBody, ...] = ()
+    ignore_pairs: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
-        """Freeze the array and refuse impossible arms."""
+        """Freeze the arrays and refuse impossible arms."""
         object.__setattr__(self, "link_lengths", frozen(self.link_lengths))
         lengths = self.link_lengths
         if lengths.ndim != 1 or not 2 <= lengths.size <= MAX_LINKS:
@@ -120,11 +179,70 @@ class Manipulator:
             count = self.cables.hole_angles.shape[0]
             message = f"hole_angles has {count} rows, expected {lengths.size}"
             raise InvalidInput(message)
+        self._check_radii()
+        self._check_bodies()
+
+    def _check_radii(self) -> None:
+        if self.radii is None:
+            return
+        object.__setattr__(self, "radii", frozen(self.radii))
+        radii = self.radii
+        if radii.shape != (self.n_links,) or not (radii > 0.0).all():
+            known = f"{self.n_links} values above 0"
+            message = f"radii are {radii.tolist()} m, expected {known}"
+            raise InvalidInput(message)
+        if radii.max() != self.link_radius:
+            message = (
+                f"link_radius is {self.link_radius} m, expected the largest of "
+                f"{radii.tolist()}"
+            )
+            raise InvalidInput(message)
+
+    def _check_bodies(self) -> None:
+        last = float(self.link_lengths[-1])
+        if self.tool and not self.tool.length < last:
+            message = f"tool: length is {self.tool.length} m, expected below {last}"
+            raise InvalidInput(message)
+        names = [f"link {i + 1}" for i in range(self.n_links)]
+        names += [TOOL] if self.tool else []
+        for body in self.bodies:
+            if body.name in names:
+                message = f"body {body.name!r}: another body has this name"
+                raise InvalidInput(message)
+            names.append(body.name)
+            if not 1 <= body.link <= self.n_links or body.parts < 1:
+                known = f"1 to {self.n_links} and 1 or more"
+                found = f"link is {body.link} and parts is {body.parts}"
+                message = f"body {body.name!r}: {found}, expected {known}"
+                raise InvalidInput(message)
 
     @property
     def n_links(self) -> int:
         """Number of links N; joint centres are O_1..O_{N+1}."""
         return int(self.link_lengths.size)
+
+    def radius_of(self, link: int) -> float:
+        """Radius of a link, counted from 1; [m]."""
+        return self.link_radius if self.radii is None else float(self.radii[link - 1])
+
+    def ignores(self, one: str, other: str) -> bool:
+        """Whether two named bodies, or parts of bodies, are not to be held apart."""
+        names = {one, one.split(PART)[0]}, {other, other.split(PART)[0]}
+        return any(
+            (a in names[0] and b in names[1]) or (b in names[0] and a in names[1])
+            for a, b in self.ignore_pairs
+        )
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the arm is equal capsules and nothing else."""
+        return self.radii is None and self.tool is None and not self.bodies
+
+    @property
+    def least_radius(self) -> float:
+        """Radius within which every point of the arm's axis has matter; [m]."""
+        radii = [self.radius_of(i + 1) for i in range(self.n_links)]
+        return min(*radii, self.tool.radius if self.tool else np.inf)
 
     @cached_property
     def stations(self) -> FloatArray:

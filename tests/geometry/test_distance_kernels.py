@@ -30,7 +30,7 @@ def measure(pieces: PackedPieces, p: int, points: FloatArray) -> FloatArray:
     out = np.zeros(BRACKET + 4)
     out[NORMAL:NEAR] = [0.3, -0.5, 0.7]
     scratch = np.zeros((SCRATCH_ROWS, 3))
-    body = new_body(len(points), 0)
+    body = new_body(len(points), len(points), 0)
     body.points[:] = points
     bracket(pieces, p, body, GOAL, scratch, out)
     return out
@@ -193,7 +193,7 @@ def test_the_hierarchy_finds_the_nearest_of_many_pieces() -> None:
     assert sorted(many.order) == list(range(300))
     scratch, stack = np.zeros((SCRATCH_ROWS + 2, 3)), np.zeros(STACK, np.int64)
     for _ in range(20):
-        ends, body = rng.uniform(-3, 3, (2, 3)), new_body(2, 0)
+        ends, body = rng.uniform(-3, 3, (2, 3)), new_body(2, 2, 0)
         body.points[:] = ends
         out, trial = np.ones(BRACKET + 4), np.zeros(BRACKET + 4)
         obstacle_bracket(many, 0, body, GOAL, scratch, stack, trial, out)

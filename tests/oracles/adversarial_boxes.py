@@ -165,7 +165,7 @@ def plane_loss(batch: Batch, box: ErrorBox) -> Any:
     ends = centres[np.stack([batch.link, batch.link + 1], axis=1)]
     height = np.einsum("nec,nc->ne", ends, batch.normal)
     loss = (height + growth).max(axis=1) - height.max(axis=1)
-    return loss + np.abs(batch.normal[:, 0]) * box.base + box.obstacle
+    return loss + box.base + box.obstacle
 
 
 # ---- attacks -------------------------------------------------------------------------

@@ -200,7 +200,7 @@ class OracleWriter:
             support = min(least(piece, n)[0] for piece in pieces)
         _, base, surface = self.errors
         tops = [self.top(k, a, b, j, 0, n, -1) for j in (link, link + 1)]
-        lost = surface + base * abs(n[0]) + self.arm.link_radius
+        lost = surface + base + self.arm.link_radius
         return float(support - lost - max(tops))
 
     def plane_to_link(self, k: int, a: float, b: float, link: int, other: int) -> Any:

@@ -63,12 +63,12 @@ def checked(
         k, q = one.interval, rows.joints
         nominal = q[k] + one.share * (q[min(k + 1, len(q) - 1)] - q[k])
         off = np.abs(one.joints - nominal)
-        assert off[0] <= box.base
+        assert off[0] == 0.0
         assert (off[1:] <= box.joint).all()
         centres = joint_centres(
             ARM, one.joints[:1], one.joints[None, 1::2], one.joints[None, 2::2]
         )[0]
-        grown = box.obstacle if one.pair.obstacle else 0.0
+        grown = box.obstacle + box.base if one.pair.obstacle else 0.0
         gap = float(np.linalg.norm(one.link_point - one.other_point))
         assert gap <= one.clearance + grown + 1e-9 or one.clearance < 0.0
         assert one.clearance < one.required
@@ -122,7 +122,7 @@ def test_base_and_obstacle_errors_are_used_to_the_full() -> None:
     assert is_certified(problem, rows, ErrorBox(base=0.0019, obstacle=0.001))
     (found,) = checked(problem, rows, ErrorBox(base=0.0021, obstacle=0.001))
     assert found.interval + found.share == pytest.approx(1.0)
-    assert found.offsets[0] == pytest.approx(0.0021)
+    assert not found.offsets.any()  # the shift may have any direction
     assert found.clearance == pytest.approx(gap - 0.0031, abs=1e-8)
 
 

@@ -8,8 +8,11 @@ from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import link_gaps, row_brackets
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
-from vdsm_pin.scene import Box, Capsule, HalfSpace, Mesh, Obstacle, Sphere
-from vdsm_pin.verification.pair_slopes import link_slopes, obstacle_slopes
+from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.scene import Box, Capsule, HalfSpace, Mesh, Obstacle, Scene, Sphere
+from vdsm_pin.verification.pair_slopes import pair_slopes
+from vdsm_pin.verification.records import ErrorBox, Pair
+from vdsm_pin.verification.task import all_pairs, make_task
 
 ARM = built_in("hrm8")
 GOAL, STEP = 1e-11, 1e-6
@@ -45,7 +48,16 @@ def centres(q: FloatArray) -> FloatArray:
 def obstacle_gaps(shape: Obstacle, q: FloatArray, link: int) -> FloatArray:
     ends = np.ascontiguousarray(centres(q)[:, link : link + 2])
     pieces, only = pack_pieces([shape.pieces]), np.zeros(len(q), np.int64)
-    return row_brackets(pieces, ends, only, GOAL)[:, 1]
+    return row_brackets(pieces, ends, only, GOAL)[:, 1] - ARM.link_radius
+
+
+def asked(scene: Scene, pair: Pair, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Clearances of a pair and their slopes."""
+    tip = np.array([ARM.total_length, 0.0, 0.0])
+    path = DesiredPath(tip, tip[None])
+    problem = PlanningProblem("p", ARM, scene, path, 0.0, np.eye(4))
+    number = all_pairs(problem).index(pair)
+    return pair_slopes(make_task(problem, ErrorBox()), number, q)
 
 
 def differences(gaps: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
@@ -59,9 +71,7 @@ def differences(gaps: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
 def test_slopes_from_an_obstacle_are_those_of_differences(shape: Obstacle) -> None:
     q, looked = poses(40, 0.25), 0
     for link in (0, 4, 7):
-        gaps, slopes = obstacle_slopes(
-            pack_pieces([shape.pieces]), q, ARM.link_lengths, link, GOAL
-        )
+        gaps, slopes = asked(Scene((shape,)), Pair(link + 1, shape.name), q)
         np.testing.assert_allclose(gaps, obstacle_gaps(shape, q, link), atol=1e-9)
         for j in range(q.shape[1]):
             step = STEP * np.eye(q.shape[1])[j]
@@ -79,9 +89,11 @@ def test_slopes_from_an_obstacle_are_those_of_differences(shape: Obstacle) -> No
 def test_slopes_between_links_are_those_of_differences() -> None:
     q, looked = poses(40, 0.7), 0
     for link, other in ((0, 2), (1, 5), (3, 7)):
-        gaps, slopes = link_slopes(q, ARM.link_lengths, link, other)
+        pair = Pair(link + 1, other_link=other + 1)
+        gaps, slopes = asked(Scene(), pair, q)
+        gaps += 2.0 * ARM.link_radius
         known = link_gaps(centres(q), 0.0)[:, link, other]
-        np.testing.assert_allclose(gaps, known, atol=1e-12)
+        np.testing.assert_allclose(gaps, known, atol=1e-9)
         for j in range(q.shape[1]):
             step = STEP * np.eye(q.shape[1])[j]
             around = [

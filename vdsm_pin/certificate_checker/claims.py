@@ -144,7 +144,7 @@ class Check:
         n = pair.solid.direction(unit(column(x, y, z)))
         lost, required = arb(self.arm.link_radius), self.problem.required_self_clearance
         if pair.first == 0:
-            lost += abs(n[0, 0]) * self.base + self.obstacle
+            lost += self.base + self.obstacle
             required = self.problem.required_clearance
         reach = self.motion.reach(pair.link, pair.first, times, n)
         proved = pair.solid.support(n, *pieces) - reach - lost

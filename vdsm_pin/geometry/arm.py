@@ -81,8 +81,10 @@ def bends_and_drifts(
     alpha: FloatArray,
     theta: FloatArray,
     lengths: FloatArray,
+    errors: FloatArray,
     bends: FloatArray,
     drifts: FloatArray,
+    rates: FloatArray,
 ) -> None:
     """How far from linear a motion between two rows is.
 
@@ -90,27 +92,52 @@ def bends_and_drifts(
         alpha: Yaw angles of the two rows, shape (2, N); [rad].
         theta: Pitch angles, shape (2, N); [rad].
         lengths: Link lengths, shape (N,); [m].
+        errors: Largest errors of alpha_l and theta_l, shape (N, 2); [rad].
         bends: Result M, bound of the second derivative of O_j with joints below f at
             rest, at [f, j], shape (N + 1, N + 1); [m].
-        drifts: Result D, bound of the rate of the sway of O_j, at [f, j]; [m].
+        drifts: Result D, bound of the rate at which what the errors do to O_j changes,
+            at [f, j]; [m].
+        rates: Result W, total turning of link l with joints below f at rest, at [f, l],
+            shape (N, N); [rad].
     """
     apart()
     for f in range(lengths.size):
-        turning = bend = drift = 0.0
+        turning = bend = drift = error = 0.0
         bends[f, f] = drifts[f, f] = 0.0
         for link in range(f, lengths.size):
             turning += abs(alpha[1, link] - alpha[0, link])
             turning += abs(theta[1, link] - theta[0, link])
+            error += errors[link, 0] + errors[link, 1]
             bend += lengths[link] * turning * turning
-            drift += 2.0 * (link - f + 1) * lengths[link] * turning
+            drift += lengths[link] * error * turning
             bends[f, link + 1], drifts[f, link + 1] = bend, drift
+            rates[f, link] = turning
 
 
 @compiled
-def second_order(lengths: FloatArray, f: int, j: int, error: float) -> float:
-    """Second order of joint errors in O_j with joints below f at rest; [m]."""
+def turned_by(errors: FloatArray, f: int, link: int) -> float:
+    """Sum of the errors of the angles of joints f to `link`; [rad]."""
     total = 0.0
-    for link in range(f, j):
-        angles = 2.0 * (link - f + 1) * error
-        total += lengths[link] * angles * angles
+    for k in range(f, link + 1):
+        total += errors[k, 0] + errors[k, 1]
+    return total
+
+
+@compiled
+def second_order(
+    lengths: FloatArray, errors: FloatArray, f: int, link: int, lever: float
+) -> float:
+    """Second order of joint errors in a point of a link, joints below f at rest; [m].
+
+    Args:
+        lengths: Link lengths, shape (N,); [m].
+        errors: Largest errors of alpha_l and theta_l, shape (N, 2); [rad].
+        f: First joint that errs.
+        link: The link.
+        lever: Distance of the point from the link's origin; [m].
+    """
+    total = turned = 0.0
+    for k in range(f, link + 1):
+        turned += errors[k, 0] + errors[k, 1]
+        total += (lever if k == link else lengths[k]) * turned * turned
     return 0.5 * total

@@ -1,64 +1,100 @@
-"""Convex bodies: the hull of a few points, each grown by a zonotope and a ball.
+"""Convex bodies: the hull of a few points, each grown by a zonotope, a ball and a disc.
 
-A link at rest is the hull of two points. Over a slice of a motion and a box of errors
-either end of its axis sweeps a region: a zonotope, since each error moves it along a
-direction of its own, and a ball for what is bounded by its length alone.
+A solid at rest is the hull of its corners (the two ends of a link's axis, the eight
+corners of a box, the two face centres of a cylinder with the disc between them). Over a
+slice of a motion and a box of errors each corner sweeps a region: a zonotope, since
+each error moves it along a direction of its own, and a ball for what is bounded by its
+length alone.
 """
 
-from typing import NamedTuple
+from math import sqrt
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import apart, compiled
 
+ALIGNED: Final = 1e-14
+"""Sine below which a direction counts as that of a disc's or cylinder's axis; [-]."""
+
+RADIUS: Final = 3
+"""Layout of a disc: its axis (3) and its radius."""
+
 
 class Body(NamedTuple):
-    """A convex body. Point k is grown like end k % 2 of a link's axis.
+    """A convex body, in arrays that may have room for more.
+
+    Point k stands for corner k % corners at instant k // corners.
 
     Args:
-        points: Shape (n_points, 3); [m].
-        swings: Generators of the zonotopes of both ends, shape (2, room, 3): the end
+        points: Shape (room, 3); [m].
+        swings: Generators of each corner's zonotope, shape (corners, room, 3): it
             moves by any sum of them, each times a number between -1 and 1; [m].
-        sizes: How many generators there are, shape (2,).
-        balls: Radii of the balls, shape (2,); [m].
+        sizes: How many generators there are, shape (corners,).
+        balls: Radii of the balls, shape (corners,); [m].
+        discs: Disc that grows every point, at the first and the second instant, shape
+            (2, 4): unit axis [-] and radius [m], 0 for none.
+        used: Number of points and of corners, shape (2,).
     """
 
     points: FloatArray
     swings: FloatArray
     sizes: IntArray
     balls: FloatArray
+    discs: FloatArray
+    used: IntArray
 
 
 @compiled
-def new_body(n_points: int, room: int) -> Body:
+def new_body(n_points: int, n_corners: int, room: int) -> Body:
     """A body of points in the origin, not grown, with room for so many generators."""
     apart()
+    count = np.zeros(2, np.int64)
+    count[0], count[1] = n_points, n_corners
     return Body(
         np.zeros((n_points, 3)),
-        np.zeros((2, room, 3)),
-        np.zeros(2, np.int64),
-        np.zeros(2),
+        np.zeros((n_corners, room, 3)),
+        np.zeros(n_corners, np.int64),
+        np.zeros(n_corners),
+        np.zeros((2, 4)),
+        count,
     )
 
 
 @compiled
-def _growth(body: Body, end: int, nx: float, ny: float, nz: float) -> float:
-    """Largest n.x over the zonotope and ball of an end, n of unit length; [m]."""
-    g, total = body.swings, body.balls[end]
-    for k in range(body.sizes[end]):
-        total += abs(nx * g[end, k, 0] + ny * g[end, k, 1] + nz * g[end, k, 2])
+def _growth(body: Body, corner: int, nx: float, ny: float, nz: float) -> float:
+    """Largest n.x over the zonotope and ball of a corner, n of unit length; [m]."""
+    g, total = body.swings, body.balls[corner]
+    for k in range(body.sizes[corner]):
+        total += abs(nx * g[corner, k, 0] + ny * g[corner, k, 1] + nz * g[corner, k, 2])
     return float(total)
+
+
+@compiled
+def _disc_reach(body: Body, instant: int, nx: float, ny: float, nz: float) -> float:
+    """Largest n.x over the disc at an instant; [m]."""
+    d = body.discs[instant]
+    along = nx * d[0] + ny * d[1] + nz * d[2]
+    x, y, z = nx - along * d[0], ny - along * d[1], nz - along * d[2]
+    return float(d[RADIUS] * sqrt(x * x + y * y + z * z))
 
 
 @compiled
 def body_reach(body: Body, nx: float, ny: float, nz: float) -> float:
     """Largest n.x over a body, n of unit length; [m]."""
     p, reach = body.points, -np.inf
-    for end in range(2):
-        grown = _growth(body, end, nx, ny, nz)
-        for k in range(end, p.shape[0], 2):
-            reach = max(reach, nx * p[k, 0] + ny * p[k, 1] + nz * p[k, 2] + grown)
+    n_points, n_corners = body.used
+    first = second = 0.0
+    if body.discs[0, RADIUS] > 0.0:
+        first = _disc_reach(body, 0, nx, ny, nz)
+        second = _disc_reach(body, 1, nx, ny, nz)
+    for corner in range(n_corners):
+        grown = _growth(body, corner, nx, ny, nz)
+        for k in range(corner, n_points, n_corners):
+            disc = first if k < n_corners else second
+            along = nx * p[k, 0] + ny * p[k, 1] + nz * p[k, 2]
+            reach = max(reach, along + grown + disc)
     return reach
 
 
@@ -79,23 +115,49 @@ def body_support(
         The largest value; [m].
     """
     p, g = body.points, body.swings
-    first, second = _growth(body, 0, nx, ny, nz), _growth(body, 1, nx, ny, nz)
+    n_points, n_corners = body.used
     best, at = -np.inf, 0
-    for k in range(p.shape[0]):
-        value = nx * p[k, 0] + ny * p[k, 1] + nz * p[k, 2]
-        value += second if k % 2 else first
-        if value > best:
-            best, at = value, k
-    end = at % 2
-    ball = body.balls[end]
+    for corner in range(n_corners):
+        grown = _growth(body, corner, nx, ny, nz)
+        for k in range(corner, n_points, n_corners):
+            value = nx * p[k, 0] + ny * p[k, 1] + nz * p[k, 2] + grown
+            if body.discs[0, RADIUS] > 0.0:
+                value += _disc_reach(body, k // n_corners, nx, ny, nz)
+            if value > best:
+                best, at = value, k
+    corner = at % n_corners
+    ball = body.balls[corner]
     x, y, z = p[at, 0] + ball * nx, p[at, 1] + ball * ny, p[at, 2] + ball * nz
-    for k in range(body.sizes[end]):
-        along = nx * g[end, k, 0] + ny * g[end, k, 1] + nz * g[end, k, 2]
+    for k in range(body.sizes[corner]):
+        along = nx * g[corner, k, 0] + ny * g[corner, k, 1] + nz * g[corner, k, 2]
         side = 1.0 if along >= 0.0 else -1.0
         x, y, z = (
-            x + side * g[end, k, 0],
-            y + side * g[end, k, 1],
-            z + side * g[end, k, 2],
+            x + side * g[corner, k, 0],
+            y + side * g[corner, k, 1],
+            z + side * g[corner, k, 2],
         )
     point[0], point[1], point[2] = x, y, z
+    if body.discs[0, RADIUS] > 0.0:
+        _add_disc(body.discs[at // n_corners], nx, ny, nz, point)
     return best
+
+
+@compiled
+def _add_disc(
+    disc: FloatArray, nx: float, ny: float, nz: float, point: FloatArray
+) -> None:
+    """Move a point to the farthest place along n on a disc around it."""
+    along = nx * disc[0] + ny * disc[1] + nz * disc[2]
+    x, y, z = nx - along * disc[0], ny - along * disc[1], nz - along * disc[2]
+    # Where n is nearly the axis what is left is mostly rounding: taken across it again,
+    # or dropped, so that the point lies in the disc.
+    rest = x * disc[0] + y * disc[1] + z * disc[2]
+    x, y, z = x - rest * disc[0], y - rest * disc[1], z - rest * disc[2]
+    size = sqrt(x * x + y * y + z * z)
+    if size > ALIGNED:
+        share = disc[RADIUS] / size
+        point[0], point[1], point[2] = (
+            point[0] + share * x,
+            point[1] + share * y,
+            point[2] + share * z,
+        )

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.bodies import Body, body_support
+from vdsm_pin.geometry.bodies import ALIGNED, Body, body_support
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.pieces import CYLINDER, HALF_SPACE, PackedPieces
 from vdsm_pin.geometry.simplex import nearest
@@ -24,9 +24,6 @@ FAR: Final = 8
 BRACKET: Final = 11
 """Layout of a bracket: lower, upper, n (3), point of the body (3), point of the piece
 (3); n is a unit vector from the body to the piece."""
-
-ALIGNED: Final = 1e-14
-"""Sine below which a direction counts as that of a cylinder's axis; [-]."""
 
 MAX_STEPS: Final = 60
 """Largest number of supports tried; 5 to 15 are usual."""

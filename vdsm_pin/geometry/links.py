@@ -64,7 +64,7 @@ def link_clearances(
     n_samples, n_links = centres.shape[0], centres.shape[1] - 1
     result = np.full((n_samples, n_links), np.inf)
     desk = _Desk(
-        new_body(2, 0), np.zeros((2, 3)), np.zeros((SCRATCH_ROWS + 2, 3)),
+        new_body(2, 2, 0), np.zeros((2, 3)), np.zeros((SCRATCH_ROWS + 2, 3)),
         np.zeros(STACK, np.int64), np.zeros(BRACKET + 4), np.zeros(BRACKET + 4),
         np.ones((pieces.root.size, n_links, 3)),
     )  # fmt: skip
@@ -89,7 +89,7 @@ def _measure(
     for link in range(result.shape[1]):
         for sample in range(result.shape[0]):
             body.points[:] = centres[sample, link : link + 2]
-            box_of(body.points, box[0], box[1])
+            box_of(body, box[0], box[1])
             best = np.inf
             for o in range(pieces.root.size):
                 if box_distance(pieces, pieces.root[o], box[0], box[1]) >= best:

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.bodies import Body, body_reach
+from vdsm_pin.geometry.bodies import RADIUS, Body, body_reach
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import (
     LOWER,
@@ -28,13 +28,16 @@ TURNS: Final = 3
 
 
 @compiled
-def box_of(points: FloatArray, low: FloatArray, high: FloatArray) -> None:
-    """The box of some points, written to `low` and `high`, shape (3,) each; [m]."""
+def box_of(body: Body, low: FloatArray, high: FloatArray) -> None:
+    """The box of a body's points and discs, written, shape (3,) each; [m]."""
+    points, grown = body.points, body.discs[0, RADIUS]
     for c in range(3):
         low[c] = high[c] = points[0, c]
-        for k in range(1, points.shape[0]):
+        for k in range(1, body.used[0]):
             low[c] = min(low[c], points[k, c])
             high[c] = max(high[c], points[k, c])
+        low[c] -= grown
+        high[c] += grown
 
 
 @compiled
@@ -98,7 +101,7 @@ def obstacle_bracket(
         bracket(pieces, first, body, goal, scratch, out)
         return
     low, high = scratch[-2], scratch[-1]
-    box_of(body.points, low, high)
+    box_of(body, low, high)
     trial[NORMAL:NEAR] = out[NORMAL:NEAR]
     out[LOWER] = out[UPPER] = np.inf
     stack[0] = root
@@ -161,8 +164,21 @@ def node_support(
 
 
 @compiled
-def facing(pieces: PackedPieces, node: int, points: FloatArray, n: FloatArray) -> bool:
-    """A guess of n towards a node's box, from the first segment.
+def _spine(body: Body, c: int) -> tuple[float, float]:
+    """Coordinate c of both ends of a segment in a body: an axis, or the middle."""
+    points = body.points
+    if body.used[1] == 2:
+        return points[0, c], points[1, c]
+    middle = 0.0
+    for k in range(body.used[0]):
+        middle += points[k, c]
+    middle /= body.used[0]
+    return middle, middle
+
+
+@compiled
+def facing(pieces: PackedPieces, node: int, body: Body, n: FloatArray) -> bool:
+    """A guess of n towards a node's box, from a segment in the body.
 
     The point of the box nearest to a point of the segment, the point of the segment
     nearest to that one, and so on: a few turns come near the two nearest points.
@@ -170,7 +186,7 @@ def facing(pieces: PackedPieces, node: int, points: FloatArray, n: FloatArray) -
     Args:
         pieces: The scene.
         node: The node.
-        points: The link's points; the first two are its ends.
+        body: The body.
         n: Result, unit vector, shape (3,).
 
     Returns:
@@ -179,20 +195,22 @@ def facing(pieces: PackedPieces, node: int, points: FloatArray, n: FloatArray) -
     low, high = pieces.node_low[node], pieces.node_high[node]
     span = along = 0.0
     for c in range(3):
-        d = points[1, c] - points[0, c]
+        start, end = _spine(body, c)
+        d = end - start
         span += d * d
-        along += d * (0.5 * (low[c] + high[c]) - points[0, c])
+        along += d * (0.5 * (low[c] + high[c]) - start)
     squared = 0.0
     for _ in range(TURNS):
         t = min(1.0, max(0.0, along / span)) if span > 0.0 else 0.0
         squared = along = 0.0
         for c in range(3):
-            d = points[1, c] - points[0, c]
-            at = points[0, c] + t * d
+            start, end = _spine(body, c)
+            d = end - start
+            at = start + t * d
             inside = min(max(at, low[c]), high[c])
             n[c] = inside - at
             squared += n[c] * n[c]
-            along += d * (inside - points[0, c])
+            along += d * (inside - start)
     length = sqrt(squared)
     if not 0.0 < length < np.inf:
         return False
@@ -204,7 +222,7 @@ def facing(pieces: PackedPieces, node: int, points: FloatArray, n: FloatArray) -
 @compiled
 def _plane_gap(pieces: PackedPieces, node: int, body: Body, n: FloatArray) -> float:
     """Gap of one plane between a body and a node's box; a lower bound; [m]."""
-    if not facing(pieces, node, body.points, n):
+    if not facing(pieces, node, body, n):
         return -np.inf
     reach = body_reach(body, n[0], n[1], n[2])
     return box_support(pieces, node, n[0], n[1], n[2]) - reach

@@ -90,7 +90,7 @@ def row_brackets(
     scratch = np.zeros((SCRATCH_ROWS + 2, 3))
     stack = np.zeros(STACK, np.int64)
     trial, out = np.zeros(BRACKET + 4), np.zeros(BRACKET + 4)
-    body = new_body(2, 0)
+    body = new_body(2, 2, 0)
     out[NORMAL] = 1.0
     for m in range(obstacle.size):
         body.points[:] = ends[m]

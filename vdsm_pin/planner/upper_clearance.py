@@ -37,7 +37,7 @@ def upper_bounds(
     scratch = np.zeros((SCRATCH_ROWS + 2, 3))
     stack = np.zeros(STACK, np.int64)
     trial, out = np.zeros(BRACKET + 4), np.zeros(BRACKET + 4)
-    body = new_body(2, 0)
+    body = new_body(2, 2, 0)
     for n in range(segments.shape[0]):
         body.points[:] = segments[n]
         for o in range(count):

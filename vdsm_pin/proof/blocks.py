@@ -4,10 +4,10 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.geometry.compiled import apart, borrowed, clock, compiled
-from vdsm_pin.proof.coasting import glide, served
+from vdsm_pin.proof.coasting import bound_above, bound_below, served
 from vdsm_pin.proof.culling import Culling, cull
 from vdsm_pin.proof.desk import Desk
-from vdsm_pin.proof.layouts import POINT, UP, WIDTH
+from vdsm_pin.proof.layouts import OWN_POINT, UP, WIDTH
 from vdsm_pin.proof.pair_sweep import sweep_pair
 from vdsm_pin.proof.results import (
     Results,
@@ -22,8 +22,6 @@ from vdsm_pin.proof.terms import (
     Motion,
     Task,
     group_of,
-    is_nominal,
-    losses,
 )
 
 
@@ -49,42 +47,47 @@ def _sweep_block(
     rules, rows, runs, planes = task.rules, desk.rows, desk.runs, desk.planes
     best, counts, profile = results.best, results.counts, results.profile
     limit, lower, upper = results.limit, runs.lower[:count], runs.upper[:count]
-    n_links, rise = rules.lengths.size, rules.pad - rules.radius
-    nominal = is_nominal(rules)
-    quick = rules.joint_error == 0.0 and results.dense.verdict.shape[0] == 0
+    n_links, pairs, axial = rules.lengths.size, task.pairs, task.bodies.axial
+    quick = rules.steady and results.dense.verdict.shape[0] == 0
     for pair in near:
-        link, frame = task.pairs.link[pair], task.pairs.frame[pair]
-        column = n_links + task.pairs.obstacle[pair] if frame == BASE else -1
+        link, frame = pairs.link[pair], pairs.frame[pair]
+        column = n_links + pairs.obstacle[pair] if frame == BASE else -1
         group, plane, done = group_of(frame), planes[pair], 0
-        if quick:
-            lost = losses(rules, frame)
-            if frame == BASE:
-                lost += abs(plane[0]) * rules.base_error
-            glide(
-                rows.centres[frame + 1],
-                rows.sags[frame + 1],
+        if quick and axial[pairs.body[pair]]:
+            length, f = rules.lengths[link], frame + 1
+            points = rows.centres[f, link : link + 2]
+            bound_below(
+                points,
+                rows.sags[f, link : link + 2],
                 runs.growth,
                 plane,
-                link,
-                rules.lengths[link],
-                lost,
-                rise,
+                2,
+                pairs.lost[pair],
                 0,
                 count,
                 runs.lower,
-                runs.upper,
-                runs.at_rows,
                 runs.work,
             )
-            bar = task.pairs.required[pair]
+            bound_above(
+                points[0],
+                points[1],
+                plane,
+                1.0 / (length * length),
+                pairs.rise[pair],
+                0,
+                count,
+                runs.upper,
+                runs.at_rows,
+            )
+            bar = pairs.required[pair]
             if steady[group]:
                 bar = max(bar, limit[group] - rules.gap)
             done = served(lower, upper, bar, rules.slack, 2.0 * plane[WIDTH])
         if done == count:
             counts[pair, CERTIFIED] += count
-            point = plane[POINT:WIDTH]
-            note_upper(best[pair], upper, runs.at_rows, point, start, 0, count)
-            if nominal:
+            points_of = plane[OWN_POINT:WIDTH]
+            note_upper(best[pair], upper, runs.at_rows, points_of, start, 0, count)
+            if rules.nominal:
                 limit[group] = min(limit[group], best[pair, UP])
         elif not sweep_pair(
             task,
@@ -149,7 +152,7 @@ def sweep(
     desk = borrowed(desk)
     results = borrowed(results)
     culling = borrowed(culling)
-    if task.rules.joint_error == 0.0:
+    if task.rules.steady:
         # Whoever asks about several error boxes leaves here what the last one added.
         desk.runs.growth[:] = 0.0
     limit, steady = results.limit, np.zeros(2, np.bool_)
@@ -164,9 +167,7 @@ def sweep(
             before[group] = limit[group]
         count, offset = min(BLOCK, last - start), start - first
         fill_rows(motion, task.rules, desk.rows, start, count)
-        n_near = cull(
-            task, desk.rows, desk.space, results, culling, start, offset, count
-        )
+        n_near = cull(task, desk, results, culling, start, offset, count)
         near = culling.near[:n_near]
         if not _sweep_block(
             task, motion, desk, results, near, start, offset, count, steady, hasty

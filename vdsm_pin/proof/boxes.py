@@ -1,4 +1,4 @@
-"""Boxes of links over a block of intervals against those of obstacles, compiled.
+"""Boxes of bodies over a block of intervals against those of obstacles, compiled.
 
 Arrays have the obstacles last: the loops over them are what a compiler turns into
 vector instructions.
@@ -8,48 +8,69 @@ from math import sqrt
 
 import numpy as np
 
-from vdsm_pin.geometry.arm import second_order
+from vdsm_pin.geometry.arm import turned_by
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.geometry.compiled import apart, compiled
-from vdsm_pin.proof.rows import Rows
-from vdsm_pin.proof.terms import Rules
+from vdsm_pin.proof.coasting import crude_growth
+from vdsm_pin.proof.rows import BLOCK, Rows, place_corner
+from vdsm_pin.proof.terms import Task
 
 
 @compiled
-def _growth(rules: Rules, rows: Rows, count: int, joint: int) -> float:
-    """How far O_joint may leave the box of its rows: sag and error box; [m]."""
-    sag = drift = swing = behind = 0.0
+def _growth(task: Task, rows: Rows, count: int, body: int, corner: int) -> float:
+    """How far a corner may leave the box of its rows: sag and error box; [m]."""
+    rules, bodies = task.rules, task.bodies
+    link, lever = bodies.link[body], bodies.levers[bodies.first[body] + corner]
+    sag = drift = 0.0
+    error = lever * turned_by(rules.joint_errors, 0, link)
     for r in range(count):
-        sag = max(sag, rows.sags[0, joint, r])
-        drift = max(drift, rows.drifts[0, joint, r])
-    for link in range(joint - 1, -1, -1):
-        behind += rules.lengths[link]
-        swing += 2.0 * behind
-    error = rules.joint_error * (swing + 0.5 * drift) + rules.base_error
-    return error + sag + second_order(rules.lengths, 0, joint, rules.joint_error)
+        turning = 0.0
+        for k in range(link + 1):
+            turning += rows.turns[k, r]
+        sag = max(sag, rows.sags[0, link, r] + 0.125 * lever * turning * turning)
+        if rules.joints_err:
+            drift = max(drift, rows.drifts[0, link, r] + error * turning)
+    grown = sag + 0.5 * drift + bodies.discs[body, RADIUS]
+    return float(grown + crude_growth(rules, 0, link, lever))
 
 
 @compiled
-def link_box(
-    rules: Rules, rows: Rows, count: int, link: int, low: FloatArray, high: FloatArray
+def body_box(
+    task: Task,
+    rows: Rows,
+    count: int,
+    body: int,
+    low: FloatArray,
+    high: FloatArray,
 ) -> None:
-    """Box of a link over a block and the error box, shape (3,) each; [m]."""
+    """Box of a body's core over a block and the error box, shape (3,) each; [m].
+
+    Its ball and shifts are left to what every plane of a pair loses.
+    """
     apart()
     low[:], high[:] = np.inf, -np.inf
-    for joint in (link, link + 1):
-        grown = _growth(rules, rows, count, joint)
+    bodies, at = task.bodies, np.zeros((3, BLOCK + 1))
+    first, link = bodies.first[body], bodies.link[body]
+    for corner in range(bodies.first[body + 1] - first):
+        grown = _growth(task, rows, count, body, corner)
+        place_corner(rows, link, bodies.corners[first + corner], count + 1, at)
+        if task.rules.base_turn > 0.0:
+            far = 0.0
+            for r in range(count + 1):
+                far = max(far, at[0, r] ** 2 + at[1, r] ** 2 + at[2, r] ** 2)
+            grown += task.rules.base_turn * (sqrt(far) + grown)
         for c in range(3):
-            at = rows.centres[0, joint, c, : count + 1]
-            for r in range(at.size):
-                low[c] = min(low[c], at[r] - grown)
-                high[c] = max(high[c], at[r] + grown)
+            for r in range(count + 1):
+                low[c] = min(low[c], at[c, r] - grown)
+                high[c] = max(high[c], at[c, r] + grown)
 
 
 @compiled
 def box_gaps(
-    box: FloatArray, low: FloatArray, high: FloatArray, lost: float, gap: FloatArray
+    box: FloatArray, low: FloatArray, high: FloatArray, gap: FloatArray
 ) -> None:
-    """Distance of a link's box from every obstacle's, less what every bound loses."""
+    """Distance of a body's box from every obstacle's."""
     apart()
     lx, ly, lz, hx, hy, hz = (
         box[0, 0],
@@ -64,7 +85,7 @@ def box_gaps(
         x = max(lx[o] - bx, ax - hx[o], 0.0)
         y = max(ly[o] - by, ay - hy[o], 0.0)
         z = max(lz[o] - bz, az - hz[o], 0.0)
-        gap[o] = sqrt(x * x + y * y + z * z) - lost
+        gap[o] = sqrt(x * x + y * y + z * z)
 
 
 @compiled

@@ -1,7 +1,7 @@
 """Boxes over a block of intervals settle the pairs that are far, in compiled code.
 
 A pair is far where the distance of the boxes exceeds the required clearance, the
-least clearance met so far, and the distance of the link's nearest obstacle: then no
+least clearance met so far, and the distance of the body's nearest obstacle: then no
 narrower bracket could change what is reported.
 """
 
@@ -11,22 +11,22 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.bodies import Body, new_body
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import NORMAL, UPPER
 from vdsm_pin.geometry.obstacles import obstacle_bracket
 from vdsm_pin.geometry.pieces import PackedPieces
-from vdsm_pin.proof.boxes import box_gaps, box_reaches, link_box
+from vdsm_pin.proof.boxes import body_box, box_gaps, box_reaches
+from vdsm_pin.proof.coasting import place_body
+from vdsm_pin.proof.desk import Desk, load_rows
 from vdsm_pin.proof.results import Dense, Results
-from vdsm_pin.proof.rows import Rows
-from vdsm_pin.proof.slices import Space
+from vdsm_pin.proof.rows import BLOCK, Rows, place_corner
 from vdsm_pin.proof.terms import (
     BASE,
     CERTIFIED,
     OBSTACLES,
+    Pairs,
     Task,
-    is_nominal,
-    losses,
+    mover_of,
 )
 
 FEW: Final = 8
@@ -37,14 +37,18 @@ class Culling(NamedTuple):
     """The obstacles as culling sees them, its working space, and what it settled.
 
     Args:
+        number: The pair of every body and obstacle, -1 for none, shape (n_bodies,
+            n_obstacles).
+        others: The pairs without an obstacle.
         box: Lower and upper corner of every obstacle's box, shape (2, 3, n_obstacles);
             [m].
         point: A point of every obstacle, shape (3, n_obstacles); [m].
-        gap: Lower bounds of a block, shape (N, n_obstacles); [m].
+        gap: Lower bounds of a block, inf where not far, shape (n_bodies, n_obstacles);
+            [m].
         reach: Upper bounds of a block, inf where not far, the same shape; [m].
         far: Which pairs are far, the same shape.
         near: The pairs that are not, in no order, shape (n_pairs,).
-        lower: Least lower bounds of far pairs, shape (N, n_obstacles); [m].
+        lower: Least lower bounds of far pairs, shape (n_bodies, n_obstacles); [m].
         upper: Least upper bounds, the same shape; [m].
         at_lower: First interval of the block of the former, the same shape.
         at_upper: Of the latter, the same shape.
@@ -52,6 +56,8 @@ class Culling(NamedTuple):
         least: Least lower and upper bounds by obstacle, shape (2, n_obstacles); [m].
     """
 
+    number: IntArray
+    others: IntArray
     box: FloatArray
     point: FloatArray
     gap: FloatArray
@@ -68,10 +74,10 @@ class Culling(NamedTuple):
 
 @compiled
 def new_culling(
-    pieces: PackedPieces, n_links: int, n_obstacles: int, n_pairs: int
+    pieces: PackedPieces, pairs: Pairs, n_bodies: int, n_obstacles: int
 ) -> Culling:
     """Nothing settled yet; the obstacles are the first ones of the packed scene."""
-    n, shape = n_obstacles, (n_links, n_obstacles)
+    n, shape, n_pairs = n_obstacles, (n_bodies, n_obstacles), pairs.body.size
     box, point = np.zeros((2, 3, n)), np.zeros((3, n))
     for o in range(n):
         root, first = pieces.root[o], pieces.first_piece[o]
@@ -79,7 +85,17 @@ def new_culling(
             box[0, c, o] = pieces.node_low[root, c]
             box[1, c, o] = pieces.node_high[root, c]
             point[c, o] = pieces.centre[first, c]
+    number, others = np.full(shape, -1), np.zeros(n_pairs, np.int64)
+    n_others = 0
+    for pair in range(n_pairs):
+        if pairs.frame[pair] == BASE and pairs.obstacle[pair] < n:
+            number[pairs.body[pair], pairs.obstacle[pair]] = pair
+        else:
+            others[n_others] = pair
+            n_others += 1
     return Culling(
+        number,
+        others[:n_others].copy(),
         box,
         point,
         np.zeros(shape),
@@ -105,53 +121,61 @@ def _keep_least(values: FloatArray, least: FloatArray, at: IntArray, k: int) -> 
 
 
 @compiled
-def _nearest_upper(
-    task: Task, rows: Rows, space: Space, body: Body, link: int, obstacle: int
-) -> float:
-    """Upper bound of the clearance of a link and an obstacle at a block's first row."""
+def _nearest_upper(task: Task, desk: Desk, culling: Culling, body: int) -> float:
+    """Upper bound of the clearance of a body and of the obstacle whose box is nearest.
+
+    At the first row of a block; inf for a body without pairs.
+    """
     apart()
-    for k in range(2):
-        for c in range(3):
-            body.points[k, c] = rows.centres[0, link + k, c, 0]
+    pair, least, space = -1, np.inf, desk.space
+    for o in range(culling.number.shape[1]):
+        if culling.number[body, o] >= 0 and culling.gap[body, o] < least:
+            pair, least = culling.number[body, o], culling.gap[body, o]
+    if pair < 0:
+        return np.inf
+    mover = mover_of(task, pair)
+    place_body(mover, desk.rows, desk.runs, 1, task.rules.steady)
+    load_rows(task.rules, mover, desk, 0, 0)
     space.out[NORMAL : NORMAL + 3] = 1.0
     obstacle_bracket(
         task.pieces,
-        obstacle,
-        body,
+        task.pairs.obstacle[pair],
+        space.core,
         task.rules.goal,
         space.scratch,
         space.nodes,
         space.trial,
         space.out,
     )
-    return float(space.out[UPPER] - task.rules.radius + task.rules.pad)
+    return float(space.out[UPPER] + mover.rise)
 
 
 @compiled
-def _settle_link(
-    task: Task, results: Results, culling: Culling, link: int, upper: float, n_near: int
+def _settle_body(
+    task: Task, results: Results, culling: Culling, body: int, upper: float, n_near: int
 ) -> int:
-    """Tell which obstacles are far from a link; adds the near ones, their number.
+    """Tell which obstacles are far from a body; adds the near ones, their number.
 
     Args:
         task: The scene, pairs and rules.
         results: For the least clearance met.
-        culling: `gap` of the link is read, `far` written.
-        link: The link.
+        culling: `gap` of the body is read, `far` written.
+        body: The body.
         upper: Upper bound of the distance of its nearest obstacle; [m].
         n_near: Near pairs so far.
     """
     apart()
-    n_links = culling.gap.shape[0]
-    threshold = max(task.pairs.required[0], upper, results.limit[OBSTACLES])
-    gap, far = culling.gap[link], culling.far[link]
+    threshold = max(upper, results.limit[OBSTACLES])
+    gap, far, number = culling.gap[body], culling.far[body], culling.number[body]
     for o in range(gap.size):
-        far[o] = gap[o] >= threshold
+        required = task.pairs.required[max(number[o], 0)]
+        far[o] = gap[o] >= max(threshold, required) and number[o] >= 0
     for o in range(gap.size):
         if not far[o]:
-            culling.near[n_near] = o * n_links + link
-            n_near += 1
             gap[o] = np.inf
+            if number[o] >= 0:
+                culling.near[n_near] = number[o]
+                n_near += 1
     return n_near
 
 
@@ -159,27 +183,30 @@ def _settle_link(
 def _dense_far(
     task: Task, dense: Dense, rows: Rows, culling: Culling, offset: int, count: int
 ) -> None:
-    """Dense rows of the far pairs; witnesses are the obstacle's point and a cap's."""
+    """Dense rows of the far pairs; witnesses are the obstacle's point and a corner."""
     apart()
-    n_links, n_obstacles = culling.far.shape
-    for o in range(n_obstacles):
-        for link in range(n_links):
-            if not culling.far[link, o]:
+    n_bodies, n_obstacles = culling.far.shape
+    bodies, at = task.bodies, np.zeros((3, BLOCK + 1))
+    for body in range(n_bodies):
+        corner = bodies.corners[bodies.first[body]]
+        place_corner(rows, bodies.link[body], corner, count + 1, at)
+        radius = bodies.radius[body]
+        for o in range(n_obstacles):
+            if not culling.far[body, o]:
                 continue
-            pair = o * n_links + link
+            pair = culling.number[body, o]
             for local in range(count):
                 m, squared = offset + local, 0.0
                 for c in range(3):
-                    d = culling.point[c, o] - rows.centres[0, link, c, local]
-                    squared += d * d
+                    squared += (culling.point[c, o] - at[c, local]) ** 2
                 gap = sqrt(squared)
-                share = task.rules.radius / gap if gap > 0.0 else 0.0
+                share = radius / gap if gap > 0.0 else 0.0
                 for c in range(3):
-                    at = rows.centres[0, link, c, local]
-                    dense.own[m, pair, c] = at + share * (culling.point[c, o] - at)
+                    away = culling.point[c, o] - at[c, local]
+                    dense.own[m, pair, c] = at[c, local] + share * away
                     dense.other[m, pair, c] = culling.point[c, o]
-                dense.lower[m, pair] = culling.gap[link, o]
-                dense.upper[m, pair] = gap - task.rules.radius + task.rules.pad
+                dense.lower[m, pair] = culling.gap[body, o]
+                dense.upper[m, pair] = gap + task.pairs.rise[pair]
                 dense.time[m, pair], dense.verdict[m, pair] = 0.0, CERTIFIED
 
 
@@ -202,16 +229,18 @@ def _lower_profile(
 
 
 @compiled
-def _profile_far(results: Results, culling: Culling, start: int, count: int) -> None:
+def _profile_far(
+    task: Task, results: Results, culling: Culling, start: int, count: int
+) -> None:
     """Lower the profile's bins of a block to the least bounds of its far pairs."""
     apart()
-    n_links, n_obstacles = culling.far.shape
-    profile, stride = results.profile, results.stride
+    n_bodies, n_obstacles = culling.far.shape
+    profile, stride, n_links = results.profile, results.stride, task.rules.lengths.size
     culling.least[:] = np.inf
-    for link in range(n_links):
+    for body in range(n_bodies):
         low = high = np.inf
         for side in range(2):
-            values = culling.gap[link] if side == 0 else culling.reach[link]
+            values = culling.gap[body] if side == 0 else culling.reach[body]
             least = culling.least[side]
             for o in range(n_obstacles):
                 least[o] = values[o] if values[o] < least[o] else least[o]
@@ -220,6 +249,7 @@ def _profile_far(results: Results, culling: Culling, start: int, count: int) -> 
                     low = min(low, values[o])
                 else:
                     high = min(high, values[o])
+        link = task.bodies.link[body]
         _lower_profile(profile, stride, link, low, high, start, count)
     for o in range(n_obstacles):
         low, high = culling.least[0, o], culling.least[1, o]
@@ -230,8 +260,7 @@ def _profile_far(results: Results, culling: Culling, start: int, count: int) -> 
 @compiled
 def cull(
     task: Task,
-    rows: Rows,
-    space: Space,
+    desk: Desk,
     results: Results,
     culling: Culling,
     start: int,
@@ -242,8 +271,7 @@ def cull(
 
     Args:
         task: The scene, pairs and rules.
-        rows: The block.
-        space: Working space.
+        desk: Working space; its rows are filled.
         results: Where to write.
         culling: Where to write; `near` lists the pairs that need a closer look.
         start: First interval of the block.
@@ -254,30 +282,34 @@ def cull(
         The number of near pairs.
     """
     apart()
-    n_links, n_obstacles = culling.gap.shape
+    n_bodies, n_obstacles = culling.gap.shape
     if n_obstacles <= FEW:
         return culling.near.size
-    rules, n_near = task.rules, 0
-    lost, rise = losses(rules, BASE), rules.pad - rules.radius
-    low, high, body = np.zeros(3), np.zeros(3), new_body(2, 0)
-    for link in range(n_links):
-        gap, reach = culling.gap[link], culling.reach[link]
-        link_box(rules, rows, count, link, low, high)
-        box_gaps(culling.box, low, high, lost, gap)
-        upper = _nearest_upper(task, rows, space, body, link, int(np.argmin(gap)))
-        if is_nominal(rules):
+    rules, rows, n_near = task.rules, desk.rows, 0
+    low, high, lost = np.zeros(3), np.zeros(3), task.pairs.lost
+    for body in range(n_bodies):
+        gap, reach = culling.gap[body], culling.reach[body]
+        body_box(task, rows, count, body, low, high)
+        box_gaps(culling.box, low, high, gap)
+        radius = task.bodies.radius[body]
+        for o in range(n_obstacles):
+            pair = culling.number[body, o]
+            gap[o] -= lost[pair] if pair >= 0 else 0.0
+        upper = _nearest_upper(task, desk, culling, body)
+        if rules.nominal:
             results.limit[OBSTACLES] = min(results.limit[OBSTACLES], upper)
-        n_near = _settle_link(task, results, culling, link, upper, n_near)
-        far, settled = culling.far[link], culling.settled[link]
-        box_reaches(culling.point, low, high, rise, far, reach)
+        n_near = _settle_body(task, results, culling, body, upper, n_near)
+        far, settled = culling.far[body], culling.settled[body]
+        rise_of = rules.pad - radius
+        box_reaches(culling.point, low, high, rise_of, far, reach)
         for o in range(n_obstacles):
             settled[o] += count if far[o] else 0
-        _keep_least(gap, culling.lower[link], culling.at_lower[link], start)
-        _keep_least(reach, culling.upper[link], culling.at_upper[link], start)
-    for pair in range(n_links * n_obstacles, task.pairs.link.size):
+        _keep_least(gap, culling.lower[body], culling.at_lower[body], start)
+        _keep_least(reach, culling.upper[body], culling.at_upper[body], start)
+    for pair in culling.others:
         culling.near[n_near] = pair
         n_near += 1
-    _profile_far(results, culling, start, count)
+    _profile_far(task, results, culling, start, count)
     if results.dense.verdict.shape[0] > 0:
         _dense_far(task, results.dense, rows, culling, offset, count)
     return n_near

@@ -5,13 +5,14 @@ from typing import NamedTuple
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.proof.coasting import Runs, new_runs
-from vdsm_pin.proof.layouts import HELD_CLEARANCE, PLANE, SLICE, SUPPORT
+from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE, SLICE, SUPPORT
 from vdsm_pin.proof.rows import BLOCK, Rows, new_rows
 from vdsm_pin.proof.slices import Space, new_space
-from vdsm_pin.proof.swept_links import Ends, load_errors, new_ends
-from vdsm_pin.proof.terms import Task
+from vdsm_pin.proof.swept_bodies import Ends, load_errors, new_ends
+from vdsm_pin.proof.terms import Mover, Rules
 
 
 class Desk(NamedTuple):
@@ -20,7 +21,7 @@ class Desk(NamedTuple):
     Args:
         rows: The block.
         runs: Bounds of the block's intervals for one pair.
-        planes: What the pairs remember, shape (n_pairs, PLANE).
+        planes: What the pairs remember, one row each.
         ends: For slices inside an interval.
         space: For bounds.
         heap: For subdivision; its length is the budget of one interval and pair.
@@ -36,20 +37,27 @@ class Desk(NamedTuple):
 
 @compiled
 def forget(planes: FloatArray) -> None:
-    """No pair remembers a plane any more, shape (n_pairs, PLANE)."""
+    """No pair remembers a plane any more, one row each."""
     planes[:] = 0.0
     planes[:, 0] = 1.0
     planes[:, SUPPORT] = planes[:, HELD_CLEARANCE] = -np.inf
 
 
 @compiled
-def new_desk(n_links: int, n_pairs: int, budget: int) -> Desk:
-    """Fresh working space; no pair remembers a plane yet."""
-    planes = np.zeros((n_pairs, PLANE))
+def new_desk(n_links: int, n_pairs: int, corners: int, budget: int) -> Desk:
+    """Fresh working space; no pair remembers a plane yet.
+
+    Args:
+        n_links: Links of the arm.
+        n_pairs: Number of pairs.
+        corners: Most corners of a body.
+        budget: Most slices of one interval and pair.
+    """
+    planes = np.zeros((n_pairs, HELD_AT + 3 * corners))
     forget(planes)
     heap = np.zeros((budget, SLICE))
-    ends, space = new_ends(n_links), new_space(n_links)
-    return Desk(new_rows(n_links), new_runs(), planes, ends, space, heap)
+    ends, space = new_ends(n_links), new_space(n_links, corners)
+    return Desk(new_rows(n_links), new_runs(corners), planes, ends, space, heap)
 
 
 @compiled
@@ -69,22 +77,32 @@ def take_rows(rows: Rows, first: int, last: int, ends: Ends) -> None:
 
 
 @compiled
-def load_rows(task: Task, desk: Desk, pair: int, first: int, last: int) -> None:
-    """Load the link of a pair between two rows of a block; `last` is `first` or next.
+def load_rows(rules: Rules, mover: Mover, desk: Desk, first: int, last: int) -> None:
+    """Load a body between two rows of a block; `last` is `first` or next.
 
-    Of the ends only what joint errors ask for is written.
+    Its corners over the block are placed. Of the ends only what errors ask for is
+    written.
     """
     apart()
-    rules, rows, body, ends = task.rules, desk.rows, desk.space.body, desk.ends
-    link, frame = task.pairs.link[pair], task.pairs.frame[pair]
-    f, h = frame + 1, float(last - first)
-    for k in range(2):
-        body.balls[k] = rows.sags[f, link + k, first] if last > first else 0.0
+    rows, runs, loaded, ends = desk.rows, desk.runs, desk.space.body, desk.ends
+    link, f, corners = mover.link, mover.first, mover.levers.size
+    loaded.used[0], loaded.used[1] = 2 * corners, corners
+    for k in range(corners):
+        loaded.balls[k] = runs.sags[k, first] if last > first else 0.0
         for c in range(3):
-            body.points[k, c] = rows.centres[f, link + k, c, first]
-            body.points[2 + k, c] = rows.centres[f, link + k, c, last]
-        if rules.joint_error > 0.0:
-            ends.drifts[f, link + k] = rows.drifts[f, link + k, min(first, BLOCK - 1)]
-    if rules.joint_error > 0.0:
+            loaded.points[k, c] = runs.points[k, c, first]
+            loaded.points[corners + k, c] = runs.points[k, c, last]
+    disc = mover.disc[RADIUS]
+    loaded.discs[0, RADIUS] = loaded.discs[1, RADIUS] = disc
+    if disc > 0.0:
+        for c in range(3):
+            loaded.discs[0, c] = runs.axis[c, first]
+            loaded.discs[1, c] = runs.axis[c, last]
+    if not rules.steady:
+        interval = min(first, BLOCK - 1)
+        ends.drifts[f, link] = rows.drifts[f, link, interval]
+        ends.rates[f, link] = 0.0
+        for k in range(f, link + 1):
+            ends.rates[f, link] += rows.turns[k, interval]
         take_rows(rows, first, last, ends)
-    load_errors(rules, ends, body, link, frame, h)
+    load_errors(rules, mover, ends, loaded, float(last - first))

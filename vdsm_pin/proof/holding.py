@@ -1,4 +1,4 @@
-"""A clearance held from row to row: it falls no faster than the link moves, compiled.
+"""A clearance held from row to row: it falls no faster than the body moves, compiled.
 
 A partner of many pieces needs a plane for each, found by a walk through its hierarchy.
 What one walk proved serves the rows around it.
@@ -14,39 +14,40 @@ from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE
 
 @compiled
 def hold(plane: FloatArray, clearance: float, body: Body) -> None:
-    """Remember the clearance proved over a slice, and the link at the end of it.
+    """Remember the clearance proved over a slice, and the body at the end of it.
 
     Args:
-        plane: What the pair remembers, shape (PLANE,).
+        plane: What the pair remembers.
         clearance: Lower bound over the slice; [m].
-        body: The link over the slice.
+        body: The body over the slice, without a disc.
     """
     plane[HELD_CLEARANCE] = clearance
-    for end in range(2):
+    corners = body.used[1]
+    for k in range(corners):
         for c in range(3):
-            plane[HELD_AT + 3 * end + c] = body.points[2 + end, c]
+            plane[HELD_AT + 3 * k + c] = body.points[corners + k, c]
 
 
 @compiled
 def raise_to_held(
-    centres: FloatArray,
+    points: FloatArray,
     sags: FloatArray,
     plane: FloatArray,
-    link: int,
+    corners: int,
     first: int,
     last: int,
     lower: FloatArray,
 ) -> None:
-    """Raise lower bounds to the clearance held, less what the link has moved since.
+    """Raise lower bounds to the clearance held, less what the body has moved since.
 
-    No point of a link moves farther than one of its ends. What errors add must not
+    No point of a body moves farther than one of its corners. What errors add must not
     depend on the configuration.
 
     Args:
-        centres: Joint centres in the partner's frame, shape (N + 1, 3, BLOCK + 1); [m].
-        sags: Of that frame, shape (N + 1, BLOCK); [m].
-        plane: What the pair remembers, shape (PLANE,).
-        link: The link.
+        points: Corners in the partner's frame, shape (corners, 3, BLOCK + 1); [m].
+        sags: Shape (corners, BLOCK); [m].
+        plane: What the pair remembers.
+        corners: How many the body has.
         first: First interval of the block to look at.
         last: One past the last.
         lower: Updated, shape (BLOCK,); [m].
@@ -54,15 +55,16 @@ def raise_to_held(
     apart()
     before = 0.0
     for row in range(first, last + 1):
-        moved = 0.0
-        for end in range(2):
+        moved = sag = 0.0
+        for k in range(corners):
             squared = 0.0
             for c in range(3):
-                d = centres[link + end, c, row] - plane[HELD_AT + 3 * end + c]
+                d = points[k, c, row] - plane[HELD_AT + 3 * k + c]
                 squared += d * d
             moved = max(moved, sqrt(squared))
+            if row > first:
+                sag = max(sag, sags[k, row - 1])
         if row > first:
-            sag = max(sags[link, row - 1], sags[link + 1, row - 1])
             held = plane[HELD_CLEARANCE] - max(before, moved) - sag
             lower[row - 1] = max(lower[row - 1], held)
         before = moved

@@ -3,14 +3,15 @@
 from typing import Final
 
 SUPPORT: Final = 3
-POINT: Final = 4
-WIDTH: Final = 7
-HELD_CLEARANCE: Final = 8
-HELD_AT: Final = 9
-PLANE: Final = 15
-"""Layout of what a pair remembers: n (3), support in n, witness on the partner (3),
-width of the bracket when they were found; of a partner of many pieces the clearance
-proved at one configuration, else -inf, and both ends of the link there (6)."""
+OWN_POINT: Final = 4
+POINT: Final = 7
+WIDTH: Final = 10
+HELD_CLEARANCE: Final = 11
+HELD_AT: Final = 12
+"""Layout of what a pair remembers: n (3), support in n, witness on the body in its
+link's frame (3) and on the partner (3), width of the bracket when they were found; of a
+partner of many pieces the clearance proved at one configuration, else -inf, and the
+corners of the body there (3 each)."""
 
 KEY: Final = 0
 INTERVAL: Final = 1
@@ -34,8 +35,9 @@ OWN: Final = 5
 OTHER: Final = 8
 BEST: Final = 11
 """Layout of a pair's best row: lower bound and its interval, upper bound, its interval
-and time, witnesses on the link and on the partner in the base frame (3 each). Until
-`place_best` the last is a core point of the partner, in its frame."""
+and time, witnesses on the body and on the partner in the base frame (3 each). Until
+`place_best` they are core points, of the body in its link's frame, of the partner in
+its own."""
 
 HELD: Final = 0
 SLICES: Final = 1

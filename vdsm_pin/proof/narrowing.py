@@ -11,7 +11,7 @@ from vdsm_pin.proof.layouts import (
     END,
     INTERVAL,
     KEY,
-    OTHER,
+    OWN,
     PAIR,
     SLICE,
     TIME,
@@ -110,6 +110,6 @@ def narrow(
         if found.upper[pair] < results.best[pair, UP]:
             best = results.best[pair]
             best[UP], best[AT_UPPER] = found.upper[pair], found.interval[pair]
-            best[TIME], best[OTHER:] = found.time[pair], found.points[pair, 3:]
+            best[TIME], best[OWN:] = found.time[pair], found.points[pair]
         results.limit[group] = min(results.limit[group], found.instant[pair])
     return count

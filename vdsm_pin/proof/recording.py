@@ -26,8 +26,8 @@ from vdsm_pin.proof.terms import CERTIFIED, Motion, Task
 @compiled
 def _claim(task: Task, desk: Desk, row: FloatArray, node: int, n: FloatArray) -> float:
     """Clearance that one plane proves of the pieces of a node over a slice; [m]."""
-    frame = task.pairs.frame[int(row[PAIR])]
-    return plane_bound(task.pieces, task.rules, desk.space, node, frame, n)
+    lost = task.pairs.lost[int(row[PAIR])]
+    return plane_bound(task.pieces, desk.space, node, lost, n)
 
 
 @compiled
@@ -61,7 +61,7 @@ def _write_ranges(
     """Write planes for ranges of pieces, as few as the hierarchy allows."""
     apart()
     pieces, space, pair = task.pieces, desk.space, int(row[PAIR])
-    frame, needed = task.pairs.frame[pair], task.pairs.required[pair]
+    lost, needed = task.pairs.lost[pair], task.pairs.required[pair]
     n, nodes = np.zeros(3), space.nodes
     waiting = 1
     nodes[0] = pieces.root[task.pairs.obstacle[pair]]
@@ -69,12 +69,12 @@ def _write_ranges(
         waiting -= 1
         node = nodes[waiting]
         if pieces.node_range[node, 1] - pieces.node_range[node, 0] == 1:
-            leaf_bound(pieces, task.rules, space, node, frame, False, space.trial)
+            leaf_bound(task, space, node, lost, False, space.trial)
             n[:] = space.trial[NORMAL:NEAR]
             claim = _claim(task, desk, row, node, n)
             count = _write(task, row, node, n, claim, records, count)
             continue
-        bound = node_bound(pieces, task.rules, space, node, frame, n)
+        bound = node_bound(pieces, space, node, lost, n)
         if bound >= needed:
             claim = _claim(task, desk, row, node, n)
             count = _write(task, row, node, n, claim, records, count)

@@ -10,7 +10,7 @@ from vdsm_pin.proof.layouts import (
     HELD,
     LOST,
     LOW,
-    OTHER,
+    OWN,
     TIME,
     UP,
 )
@@ -104,7 +104,7 @@ def note_upper(
     best: FloatArray,
     upper: FloatArray,
     at_rows: FloatArray,
-    point: FloatArray,
+    points: FloatArray,
     start: int,
     first: int,
     last: int,
@@ -115,7 +115,7 @@ def note_upper(
         best: The pair's, shape (BEST,).
         upper: Upper bounds of the block, shape (>= last,); [m].
         at_rows: Core distances at its rows, shape (> last,); [m].
-        point: The witness, shape (3,); [m].
+        points: The witnesses on the body and on the partner, shape (6,); [m].
         start: First interval of the block.
         first: First interval, counted in the block.
         last: One past the last.
@@ -124,7 +124,7 @@ def note_upper(
         at = first + _least(upper[first:last])
         later = 1.0 if at_rows[at + 1] < at_rows[at] else 0.0
         best[UP], best[AT_UPPER], best[TIME] = upper[at], start + at, later
-        best[OTHER:] = point
+        best[OWN:] = points
 
 
 @compiled

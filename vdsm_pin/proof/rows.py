@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.geometry.arm import second_order
+from vdsm_pin.geometry.arm import turned_by
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.proof.terms import Motion, Rules
@@ -33,7 +33,7 @@ class Rows(NamedTuple):
         sags: M/8, how far O_j may leave its chord with joints before f at rest, at
             [f, j], shape (N + 1, N + 1, BLOCK); [m].
         drifts: D at [f, j], only where joints may err, the same shape; [m].
-        turns: |change of alpha_i| + |change of theta_i|, shape (N, BLOCK); [rad].
+        turns: |change of alpha_l| + |change of theta_l|, shape (N, BLOCK); [rad].
         work: Working space, shape (WORK, BLOCK + 1).
     """
 
@@ -161,18 +161,19 @@ def _bend(motion: Motion, rules: Rules, rows: Rows, first: int, count: int) -> N
     for f in range(n_links):
         turning[:] = 0.0
         for link in range(f, n_links):
-            length, angles = rules.lengths[link], 2.0 * (link - f + 1)
+            length = rules.lengths[link]
             turn = rows.turns[link, :count]
             for r in range(count):
                 turning[r] += turn[r]
             before, after = rows.sags[f, link, :count], rows.sags[f, link + 1, :count]
             for r in range(count):
                 after[r] = before[r] + 0.125 * length * turning[r] * turning[r]
-            if rules.joint_error > 0.0:
+            if rules.joints_err:
+                error = turned_by(rules.joint_errors, f, link)
                 before = rows.drifts[f, link, :count]
                 after = rows.drifts[f, link + 1, :count]
                 for r in range(count):
-                    after[r] = before[r] + angles * length * turning[r]
+                    after[r] = before[r] + error * length * turning[r]
 
 
 @compiled
@@ -185,27 +186,103 @@ def fill_rows(motion: Motion, rules: Rules, rows: Rows, first: int, count: int) 
 
 
 @compiled
-def _swing(rows: Rows, f: int, j: int, first: int, end: int) -> None:
-    """G of O_j along the directions in work[3:6], to work[6], rows [first, end).
+def turning_of(rows: Rows, f: int, link: int, count: int, out: FloatArray) -> None:
+    """W of a link with joints below f at rest, shape (>= count,); [rad]."""
+    out[:count] = 0.0
+    for k in range(f, link + 1):
+        turn = rows.turns[k]
+        for r in range(count):
+            out[r] += turn[r]
 
-    The sum over the angles of joints f to j - 1 of |n . (axis x arm)|: yaw turns about
-    z of the frame before, pitch about y of the joint's own; [m/rad].
+
+@compiled
+def place_corner(
+    rows: Rows, link: int, at: FloatArray, count: int, out: FloatArray
+) -> None:
+    """A point of a link's frame in the base frame, shape (3, >= count); [m]."""
+    x, y, z = at[0], at[1], at[2]
+    for c in range(3):
+        o, f = rows.centres[0, link, c], rows.frames[link + 1, c]
+        fx, fy, fz, place = f[0], f[1], f[2], out[c]
+        for r in range(count):
+            place[r] = o[r] + (x * fx[r] + y * fy[r] + z * fz[r])
+
+
+@compiled
+def turn_axis(
+    rows: Rows, f: int, link: int, axis: FloatArray, count: int, out: FloatArray
+) -> None:
+    """A direction of a link's frame in frame f, shape (3, >= count)."""
+    x, y, z = axis[0], axis[1], axis[2]
+    for c in range(3):
+        g = rows.frames[link + 1, c]
+        gx, gy, gz, turned = g[0], g[1], g[2], out[c]
+        for r in range(count):
+            turned[r] = x * gx[r] + y * gy[r] + z * gz[r]
+    if f > 0:
+        _turn_back(rows, f, count, out)
+
+
+@compiled
+def _turn_back(rows: Rows, f: int, count: int, out: FloatArray) -> None:
+    """Directions of the base frame in frame f, shape (3, >= count)."""
+    work = rows.work
+    for c in range(3):
+        for r in range(count):
+            work[c, r] = out[c, r]
+    for c in range(3):
+        _blend(
+            work[0, :count],
+            work[1, :count],
+            work[2, :count],
+            rows.frames[f, 0, c, :count],
+            rows.frames[f, 1, c, :count],
+            rows.frames[f, 2, c, :count],
+            out[c, :count],
+        )
+
+
+@compiled
+def to_frame(
+    rows: Rows, f: int, count: int, based: FloatArray, out: FloatArray
+) -> None:
+    """Points of the base frame in frame f, shape (3, >= count); [m]."""
+    for c in range(3):
+        if f == 0:
+            out[c, :count] = based[c, :count]
+            continue
+        o = rows.centres[0, f - 1, c]
+        for r in range(count):
+            out[c, r] = based[c, r] - o[r]
+    if f > 0:
+        _turn_back(rows, f, count, out)
+
+
+@compiled
+def _swing(
+    rules: Rules, rows: Rows, f: int, link: int, based: FloatArray, first: int, end: int
+) -> None:
+    """G of a point along the directions in work[3:6], to work[6], rows [first, end).
+
+    The sum over the angles of joints f to `link` of error |n . (axis x arm)|: yaw turns
+    about z of the frame before, pitch about y of the joint's own; [m].
     """
     apart()
     nx, ny = rows.work[3, first:end], rows.work[4, first:end]
     nz = rows.work[5, first:end]
     swing = rows.work[6, first:end]
     swing[:] = 0.0
-    for joint in range(f, j):
+    for joint in range(f, link + 1):
         for c in range(3):
             o = rows.centres[0, joint, c, first:end]
-            p, arm = rows.centres[0, j, c, first:end], rows.work[c, first:end]
+            p, arm = based[c, first:end], rows.work[c, first:end]
             for r in range(arm.size):
                 arm[r] = p[r] - o[r]
         ax, ay = rows.work[0, first:end], rows.work[1, first:end]
         az = rows.work[2, first:end]
         for turn in range(2):
             frame, axis = joint + turn, 2 - turn
+            error = rules.joint_errors[joint, turn]
             ux = rows.frames[frame, 0, axis, first:end]
             uy = rows.frames[frame, 1, axis, first:end]
             uz = rows.frames[frame, 2, axis, first:end]
@@ -213,31 +290,33 @@ def _swing(rows: Rows, f: int, j: int, first: int, end: int) -> None:
                 x = uy[r] * az[r] - uz[r] * ay[r]
                 y = uz[r] * ax[r] - ux[r] * az[r]
                 z = ux[r] * ay[r] - uy[r] * ax[r]
-                swing[r] += abs(nx[r] * x + ny[r] * y + nz[r] * z)
+                swing[r] += error * abs(nx[r] * x + ny[r] * y + nz[r] * z)
 
 
 @compiled
-def error_growth(
+def add_errors(
     rules: Rules,
     rows: Rows,
     f: int,
-    j: int,
+    link: int,
+    based: FloatArray,
     n: FloatArray,
     first: int,
     last: int,
     out: FloatArray,
 ) -> None:
-    """How far joint errors may push O_j along n, given in frame f.
+    """Add half of G of a point at both ends of intervals, along n given in frame f.
 
     Args:
         rules: The error box.
         rows: The block.
         f: Frame of the partner: joints from f on err.
-        j: Joint centre.
+        link: The link that the point rides on.
+        based: The point in the base frame, shape (3, BLOCK + 1); [m].
         n: Unit vector, shape (3,); [-].
         first: First interval.
         last: One past the last interval.
-        out: Result, written at [first, last), shape (BLOCK,); [m].
+        out: Added to at [first, last), shape (BLOCK,); [m].
     """
     apart()
     end = last + 1
@@ -246,8 +325,7 @@ def error_growth(
         z, turned = rows.frames[f, c, 2, first:end], rows.work[3 + c, first:end]
         for r in range(turned.size):
             turned[r] = n[0] * x[r] + n[1] * y[r] + n[2] * z[r]
-    _swing(rows, f, j, first, end)
-    least = second_order(rules.lengths, f, j, rules.joint_error)
-    half, swing, drift = 0.5 * rules.joint_error, rows.work[6], rows.drifts[f, j]
+    _swing(rules, rows, f, link, based, first, end)
+    swing = rows.work[6]
     for r in range(first, last):
-        out[r] = least + half * (drift[r] + swing[r] + swing[r + 1])
+        out[r] += 0.5 * (swing[r] + swing[r + 1])

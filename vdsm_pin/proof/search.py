@@ -21,13 +21,14 @@ from vdsm_pin.proof.layouts import (
     WHEN,
 )
 from vdsm_pin.proof.slices import Space, slice_bound
-from vdsm_pin.proof.swept_links import Ends
+from vdsm_pin.proof.swept_bodies import Ends, to_link
 from vdsm_pin.proof.terms import (
     CERTIFIED,
     REFUTED,
     UNDECIDED,
     Motion,
     Task,
+    mover_of,
 )
 
 SHORTEST: Final = 2.0**-30
@@ -39,7 +40,8 @@ class Witness(NamedTuple):
 
     Args:
         value: Upper bound, its time, and the least instant lower bound, shape (3,).
-        points: Core points of the link and of the partner, shape (6,); [m].
+        points: Core points of the body in its link's frame and of the partner in its
+            own, shape (6,); [m].
     """
 
     value: FloatArray
@@ -53,7 +55,7 @@ class Witnesses(NamedTuple):
         upper: Least upper bounds, shape (n_pairs,); [m].
         interval: Where they were met, shape (n_pairs,).
         time: When in that interval, shape (n_pairs,).
-        points: Core points of the link and of the partner, shape (n_pairs, 6); [m].
+        points: Core points as in a `Witness`, shape (n_pairs, 6); [m].
         instant: Least bounds proved for one instant, shape (n_pairs,); [m].
     """
 
@@ -95,12 +97,14 @@ def bound_between(
         t = row[START + end] if last - k == 2 else 0.0
         place_between(t, x0, alpha, theta, lengths, ends.centres[end], ends.frames[end])
     if last - k == 2:
-        bends_and_drifts(alpha, theta, lengths, ends.bends, ends.drifts)
+        errors = task.rules.joint_errors
+        bends, drifts, rates = ends.bends, ends.drifts, ends.rates
+        bends_and_drifts(alpha, theta, lengths, errors, bends, drifts, rates)
     else:
         ends.bends[:] = 0.0
         ends.drifts[:] = 0.0
-    h = row[END] - row[START]
-    slice_bound(task.pieces, task.pairs, task.rules, ends, space, int(row[PAIR]), h)
+        ends.rates[:] = 0.0
+    slice_bound(task, ends, space, int(row[PAIR]), row[END] - row[START])
     row[KEY] = space.out[LOWER]
 
 
@@ -123,11 +127,14 @@ def examine(
     instant = row.copy()
     instant[START] = instant[END] = t
     bound_between(task, motion, ends, space, instant)
-    upper = space.out[UPPER] - task.rules.radius + task.rules.pad
+    pair = int(row[PAIR])
+    upper = space.out[UPPER] + task.pairs.rise[pair]
     if upper < witness.value[MET]:
         witness.value[MET], witness.value[WHEN] = upper, t
         for c in range(NEAR, BRACKET):
             witness.points[c - NEAR] = space.out[c]
+        own, mover = witness.points[:3], mover_of(task, pair)
+        to_link(mover, ends.centres[0], ends.frames[0], own)
     witness.value[INSTANT] = min(witness.value[INSTANT], instant[KEY])
     return float(instant[KEY])
 

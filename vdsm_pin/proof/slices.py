@@ -26,8 +26,8 @@ from vdsm_pin.geometry.obstacles import (
     push_children,
 )
 from vdsm_pin.geometry.pieces import PackedPieces
-from vdsm_pin.proof.swept_links import Ends, load_link, room_of
-from vdsm_pin.proof.terms import Pairs, Rules, losses
+from vdsm_pin.proof.swept_bodies import Ends, load_body, room_of
+from vdsm_pin.proof.terms import Task, mover_of
 
 EASE: Final = 0.5
 """Part of the slack that the pieces of a partner need not be told apart by."""
@@ -37,8 +37,8 @@ class Space(NamedTuple):
     """Working space of the bounds, and their result.
 
     Args:
-        body: The link over the slice and the error box, in its partner's frame: O_i and
-            O_{i+1} at the start, then at the end.
+        body: The body over the slice and the error box, in its partner's frame: its
+            corners at the start, then at the end.
         core: The same points, not grown.
         scratch: Shape (SCRATCH_ROWS + 2, 3).
         nodes: Nodes still to look at, shape (STACK,).
@@ -59,13 +59,14 @@ class Space(NamedTuple):
 
 
 @compiled
-def new_space(n_links: int) -> Space:
-    """Fresh working space."""
+def new_space(n_links: int, corners: int) -> Space:
+    """Fresh working space for bodies of up to so many corners."""
     apart()
-    body, core = new_body(4, room_of(n_links)), new_body(4, 0)
+    body = new_body(2 * corners, corners, room_of(n_links))
+    core = new_body(0, corners, 0)
     return Space(
         body,
-        Body(body.points, core.swings, core.sizes, core.balls),
+        Body(body.points, core.swings, core.sizes, core.balls, body.discs, body.used),
         np.zeros((SCRATCH_ROWS + 2, 3)),
         np.zeros(STACK, np.int64),
         np.zeros(STACK, np.int64),
@@ -77,42 +78,31 @@ def new_space(n_links: int) -> Space:
 
 @compiled
 def plane_bound(
-    pieces: PackedPieces,
-    rules: Rules,
-    space: Space,
-    node: int,
-    frame: int,
-    n: FloatArray,
+    pieces: PackedPieces, space: Space, node: int, lost: float, n: FloatArray
 ) -> float:
     """Clearance that a plane proves of all pieces of a node over a slice; [m].
 
     Args:
         pieces: The scene.
-        rules: What the plane loses.
         space: Its `body` is loaded.
         node: The node.
-        frame: Frame of the partner.
+        lost: What every plane of the pair loses; [m].
         n: Unit vector towards the partner, in its frame, shape (3,); [-].
     """
     apart()
     support = node_support(pieces, node, n, space.stack, space.scratch[0])
-    return support - body_reach(space.body, n[0], n[1], n[2]) - losses(rules, frame)
+    return support - body_reach(space.body, n[0], n[1], n[2]) - lost
 
 
 @compiled
 def node_bound(
-    pieces: PackedPieces,
-    rules: Rules,
-    space: Space,
-    node: int,
-    frame: int,
-    n: FloatArray,
+    pieces: PackedPieces, space: Space, node: int, lost: float, n: FloatArray
 ) -> float:
     """The same of a plane that faces the node's box, written to n, by that box; [m]."""
-    if not facing(pieces, node, space.body.points, n):
+    if not facing(pieces, node, space.body, n):
         return -np.inf
     support = box_support(pieces, node, n[0], n[1], n[2])
-    return support - body_reach(space.body, n[0], n[1], n[2]) - losses(rules, frame)
+    return support - body_reach(space.body, n[0], n[1], n[2]) - lost
 
 
 @compiled
@@ -136,7 +126,9 @@ def leaf_bracket(
             and the witnesses are of the hull of the points alone, inf where not wanted.
     """
     body, wide = space.body, space.wide
-    grown = body.sizes[0] + body.sizes[1] > 0
+    grown = False
+    for corner in range(body.used[1]):
+        grown |= body.sizes[corner] > 0
     wide[NORMAL:NEAR] = out[NORMAL:NEAR]
     if sighted or not grown:
         bracket(pieces, p, space.core, goal, space.scratch, out)
@@ -153,45 +145,33 @@ def leaf_bracket(
 
 @compiled
 def leaf_bound(
-    pieces: PackedPieces,
-    rules: Rules,
-    space: Space,
-    node: int,
-    frame: int,
-    sighted: bool,
-    out: FloatArray,
+    task: Task, space: Space, node: int, lost: float, sighted: bool, out: FloatArray
 ) -> None:
     """Replace the distance bracket of a piece by the clearance that its plane proves.
 
     Args:
-        pieces: The scene.
-        rules: What the plane loses.
+        task: The scene and the rules.
         space: Its `body` is loaded.
         node: Node of the one piece.
-        frame: Frame of the partner.
+        lost: What every plane of the pair loses; [m].
         sighted: As for `leaf_bracket`.
         out: The same; on return `lower` is the bound over the slice.
     """
-    p = pieces.node_range[node, 0]
-    leaf_bracket(pieces, space, p, rules.goal, sighted, out)
-    out[LOWER] -= losses(rules, frame)
+    p = task.pieces.node_range[node, 0]
+    leaf_bracket(task.pieces, space, p, task.rules.goal, sighted, out)
+    out[LOWER] -= lost
 
 
 @compiled
 def _mesh_bound(
-    pieces: PackedPieces,
-    rules: Rules,
-    space: Space,
-    root: int,
-    frame: int,
-    sighted: bool,
-    enough: float,
+    task: Task, space: Space, root: int, lost: float, sighted: bool, enough: float
 ) -> None:
     """`loaded_bound` for an obstacle of many pieces, by its hierarchy."""
     apart()
-    left_out, part = np.inf, 1.0 - EASE * rules.slack
+    pieces = task.pieces
+    left_out, part = np.inf, 1.0 - EASE * task.rules.slack
     low, high = space.scratch[SCRATCH_ROWS], space.scratch[SCRATCH_ROWS + 1]
-    box_of(space.body.points, low, high)
+    box_of(space.body, low, high)
     nodes, trial, out = space.nodes, space.trial, space.out
     trial[NORMAL:NEAR] = out[NORMAL:NEAR]
     out[LOWER] = out[UPPER] = np.inf
@@ -201,7 +181,7 @@ def _mesh_bound(
         waiting -= 1
         node = nodes[waiting]
         n = trial[BRACKET : BRACKET + 3]
-        bound = node_bound(pieces, rules, space, node, frame, n)
+        bound = node_bound(pieces, space, node, lost, n)
         if bound >= min(out[LOWER], max(enough, part * out[LOWER])):
             left_out = min(left_out, bound)
             continue
@@ -209,27 +189,19 @@ def _mesh_bound(
         if last - first > 1:
             waiting = push_children(pieces, node, low, high, nodes, waiting)
             continue
-        leaf_bound(pieces, rules, space, node, frame, sighted, trial)
+        leaf_bound(task, space, node, lost, sighted, trial)
         keep_least(trial, out)
     out[LOWER] = min(out[LOWER], left_out)
 
 
 @compiled
 def loaded_bound(
-    pieces: PackedPieces,
-    pairs: Pairs,
-    rules: Rules,
-    space: Space,
-    pair: int,
-    sighted: bool,
-    enough: float,
+    task: Task, space: Space, pair: int, sighted: bool, enough: float
 ) -> None:
     """`slice_bound` where the body is in the working space already.
 
     Args:
-        pieces: The scene.
-        pairs: All pairs.
-        rules: What the planes lose.
+        task: The scene, pairs and rules.
         space: Its `body` is loaded; otherwise as for `slice_bound`.
         pair: Number of the pair.
         sighted: As for `leaf_bracket`.
@@ -237,37 +209,28 @@ def loaded_bound(
             the partner is of many pieces; [m].
     """
     apart()
-    root, frame = pieces.root[pairs.obstacle[pair]], pairs.frame[pair]
+    pieces, lost = task.pieces, task.pairs.lost[pair]
+    root = pieces.root[task.pairs.obstacle[pair]]
     first, last = pieces.node_range[root]
     if last - first == 1:
-        leaf_bound(pieces, rules, space, root, frame, sighted, space.out)
+        leaf_bound(task, space, root, lost, sighted, space.out)
     else:
-        _mesh_bound(pieces, rules, space, root, frame, sighted, enough)
+        _mesh_bound(task, space, root, lost, sighted, enough)
 
 
 @compiled
-def slice_bound(
-    pieces: PackedPieces,
-    pairs: Pairs,
-    rules: Rules,
-    ends: Ends,
-    space: Space,
-    pair: int,
-    h: float,
-) -> None:
+def slice_bound(task: Task, ends: Ends, space: Space, pair: int, h: float) -> None:
     """Least clearance of a pair over a slice, proved by planes.
 
     Args:
-        pieces: The scene.
-        pairs: All pairs.
-        rules: The error box.
+        task: The scene, pairs and rules.
         ends: The slice.
         space: Working space; out[NORMAL:NEAR] is a guess of n on entry. On return `out`
             is the bracket: `lower` holds over the slice and the error box, `upper` is
-            the core distance of the hull of the four points, where it is known.
+            the core distance of the hull of all points, where it is known.
         pair: Number of the pair.
         h: Length of the slice; 0 for an instant, where `upper` is a true distance.
     """
     apart()
-    load_link(rules, ends, space.body, pairs.link[pair], pairs.frame[pair], h)
-    loaded_bound(pieces, pairs, rules, space, pair, h == 0.0, np.inf)
+    load_body(task.rules, mover_of(task, pair), ends, space.body, h)
+    loaded_bound(task, space, pair, h == 0.0, np.inf)

@@ -1,13 +1,14 @@
-"""What a proof is about: the pairs, the rules, the rows of joint values.
+"""What a proof is about: the bodies, the pairs, the rules, the rows of joint values.
 
-A pair is a link and an obstacle or, in the frame of another link, that link. Both
-are the same to the kernels: two moving joint centres against an obstacle of the packed
-scene, in which the axes of the links stand behind the obstacles.
+A body is a convex solid that rides on a link: the link itself, a tool, a camera. A pair
+is a body and an obstacle or, in the frame of another link, a body that rests on that
+link. Both are the same to the kernels: moving corners against an obstacle of the packed
+scene, in which the bodies stand behind the obstacles.
 """
 
 from typing import Final, NamedTuple
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.geometry.pieces import PackedPieces
 
@@ -24,20 +25,76 @@ LINKS: Final = 1
 """Groups of pairs, each with a least clearance of its own."""
 
 
-class Pairs(NamedTuple):
-    """All pairs, in the order of the certificate.
+class Bodies(NamedTuple):
+    """Convex solids that ride on the links: hulls of corners, grown by ball and disc.
 
     Args:
-        link: The moving link, from 0, shape (n_pairs,).
+        link: The link that each rides on, from 0, shape (n_bodies,).
+        first: Where a body's corners start, shape (n_bodies + 1,).
+        corners: In the frames of their links, shape (n_corners, 3); [m].
+        levers: Distance of each corner, with its disc, from the link's origin, shape
+            (n_corners,); [m].
+        radius: Of the ball that grows the body, shape (n_bodies,); [m].
+        discs: Axis and radius of the disc that grows it, shape (n_bodies, 4).
+        axial: Whether a body is the whole axis of its link, grown by a ball, shape
+            (n_bodies,): its corners are the two joint centres.
+    """
+
+    link: IntArray
+    first: IntArray
+    corners: FloatArray
+    levers: FloatArray
+    radius: FloatArray
+    discs: FloatArray
+    axial: BoolArray
+
+
+class Pairs(NamedTuple):
+    """All pairs, those with obstacles first, in the order of the certificate.
+
+    Args:
+        body: The moving body, shape (n_pairs,).
+        link: The link that it rides on, from 0, shape (n_pairs,).
         obstacle: Its partner in the packed scene, shape (n_pairs,).
         frame: Link in whose frame the partner rests, or BASE, shape (n_pairs,).
         required: Least clearance, shape (n_pairs,); [m].
+        lost: What every plane loses: radius, shifts, rounding, shape (n_pairs,); [m].
+        rise: What turns a distance of core points into an upper bound, (n_pairs,); [m].
     """
 
+    body: IntArray
     link: IntArray
     obstacle: IntArray
     frame: IntArray
     required: FloatArray
+    lost: FloatArray
+    rise: FloatArray
+
+
+class Mover(NamedTuple):
+    """The moving side of a pair.
+
+    Args:
+        link: The link that the body rides on, from 0.
+        first: The first joint that moves it in the frame of its partner.
+        corners: In the frame of the link, shape (n, 3); [m].
+        levers: As in `Bodies`, shape (n,); [m].
+        disc: Axis and radius, shape (4,).
+        radius: Of the ball that grows it; [m].
+        axial: As in `Bodies`.
+        lost: As in `Pairs`; [m].
+        rise: As in `Pairs`; [m].
+    """
+
+    link: int
+    first: int
+    corners: FloatArray
+    levers: FloatArray
+    disc: FloatArray
+    radius: float
+    axial: bool
+    lost: float
+    rise: float
 
 
 class Rules(NamedTuple):
@@ -45,10 +102,11 @@ class Rules(NamedTuple):
 
     Args:
         lengths: Link lengths, shape (N,); [m].
-        radius: Radius of the links; [m].
-        joint_error: Largest error of an angle; [rad].
-        base_error: Largest error of x0; [m].
-        obstacle_error: Largest displacement of an obstacle's surface; [m].
+        joint_errors: Largest errors of alpha_l and theta_l, shape (N, 2); [rad].
+        base_turn: Largest rotation of the base about its origin; [rad].
+        joints_err: Whether any angle may be off.
+        steady: Whether the errors cost the same in every configuration.
+        nominal: Whether the error box is empty.
         pad: Bound of all rounding in one evaluation; [m].
         goal: Width of a distance bracket at which to stop; [m].
         gap: Width of the bracket of the least clearance at which to stop; [m].
@@ -59,10 +117,11 @@ class Rules(NamedTuple):
     """
 
     lengths: FloatArray
-    radius: float
-    joint_error: float
-    base_error: float
-    obstacle_error: float
+    joint_errors: FloatArray
+    base_turn: float
+    joints_err: bool
+    steady: bool
+    nominal: bool
     pad: float
     goal: float
     gap: float
@@ -88,21 +147,28 @@ class Task(NamedTuple):
     """Everything that stays the same while a motion is judged."""
 
     pieces: PackedPieces
+    bodies: Bodies
     pairs: Pairs
     rules: Rules
 
 
 @compiled
-def losses(rules: Rules, frame: int) -> float:
-    """What every plane loses: radius of the link, obstacle error, rounding; [m]."""
-    own = rules.radius + rules.pad
-    return own + rules.obstacle_error if frame == BASE else own
-
-
-@compiled
-def is_nominal(rules: Rules) -> bool:
-    """Whether the error box is empty."""
-    return rules.joint_error + rules.base_error + rules.obstacle_error == 0.0
+def mover_of(task: Task, pair: int) -> Mover:
+    """The moving side of a pair."""
+    pairs, bodies = task.pairs, task.bodies
+    body, frame = pairs.body[pair], pairs.frame[pair]
+    first, last = bodies.first[body], bodies.first[body + 1]
+    return Mover(
+        pairs.link[pair],
+        frame + 1,
+        bodies.corners[first:last],
+        bodies.levers[first:last],
+        bodies.discs[body],
+        bodies.radius[body],
+        bodies.axial[body],
+        pairs.lost[pair],
+        pairs.rise[pair],
+    )
 
 
 @compiled

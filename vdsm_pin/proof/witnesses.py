@@ -7,60 +7,62 @@ import numpy as np
 from vdsm_pin.geometry.arm import place_between
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import compiled
-from vdsm_pin.proof.layouts import AT_UPPER, OTHER, OWN, TIME, UP
-from vdsm_pin.proof.swept_links import Ends, local_points
-from vdsm_pin.proof.terms import BASE, Motion, Task
+from vdsm_pin.proof.layouts import AT_UPPER, OWN, TIME, UP
+from vdsm_pin.proof.swept_bodies import Ends, place_point
+from vdsm_pin.proof.terms import BASE, Motion, Mover, Task, mover_of
+
+
+@compiled
+def _nearest_on_axis(
+    start: FloatArray, end: FloatArray, point: FloatArray, near: FloatArray
+) -> None:
+    """The point of a segment nearest to another point, shape (3,); [m]."""
+    span = along = 0.0
+    for c in range(3):
+        d = end[c] - start[c]
+        span += d * d
+        along += d * (point[c] - start[c])
+    t = min(1.0, max(0.0, along / span)) if span > 0.0 else 0.0
+    for c in range(3):
+        near[c] = start[c] + t * (end[c] - start[c])
 
 
 @compiled
 def witness_at(
-    link: int,
-    frame: int,
-    radius: float,
+    mover: Mover,
     centres: FloatArray,
     frames: FloatArray,
-    point: FloatArray,
-    core: FloatArray,
+    points: FloatArray,
     own: FloatArray,
     other: FloatArray,
 ) -> None:
-    """Surface points of a link and of its partner, in the base frame.
-
-    It takes bare arrays: handing on whole tuples takes longer than all it does.
+    """Surface points of a body and of its partner, in the base frame.
 
     Args:
-        link: The link.
-        frame: Frame of the partner.
-        radius: Of the links; [m].
+        mover: The body of the pair.
         centres: Joint centres of the configuration, shape (N + 1, 3); [m].
         frames: R_base_link, shape (N, 3, 3); [-].
-        point: Core point of the partner, in its frame, shape (3,); [m].
-        core: Working space, shape (2, 3).
-        own: Result on the link, shape (3,); [m].
+        points: Core points of the body in its link's frame, not read where it is an
+            axis, and of the partner in its own, shape (6,); [m].
+        own: Result on the body, shape (3,); [m].
         other: Result on the partner, shape (3,); [m].
     """
-    local_points(centres, frames, link, frame, core)
-    span = along = squared = 0.0
+    link, frame = mover.link, mover.first - 1
+    if frame == BASE:
+        other[:] = points[3:]
+    else:
+        place_point(centres, frames, frame, points[3:], other)
+    if mover.axial:
+        _nearest_on_axis(centres[link], centres[link + 1], other, own)
+    else:
+        place_point(centres, frames, link, points, own)
+    squared = 0.0
     for c in range(3):
-        d = core[1, c] - core[0, c]
-        span += d * d
-        along += d * (point[c] - core[0, c])
-    t = min(1.0, max(0.0, along / span)) if span > 0.0 else 0.0
-    for c in range(3):
-        core[0, c] += t * (core[1, c] - core[0, c])
-        squared += (point[c] - core[0, c]) ** 2
+        squared += (other[c] - own[c]) ** 2
     gap = sqrt(squared)
-    share = radius / gap if gap > 0.0 else 0.0
+    share = mover.radius / gap if gap > 0.0 else 0.0
     for c in range(3):
-        core[0, c] += share * (point[c] - core[0, c])
-    for c in range(3):
-        own[c], other[c] = core[0, c], point[c]
-        if frame == BASE:
-            continue
-        own[c] = other[c] = centres[frame, c]
-        for k in range(3):
-            own[c] += frames[frame, c, k] * core[0, k]
-            other[c] += frames[frame, c, k] * point[k]
+        own[c] += share * (other[c] - own[c])
 
 
 @compiled
@@ -70,14 +72,13 @@ def place_best(
     """Put the witnesses of all pairs on the surfaces, in the base frame.
 
     Args:
-        task: The scene, pairs and rules.
+        task: The scene, bodies and pairs.
         motion: Rows of joint values.
         ends: Working space.
-        best: Best rows with core points of the partners; witnesses on return.
+        best: Best rows with core points; witnesses on return.
         order: The pairs, those of one instant together, shape (n_pairs,).
     """
-    at, when, core = -1, -1.0, np.zeros((2, 3))
-    pairs, places = task.pairs, np.zeros((2, 3))
+    at, when, places = -1, -1.0, np.zeros((2, 3))
     for pair in order:
         row = best[pair]
         if not row[UP] < np.inf:
@@ -95,15 +96,7 @@ def place_best(
                 ends.centres[0],
                 ends.frames[0],
             )
-        witness_at(
-            pairs.link[pair],
-            pairs.frame[pair],
-            task.rules.radius,
-            ends.centres[0],
-            ends.frames[0],
-            row[OTHER:],
-            core,
-            places[0],
-            places[1],
-        )
+        centres, frames = ends.centres[0], ends.frames[0]
+        mover = mover_of(task, pair)
+        witness_at(mover, centres, frames, row[OWN:], places[0], places[1])
         row[OWN:] = places.ravel()

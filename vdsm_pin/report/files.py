@@ -97,7 +97,7 @@ class ErrorBoxRow(FileModel):
     """The errors of the real arm that the clearance proof was asked to cover."""
 
     joint_error_rad: FiniteFloat = Field(description="of every joint angle, either way")
-    base_error_m: FiniteFloat = Field(description="of x0, either way")
+    base_error_m: FiniteFloat = Field(description="of the base, in any direction")
     obstacle_error_m: FiniteFloat = Field(description="displacement of every surface")
 
 

@@ -22,7 +22,9 @@ class ErrorLimits(LineModel):
     """The errors that every clearance is proved under."""
 
     joint_rad: FiniteFloat = Field(ge=0.0, description="of every angle, either way")
-    base_m: FiniteFloat = Field(ge=0.0, description="of x0, either way")
+    base_m: FiniteFloat = Field(
+        ge=0.0, description="displacement of the base, in any direction"
+    )
     obstacle_m: FiniteFloat = Field(ge=0.0, description="of every surface")
 
 

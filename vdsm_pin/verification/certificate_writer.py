@@ -36,7 +36,7 @@ from vdsm_pin.verification.certificate_file import (
     Pair,
 )
 from vdsm_pin.verification.limits import extremes
-from vdsm_pin.verification.proving import BUDGET
+from vdsm_pin.verification.proving import BUDGET, most_corners
 from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.task import all_pairs, make_task
 
@@ -178,8 +178,8 @@ def _lines(verification: Verification, task: Task, deadline: Deadline) -> Iterat
     trajectory = verification.trajectory
     motion = Motion(trajectory.x0, trajectory.alpha, trajectory.theta)
     n_intervals = max(1, trajectory.n_samples - 1)
-    n_links, n_pairs = trajectory.n_links, task.pairs.link.size
-    desk = new_desk(n_links, n_pairs, BUDGET)
+    n_links, n_pairs = trajectory.n_links, task.pairs.body.size
+    desk = new_desk(n_links, n_pairs, most_corners(task.bodies), BUDGET)
     records, first = np.zeros((ROOM, RECORD)), 0
     while first < n_intervals:
         last = min(first + CHUNK, n_intervals)

@@ -12,7 +12,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.geometry.pieces import PackedPieces
-from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.kinematics import joint_centres, link_frames
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.layouts import (
     AT_LOWER,
@@ -21,6 +21,7 @@ from vdsm_pin.proof.layouts import (
     KEY,
     LOW,
     OTHER,
+    OWN,
     PAIR,
     SLICE,
     SLICES,
@@ -179,22 +180,38 @@ def _merge_far(
     problem: PlanningProblem, trajectory: Trajectory, proving: Proving
 ) -> None:
     """Bring what culling settled to the results of the pairs."""
-    far, best, arm = proving.culling, proving.results.best, problem.manipulator
-    size = far.settled.size
-    proving.results.counts[:size, CERTIFIED] += far.settled.T.ravel()
-    mine, lower, upper = best[:size], far.lower.T.ravel(), far.upper.T.ravel()
-    better = lower < mine[:, LOW]
-    mine[better, LOW] = lower[better]
-    mine[better, AT_LOWER] = far.at_lower.T.ravel()[better]
-    found = np.flatnonzero(upper < mine[:, UP])
-    at, link = far.at_upper.T.ravel()[found], found % arm.n_links
-    rows = (trajectory.x0[at], trajectory.alpha[at], trajectory.theta[at])
-    start = joint_centres(arm, *rows)[np.arange(len(at)), link]
-    point = far.point.T[found // arm.n_links]
-    gap = np.linalg.norm(point - start, axis=1)
-    mine[found, UP] = gap - arm.link_radius + proving.task.rules.pad
-    mine[found, AT_UPPER], mine[found, TIME] = at, 0.0
-    mine[found, OTHER:] = point
+    far, task = proving.culling, proving.task
+    body, obstacle = np.nonzero(far.number >= 0)
+    pair, at = far.number[body, obstacle], (body, obstacle)
+    best = proving.results.best
+    proving.results.counts[pair, CERTIFIED] += far.settled[at]
+    better = far.lower[at] < best[pair, LOW]
+    best[pair[better], LOW] = far.lower[at][better]
+    best[pair[better], AT_LOWER] = far.at_lower[at][better]
+    found = np.flatnonzero(far.upper[at] < best[pair, UP])
+    body, pair, rows = body[found], pair[found], far.at_upper[at][found]
+    corner = task.bodies.corners[task.bodies.first[body]]
+    place = _places(problem, trajectory, rows, task.bodies.link[body], corner)
+    point = far.point.T[obstacle[found]]
+    gap = np.linalg.norm(point - place, axis=1)
+    best[pair, UP] = gap - task.bodies.radius[body] + task.rules.pad
+    best[pair, AT_UPPER], best[pair, TIME] = rows, 0.0
+    best[pair, OWN:OTHER], best[pair, OTHER:] = corner, point
+
+
+def _places(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    rows: IntArray,
+    link: IntArray,
+    corner: FloatArray,
+) -> FloatArray:
+    """Places of points of links at rows, in the base frame, shape (n, 3); [m]."""
+    arm, each = problem.manipulator, np.arange(len(rows))
+    joints = (trajectory.x0[rows], trajectory.alpha[rows], trajectory.theta[rows])
+    turned = link_frames(joints[1], joints[2])[each, link]
+    start = joint_centres(arm, *joints)[each, link]
+    return np.asarray(start + np.einsum("nij,nj->ni", turned, corner))
 
 
 def _narrow(proving: Proving, group: int) -> None:

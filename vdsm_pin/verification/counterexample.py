@@ -13,7 +13,6 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, frozen
-from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, TIME
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED
@@ -22,8 +21,9 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
-from vdsm_pin.verification.pair_slopes import link_slopes, obstacle_slopes
+from vdsm_pin.verification.pair_slopes import pair_slopes
 from vdsm_pin.verification.records import ClearanceChunk, Counterexample, ErrorBox, Pair
+from vdsm_pin.verification.task import all_pairs, make_task
 
 PAIRS: Final = 8
 """Pairs looked at, those of the least lower bounds first."""
@@ -75,8 +75,9 @@ class Search:
         self.pair, self.joints = pair, trajectory.joints
         self.required = problem.required_self_clearance
         if pair.obstacle:
-            self.pieces = pack_pieces([mine[0].pieces])
             self.required = problem.required_clearance
+        self.task = make_task(self.problem, ErrorBox())
+        self.number = all_pairs(self.problem).index(pair)
 
     def find(
         self, errors: ErrorBox, moments: tuple[Moment, ...]
@@ -109,15 +110,15 @@ class Search:
         return self._judged(errors, moment, np.where(joints, high * offset, offset))
 
     def _grown(self, errors: ErrorBox) -> float:
-        """By how much the surface of the partner may come nearer; [m]."""
-        return errors.obstacle if self.pair.obstacle else 0.0
+        """By how much the partner may come nearer: surface and base shift; [m]."""
+        return errors.obstacle + errors.base if self.pair.obstacle else 0.0
 
     def _nearest(
         self, errors: ErrorBox, moments: tuple[Moment, ...]
     ) -> tuple[Moment, FloatArray]:
         """The nearest configuration found within the box: moment and offsets."""
         scale = np.full(self.joints.shape[1], errors.joint)
-        scale[0] = errors.base
+        scale[0] = 0.0
         scale *= INSIDE
         corners = self._first_corners()
         at = [(moment, corner) for moment in moments for corner in corners]
@@ -149,16 +150,7 @@ class Search:
 
     def _slopes(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The same, and how it changes with every joint, shape (m, 1 + 2N)."""
-        arm, link, other = (
-            self.problem.manipulator, self.pair.link - 1, self.pair.other_link - 1,
-        )  # fmt: skip
-        if not self.pair.obstacle:
-            gaps, slopes = link_slopes(q, arm.link_lengths, link, other)
-            return gaps - 2.0 * arm.link_radius, slopes
-        gaps, slopes = obstacle_slopes(
-            self.pieces, q, arm.link_lengths, link, TOLERANCES.bracket_gap
-        )
-        return gaps - arm.link_radius, slopes
+        return pair_slopes(self.task, self.number, np.ascontiguousarray(q))
 
     def _walk(
         self, q: FloatArray, offsets: FloatArray, scale: FloatArray
@@ -190,17 +182,17 @@ class Search:
         self, errors: ErrorBox, moment: Moment, offset: FloatArray
     ) -> Counterexample | None:
         """What the clearance proof says of one configuration."""
-        q, links = self._joints(moment) + offset, (self.pair.link, self.pair.other_link)
+        q, grown = self._joints(moment) + offset, self._grown(errors)
         problem = replace(
             self.problem,
-            required_clearance=self.problem.required_clearance + errors.obstacle,
+            required_clearance=self.problem.required_clearance + grown,
         )
         row = Trajectory(
             np.zeros(1, bool), np.zeros(1), q[:1], q[None, 1::2], q[None, 2::2]
         )
         chunks: list[ClearanceChunk] = []
         proof = prove_clearance(problem, row, ErrorBox(), [chunks.append])
-        column = [(p.link, p.other_link) for p in proof.pairs].index(links)
+        column = proof.pairs.index(self.pair)
         if chunks[0].verdict[0, column] != REFUTED:
             return None
         return Counterexample(
@@ -209,7 +201,7 @@ class Search:
             pair=self.pair,
             joints=frozen(q),
             offsets=frozen(offset),
-            clearance=float(chunks[0].upper[0, column]) - self._grown(errors),
+            clearance=float(chunks[0].upper[0, column]) - grown,
             required=self.required,
             link_point=frozen(chunks[0].link_point[0, column]),
             other_point=frozen(chunks[0].other_point[0, column]),

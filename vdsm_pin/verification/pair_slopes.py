@@ -15,8 +15,8 @@ from vdsm_pin.geometry.bodies import new_body
 from vdsm_pin.geometry.compiled import apart, borrowed, compiled
 from vdsm_pin.geometry.kernels import BRACKET, FAR, NEAR, NORMAL, SCRATCH_ROWS, UPPER
 from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
-from vdsm_pin.geometry.pieces import PackedPieces
-from vdsm_pin.geometry.segments import nearest_places
+from vdsm_pin.proof.swept_bodies import load_disc, local_point, place_point
+from vdsm_pin.proof.terms import BASE, Task, mover_of
 
 
 @compiled
@@ -70,76 +70,57 @@ def _slopes(
 
 
 @compiled
-def obstacle_slopes(
-    pieces: PackedPieces,
-    joints: FloatArray,
-    lengths: FloatArray,
-    link: int,
-    goal: float,
+def pair_slopes(
+    task: Task, pair: int, joints: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Distances of a link's axis from the first obstacle, and how they change.
+    """Clearances of one pair, and how they change with every joint.
 
     Args:
-        pieces: The scene.
+        task: The scene, bodies and pairs.
+        pair: The pair.
         joints: Rows q = (x0, alpha1, theta1, ..), shape (m, 1 + 2 N); [m], [rad].
-        lengths: Link lengths, shape (N,); [m].
-        link: The link, from 0.
-        goal: Width of a distance bracket at which to stop; [m].
 
     Returns:
-        Upper bounds of the distances, below zero only the sign is meant, shape (m,)
+        Upper bounds of the clearance, below zero only the sign is meant, shape (m,)
         [m]; their slopes, shape (m, 1 + 2 N) [-], [m/rad].
     """
-    pieces, joints = borrowed(pieces), borrowed(joints)
-    n_links = lengths.size
+    task, joints = borrowed(task), borrowed(joints)
+    mover, lengths = mover_of(task, pair), task.rules.lengths
+    n_links, corners, frame = lengths.size, mover.levers.size, mover.first - 1
     gaps, slopes = np.zeros(joints.shape[0]), np.zeros(joints.shape)
     centres, frames = np.zeros((n_links + 1, 3)), np.zeros((n_links, 3, 3))
     scratch = np.zeros((SCRATCH_ROWS + 2, 3))
     stack = np.zeros(STACK, np.int64)
     trial, out = np.zeros(BRACKET + 4), np.zeros(BRACKET + 4)
-    body = new_body(2, 0)
+    near, far = np.zeros(3), np.zeros(3)
+    body = new_body(corners, corners, 0)
     out[NORMAL] = 1.0
     for m in range(joints.shape[0]):
         q = joints[m]
         place(q[0], q[1::2], q[2::2], lengths, centres, frames)
-        body.points[:] = centres[link : link + 2]
-        obstacle_bracket(pieces, 0, body, goal, scratch, stack, trial, out)
-        gaps[m], near, far = out[UPPER], out[NEAR:FAR], out[FAR:BRACKET]
-        part = _slopes(centres, frames, 0, link, near, far, gaps[m], slopes[m])
-        slopes[m, 0] = -part
-    return gaps, slopes
-
-
-@compiled
-def link_slopes(
-    joints: FloatArray, lengths: FloatArray, link: int, other: int
-) -> tuple[FloatArray, FloatArray]:
-    """Distances of the axes of two links, and how they change.
-
-    Args:
-        joints: Rows q = (x0, alpha1, theta1, ..), shape (m, 1 + 2 N); [m], [rad].
-        lengths: Link lengths, shape (N,); [m].
-        link: One link, from 0.
-        other: The other, behind it.
-
-    Returns:
-        Distances, shape (m,) [m]; their slopes, shape (m, 1 + 2 N) [-], [m/rad].
-    """
-    joints = borrowed(joints)
-    n_links = lengths.size
-    gaps, slopes = np.zeros(joints.shape[0]), np.zeros(joints.shape)
-    centres, frames = np.zeros((n_links + 1, 3)), np.zeros((n_links, 3, 3))
-    near, far = np.zeros(3), np.zeros(3)
-    for m in range(joints.shape[0]):
-        row = joints[m]
-        place(row[0], row[1::2], row[2::2], lengths, centres, frames)
-        a, b = centres[other], centres[other + 1]
-        p, q = centres[link], centres[link + 1]
-        s, t = nearest_places(a, b, p, q)
-        square = 0.0
-        for c in range(3):
-            near[c], far[c] = a[c] + s * (b[c] - a[c]), p[c] + t * (q[c] - p[c])
-            square += (near[c] - far[c]) ** 2
-        gaps[m] = sqrt(square)
-        _slopes(centres, frames, link + 1, other, near, far, gaps[m], slopes[m])
+        for k in range(corners):
+            point = body.points[k]
+            place_point(centres, frames, mover.link, mover.corners[k], point)
+            local_point(centres, frames, frame, point)
+        load_disc(mover, frames, body.discs[0])
+        obstacle_bracket(
+            task.pieces,
+            task.pairs.obstacle[pair],
+            body,
+            task.rules.goal,
+            scratch,
+            stack,
+            trial,
+            out,
+        )
+        gaps[m] = out[UPPER] - mover.radius
+        near[:], far[:] = out[NEAR:FAR], out[FAR:BRACKET]
+        if frame != BASE:
+            place_point(centres, frames, frame, out[NEAR:FAR], near)
+            place_point(centres, frames, frame, out[FAR:BRACKET], far)
+        moved = _slopes(
+            centres, frames, mover.first, mover.link, near, far, out[UPPER], slopes[m]
+        )
+        if frame == BASE:
+            slopes[m, 0] = -moved
     return gaps, slopes

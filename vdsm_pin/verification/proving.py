@@ -12,7 +12,7 @@ from vdsm_pin.proof.culling import Culling, new_culling
 from vdsm_pin.proof.desk import Desk, new_desk
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, BEST, TALLY, TIME
 from vdsm_pin.proof.results import Candidates, Dense, Results
-from vdsm_pin.proof.terms import Motion, Task
+from vdsm_pin.proof.terms import Bodies, Motion, Task
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import ErrorBox
@@ -101,6 +101,11 @@ class Proving:
         )
 
 
+def most_corners(bodies: Bodies) -> int:
+    """Most corners of a body."""
+    return int(np.diff(bodies.first).max())
+
+
 def new_proving(
     problem: PlanningProblem,
     trajectory: Trajectory,
@@ -122,15 +127,15 @@ def new_proving(
         deadline: When to stop; who sweeps asks it afterwards.
     """
     task = make_task(problem, errors, pieces, deadline)
-    n_pairs, n_links = task.pairs.link.size, problem.manipulator.n_links
+    n_pairs, n_links = task.pairs.body.size, problem.manipulator.n_links
     n_intervals = max(1, trajectory.n_samples - 1)
-    n_obstacles = len(problem.scene.obstacles)
+    n_obstacles, n_bodies = len(problem.scene.obstacles), task.bodies.link.size
     return Proving(
         task=task,
         motion=Motion(trajectory.x0, trajectory.alpha, trajectory.theta),
-        desk=new_desk(n_links, n_pairs, budget),
+        desk=new_desk(n_links, n_pairs, most_corners(task.bodies), budget),
         results=new_results(n_pairs, n_links + n_obstacles, n_intervals, values),
-        culling=new_culling(task.pieces, n_links, n_obstacles, n_pairs),
+        culling=new_culling(task.pieces, task.pairs, n_bodies, n_obstacles),
         n_intervals=n_intervals,
         deadline=deadline,
     )

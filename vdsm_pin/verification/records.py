@@ -65,33 +65,44 @@ class ErrorBox:
 
     Args:
         joint: Largest error of every theta_i and alpha_i; [rad].
-        base: Largest error of x0; [m].
+        base: Largest displacement of the base in any direction, and so of x0; [m].
         obstacle: Largest displacement of an obstacle surface; [m].
+        base_turn: Largest rotation of the base about its origin; [rad].
     """
 
     joint: float = 0.0
     base: float = 0.0
     obstacle: float = 0.0
+    base_turn: float = 0.0
 
 
 @dataclass(frozen=True)
 class Pair:
-    """A link and what it must stay clear of: an obstacle, or another link.
+    """A body of the arm and what it must stay clear of: an obstacle, or another body.
 
     Args:
-        link: 1 to N.
-        obstacle: Name; empty for a pair of links.
-        other_link: link + 2 to N for a pair of links, else 0.
+        link: The link that the body rides on, 1 to N.
+        obstacle: Name; empty for a pair of bodies.
+        other_link: The link of the other body, farther from the base; else 0.
+        body: Name of the body; empty for the link itself.
+        other_body: Name of the other body; empty for the link itself.
     """
 
     link: int
     obstacle: str = ""
     other_link: int = 0
+    body: str = ""
+    other_body: str = ""
+
+    @property
+    def own(self) -> str:
+        """The body in words: its name or 'link k'."""
+        return self.body or f"link {self.link}"
 
     @property
     def label(self) -> str:
-        """The partner in words: an obstacle's name or 'link k'."""
-        return self.obstacle if self.obstacle else f"link {self.other_link}"
+        """The partner in words: the name of an obstacle or body, or 'link k'."""
+        return self.obstacle or self.other_body or f"link {self.other_link}"
 
 
 @dataclass(frozen=True)
@@ -135,7 +146,8 @@ class Counterexample:
         joints: x0, alpha1, theta1, .. at that instant, shape (1 + 2N,); [m], [rad].
         offsets: What they differ by from the nominal ones: constant errors within the
             box, shape (1 + 2N,); [m], [rad].
-        clearance: Proved upper bound with the obstacle's error taken off; [m].
+        clearance: Proved upper bound with the obstacle's error and the base's
+            displacement taken off; [m].
         required: What it falls short of; [m].
         link_point: Witness on the link's surface, base frame, shape (3,); [m].
         other_point: Witness on the partner's nominal surface, shape (3,); [m].

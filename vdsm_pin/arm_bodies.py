@@ -1,0 +1,191 @@
+"""The convex bodies that ride on an arm's links, and which of them are held apart.
+
+A body of several convex pieces becomes several bodies, `camera part 1` and so on. A
+mesh is covered by the hulls of groups of its own triangles.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
+from vdsm_pin.geometry.ordering import coherent_order
+from vdsm_pin.geometry.pieces import pack_pieces
+from vdsm_pin.geometry.row_bounds import row_brackets
+from vdsm_pin.manipulator import PART, TOOL, LinkBody, Manipulator
+from vdsm_pin.scene import Mesh
+from vdsm_pin.tolerances import TOLERANCES
+
+DIRECTIONS: Final = 256
+"""Directions in which the corners of a hull are sought first."""
+
+
+@dataclass(frozen=True)
+class ArmBody:
+    """A convex solid in the frame of its link: origin at O_i, x along the link.
+
+    Args:
+        name: `link 3`, `tool`, or as in the problem file.
+        link: The link that it rides on, 1 to N.
+        piece: The solid.
+        axial: Whether it is the whole axis of its link, grown by a radius.
+    """
+
+    name: str
+    link: int
+    piece: Hull | FlatCylinder
+    axial: bool = False
+
+    @property
+    def corners(self) -> FloatArray:
+        """Corners of a hull, or the centres of a cylinder's ends, shape (n, 3); [m]."""
+        if isinstance(self.piece, Hull):
+            return self.piece.points
+        offset = self.piece.half_length * self.piece.axis
+        return np.stack([self.piece.centre - offset, self.piece.centre + offset])
+
+    @property
+    def disc(self) -> float:
+        """Radius of the disc that grows the corners, 0 for a hull; [m]."""
+        return 0.0 if isinstance(self.piece, Hull) else self.piece.radius
+
+    @property
+    def ball(self) -> float:
+        """Radius of the ball that grows the corners, 0 for a cylinder; [m]."""
+        return self.piece.radius if isinstance(self.piece, Hull) else 0.0
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Two bodies, or a body and an obstacle, that nobody holds apart, and why."""
+
+    body: str
+    other: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class SelfPairs:
+    """Which bodies of an arm are held apart.
+
+    Args:
+        held: Numbers of two bodies; the first rides nearer to the base, shape (n, 2).
+        left_out: The other pairs, with a reason each.
+    """
+
+    held: IntArray
+    left_out: tuple[LeftOut, ...]
+
+
+def arm_bodies(arm: Manipulator) -> tuple[ArmBody, ...]:
+    """Every convex body: links 1 to N, the tool, then the others in file order."""
+    found = []
+    for i, length in enumerate(arm.link_lengths.tolist(), start=1):
+        tool = arm.tool.length if arm.tool and i == arm.n_links else 0.0
+        axis = np.array([[0.0, 0.0, 0.0], [length - tool, 0.0, 0.0]])
+        solid = Hull(axis, arm.radius_of(i))
+        found.append(ArmBody(f"link {i}", i, solid, axial=tool == 0.0))
+    if arm.tool:
+        end = float(arm.link_lengths[-1])
+        axis = np.array([[end - arm.tool.length, 0.0, 0.0], [end, 0.0, 0.0]])
+        found.append(ArmBody(TOOL, arm.n_links, Hull(axis, arm.tool.radius)))
+    for body in arm.bodies:
+        pieces = convex_cover(body)
+        for k, piece in enumerate(pieces, start=1):
+            part = f"{body.name}{PART}{k}" if len(pieces) > 1 else body.name
+            found.append(ArmBody(part, body.link, piece))
+    return tuple(found)
+
+
+def convex_cover(body: LinkBody) -> tuple[Hull | FlatCylinder, ...]:
+    """Convex pieces that together hold a body; a mesh's have all of its triangles."""
+    if isinstance(body.solid, Mesh):
+        corners = body.solid.vertices[body.solid.triangles]
+        groups = triangle_groups(body)
+        return tuple(Hull(_outer(corners[group].reshape(-1, 3))) for group in groups)
+    return tuple(_bounded(piece) for piece in body.solid.pieces)
+
+
+def _bounded(piece: Piece) -> Hull | FlatCylinder:
+    assert not isinstance(piece, HalfSpacePiece)  # `LinkBody` has none
+    return piece
+
+
+def triangle_groups(body: LinkBody) -> tuple[IntArray, ...]:
+    """Numbers of the triangles under each hull of a mesh body."""
+    assert isinstance(body.solid, Mesh)
+    corners = body.solid.vertices[body.solid.triangles]
+    order = coherent_order(corners.mean(axis=1))
+    return tuple(np.array_split(order, min(body.parts, len(order))))
+
+
+def _outer(points: FloatArray) -> FloatArray:
+    """Some of the points, with the same hull; those surely inside are left out."""
+    points = np.unique(points, axis=0)
+    if len(points) <= DIRECTIONS // 4:
+        return points
+    directions = np.random.default_rng(0).normal(size=(DIRECTIONS, 3))
+    few = np.unique(np.argmax(points @ directions.T, axis=0))
+    pieces = pack_pieces([[Hull(points[few])]])
+    ends = np.ascontiguousarray(np.repeat(points[:, None], 2, axis=1))
+    none = np.zeros(len(points), np.int64)
+    bounds = row_brackets(pieces, ends, none, TOLERANCES.bracket_gap)
+    keep = bounds[:, 1] > 0.0
+    keep[few] = True
+    return np.asarray(points[keep])
+
+
+def self_pairs(arm: Manipulator, bodies: tuple[ArmBody, ...]) -> SelfPairs:
+    """Which bodies are held apart: all that move against each other and can part.
+
+    Args:
+        arm: The arm.
+        bodies: `arm_bodies(arm)`.
+
+    Returns:
+        Pairs in the order of the bodies. Left out are bodies of one link, neighbours
+        that meet at the joint between them in every pose, and what the file says.
+    """
+    held, left_out = [], []
+    for i, one in enumerate(bodies):
+        for k in range(i + 1, len(bodies)):
+            other = bodies[k]
+            near, far = (one, other) if one.link <= other.link else (other, one)
+            reason = _reason(arm, near, far)
+            if reason:
+                left_out.append(LeftOut(one.name, other.name, reason))
+            else:
+                held.append((i, k) if near is one else (k, i))
+    pairs = np.array(held, dtype=np.int64).reshape(-1, 2)
+    return SelfPairs(pairs, tuple(left_out))
+
+
+def _reason(arm: Manipulator, near: ArmBody, far: ArmBody) -> str:
+    """Why two bodies are not held apart; empty where they are."""
+    if near.link == far.link:
+        return f"both ride on link {near.link}"
+    if far.link == near.link + 1:
+        end = np.array([arm.link_lengths[near.link - 1], 0.0, 0.0])
+        gap = _distance(near, end) + _distance(far, np.zeros(3))
+        if gap <= near.ball + far.ball:
+            return f"meet at joint {far.link} in every pose"
+    if arm.ignores(near.name, far.name):
+        return "left out by the problem file"
+    return ""
+
+
+def _distance(body: ArmBody, point: FloatArray) -> float:
+    """Distance of a point from the core of a body, from above; [m]."""
+    core = body.piece
+    if isinstance(core, Hull):
+        if (core.points == point).all(axis=1).any():
+            return 0.0
+        core = Hull(core.points)
+    pieces = pack_pieces([[core]])
+    ends = np.repeat(point[None, None], 2, axis=1)
+    goal = TOLERANCES.bracket_gap
+    return max(
+        0.0, float(row_brackets(pieces, ends, np.zeros(1, np.int64), goal)[0, 1])
+    )
