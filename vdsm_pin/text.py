@@ -16,10 +16,11 @@ def printable(text: str) -> str:
     r"""One line in which every sign can be seen, for terminals and files.
 
     Control signs, line ends, signs of no width, those that turn the direction and lone
-    surrogates are spelled as escapes, such as \x1b; what is too long is cut.
+    surrogates are spelled as escapes, such as \x1b. What is too long loses its middle:
+    a message begins with the place and ends with the cause.
     """
     if len(text) > LONGEST:
-        text = f"{text[:LONGEST]}..."
+        text = f"{text[: LONGEST // 2]}...{text[-LONGEST // 2 :]}"
     if text.isprintable():
         return text
     return "".join(
