@@ -26,7 +26,8 @@ def poses(problem: PlanningProblem, found: Simulation) -> Figure:
         problem.manipulator, joints[:, 0], joints[:, 1::2], joints[:, 2::2]
     )
     path = VIEW(problem.path.corners)
-    low, high = VIEW(centres.reshape(-1, 3)).min(axis=0), path.max(axis=0)
+    drawn = np.vstack([VIEW(centres.reshape(-1, 3)), path])
+    low, high = drawn.min(axis=0), drawn.max(axis=0)
     across, up = (low[0] - 150.0, high[0] + 150.0), (low[1] - 150.0, high[1] + 350.0)
     for k, row in enumerate(rows):
         axes = style.place(
@@ -50,8 +51,12 @@ def actual_and_planned(found: Simulation) -> Figure:
         planned, executed = np.rad2deg(
             [found.planned[:, 1 + k], found.executed[:, 1 + k]]
         )
-        axes.plot(found.times, planned, color=style.FAINT, linewidth=2.2)
-        axes.plot(found.times, executed, color=_colour(k), linewidth=0.8)
+        axes.plot(
+            found.times, planned, color=style.FAINT, linewidth=2.2, rasterized=True
+        )
+        axes.plot(
+            found.times, executed, color=_colour(k), linewidth=0.8, rasterized=True
+        )
     _labels(figure, "angle [°]: grey as planned, coloured as executed")
     return figure
 
@@ -61,7 +66,11 @@ def errors(found: Simulation) -> Figure:
     figure, panels = _panels(found)
     for k, axes in enumerate(panels):
         axes.plot(
-            found.times, np.rad2deg(found.errors[:, k]), color=_colour(k), linewidth=0.7
+            found.times,
+            np.rad2deg(found.errors[:, k]),
+            color=_colour(k),
+            linewidth=0.7,
+            rasterized=True,
         )
         for side in (-1.0, 1.0):
             axes.axhline(

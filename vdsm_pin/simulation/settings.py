@@ -53,7 +53,7 @@ class Cables(Part):
         default=4000.0, description="of a cable; below the rope's breaking load"
     )
     pretension_n: NotNegative = Field(
-        default=50.0, description="aimed at where gravity asks for no more"
+        default=100.0, description="aimed at where gravity asks for no more"
     )
 
 
@@ -73,14 +73,18 @@ class Sensors(Part):
 
 
 class Controller(Part):
-    """PID on the joint angles; its output goes through the cable kinematics."""
+    """PID on the joint angles; its output goes through the cable kinematics.
+
+    The gains are those with which a kicked arm comes to rest: with twice the derivative
+    it swings for ever once cables go slack, with none it swings up.
+    """
 
     period_s: Positive = Field(default=0.005, description="200 Hz; assumed")
     proportional: NotNegative = Field(
-        default=0.3, description="radians commanded per radian of error"
+        default=0.2, description="radians commanded per radian of error"
     )
-    integral_per_s: NotNegative = Field(default=1.0, description="the same, per second")
-    derivative_s: NotNegative = Field(default=0.03, description="per radian a second")
+    integral_per_s: NotNegative = Field(default=0.5, description="the same, per second")
+    derivative_s: NotNegative = Field(default=0.015, description="per radian a second")
     derivative_lag_s: Positive = Field(
         default=0.02, description="first-order filter of the derivative"
     )
