@@ -7,11 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from flint import arb
 from oracles.certificate_cases import (
     CUBE,
     NOTCHED,
     SHAPES,
     Case,
+    at_start,
     random_case,
     write_cube,
     write_rows,
@@ -34,8 +36,15 @@ from oracles.certificate_oracle import (
 )
 
 from vdsm_pin.certificate_checker import check_certificate, main
+from vdsm_pin.certificate_checker.path import Drawing
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.convex import HalfSpacePiece
+from vdsm_pin.manipulator import built_in
+from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.scene import Scene
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.drawing import check_order
+from vdsm_pin.verification.records import Verdict
 
 STRAIGHT = {
     "vdsm_problem": 1,
@@ -166,7 +175,7 @@ def edited(case: Case, change: Any) -> Any:
 
 def test_a_row_that_stands_still_is_accepted(tmp_path: Path) -> None:
     ball = {"name": "ball", "shape": "sphere", "center": [0.5, 0.5, 0], "radius": 0.2}
-    case = Case(tmp_path, with_obstacles(ball), straight_rows([0.1]), NO_ERRORS)
+    case = Case(tmp_path, with_obstacles(ball), straight_rows([0.0]), NO_ERRORS)
     outcome = judge(case)
     assert outcome.accepted, outcome.reason
     assert outcome.n_intervals == 1
@@ -176,7 +185,7 @@ def test_a_row_that_stands_still_is_accepted(tmp_path: Path) -> None:
 def test_a_closed_path_is_covered(past_the_seam: bool, tmp_path: Path) -> None:
     """Out and back along x: the path closes, path_m goes on or starts again."""
     points = [[1.0, 0, 0], [1.2, 0, 0], [1.4, 0, 0]]
-    path = {"start": [1.0, 0, 0], "points": points, "closed": True}
+    path = {"start": [1.3, 0, 0], "points": points, "closed": True}
     x0 = np.array([0.3, 0.4, 0.4, 0.3, 0.1, 0.0, 0.0, 0.1, 0.3])
     station = np.array([0.3, 0.4, 0.4, 0.5, 0.7, 0.8, 0.8, 0.9, 1.1])
     if not past_the_seam:
@@ -244,7 +253,7 @@ def test_a_tip_that_strays_between_rows_is_rejected(tmp_path: Path) -> None:
     q = straight_rows([0.0, 0.1])
     q[0, 1], q[1, 1] = -0.4, 0.4
     tips = [frames_and_centres([0.4, 0.3, 0.3], row)[1][-1].tolist() for row in q]
-    path = {"start": [1, 0, 0], "points": tips}
+    path = {"start": {"joints": at_start(0.0, q[0, 1:])}, "points": tips}
     length = float(np.linalg.norm(np.subtract(*tips)))
     drawn = {"on_path": [1, 1], "path_m": [0.0, length]}
     case = Case(tmp_path, STRAIGHT | {"tip_path": path}, q, NO_ERRORS, **drawn)
@@ -282,6 +291,95 @@ def test_one_row_draws_a_path_of_one_point(
         assert judge(case).accepted
     else:
         assert "coverage" in refused(case)
+
+
+def refused_or_not(
+    folder: Path, data: Any, x0: list[float], path_m: list[float], on_path: Any = None
+) -> str:
+    """Why a straight arm that moves along x is rejected; empty where it is not."""
+    on = [1] * len(x0) if on_path is None else on_path
+    drawn = {"on_path": on, "path_m": path_m}
+    outcome = judge(Case(folder, data, straight_rows(x0), NO_ERRORS, **drawn))
+    return str(outcome.reason)
+
+
+def test_a_start_and_a_goal_are_judged(tmp_path: Path) -> None:
+    data = {key: value for key, value in STRAIGHT.items() if key != "tip_path"}
+    joints = {"x0": 0.2, "alpha_deg": [0, 0, 0], "theta_deg": [0, 0, 0]}
+    tip = data | {"start": [1, 0, 0], "goal": {"tip": [1.2, 0, 0]}}
+    whole = data | {"start": [1, 0, 0], "goal": {"joints": joints}}
+    for asked in (tip, whole):
+        assert refused_or_not(tmp_path, asked, [0.0, 0.2], [0.0, 0.0]) == ""
+        found = refused_or_not(tmp_path, asked, [2e-6, 0.2], [0.0, 0.0])
+        assert "2e-06 m off its start" in found
+        found = refused_or_not(tmp_path, asked, [0.0, 0.1, 0.2 + 2e-6], [0.0] * 3)
+        assert found.startswith("interval 1: the tip is")
+        assert "m off its goal" in found
+    bent = joints | {"alpha_deg": [1e-4, -2.5e-4, 0]}  # the tip is hardly elsewhere
+    found = refused_or_not(
+        tmp_path, data | {"goal": {"joints": bent}}, [0, 0.2], [0, 0]
+    )
+    assert "off its goal" in found or "off their goal" in found
+
+
+def test_what_is_drawn_backwards_is_rejected(tmp_path: Path) -> None:
+    x0, station = [0.0, 0.1, 0.05, 0.3], [0.0, 0.1, 0.05, 0.3]
+    found = refused_or_not(tmp_path, STRAIGHT, x0, station)
+    assert found == "interval 1: the path is drawn 0.05 m backwards"
+    free = STRAIGHT | {"tip_path": STRAIGHT["tip_path"] | {"order": "free"}}
+    assert refused_or_not(tmp_path, free, x0, station) == ""
+    # Left in between and drawn on behind what is drawn.
+    x0, station, on = (
+        [0.0, 0.3, 0.3, 0.1, 0.2],
+        [0, 0.3, 0.3, 0.1, 0.2],
+        [1, 1, 0, 1, 1],
+    )
+    found = refused_or_not(tmp_path, STRAIGHT, x0, station, on)
+    assert found == "interval 2: the path is drawn 0.2 m backwards"
+
+
+def test_a_limit_of_the_change_per_row_is_judged(tmp_path: Path) -> None:
+    data = {key: value for key, value in STRAIGHT.items() if key != "tip_path"}
+    q = straight_rows([0.0, 0.0])
+    q[1, 2] = np.deg2rad(3.0)
+    for limit, good in ((None, True), (3.0, True), (2.99, False)):
+        asked = data if limit is None else data | {"max_change_per_row_deg": limit}
+        case = Case(tmp_path, asked, q, NO_ERRORS)
+        if good:
+            assert judge(case).accepted
+        else:
+            assert "a joint turns by 0.0523" in refused(case)
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_the_order_is_judged_as_the_verifier_judges_it(closed: bool) -> None:
+    """Random walks along a path, off it and on again: two programs, one verdict."""
+    corners = np.array([[0.0, 0, 0], [0.5, 0, 0], [0.5, 0.7, 0], [0, 0.7, 0.1]])
+    path = DesiredPath(corners[0], corners, closed)
+    arm, rng, verdicts = built_in("hrm8"), np.random.default_rng(5), []
+    problem = PlanningProblem("walk", arm, Scene(), path, 0.0, np.eye(4))
+    for _ in range(400):
+        n = int(rng.integers(2, 9))
+        steps = rng.choice([0.05, 0.3, 0.6, -5e-7, -5e-6, -0.1], n,
+                           p=[0.4, 0.3, 0.1, 0.1, 0.05, 0.05])  # fmt: skip
+        stations = np.maximum(rng.uniform(0, 2) + np.cumsum(steps), 0.0)
+        if closed and rng.random() < 0.5:
+            stations = np.mod(stations, path.length)
+        on = rng.random(n) < 0.8
+        joints = np.zeros(n), np.zeros((n, 8)), np.zeros((n, 8))
+        motion = Trajectory(on, stations, *joints)
+        (row,) = check_order(problem, motion)
+        if not on.any():
+            continue
+        drawing, good, same = Drawing(path), True, arb(problem.tip_tolerance)
+        for k in np.flatnonzero(on):
+            joined = k > 0 and bool(on[k - 1])
+            good &= bool(drawing.visit(arb(stations[k]), joined, same) >= -same - 1e-9)
+        past = drawing.advanced - drawing.length - same
+        good &= bool(past <= 1e-9) or not (closed and drawing.left)
+        assert good == (row.verdict is Verdict.CERTIFIED), (stations, on, row)
+        verdicts.append(good)
+    assert 0.1 < np.mean(verdicts) < 0.9
 
 
 # ---- meshes and their inside ---------------------------------------------------------

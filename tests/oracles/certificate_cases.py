@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 from oracles.certificate_oracle import CannotCertify, OracleWriter, sealed
 
-from vdsm_pin.geometry.arrays import rotation_from_rpy
-
 SHAPES = (
     "cylinder",
     "cylinder_oblique",
@@ -122,7 +120,7 @@ def random_problem(rng: np.random.Generator, folder: Path, shapes: Any) -> Any:
         },
         "obstacles": placed,
         "tip_path": {
-            "start": [sum(lengths), 0.0, 0.0],
+            "start": {"joints": at_start(x0[0], angles[0])},
             "points": [[0.5, 0.1, 0.0], [0.6, 0.1, 0.0], [0.6, 0.3, 0.2]],
             "required_coverage": 0.0,
         },
@@ -130,16 +128,13 @@ def random_problem(rng: np.random.Generator, folder: Path, shapes: Any) -> Any:
     }
     if rng.random() < 0.5:
         data["base"] = base
-        data["tip_path"]["start"] = frame(base) @ [sum(lengths), 0.0, 0.0]
-        data["tip_path"]["start"] = (
-            data["tip_path"]["start"] + base["position"]
-        ).tolist()
     return data, np.column_stack([x0, angles])
 
 
-def frame(base: Any) -> Any:
-    """R_world_base of a problem's base entry."""
-    return rotation_from_rpy(np.deg2rad(base["rpy_deg"]))
+def at_start(x0: float, angles: Any) -> Any:
+    """Joint values of a row as a problem file states them."""
+    turned = [float(x) for x in np.rad2deg(angles)]
+    return {"x0": float(x0), "alpha_deg": turned[0::2], "theta_deg": turned[1::2]}
 
 
 def write_rows(path: Path, q: Any, on_path: Any = None, path_m: Any = None) -> None:

@@ -14,7 +14,7 @@ from vdsm_pin.certificate_checker.balls import Matrix, claim, column, norm, numb
 from vdsm_pin.certificate_checker.motion import Interval
 from vdsm_pin.certificate_checker.path import Drawing
 from vdsm_pin.certificate_checker.solids import Mesh, Solid, solid
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem import Order, PlanningProblem, Posture
 from vdsm_pin.trajectory import Trajectory
 
 VERSION: Final = 2
@@ -63,6 +63,7 @@ class Check:
             self.pairs += [Pair(link, body, i + 1) for link in links[i + 2 :]]
         path = problem.tip_path
         self.drawing = None if path is None else Drawing(path)
+        self.ordered = path is not None and path.order is Order.AS_GIVEN
         self.psi = arb(0)
         self.motion: Interval  # the last one read
         self.n_intervals, self.n_claims, self.place = 0, 0, "header"
@@ -155,27 +156,52 @@ class Check:
 
     def _rows(self, rows: tuple[int, int]) -> None:
         """Take both rows into what is said of the whole motion."""
-        poses = [self.motion.pose(0.0), self.motion.pose(1.0)]
+        problem, poses = self.problem, [self.motion.pose(t) for t in (0.0, 1.0)]
         self.psi = self.psi.max(poses[0].psi).max(poses[1].psi)
+        tips = [pose.centres[-1] for pose in poses]
         if rows[0] == 0:
             base = [float(self.joints[0, 0]), 0.0, 0.0]
             for mesh in (one for one in self.solids if isinstance(one, Mesh)):
                 claim(mesh.excludes(base), f"the arm is not proved outside {mesh.name}")
+            self._end("start", problem.begin, 0, tips[0])
+        if rows[1] == self.rows.n_samples - 1:
+            self._end("goal", problem.goal, rows[1], tips[1])
+        if problem.max_row_change is not None:
+            turns = abs(self.joints[rows[1]] - self.joints[rows[0]])[1:]
+            limit = problem.max_row_change + SLACK
+            claim(turns.max() <= limit, "a joint turns by {} rad", turns.max())
         if self.drawing is not None:
-            self._draw(self.drawing, rows, [pose.centres[-1] for pose in poses])
+            self._draw(self.drawing, rows, tips)
+
+    def _end(self, name: str, end: Posture | None, row: int, tip: Matrix) -> None:
+        """Check a row at the start or goal: its tip, and joints that are stated."""
+        if end is None:
+            return
+        away, most = norm(tip - column(*end.tip.tolist())), self.problem.tip_tolerance
+        claim(away <= most, f"the tip is {{}} m off its {name}", away)
+        if end.joints is not None:
+            pairs = zip(self.joints[row].tolist(), end.joints.tolist(), strict=True)
+            off = [abs(arb(found) - stated) for found, stated in pairs]
+            lever = sum(self.lengths, arb(0))  # how far an angle moves the tip at most
+            for way in (off[0], *(lever * angle for angle in off[1:])):
+                claim(way <= most, f"the joints are {{}} m off their {name}", way)
 
     def _draw(
         self, drawing: Drawing, rows: tuple[int, int], tips: list[Matrix]
     ) -> None:
         """Take what the tip does at both rows and in between into the drawing."""
         stations = [arb(float(self.rows.path_m[row])) for row in rows]
-        on_path = self.rows.on_path[list(rows)]
-        for on, tip, station in zip(on_path, tips, stations, strict=True):
-            away = norm(tip - drawing.point(station))
-            near = away <= self.problem.tip_tolerance
-            claim(not on or near, "the tip is {} m off the path", away)
-        drawing.touched |= bool(on_path.any())
-        if on_path.all():
+        on, same = self.rows.on_path[list(rows)], arb(self.problem.tip_tolerance)
+        for i in (0, 1):
+            if not on[i]:
+                continue
+            away = norm(tips[i] - drawing.point(stations[i]))
+            claim(away <= same, "the tip is {} m off the path", away)
+            if i == 1 or rows[0] == 0:  # else it was taken in with the interval before
+                ahead = drawing.visit(stations[i], bool(on[0]), same)
+                forwards = ahead >= -same - SLACK or not self.ordered
+                claim(forwards, "the path is drawn {} m backwards", -ahead)
+        if on.all():
             drawing.draw(stations, tips, self.motion.bounds(0)[-1][0] / 8)
         else:
             drawing.last = None
@@ -192,15 +218,16 @@ class Check:
             ("-x0_min_m", -low, -q[:, 0].min(), -arm.base_range[0]),
             ("x0_max_m", high, q[:, 0].max(), arm.base_range[1]),
         ]
-        tip, share, drawing = (
-            header["tip_deviation_m"],
-            header["coverage"],
-            self.drawing,
-        )
+        tip, share = header["tip_deviation_m"], header["coverage"]
+        drawing = self.drawing
         if drawing is None:
             claim(tip is share is None, "claims a desired path, the problem has none")
         else:
             path, drawn = self.problem.path, drawing.coverage()
+            past = drawing.advanced - drawing.length - self.problem.tip_tolerance
+            again = self.ordered and drawing.left and drawing.closed
+            once = past <= SLACK or not again
+            claim(once, "the path is begun again, {} m past its end", past)
             claims += [
                 ("tip_deviation_m", tip, drawing.deviation, path.spacing),
                 ("-coverage", -share, -drawn, -path.required_coverage),

@@ -26,7 +26,9 @@ class Drawing:
         self.length, self.deviation = self.stations[-1], arb(0)
         self.stretches: list[tuple[Ball, Ball]] = []
         self.last: Ball | None = None  # station of the row before; None off the path
-        self.touched = False  # whether any row is on the path
+        self.here: Ball | None = None  # station of the latest row on the path
+        self.advanced = arb(0)  # from the first row on the path to that one
+        self.left = False  # whether rows off the path lie in between
 
     def laps(self, station: Ball) -> int:
         """Whole laps in a station; the nearest number where that is not certain."""
@@ -49,6 +51,39 @@ class Drawing:
         a, b = self.corners[i : i + 2]
         return a + (b - a) * ((s - self.stations[i]) / norm(b - a))
 
+    def step(self, a: Ball, b: Ball) -> Ball:
+        """How far an interval between two stations advances.
+
+        The shorter way round; forwards where both are as long, as at an exact tie.
+        """
+        if not self.closed:
+            return self.local(b) - self.local(a)
+        return (b - a) + self.laps(self.length / 2 - (b - a)) * self.length
+
+    def visit(self, station: Ball, joined: bool, same: Ball) -> Ball:
+        """Take in a row on the path; rows come in the order of the motion.
+
+        Args:
+            station: Its path_m; [m].
+            joined: Whether the row before it is on the path as well.
+            same: Stations no farther apart are the same place; [m].
+
+        Returns:
+            How far the row lies beyond the one on the path before it; where the tip has
+            left a closed path in between, on the way forward; [m].
+        """
+        last, self.here = self.here, station
+        if last is None:
+            return arb(0)
+        advance = self.step(last, station)
+        if self.closed and not joined:
+            advance = self.local(station - last)
+            if self.length - advance <= same:  # a hair backwards is not once round
+                advance -= self.length
+        self.left |= not joined
+        self.advanced += advance
+        return advance
+
     def draw(self, stations: list[Ball], tips: list[Matrix], bend: Ball) -> None:
         """Take in an interval with both rows on the path.
 
@@ -57,10 +92,9 @@ class Drawing:
             tips: The tip at both.
             bend: How far it may lie off the chord in between; [m].
         """
-        a, b = stations if self.closed else map(self.local, stations)
-        start = a if self.last is None else self.last
-        # The shorter way round; forwards where both are as long, as at an exact tie.
-        stop = start + (b - a) + self.laps(self.length / 2 - (b - a)) * self.length
+        first = stations[0] if self.closed else self.local(stations[0])
+        start = first if self.last is None else self.last
+        stop = start + self.step(*stations)
         if self.last is None:
             self.stretches.append((start, start))
         low, high = self.stretches[-1]
@@ -93,4 +127,4 @@ class Drawing:
             # Only what lies beyond everything before it is added: none counts twice.
             total += (stop.min(self.length) - start.max(reached)).max(arb(0))
             reached = reached.max(stop)
-        return total / self.length if self.length > 0 else arb(self.touched)
+        return total / self.length if self.length > 0 else arb(self.here is not None)
