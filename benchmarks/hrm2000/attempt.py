@@ -1,12 +1,9 @@
 """One problem, one method: plan, judge, look again densely."""
 
-import signal
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
-from types import FrameType
 from typing import Final
 
 import numpy as np
@@ -14,21 +11,22 @@ import numpy as np
 from benchmarks.hrm2000.references import REFERENCES, reference
 from benchmarks.hrm2000.sampling import sample
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
-from vdsm_pin.geometry.compiled import is_compiling
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.strategies import strategy
+from vdsm_pin.planner.time_limit import within_time
 from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.robot_model import RobotModel, load_robot
+from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.verify import verify
 
-AGAIN: Final = 0.5
-"""Processor time after which a limit that was not heard is raised again; [s]."""
+WALL: Final = 6.0
+"""Time on the wall over processor time at which work is ended all the same."""
 
 
 @dataclass(frozen=True)
@@ -78,29 +76,26 @@ class Judged:
     plan_s: float
 
 
-@contextmanager
-def processor_time(seconds: float) -> Iterator[None]:
-    """End what is inside after so much processor time, between two calls of Python.
+@dataclass(frozen=True)
+class ProcessorTime(Deadline):
+    """A deadline by the processor's clock; compiled loops go by the wall's, far off.
 
-    Raises:
-        OutOfTime: When the time is over.
+    Args:
+        spent: Processor time at which work must have ended; [s].
     """
-    end = time.process_time() + seconds
 
-    def stop(number: int, frame: FrameType | None) -> None:
-        left = end - time.process_time()
-        if left > 0.0:  # the timer counts in ticks
-            signal.setitimer(signal.ITIMER_PROF, left, AGAIN)
-        elif not is_compiling():  # else it is raised again
-            raise OutOfTime(seconds)
+    spent: float = inf
 
-    before = signal.signal(signal.SIGPROF, stop)
-    signal.setitimer(signal.ITIMER_PROF, seconds, AGAIN)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
-        signal.signal(signal.SIGPROF, before)
+    @classmethod
+    def after(cls, seconds: float) -> "ProcessorTime":
+        """So many seconds of this process from now."""
+        end, spent = time.monotonic() + WALL * seconds, time.process_time() + seconds
+        return cls(seconds, end, spent)
+
+    @property
+    def passed(self) -> bool:
+        """Whether the time is over."""
+        return time.process_time() > self.spent or time.monotonic() > self.end
 
 
 def by_strategy(
@@ -111,14 +106,14 @@ def by_strategy(
     The proof of the first plan is not counted as planning, later ones are.
     """
     begin = time.process_time()
-    with processor_time(limit):
-        plan = strategy(name)(problem, link_clearance(problem), 0.0)
+    clearance = within_time(link_clearance(problem), ProcessorTime.after(limit))
+    plan = strategy(name)(problem, clearance, 0.0)
     plan_s = time.process_time() - begin
     verification = verify(problem, plan.trajectory, robot)
     if verification.verdict is not Verdict.CERTIFIED:
         begin = time.process_time()
-        with processor_time(limit):
-            result = plan_and_verify(problem, name, robot)
+        deadline = ProcessorTime.after(limit)
+        result = plan_and_verify(problem, name, robot, deadline=deadline)
         plan_s = time.process_time() - begin
         plan, verification = result.plan, result.verification
     return Judged(plan.trajectory, verification, plan_s)
@@ -130,8 +125,8 @@ def by_reference(
     """One of the references, judged as it comes."""
     follow = reference(name)
     begin = time.process_time()
-    with processor_time(limit):
-        trajectory = follow(problem, robot, link_clearance(problem))
+    clearance = within_time(link_clearance(problem), ProcessorTime.after(limit))
+    trajectory = follow(problem, robot, clearance)
     plan_s = time.process_time() - begin
     return Judged(trajectory, verify(problem, trajectory, robot), plan_s)
 
