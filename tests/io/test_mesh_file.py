@@ -242,7 +242,7 @@ DAMAGE = [
     ("a.obj", "v 0 0 0\nsurf 0 1 0 1\n", "line 2: has a free-form curve or surface"),
     ("a.obj", "call b.obj\n", "line 1: takes in another file (call), expected all"),
     ("a.obj", "v" + " 0" * 600_000, "line 1: is longer than 1048576 characters"),
-    ("a.obj", "v \\\n" * 600_000, "line 1: goes on for more than 1048576 char"),
+    ("a.obj", "v \\\n" * 550_000, "line 1: goes on for more than 1048576 char"),
     ("a.obj", "v 0 0\n", "line 1: found '0 0', expected 3 numbers"),
     ("a.obj", "v 0 0 0\nf 1 1 2\n", "line 2: the face corner '2' names none of"),
     ("a.obj", "v 0 0 0\nf 1 1 0\n", "line 2: the face corner '0' names none of"),
@@ -253,7 +253,7 @@ DAMAGE = [
         "vertex 2: has a coordinate that is not",
     ),
     ("a.obj", "hello\n", "has no triangle"),
-    ("a.ply", "ply\n", "has the ending '.ply', expected .stl or .obj"),
+    ("a.step", "x", "has the ending '.step', expected .stl, .obj, .ply, .glb or .dae"),
 ]
 
 

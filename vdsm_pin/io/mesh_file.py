@@ -15,15 +15,32 @@ import numpy as np
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.io.meshes.obj import read_obj
+from vdsm_pin.io.meshes.ply import read_ply
 from vdsm_pin.io.meshes.raw import MeshStream, RawMesh
 from vdsm_pin.io.meshes.stl import read_stl
 from vdsm_pin.io.source import Digest, opened
 
 MAX_MESH_BYTES: Final = 1 << 30
 
+
+def _read_glb(stream: MeshStream) -> RawMesh:
+    from vdsm_pin.io.meshes.glb import read_glb  # models that few meshes need
+
+    return read_glb(stream)
+
+
+def _read_dae(stream: MeshStream) -> RawMesh:
+    from vdsm_pin.io.meshes.dae import read_dae  # XML, which few meshes need
+
+    return read_dae(stream)
+
+
 _READERS: Final[dict[str, Callable[[MeshStream], RawMesh]]] = {
     ".stl": read_stl,
     ".obj": read_obj,
+    ".ply": read_ply,
+    ".glb": _read_glb,
+    ".dae": _read_dae,
 }
 
 

@@ -66,20 +66,24 @@ def _mesh(faces: _Faces, stream: MeshStream) -> RawMesh:
 
 def _whole_lines(stream: MeshStream) -> Iterator[tuple[int, str]]:
     """Lines without remarks; one that ends in a backslash goes on in the next."""
-    first, begun = 0, ""
+    first, begun, length = 0, list[str](), 0
     for number, line in stream.lines():
         plain, remark, _ = line.partition("#")
-        plain = plain.rstrip() if not remark else plain
-        if plain.endswith("\\") and not remark:
-            first, begun = first or number, f"{begun}{plain[:-1]} "
-            if len(begun) > MAX_LINE:
-                problem = f"goes on for more than {MAX_LINE} characters"
-                raise stream.invalid(problem, line=first)
-        else:
-            yield first or number, begun + plain
-            first, begun = 0, ""
+        plain = plain.rstrip()
+        goes_on = plain.endswith("\\") and not remark
+        if not begun and not goes_on:
+            yield number, plain
+            continue
+        first, length = first or number, length + len(plain)
+        begun.append(plain[:-1] if goes_on else plain)
+        if length > MAX_LINE:
+            problem = f"goes on for more than {MAX_LINE} characters"
+            raise stream.invalid(problem, line=first)
+        if not goes_on:
+            yield first, " ".join(begun)
+            first, begun, length = 0, [], 0
     if begun:
-        yield first, begun
+        yield first, " ".join(begun)
 
 
 def _read_face(words: list[str], faces: _Faces, stream: MeshStream, line: int) -> None:

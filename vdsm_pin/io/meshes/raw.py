@@ -82,7 +82,8 @@ class MeshStream:
                 yield number, line
                 number, line = number + 1, text.readline(MAX_LINE)
         finally:
-            text.detach()
+            if not text.closed:
+                text.detach()
 
     def numbers(self, words: list[str], count: int, line: int) -> list[float]:
         """So many words as numbers.

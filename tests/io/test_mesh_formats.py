@@ -1,0 +1,404 @@
+"""PLY, GLB and DAE: what trimesh finds in the same file, and damage named."""
+
+import io
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import collada
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial import cKDTree
+
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.io.mesh_file import MeshData, read_mesh
+
+
+def solids(rng: np.random.Generator) -> list[trimesh.Trimesh]:
+    made = [
+        trimesh.creation.box(rng.uniform(0.1, 1, 3)),
+        trimesh.creation.icosphere(1, float(rng.uniform(0.1, 1))),
+        trimesh.creation.annulus(0.2, 0.5, float(rng.uniform(0.1, 1))),
+        trimesh.creation.cone(0.3, 1.0),
+    ]
+    return [made[i] for i in rng.permutation(4)[: int(rng.integers(1, 5))]]
+
+
+def pose(rng: np.random.Generator) -> np.ndarray:
+    """A turn, a stretch, perhaps a mirror, and a shift."""
+    matrix = trimesh.transformations.random_rotation_matrix(rng.uniform(size=3))
+    matrix[:3, :3] = matrix[:3, :3] @ np.diag(rng.uniform(0.5, 2, 3))
+    if rng.uniform() < 0.3:
+        matrix[:3, :3] = matrix[:3, :3] @ np.diag([1, -1, 1])
+    matrix[:3, 3] = rng.uniform(-3, 3, 3)
+    return matrix
+
+
+def assert_same(mesh: MeshData, oracle: trimesh.Trimesh, *, close: float) -> None:
+    """The same triangles in any order, and the same volume with its sign."""
+    found, expected = mesh.vertices[mesh.triangles], np.asarray(oracle.triangles)
+    assert_same_middles(found, expected, close=close)
+    volumes = [volume(corners) for corners in (found, expected)]
+    assert volumes[0] == pytest.approx(volumes[1], abs=1e3 * close)
+
+
+def volume(corners: np.ndarray) -> float:
+    products = np.cross(corners[:, 1], corners[:, 2])
+    return float(np.einsum("ij,ij->", corners[:, 0], products) / 6)
+
+
+def assert_same_middles(
+    found: np.ndarray, expected: np.ndarray, *, close: float
+) -> None:
+    """As many triangles, and each has its like in the other set."""
+    assert len(found) == len(expected)
+    middles, others = found.mean(axis=1), expected.mean(axis=1)
+    there = cKDTree(others).query(middles)[0]
+    back = cKDTree(middles).query(others)[0]
+    assert max(there.max(), back.max()) < close
+
+
+def write(folder: Path, name: str, content: str | bytes) -> Path:
+    path = folder / name
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary"])
+@pytest.mark.parametrize("seed", range(5))
+def test_ply_is_what_trimesh_wrote(tmp_path: Path, encoding: str, seed: int) -> None:
+    solid = trimesh.util.concatenate(solids(np.random.default_rng(seed)))
+    content = solid.export(file_type="ply", encoding=encoding)
+    mesh = read_mesh(write(tmp_path, "a.ply", content))
+    assert_same(mesh, solid, close=1e-7)
+    assert mesh.watertight
+    assert mesh.unit is None
+
+
+@pytest.mark.parametrize("order", [">", "<", ""])
+@pytest.mark.parametrize("kind", ["u1", "i4"])
+@pytest.mark.parametrize("alike", [True, False])
+def test_ply_of_any_order_with_other_elements_and_values(
+    tmp_path: Path, order: str, kind: str, alike: bool
+) -> None:
+    """A cube of quads, or of quads and triangles, written here."""
+    vertices = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4]]
+    faces += [[1, 5, 7, 3]] if alike else [[1, 5, 7], [1, 7, 3]]
+    words = {"u1": "uchar", "i4": "int"}[kind]
+    name = {">": "binary_big_endian", "<": "binary_little_endian", "": "ascii"}[order]
+    lines = [
+        "ply", f"format {name} 1.0", "comment Gehäuse \u2028", "obj_info x",
+        "element camera 2", "property list uchar short tags", "property double t",
+        "element vertex 8", "property uchar red", "property double x",
+        "property double y", "property float z",
+        f"element face {len(faces)}", "property short flag",
+        f"property list {words} uint vertex_indices", "property float more",
+        "element edge 1", "property int a", "end_header",
+    ]  # fmt: skip
+
+    def put(text_or_kind: str, value: float) -> bytes:
+        if not order:
+            return f"{value:g} ".encode()
+        return np.array(value, order + text_or_kind).tobytes()
+
+    end = b"" if order else b"\r\n"
+    body = b""
+    for tags in ([], [5, 6]):
+        body += put("u1", len(tags)) + b"".join(put("i2", t) for t in tags)
+        body += put("f8", 0.5) + end
+    for x, y, z in vertices.tolist():
+        body += put("u1", 7) + put("f8", x) + put("f8", y) + put("f4", z) + end
+    for face in faces:
+        body += put("i2", -1) + put(kind, len(face))
+        body += b"".join(put("u4", i) for i in face) + put("f4", 0) + end
+    body += put("i4", 3) + end
+    head = ("\r\n" if not order else "\n").join([*lines, ""]).encode()
+    mesh = read_mesh(write(tmp_path, "a.ply", head + body))
+    assert mesh.watertight
+    assert len(mesh.triangles) == 12
+    a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
+    assert abs(np.einsum("ij,ij->", a, np.cross(b, c)) / 6) == pytest.approx(1.0)
+
+
+def scene(rng: np.random.Generator) -> trimesh.Scene:
+    """Solids in a tree of frames, some of them there twice."""
+    made = trimesh.Scene()
+    frames = ["world"]
+    for i, solid in enumerate(solids(rng)):
+        for k in range(int(rng.integers(1, 3))):
+            name = f"n{i}-{k}"
+            parent = frames[int(rng.integers(len(frames)))]
+            made.add_geometry(
+                solid, geom_name=f"g{i}", node_name=name, transform=pose(rng),
+                parent_node_name=parent,
+            )  # fmt: skip
+            frames.append(name)
+    return made
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_glb_is_the_scene_that_trimesh_finds_in_it(tmp_path: Path, seed: int) -> None:
+    made = scene(np.random.default_rng(seed))
+    path = write(tmp_path, "a.glb", made.export(file_type="glb"))
+    oracle = trimesh.load_scene(path, process=False).to_mesh()
+    mesh = read_mesh(path)
+    assert mesh.unit == 1.0
+    assert not mesh.notes
+    assert_same(mesh, oracle, close=1e-6)
+
+
+def dae(body: str, *, unit: str = "", root: str = "") -> str:
+    """A tetrahedron in a library, and a scene that puts it somewhere."""
+    points = "0 0 0 1 0 0 0 1 0 0 0 1"
+    return f"""<?xml version="1.0" encoding="utf-8"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset>{unit}<up_axis>Z_UP</up_axis></asset>
+<library_geometries><geometry id="g"><mesh>
+ <source id="s"><float_array id="a" count="12">{points}</float_array>
+  <technique_common><accessor source="#a" count="4" stride="3">
+   <param name="X" type="float"/><param name="Y" type="float"/>
+   <param name="Z" type="float"/></accessor></technique_common></source>
+ <vertices id="v"><input semantic="POSITION" source="#s"/></vertices>
+ {root or TRIANGLES}
+</mesh></geometry></library_geometries>
+<library_nodes><node id="lib"><scale>2 2 2</scale><instance_geometry url="#g"/></node>
+</library_nodes>
+<library_visual_scenes><visual_scene id="vs">{body}</visual_scene>
+<visual_scene id="other"><node><instance_geometry url="#g"/></node></visual_scene>
+</library_visual_scenes>
+<scene><instance_visual_scene url="#vs"/></scene></COLLADA>"""
+
+
+TRIANGLES = """<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/>
+ <input semantic="NORMAL" source="#s" offset="1"/>
+ <p>0 0 2 0 1 0 0 1 1 1 3 1 0 2 3 2 2 2 1 3 2 3 3 3</p></triangles>"""
+HERE = '<node><instance_geometry url="#g"/></node>'
+
+
+@pytest.mark.filterwarnings("ignore:the matrix subclass")
+@pytest.mark.parametrize("seed", range(12))
+def test_dae_is_the_scene_that_pycollada_finds_in_it(tmp_path: Path, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+
+    def node(depth: int) -> str:
+        moves = [
+            f"<translate>{rng.uniform():.3f} 1 2</translate>",
+            f"<rotate>0.6 0 0.8 {rng.uniform(-400, 400):.2f}</rotate>",
+            f"<scale>{rng.uniform(0.5, 2):.3f} 1 -1</scale>",
+            f"<matrix>{' '.join(f'{x:.6f}' for x in pose(rng).ravel())}</matrix>",
+        ]
+        picked = [moves[i] for i in rng.permutation(4)[: int(rng.integers(0, 5))]]
+        inner = "".join(node(depth + 1) for _ in range(2 if depth < 2 else 0))
+        at = '<instance_geometry url="#g"/>'
+        return f"<node>{''.join(picked)}{at}{inner}</node>"
+
+    path = write(tmp_path, "a.dae", dae(node(0), unit='<unit meter="0.0254"/>'))
+    mesh = read_mesh(path)
+    assert mesh.unit == 0.0254
+    bound = collada.Collada(str(path)).scene.objects("geometry")
+    parts = [p for one in bound for p in one.primitives()]
+    expected = np.concatenate([p.vertex[p.vertex_index] for p in parts])
+    found = mesh.vertices[mesh.triangles]
+    assert_same_middles(found, expected.astype(float), close=1e-4)
+
+
+def test_the_axis_of_a_turn_in_dae_may_be_of_any_length(tmp_path: Path) -> None:
+    turned = HERE.replace("<instance", "<rotate>0 0 7 90</rotate><instance")
+    mesh = read_mesh(write(tmp_path, "a.dae", dae(turned)))
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    np.testing.assert_allclose([low, high], [[-1, 0, 0], [0, 1, 1]], atol=1e-15)
+
+
+def test_a_node_of_a_dae_library_stands_where_it_is_named(tmp_path: Path) -> None:
+    there = HERE.replace("instance_geometry", "instance_node").replace("#g", "#lib")
+    there = there.replace("<node>", "<node><translate>1 0 0</translate>")
+    mesh = read_mesh(write(tmp_path, "a.dae", dae(there)))
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    assert (low.tolist(), high.tolist()) == ([1, 0, 0], [3, 2, 2])
+
+
+def test_a_mirror_in_dae_does_not_turn_the_solid_inside_out(tmp_path: Path) -> None:
+    mirror = HERE.replace("<instance", "<scale>2 -1 1</scale><instance")
+    mesh = read_mesh(write(tmp_path, "a.dae", dae(mirror)))
+    plain = read_mesh(write(tmp_path, "a.dae", dae(HERE)))
+    volumes = [volume(m.vertices[m.triangles]) for m in (mesh, plain)]
+    assert volumes[0] == pytest.approx(2 * volumes[1])
+    assert plain.watertight
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_dae_is_what_trimesh_wrote(tmp_path: Path, seed: int) -> None:
+    solid = trimesh.util.concatenate(solids(np.random.default_rng(seed)))
+    mesh = read_mesh(write(tmp_path, "a.dae", solid.export(file_type="dae")))
+    assert mesh.unit == 1.0
+    assert_same(mesh, solid, close=1e-6)
+
+
+INPUT = '<input semantic="VERTEX" source="#v" offset="0"/>'
+
+
+@pytest.mark.parametrize(
+    ("faces", "count"),
+    [
+        (f"<polylist>{INPUT}<vcount>3 4</vcount><p>0 1 2 0 1 3 2</p></polylist>", 3),
+        (f"<polygons>{INPUT}<p>0 1 2</p><p>0 1 2 3</p></polygons>", 3),
+        (f"<tristrips>{INPUT}<p>0 1 2 3</p></tristrips>", 2),
+        (f"<trifans>{INPUT}<p>0 1 2 3</p><p>1 2 3</p></trifans>", 3),
+    ],
+)  # fmt: skip
+def test_dae_has_faces_of_many_kinds(tmp_path: Path, faces: str, count: int) -> None:
+    mesh = read_mesh(write(tmp_path, "a.dae", dae(HERE, root=faces)))
+    assert len(mesh.triangles) == count
+    lines = f"<lines>{INPUT}<p>0 1</p></lines>"
+    mesh = read_mesh(write(tmp_path, "a.dae", dae(HERE, root=faces + lines)))
+    assert mesh.notes == ("lines and points left out: 1",)
+
+
+def glb(change: Callable[[dict], None]) -> bytes:
+    """A box by trimesh with its JSON changed."""
+    content = trimesh.Scene(trimesh.creation.box()).export(file_type="glb")
+    size = int.from_bytes(content[12:16], "little")
+    document = json.loads(content[20 : 20 + size])
+    change(document)
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    rest = content[20 + size :]
+    body = len(text).to_bytes(4, "little") + b"JSON" + text + rest
+    return b"glTF" + (2).to_bytes(4, "little") + (12 + len(body)).to_bytes(
+        4, "little"
+    ) + body  # fmt: skip
+
+
+def setting(*path: object) -> Callable[[dict], None]:
+    """Sets the last value at the place that the others lead to."""
+
+    def change(document: dict) -> None:
+        holder = document
+        *steps, key, value = path
+        for step in steps:
+            holder = holder[step]
+        holder[key] = value
+
+    return change
+
+
+def triangles_of(content: bytes, folder: Path) -> np.ndarray:
+    mesh = read_mesh(write(folder, "a.glb", content))
+    return mesh.vertices[mesh.triangles]
+
+
+def test_glb_strips_and_fans_are_triangles_of_one_sense(tmp_path: Path) -> None:
+    for mode, name in ((5, "strip"), (6, "fan")):
+        change = setting("meshes", 0, "primitives", 0, "mode", mode)
+        found = triangles_of(glb(change), tmp_path)
+        assert len(found) == 34, name
+    last = setting("meshes", 0, "primitives", 0, "mode", 4)
+    assert len(triangles_of(glb(last), tmp_path)) == 12
+
+
+GLB_DAMAGE = [
+    (setting("extensionsRequired", ["KHR_draco_mesh_compression"]), "requires the ext"),
+    (setting("meshes", 0, "primitives", 0, "mode", 9), "glTF is damaged: Input should"),
+    (
+        setting("meshes", 0, "primitives", 0, "attributes", "POSITION", 99),
+        "names acces",
+    ),
+    (setting("accessors", 0, "count", 10**9), "promises 1000000000 values, too many"),
+    (setting("accessors", 0, "byteOffset", 10**9), "values, too many"),
+    (setting("accessors", 0, "sparse", {}), "is sparse or no"),
+    (setting("bufferViews", 0, "byteLength", 10**9), "values, too many"),
+    (setting("buffers", 0, "uri", "x.bin"), "has data in another file or compressed"),
+    (setting("scenes", 0, "nodes", [0, 0]), "stands in the scene twice"),
+    (setting("scenes", 0, "nodes", [77]), "names nodes[77], there are"),
+    (setting("scene", 7), "names scenes[7], there are 1"),
+    (setting("nodes", 0, "scale", [1e12, 1e13, 1]), "its glTF is damaged"),
+    (setting("nodes", 0, "matrix", [0.0] * 16), "matrix that is not affine"),
+    (setting("nodes", 0, {"mesh": 0, "skin": 0}), "is bent by a skin or by morph"),
+    (setting("nodes", 0, {"mesh": 0, "weights": [0.5]}), "is bent by a skin or by"),
+    (setting("nodes", 0, {"extensions": {"EXT_mesh_gpu_instancing": {}}}), "instanc"),
+    (setting("scenes", 0, "nodes", []), "has no triangle"),
+]
+
+
+@pytest.mark.parametrize(("change", "expected"), GLB_DAMAGE)
+def test_damage_of_glb_is_named(
+    tmp_path: Path, change: Callable[[dict], None], expected: str | None
+) -> None:
+    path = write(tmp_path, "a.glb", glb(change))
+    if expected is None:
+        read_mesh(path)
+        return
+    with pytest.raises(InvalidFile, match=expected.replace("[", r"\[")):
+        read_mesh(path)
+
+
+PLY = (
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+    "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+    "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+)
+TEXT_DAMAGE = [
+    ("a.ply", "plx\n", "line 1: is no header of a PLY file: 'plx'"),
+    ("a.ply", PLY.replace("ascii", "asci"), "line 2: is no header of a PLY file"),
+    ("a.ply", PLY.replace("float x", "float w"), "has no x, y, z of its vertices"),
+    ("a.ply", PLY.replace("vertex 3", "vertex 4"), "has 4 values, 'vertex' has 3"),
+    ("a.ply", PLY.replace("face 1", "face 2"), "promises 2 of 'face', has 1"),
+    ("a.ply", PLY.replace("face 1", "face 99999999999"), "has 1"),
+    ("a.ply", PLY.replace("3 0 1 2", "3 0 1"), "line 13: has 3 values, too few"),
+    ("a.ply", PLY.replace("3 0 1 2", "3 0 1 2 4"), "line 13: has 5 values, 'face' ha"),
+    ("a.ply", PLY.replace("3 0 1 2", "3 0 1 3"), "a face names vertex 3, expected 0 "),
+    ("a.ply", PLY.replace("3 0 1 2", "3 0 1 1.5"), "a face names vertex 1.5, expecte"),
+    ("a.ply", PLY.replace("3 0 1 2", "-3 0 1 2"), "line 13: has 4 values, too few"),
+    ("a.ply", PLY.replace("1 0 0", "nan 0 0"), "vertex 2: has a coordinate that is n"),
+    ("a.ply", PLY.replace("3 0 1 2", "2 0 1"), "has no triangle"),
+    ("a.ply", PLY.replace("ascii", "binary_little_endian"), "promises 3 of 'vertex'"),
+    ("a.ply", PLY.replace("face 1", "tristrips 1"), "has triangle strips"),
+    ("a.ply", "ply\n" + "comment\n" * 20_000, "has a header of more than 10000"),
+    ("a.dae", "<x/>", "is no COLLADA file: its root is 'x'"),
+    ("a.dae", "<COLLADA>", "is no XML"),
+    ("a.dae", "\0\1\2", "is no XML"),
+    ("a.dae", '<!DOCTYPE a [<!ENTITY b "c">]><COLLADA>&b;</COLLADA>', "has a DOCTYPE"),
+    ("a.dae", "<COLLADA/>", "has no triangle"),
+    ("a.dae", dae(HERE.replace("#g", "#h")), "names '#h', which is not in this file"),
+    ("a.dae", dae(HERE.replace("#g", "b.dae#g")), "names 'b.dae#g', which is not"),
+    ("a.dae", dae(HERE, unit='<unit meter="0"/>'), "its unit is 0 m, expected 1e-9"),
+    ("a.dae", dae(HERE, unit='<unit meter="inch"/>'), "found 'inch' where numbers"),
+    ("a.dae", dae(HERE).replace("3 3 3</p>", "3 3 9</p>"), None),
+    ("a.dae", dae(HERE).replace("0 0 2 0", "0 0 9 0"), "names vertices that are not"),
+    ("a.dae", dae(HERE).replace("0 0 2 0", f"0 0 {10**30} 0"), "where numbers are me"),
+    ("a.dae", dae(HERE).replace('count="4" st', 'count="5" st'), "or is cut short"),
+    ("a.dae", dae(HERE).replace("0 0 1</f", "0 0 inf</f"), "vertex 4: has a coordin"),
+    ("a.dae", dae("<node><skew>1</skew></node>"), "places a part by <skew>"),
+    ("a.dae", dae("<node><instance_controller/></node>"), "is bent by a skin"),
+    ("a.dae", dae("<node><matrix>1 2</matrix></node>"), "found '1 2' where numbers"),
+    ("a.dae", dae(f"<node><scale>{'1e300 ' * 3}</scale></node>"), "that is not affine"),
+    ("a.dae", dae('<node id="n"><instance_node url="#n"/></node>'), "nodes 100 deep"),
+    ("a.dae", dae(HERE, root="<tristrips><p>0 1 2</p></tristrips>"), "names no vert"),
+]
+
+
+@pytest.mark.parametrize(("name", "content", "expected"), TEXT_DAMAGE)
+def test_damage_of_ply_and_dae_is_named(
+    tmp_path: Path, name: str, content: str, expected: str | None
+) -> None:
+    path = write(tmp_path, name, content)
+    if expected is None:
+        read_mesh(path)
+        return
+    with pytest.raises(InvalidFile) as caught:
+        read_mesh(path)
+    assert expected in str(caught.value)
+
+
+def test_a_binary_ply_that_promises_more_than_it_has_is_refused(tmp_path: Path) -> None:
+    box = trimesh.creation.box()
+    content = box.export(file_type="ply", encoding="binary")
+    for old, new in ((b"face 12", b"face 99"), (b"vertex 8", b"vertex 4000000000")):
+        assert old in content
+        with pytest.raises(InvalidFile, match="is cut short"):
+            read_mesh(write(tmp_path, "a.ply", content.replace(old, new)))
+    for end in range(len(content) - 160, len(content), 7):
+        with pytest.raises(InvalidFile):
+            read_mesh(write(tmp_path, "a.ply", io.BytesIO(content[:end]).read()))

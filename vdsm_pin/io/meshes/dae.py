@@ -1,0 +1,287 @@
+"""COLLADA (DAE): the scene's triangles in metres, as its transforms place them.
+
+Everything that has faces is read or refused: nothing is left out silently.
+"""
+
+import math
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Iterator
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.io.meshes.faces import cut_faces
+from vdsm_pin.io.meshes.raw import MeshStream, RawMesh
+from vdsm_pin.io.meshes.scene import Part, Placed, composed
+
+MAX_BYTES: Final = 256 << 20
+"""Largest file read, as XML takes several times its size; [bytes]."""
+
+MAX_NODES: Final = 100_000
+
+_LARGEST_INT: Final = 1 << 40
+
+_Element = ElementTree.Element
+_FACES: Final = frozenset({"triangles", "polylist", "polygons", "tristrips", "trifans"})
+_LINES: Final = frozenset({"lines", "linestrips"})
+_OTHERS: Final = frozenset({"convex_mesh", "spline", "brep"})
+
+
+def read_dae(stream: MeshStream) -> RawMesh:
+    """The triangles of the scene of a COLLADA file; its unit is the one it states.
+
+    Raises:
+        InvalidFile: If it is damaged, or has faces in a form that is not read.
+    """
+    if stream.size > MAX_BYTES:
+        problem = f"is larger than {MAX_BYTES >> 20} MiB, the most that is read as XML"
+        raise stream.invalid(problem)
+    content = stream.content.read()
+    if b"<!DOCTYPE" in content:  # whose entities may grow without end
+        problem = "has a DOCTYPE, expected plain XML"
+        raise stream.invalid(problem)
+    try:
+        root = ElementTree.fromstring(content)
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        problem = f"is no XML: {' '.join(str(error).split())[:100]}"
+        raise stream.invalid(problem) from None
+    if _tag(root) != "COLLADA":
+        problem = f"is no COLLADA file: its root is {_tag(root)[:40]!r}"
+        raise stream.invalid(problem)
+    return _Reader(stream, root).read()
+
+
+def _tag(element: _Element) -> str:
+    """The name without its namespace."""
+    return element.tag.rpartition("}")[2]
+
+
+def _children(element: _Element, *tags: str) -> Iterator[_Element]:
+    return (child for child in element if _tag(child) in tags)
+
+
+class _Reader:
+    """The scene of one document, node by node."""
+
+    def __init__(self, stream: MeshStream, root: _Element) -> None:
+        self._stream, self._root = stream, root
+        self._by_id = {e.get("id"): e for e in root.iter() if e.get("id")}
+        self._parts: dict[str, Part] = {}
+        self._placed, self._notes = Placed(stream), dict[str, int]()
+        self._bend, self._n_nodes = 0.0, 0
+
+    def read(self) -> RawMesh:
+        """All triangles of the scene."""
+        for node in self._roots():
+            self._walk(node, np.eye(4), 0)
+        notes = [f"{what}: {count}" for what, count in self._notes.items()]
+        if next(self._root.iter(self._root.tag.replace("COLLADA", "animation")), None):
+            notes.append("its motion is not read: parts stand where their nodes do")
+        return self._placed.mesh(self._unit(), bend=self._bend, notes=notes)
+
+    def _unit(self) -> float:
+        """Metres per unit; 1 where the file leaves it out, as COLLADA has it."""
+        for asset in _children(self._root, "asset"):
+            for unit in _children(asset, "unit"):
+                metres = self._floats(unit.get("meter", "1"), 1)[0]
+                if not 1e-9 <= metres <= 1e9:
+                    problem = f"its unit is {metres:g} m, expected 1e-9 to 1e9"
+                    raise self._invalid(problem)
+                return float(metres)
+        return 1.0
+
+    def _roots(self) -> Iterator[_Element]:
+        for scene in _children(self._root, "scene"):
+            for instance in _children(scene, "instance_visual_scene"):
+                yield from _children(self._named(instance, "url"), "node")
+
+    def _walk(self, node: _Element, pose: FloatArray, depth: int) -> None:
+        self._n_nodes += 1
+        if depth > 100 or self._n_nodes > MAX_NODES:
+            problem = f"has nodes 100 deep or more than {MAX_NODES}"
+            raise self._invalid(problem)
+        for child in node:
+            tag = _tag(child)
+            if tag in _MOVES:
+                pose = composed(self._stream, pose, self._move(child))
+            elif tag in ("skew", "lookat"):
+                problem = f"places a part by <{tag}>, which is not read"
+                raise self._invalid(problem)
+        for child in node:
+            match _tag(child):
+                case "node":
+                    self._walk(child, pose, depth + 1)
+                case "instance_node":
+                    self._walk(self._named(child, "url"), pose, depth + 1)
+                case "instance_geometry":
+                    self._put(self._named(child, "url"), pose)
+                case "instance_controller":
+                    problem = "is bent by a skin; export it as it stands"
+                    raise self._invalid(problem)
+
+    def _move(self, element: _Element) -> FloatArray:
+        kind = _tag(element)
+        count, matrix = _MOVES[kind]
+        return matrix(self._floats(element.text or "", count))
+
+    def _put(self, geometry: _Element, pose: FloatArray) -> None:
+        parts = []
+        for mesh in geometry:
+            if _tag(mesh) in _OTHERS:
+                problem = f"has a <{_tag(mesh)}>, which is not read"
+                raise self._invalid(problem)
+            for faces in mesh:
+                if _tag(faces) in _LINES:
+                    what = "lines and points left out"
+                    self._notes[what] = self._notes.get(what, 0) + 1
+                elif _tag(faces) in _FACES:
+                    parts.append(self._part(mesh, faces))
+        self._placed.put(parts, pose)
+
+    def _part(self, mesh: _Element, faces: _Element) -> Part:
+        """The triangles of one list of faces."""
+        offset, stride, vertices = self._inputs(faces)
+        loops = [
+            self._ints(p.text or "")[offset::stride] for p in _children(faces, "p")
+        ]
+        if next(_children(faces, "ph"), None) is not None:
+            problem = "has faces with holes (<ph>), which are not read"
+            raise self._invalid(problem)
+        match _tag(faces):
+            case "polygons":
+                sizes = np.array([len(loop) for loop in loops], dtype=np.int64)
+            case "polylist":
+                counts = [c.text or "" for c in _children(faces, "vcount")]
+                sizes = self._ints(" ".join(counts))
+            case "triangles":
+                sizes = np.full(sum(map(len, loops)) // 3, 3)
+            case strip:
+                loops = [_unrolled(loop, fan=strip == "trifans") for loop in loops]
+                sizes = np.full(sum(map(len, loops)) // 3, 3)
+        corners = np.concatenate([np.zeros(0, np.int64), *loops])
+        good = (corners >= 0) & (corners < len(vertices))
+        if not good.all() or len(corners) != sizes.sum() or (sizes < 0).any():
+            problem = (
+                f"<{_tag(faces)}> names vertices that are not there, or is cut short"
+            )
+            raise self._invalid(problem)
+        corners = corners[np.repeat(sizes >= 3, sizes)]
+        self._stream.check_numbers(vertices, "vertex", used=corners)
+        cut = cut_faces(vertices, corners, sizes[sizes >= 3])
+        self._bend = max(self._bend, cut.bend)
+        for note in cut.notes:
+            self._notes[note] = self._notes.get(note, 0) + 1
+        return Part(vertices, cut.triangles)
+
+    def _inputs(self, faces: _Element) -> tuple[int, int, FloatArray]:
+        """Where vertex numbers stand among those of a corner, how many there are."""
+        offset, stride, vertices = -1, 1, np.zeros((0, 3))
+        for one in _children(faces, "input"):
+            place = int(self._ints(one.get("offset", "0"))[0])
+            stride = max(stride, place + 1)
+            if one.get("semantic") == "VERTEX":
+                offset, vertices = place, self._vertices(self._named(one, "source"))
+        if not 0 <= offset < stride <= 64:
+            problem = f"<{_tag(faces)}> names no vertices"
+            raise self._invalid(problem)
+        return offset, stride, vertices
+
+    def _vertices(self, element: _Element) -> FloatArray:
+        for one in _children(element, "input"):
+            if one.get("semantic") == "POSITION":
+                return self._source(self._named(one, "source"))
+        problem = "has <vertices> without POSITION"
+        raise self._invalid(problem)
+
+    def _source(self, source: _Element) -> FloatArray:
+        """Points of a source, shape (n, 3)."""
+        for common in _children(source, "technique_common"):
+            for accessor in _children(common, "accessor"):
+                array = self._named(accessor, "source")
+                values = self._floats(array.text or "")
+                names = [param.get("name") for param in _children(accessor, "param")]
+                stride = int(self._ints(accessor.get("stride", "1"))[0])
+                start = int(self._ints(accessor.get("offset", "0"))[0])
+                count = int(self._ints(accessor.get("count", "0"))[0])
+                if (
+                    names != ["X", "Y", "Z"]
+                    or stride < 3
+                    or min(start, count) < 0
+                    or start + count * stride > len(values)
+                ):
+                    problem = "has a source that is not X, Y, Z, or is cut short"
+                    raise self._invalid(problem)
+                rows = values[start : start + count * stride].reshape(count, stride)
+                return rows[:, :3]
+        problem = "has a source without accessor"
+        raise self._invalid(problem)
+
+    def _named(self, element: _Element, key: str) -> _Element:
+        """What an element points to in this file."""
+        name = element.get(key, "")
+        found = self._by_id.get(name[1:]) if name.startswith("#") else None
+        if found is None:
+            problem = f"names {name[:60]!r}, which is not in this file"
+            raise self._invalid(problem)
+        return found
+
+    def _floats(self, text: str, count: int | None = None) -> FloatArray:
+        return np.array(self._numbers(text, float, count), dtype=np.float64)
+
+    def _ints(self, text: str) -> IntArray:
+        return np.array(self._numbers(text, int, None), dtype=np.int64)
+
+    def _numbers(
+        self, text: str, kind: Callable[[str], float], count: int | None
+    ) -> list[float]:
+        words = text.split()
+        try:
+            values = list(map(kind, words)) if "_" not in text else []
+        except ValueError:
+            values = []
+        good = all(-_LARGEST_INT < x < _LARGEST_INT for x in values if kind is int)
+        if not good or len(values) != (len(words) if count is None else count):
+            problem = f"found {' '.join(words[:9])[:60]!r} where numbers are meant"
+            raise self._invalid(problem)
+        return values
+
+    def _invalid(self, problem: str) -> InvalidFile:
+        return self._stream.invalid(problem)
+
+
+def _unrolled(loop: IntArray, *, fan: bool) -> IntArray:
+    """Corners of the triangles of a strip or a fan, one after the other."""
+    i = np.arange(max(len(loop) - 2, 0))
+    odd = i % 2
+    if fan:
+        triangles = [np.zeros_like(i), i + 1, i + 2]
+    else:
+        triangles = [i, i + 1 + odd, i + 2 - odd]
+    return np.asarray(loop[np.column_stack(triangles).reshape(-1)])
+
+
+def _translated(vector: FloatArray) -> FloatArray:
+    pose = np.eye(4)
+    pose[:3, 3] = vector
+    return pose
+
+
+def _turned(axis_angle: FloatArray) -> FloatArray:
+    """A turn by an angle in degrees about an axis of any length (Rodrigues)."""
+    length = float(np.linalg.norm(axis_angle[:3])) or 1.0
+    x, y, z = axis_angle[:3] / length
+    angle = math.radians(math.fmod(float(axis_angle[3]), 360.0))
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    pose = np.eye(4)
+    pose[:3, :3] += math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+    return pose
+
+
+_MOVES: Final[dict[str, tuple[int, Callable[[FloatArray], FloatArray]]]] = {
+    "matrix": (16, lambda values: values.reshape(4, 4)),
+    "translate": (3, _translated),
+    "rotate": (4, _turned),
+    "scale": (3, lambda values: np.diag([*values, 1.0])),
+}
