@@ -6,6 +6,7 @@ Commands run in this process through `main`; one runs as a real process.
 import html
 import json
 import math
+import os
 import re
 import subprocess
 import sys
@@ -500,3 +501,31 @@ def test_the_joint_error_that_the_sturdiest_plan_claims_is_the_one_verified(
     assert vdsm(*words[:-1], "clearest", "--resume").status == 0
     again = json.loads((folder / "plan.json").read_text(encoding="utf-8"))
     assert again["strategy"] == "clearest"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["problems", "--show", "paper/obs1"],
+        ["schema", "verification"],
+        ["verify", "near.yaml", "--trajectory", "trajectory.csv", "--out", "piped"],
+    ],
+)
+def test_a_closed_pipe_is_no_verdict(words: list[str], planned: Path) -> None:
+    """The status is that of SIGPIPE, standard error is silent, files are whole."""
+    script = "import sys; from vdsm_pin.cli import main; main(sys.argv[1:])"
+    reader, writer = os.pipe()
+    os.close(reader)
+    ran = subprocess.run(
+        [sys.executable, "-c", script, *words],
+        stdout=writer,
+        stderr=subprocess.PIPE,
+        cwd=planned,
+        text=True,
+        check=False,
+    )
+    os.close(writer)
+    assert (ran.returncode, ran.stderr) == (141, "")
+    if words[0] == "verify":
+        text = (planned / "piped" / "verification.json").read_text(encoding="utf-8")
+        assert json.loads(text)["verdict"] == "certified"

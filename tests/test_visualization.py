@@ -10,16 +10,19 @@ import threading
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from urllib.error import HTTPError
 
 import made_up
+import numpy as np
 import pytest
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
-from vdsm_pin.io.problem_file import built_in_text
+from vdsm_pin.io.problem_file import built_in_text, read_problem
 from vdsm_pin.io.trajectory_file import write_trajectory
-from vdsm_pin.visualization import ViewServer, page, write_page
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.visualization import ViewServer, at_start, page, write_page
 
 TETRAHEDRON = """v 0 0 900
 v 0 90 900
@@ -140,3 +143,18 @@ def test_an_interrupt_ends_it_cleanly_with_a_page_still_open() -> None:
 def quietly(url: str) -> None:
     with suppress(OSError):
         get(url)
+
+
+def test_without_a_motion_the_tip_is_drawn_at_the_start() -> None:
+    """Oracle: forward kinematics of what is drawn."""
+    problem, rng = read_problem("paper/obs1").problem, np.random.default_rng(0)
+    starts = [np.array([2.9, 0.9, 0.3]), np.array([3.126, 0.0, 0.0])]
+    starts += list(rng.uniform([-1.0, -0.7, -0.7], [4.0, 0.7, 0.7], (20, 3)))
+    for start in starts:
+        path = replace(problem.path, start=start)
+        rows = at_start(replace(problem, tip_path=path))
+        centres = joint_centres(problem.manipulator, rows.x0, rows.alpha, rows.theta)
+        np.testing.assert_allclose(centres[0, -1], start, rtol=0.0, atol=1e-12)
+        links = np.diff(centres[0], axis=0)
+        straight = np.cross(links[:-1], links[1:])
+        np.testing.assert_allclose(straight, 0.0, rtol=0.0, atol=1e-12)

@@ -3,6 +3,7 @@
 Modules are imported inside the commands, so that `vdsm --help` answers at once.
 """
 
+import os
 import shlex
 import sys
 import time
@@ -22,6 +23,8 @@ PASSED: Final = 0
 NOT_PASSED: Final = 1
 BAD_INPUT: Final = 2
 INTERRUPTED: Final = 130
+PIPE_CLOSED: Final = 141
+"""As a shell reports whoever is ended by SIGPIPE; all files are written by then."""
 
 # Without rich markup the help page is plain text and opens twice as fast.
 app = typer.Typer(
@@ -383,17 +386,30 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     show_everything()
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        app(given, prog_name="vdsm", obj=shlex.join(["vdsm", *given]))
+        try:
+            app(given, prog_name="vdsm", obj=shlex.join(["vdsm", *given]))
+        finally:
+            sys.stdout.flush()  # here a closed pipe is heard, later it is not
+    except SystemExit as ended:
+        if isinstance(ended.__context__, BrokenPipeError):  # as typer says it
+            _nobody_reads()
+        raise
     except InvalidInput as error:
         _fail(error, BAD_INPUT)
     except VdsmError as error:
         _fail(error, NOT_PASSED)
     except BrokenPipeError:
-        sys.stderr.close()  # the reader of our output is gone, and so is the need
-        sys.exit(NOT_PASSED)
+        _nobody_reads()
     except OSError as error:
         _fail(error, BAD_INPUT)
     sys.exit(PASSED)
+
+
+def _nobody_reads() -> NoReturn:
+    """End because the reader of our output has gone, which is no verdict."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())  # for what Python flushes at its end
+    sys.exit(PIPE_CLOSED)
 
 
 def _fail(error: Exception, status: int) -> NoReturn:
