@@ -28,7 +28,7 @@ from vdsm_pin.report.files import (
 )
 from vdsm_pin.report.inputs import assumed_sizes, assumption, input_notes
 from vdsm_pin.report.run_record import RunRecord, machine, versions
-from vdsm_pin.report.words import check_title, percent, place, quantity
+from vdsm_pin.report.words import check_title, depth, percent, place, quantity
 from vdsm_pin.tolerances import TOLERANCES, UNITS
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import (
@@ -102,6 +102,7 @@ def check_row(check: Check) -> CheckRow:
         unit=check.unit,
         moment=finite(check.moment),
         where=check.where,
+        deeper=check.deeper,
     )
 
 
@@ -118,6 +119,7 @@ def closest_row(verification: Verification, approach: ClosestApproach) -> Closes
         station_m=finite(approach.station),
         link_point_m=in_file_frame(verification, approach.link_point),
         other_point_m=in_file_frame(verification, approach.other_point),
+        deeper=approach.deeper,
     )
 
 
@@ -138,6 +140,7 @@ def counterexample_row(
         required_m=found.required,
         link_point_m=in_file_frame(verification, found.link_point),
         other_point_m=in_file_frame(verification, found.other_point),
+        deeper=found.deeper,
     )
 
 
@@ -178,6 +181,7 @@ def min_clearance(verification: Verification) -> MinClearance | None:
         moment=row.moment,
         link=row.pair.link,
         obstacle=row.pair.obstacle,
+        deeper=row.deeper,
     )
 
 
@@ -191,7 +195,9 @@ def reason(verification: Verification) -> str:
     if not bad:
         return "No check was carried out, so nothing is proved."
     first = bad[0]
-    found = f"{check_title(first.name)} is {quantity(first.worst, first.unit)}"
+    found = (
+        f"{check_title(first.name)} is {depth(first.worst, first.deeper, first.unit)}"
+    )
     if math.isnan(first.worst):
         found = f'there is no evidence for "{check_title(first.name)}"'
     elif not math.isnan(first.limit):

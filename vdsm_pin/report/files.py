@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from vdsm_pin.errors import UnknownName
 from vdsm_pin.io.problem_file import SCHEMA_DIALECT, problem_schema
+from vdsm_pin.report.words import BASE_ERROR
 
 Point = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 VerdictWord = Annotated[
@@ -28,6 +29,10 @@ OutcomeWord = Literal[
 _MOMENT: Final = "in waypoints, 12.25 is a quarter of the way from 12 to 13"
 _LINK: Final = "links count from 1 at the base"
 _FRAME: Final = "in the frame of the problem file"
+_DEEPER: Final = (
+    "whether the link's axis meets the body: no depth beyond the link's radius is "
+    "measured, so it may be deeper than this"
+)
 _COVERAGE: Final = (
     "proved share of the desired path that is drawn, 0 to 1; null where there is none"
 )
@@ -62,6 +67,7 @@ class CheckRow(FileModel):
     unit: str = Field(description="m, rad, share (of a whole, 0 to 1) or - (a number)")
     moment: FiniteFloat | None = Field(description=_MOMENT)
     where: str = Field(description="place of the worst case in words, without moment")
+    deeper: bool = Field(description=f"of worst: {_DEEPER}")
 
 
 class ClosestRow(FileModel):
@@ -81,6 +87,7 @@ class ClosestRow(FileModel):
     )
     link_point_m: Point | None = Field(description=f"on the link; {_FRAME}")
     other_point_m: Point | None = Field(description=f"on its partner; {_FRAME}")
+    deeper: bool = Field(description=f"of both bounds: {_DEEPER}")
 
 
 class MinClearance(FileModel):
@@ -91,13 +98,14 @@ class MinClearance(FileModel):
     moment: FiniteFloat = Field(description=f"when upper_m was found; {_MOMENT}")
     link: int = Field(description=_LINK)
     obstacle: str = Field(description="name of the obstacle")
+    deeper: bool = Field(description=f"of both bounds: {_DEEPER}")
 
 
 class ErrorBoxRow(FileModel):
     """The errors of the real arm that the clearance proof was asked to cover."""
 
     joint_error_rad: FiniteFloat = Field(description="of every joint angle, either way")
-    base_error_m: FiniteFloat = Field(description="of the base, in any direction")
+    base_error_m: FiniteFloat = Field(description=BASE_ERROR)
     obstacle_error_m: FiniteFloat = Field(description="displacement of every surface")
 
 
@@ -124,6 +132,7 @@ class CounterexampleRow(FileModel):
     other_point_m: Point | None = Field(
         description=f"on the partner where it stands nominally; {_FRAME}"
     )
+    deeper: bool = Field(description=f"of clearance_m: {_DEEPER}")
 
 
 class ToleranceRow(FileModel):

@@ -20,9 +20,11 @@ from vdsm_pin.report.files import BatchRow, PlanFile, Point, VerificationFile
 from vdsm_pin.report.inputs import assumption
 from vdsm_pin.report.page_data import report_data, view_data
 from vdsm_pin.report.words import (
+    BASE_ERROR,
     MISSING,
     OUTCOMES,
     check_title,
+    depth,
     limit,
     lost,
     measured,
@@ -74,6 +76,7 @@ def _environment() -> jinja2.Environment:
     )
     environment.filters |= {
         "quantity": quantity,
+        "depth": depth,
         "limit": limit,
         "percent": percent,
         "title_of": check_title,
@@ -91,6 +94,7 @@ def _environment() -> jinja2.Environment:
         "asset": _asset,
         "meshcat": _meshcat,
         "outcomes": OUTCOMES,
+        "base_error": BASE_ERROR,
         "vdsm_version": __version__,
     }
     return environment

@@ -9,12 +9,12 @@ from vdsm_pin.report.files import CheckRow, PlanFile, VerificationFile
 from vdsm_pin.report.inputs import assumption
 from vdsm_pin.report.words import (
     check_title,
+    depth,
     limit,
     lost,
     measured,
     outcome,
     percent,
-    quantity,
     survived,
     term,
 )
@@ -98,7 +98,7 @@ def _cells(check: CheckRow) -> tuple[str, str, str, str, str]:
     known = outcome(check.verdict)
     return (
         check_title(check.name),
-        quantity(check.worst, check.unit),
+        depth(check.worst, check.deeper, check.unit),
         limit(check.limit, check.unit),
         str(check.count),
         f"{known.mark} {known.word}",

@@ -95,6 +95,10 @@ OUTCOMES: Final[Mapping[str, Outcome]] = MappingProxyType(
 """Every outcome of a check, a verification or a problem of a batch."""
 
 
+BASE_ERROR: Final = "shift of the base in any direction, no turn of it"
+"""What the error of the base covers, and what it does not."""
+
+
 def outcome(word: str) -> Outcome:
     """The outcome of that word; an unknown word is shown and never counts as passed."""
     unknown = Outcome(word, "?", "yellow", False, "Unknown outcome.")
@@ -125,6 +129,12 @@ def quantity(value: float | None, unit: str) -> str:
     digits = 3 if abs(shown) < _LARGE else 1
     text = f"{shown:.{digits}f}" if fixed else f"{shown:.1e}"
     return text.replace("-", "−", 1) + suffix if text[0] == "-" else text + suffix
+
+
+def depth(value: float | None, deeper: bool, unit: str = "m") -> str:
+    """A clearance; of one that is as deep as is measured it is said that it is more."""
+    text = quantity(value, unit)
+    return f"{text} or deeper" if deeper else text
 
 
 def measured(value: float | None, unit: str) -> str:

@@ -13,7 +13,7 @@ from vdsm_pin.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.scene import Mesh
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.clearance import ClearanceProof
-from vdsm_pin.verification.records import Check, Counterexample, Verdict
+from vdsm_pin.verification.records import Check, Counterexample, Verdict, is_deepest
 
 
 def check_clearance(
@@ -39,6 +39,8 @@ def check_clearance(
     ):
         if mine.any():
             row = _row(proof, np.flatnonzero(mine), name, needed, late)
+            radius = problem.manipulator.link_radius
+            row = replace(row, deeper=is_deepest(row.worst, radius))
             against = [
                 found
                 for found in counterexamples
@@ -92,4 +94,5 @@ def _refuted(row: Check, found: Counterexample) -> Check:
         worst=found.clearance,
         where=f"{pair}, with errors within the error box",
         moment=found.moment,
+        deeper=found.deeper,
     )

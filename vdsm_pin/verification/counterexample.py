@@ -22,7 +22,13 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.pair_slopes import pair_slopes
-from vdsm_pin.verification.records import ClearanceChunk, Counterexample, ErrorBox, Pair
+from vdsm_pin.verification.records import (
+    ClearanceChunk,
+    Counterexample,
+    ErrorBox,
+    Pair,
+    is_deepest,
+)
 from vdsm_pin.verification.task import all_pairs, make_task
 
 PAIRS: Final = 8
@@ -195,16 +201,18 @@ class Search:
         column = proof.pairs.index(self.pair)
         if chunks[0].verdict[0, column] != REFUTED:
             return None
+        upper = float(chunks[0].upper[0, column])
         return Counterexample(
             interval=moment.interval,
             share=moment.share,
             pair=self.pair,
             joints=frozen(q),
             offsets=frozen(offset),
-            clearance=float(chunks[0].upper[0, column]) - grown,
+            clearance=upper - grown,
             required=self.required,
             link_point=frozen(chunks[0].link_point[0, column]),
             other_point=frozen(chunks[0].other_point[0, column]),
+            deeper=is_deepest(upper, self.problem.manipulator.link_radius),
         )
 
 

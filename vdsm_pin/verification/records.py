@@ -9,6 +9,7 @@ from typing import TypeAlias
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.notebook import Summarised, in_mm, in_percent
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 
 
@@ -47,6 +48,8 @@ class Check:
         where: The place of the worst case in words, joints and links from 1.
         moment: When it happens, in waypoints: 12.25 is a quarter of the way from 12 to
             13; NaN where it has no time.
+        deeper: Whether `worst` is a depth at which the link's axis meets the body: it
+            may be deeper, since no depth beyond the link's radius is measured.
     """
 
     name: str
@@ -57,6 +60,17 @@ class Check:
     unit: str
     where: str = ""
     moment: float = nan
+    deeper: bool = False
+
+
+def is_deepest(clearance: float, link_radius: float) -> bool:
+    """Whether a clearance is as deep as is measured: the link's axis meets the body.
+
+    Args:
+        clearance: An upper bound of it; [m].
+        link_radius: Distances are measured from the axis, so no depth exceeds it; [m].
+    """
+    return -inf < clearance <= TOLERANCES.bracket_gap - link_radius
 
 
 @dataclass(frozen=True)
@@ -118,6 +132,8 @@ class ClosestApproach:
         station: Arc length of the witness along the link's axis; [m].
         link_point: Witness on the link's surface, base frame, shape (3,); [m].
         other_point: Witness on the partner's surface, base frame, shape (3,); [m].
+        deeper: Whether the link's axis meets the partner: what is measured of such a
+            depth is the link's radius, and it may be deeper.
     """
 
     interval: int
@@ -128,6 +144,7 @@ class ClosestApproach:
     station: float
     link_point: FloatArray
     other_point: FloatArray
+    deeper: bool = False
 
     @property
     def moment(self) -> float:
@@ -151,6 +168,7 @@ class Counterexample:
         required: What it falls short of; [m].
         link_point: Witness on the link's surface, base frame, shape (3,); [m].
         other_point: Witness on the partner's nominal surface, shape (3,); [m].
+        deeper: As of a closest approach.
     """
 
     interval: int
@@ -162,6 +180,7 @@ class Counterexample:
     required: float
     link_point: FloatArray
     other_point: FloatArray
+    deeper: bool = False
 
     @property
     def moment(self) -> float:

@@ -28,6 +28,7 @@ from vdsm_pin.verification.records import (
     ErrorBox,
     Verdict,
     Verification,
+    is_deepest,
 )
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.tip import check_tip
@@ -260,6 +261,7 @@ def closest_approaches(
                 station=_station(problem, trajectory, row, pair.link, mine),
                 link_point=frozen(mine),
                 other_point=frozen(theirs),
+                deeper=is_deepest(float(row[UP]), problem.manipulator.link_radius),
             )
         )
     return tuple(rows)

@@ -1,0 +1,47 @@
+"""How deep links are inside obstacles, in words; oracle: where the scene puts them."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.report.facts import min_clearance, reason, verification_file
+from vdsm_pin.report.html import write_report
+from vdsm_pin.report.run_record import RunRecord
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.scene import Box, Scene
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.records import Verification
+from vdsm_pin.verification.verify import verify
+
+
+def beside_a_box(gap: float) -> Verification:
+    """The straight arm along a box whose face is so far from the axis; [m]."""
+    problem = read_problem("paper/free").problem
+    half = np.array([2.0, 0.5, 0.5])
+    box = Box("box", np.array([1.5, 0.0, gap + 0.5]), np.eye(3), half)
+    zero, links = np.zeros(1), np.zeros((1, problem.manipulator.n_links))
+    rows = Trajectory(zero.astype(bool), zero, zero, links, links)
+    problem = replace(problem, scene=Scene((box,)))
+    return verify(problem, rows, load_robot(problem.manipulator))
+
+
+@pytest.mark.parametrize("gap", [-0.3, -0.001, 0.001, 0.03])
+def test_a_depth_beyond_the_radius_is_called_that_or_deeper(
+    gap: float, tmp_path: Path
+) -> None:
+    found = beside_a_box(gap)
+    radius = found.problem.manipulator.link_radius
+    row = next(one for one in found.checks if one.name == "clearance from obstacles")
+    nearest = min_clearance(found)
+    assert nearest is not None
+    assert row.deeper == nearest.deeper == (gap < 0.0)
+    assert row.worst == pytest.approx(max(gap, 0.0) - radius, abs=1e-6)
+    file = verification_file(found, RunRecord("vdsm", "p", "0"))
+    write_report(tmp_path / "report.html", found, file)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    deepest = f"−{radius * 1e3:.3f} mm or deeper"
+    for text in (reason(found), page):
+        assert (deepest in text) == (gap < 0.0)
