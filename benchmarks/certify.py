@@ -153,7 +153,7 @@ def tube(motion: Trajectory, clearance: float, n_triangles: int) -> Mesh:
     k, j = np.meshgrid(np.arange(along), np.arange(around), indexing="ij")
     a, b = k * around + j, k * around + (j + 1) % around
     faces = np.stack([a, b, a + around, b, b + around, a + around], axis=-1)
-    return Mesh("tube", points, faces.reshape(-1, 3), watertight=False)
+    return Mesh("tube", points, faces.reshape(-1, 3), solid=False)
 
 
 def problem_of(

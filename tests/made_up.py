@@ -49,7 +49,7 @@ def every_shape() -> Scene:
             Capsule("rod", np.array([2.0, 1.6, 0.0]), (Y + Z) / np.sqrt(2), 0.4, 0.08),
             Box("crate", np.array([0.6, 0.9, -0.3]), np.eye(3), np.full(3, 0.2)),
             Prism("angle", np.array([1.8, -1.3, 1.0]), np.eye(3), outline, (0.0, 0.6)),
-            Mesh("part <1>", tetrahedron, faces, watertight=True),
+            Mesh("part <1>", tetrahedron, faces),
             HalfSpace("wall", -1.0 * Z, Z),
         )
     )

@@ -416,9 +416,10 @@ def test_an_arm_inside_two_cubes_of_one_mesh_is_rejected(tmp_path: Path) -> None
     assert "outside" in refused(cube_around(tmp_path, "c.stl"))
 
 
-def test_a_mesh_with_a_hole_is_a_surface(tmp_path: Path) -> None:
+def test_a_mesh_with_a_hole_is_accepted_as_a_surface_alone(tmp_path: Path) -> None:
     write_cube(tmp_path / "c.stl", 4.0, skip=1)
-    outcome = judge(cube_around(tmp_path, "c.stl"))
+    assert "not closed" in refused(cube_around(tmp_path, "c.stl"))
+    outcome = judge(cube_around(tmp_path, "c.stl", solid=False))
     assert outcome.accepted
     assert outcome.surfaces == ("shell",)
 

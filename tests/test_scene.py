@@ -64,4 +64,4 @@ def test_capsule_piece_is_its_segment_grown() -> None:
 
 def test_mesh_indices_must_exist() -> None:
     with pytest.raises(InvalidInput, match="index"):
-        Mesh("m", np.zeros((3, 3)), np.array([[0, 1, 3]]), False)
+        Mesh("m", np.zeros((3, 3)), np.array([[0, 1, 3]]))

@@ -10,6 +10,8 @@
     │   ├── LinkTooShort      a projected gap exceeds its link
     │   ├── LimitExceeded     a joint limit would be broken
     │   ├── StartBlocked      the arm as it starts is too close to an obstacle
+    │   ├── StartInside       the arm as it starts is inside a mesh
+    │   ├── InsideUnknown     whether it is inside a mesh cannot be decided
     │   ├── PathBlocked       an obstacle is in the way of the tip
     │   ├── CutOff            proved: no way for the tip is wide enough
     │   ├── HemmedIn          proved: the last link has no room at the tip
@@ -156,6 +158,27 @@ class StartBlocked(Infeasible):
         if not bent:
             message += "; `start: {joints: ...}` states a start that is bent"
         super().__init__(message)
+
+
+class StartInside(Infeasible):
+    """The arm as it starts is inside a mesh."""
+
+    def __init__(self, *, obstacle: str) -> None:
+        self.obstacle = obstacle
+        super().__init__(f"at its start the arm is inside {obstacle!r}")
+
+
+class InsideUnknown(Infeasible):
+    """Whether the arm starts inside a mesh cannot be decided.
+
+    Args:
+        obstacle: Name of the mesh.
+        reason: Why, in a sentence that names it.
+    """
+
+    def __init__(self, *, obstacle: str, reason: str) -> None:
+        self.obstacle, self.reason = obstacle, reason
+        super().__init__(reason)
 
 
 class PathBlocked(Infeasible):

@@ -1,17 +1,19 @@
 """Obstacles: named solids in the base frame, and the convex pieces they are made of.
 
 Everything that measures a distance works on pieces (`geometry/convex.py`). A mesh is
-one hull per triangle plus, where it is watertight, an inside.
+one hull per triangle plus, where they close (`geometry/closed_meshes.py`), an inside.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.geometry.closed_meshes import ClosedMesh, close_mesh
 from vdsm_pin.geometry.convex import (
     FlatCylinder,
     HalfSpacePiece,
@@ -19,6 +21,9 @@ from vdsm_pin.geometry.convex import (
     Piece,
     Triangles,
 )
+
+if TYPE_CHECKING:  # it brings compiled code, for which readers need not wait
+    from vdsm_pin.geometry.pieces import PackedPieces
 
 BOX_CORNERS: Final = frozen(
     [[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]
@@ -255,13 +260,14 @@ class HalfSpace:
 
 @dataclass(frozen=True)
 class Mesh:
-    """Triangles; a solid where they are watertight, else a surface.
+    """Triangles, and the inside of the closed surface that they make.
 
     Args:
         name: Unique name.
         vertices: Shape (n, 3), in the base frame; [m].
         triangles: Vertex indices, shape (m, 3), m >= 1.
-        watertight: Whether the triangles enclose an inside.
+        solid: Whether the problem says that there is an inside; None where it leaves
+            that to the triangles.
         assumed_size: Its size in words where neither its file nor the problem states
             a unit; else empty.
         notes: What else its file had, one phrase each.
@@ -270,7 +276,7 @@ class Mesh:
     name: str
     vertices: FloatArray
     triangles: IntArray
-    watertight: bool
+    solid: bool | None = None
     assumed_size: str = ""
     notes: tuple[str, ...] = ()
 
@@ -291,6 +297,21 @@ class Mesh:
     def pieces(self) -> Triangles:
         """One hull per triangle."""
         return Triangles(self.vertices[self.triangles])
+
+    @cached_property
+    def closed_mesh(self) -> ClosedMesh:
+        """The closed surface that the triangles make, if they do."""
+        return close_mesh(self.vertices, self.triangles)
+
+    @property
+    def is_surface(self) -> bool:
+        """Whether the problem says that nothing but the surface is meant."""
+        return self.solid is False
+
+    @property
+    def has_inside(self) -> bool:
+        """Whether an inside is asked for, and there is one."""
+        return not self.is_surface and self.closed_mesh.closed
 
 
 Obstacle: TypeAlias = Sphere | Capsule | Cylinder | Box | Prism | HalfSpace | Mesh
@@ -322,3 +343,18 @@ class Scene:
     def names(self) -> tuple[str, ...]:
         """Names in file order."""
         return tuple(obstacle.name for obstacle in self.obstacles)
+
+
+def covers_of(obstacles: Sequence[Obstacle], pieces: "PackedPieces") -> IntArray:
+    """How the pieces of obstacles count where an inside is asked for, (n_pieces,).
+
+    Args:
+        obstacles: Any.
+        pieces: Theirs, packed.
+    """
+    covers = np.zeros(len(pieces.kind), np.int64)
+    for k, mesh in enumerate(obstacles):
+        if isinstance(mesh, Mesh) and mesh.has_inside:
+            mine = slice(pieces.first_piece[k], pieces.first_piece[k + 1])
+            covers[mine] = mesh.closed_mesh.covers[pieces.order[mine]]
+    return covers

@@ -117,6 +117,25 @@ class Tolerances:
     Files have six digits or more; what is off by less is their rounding.
     """
 
+    mesh_gap: float = _held(2e-4, "-")
+    """Gap over the mesh's diagonal that is joined where its inside is asked for; [-].
+
+    Real files leave 1e-7 (single precision) to 1e-4 (parts meshed one by one); the arm,
+    whose radius is larger, passes through none of these gaps.
+    """
+
+    mesh_wall: float = _held(1e-6, "-")
+    """Wall over the mesh's diagonal that cannot be told from a face given twice; [-].
+
+    A face written twice in single precision differs by some 1e-7.
+    """
+
+    mesh_flat: float = _held(1e-12, "-")
+    """Height of a triangle over the mesh's diagonal up to which it has no area; [-].
+
+    Corners in line before they are turned into the base frame are so to 1e-15 after.
+    """
+
     straight_slope: float = _held(1e-10, "-")
     """Change of a link's slope dy/dL or dz/dL that counts as none; [-].
 

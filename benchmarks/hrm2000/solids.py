@@ -165,7 +165,7 @@ def _solid(name: str, vertices: FloatArray, triangles: IntArray) -> Mesh:
         message = f"{name} is not a solid"
         raise RuntimeError(message)
     outwards = triangles if solid.volume > 0.0 else triangles[:, ::-1]
-    return Mesh(name, vertices, outwards, watertight=True)
+    return Mesh(name, vertices, outwards)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import pytest
 import shapely
 import trimesh
 
-from vdsm_pin.io.mesh_file import is_closed
+from vdsm_pin.geometry.closed_meshes import close_mesh
 from vdsm_pin.io.meshes.faces import cut_faces
 
 SQUARE_WITH_HOLE = [
@@ -133,7 +133,7 @@ def test_a_prism_of_any_section_is_closed_and_has_its_volume(make, seed: int) ->
     vertices = vertices @ rotation(rng).T
     found = cut_faces(vertices, corners, sizes)
     assert found.bend < 1e-13
-    assert is_closed(found.triangles)
+    assert close_mesh(vertices, found.triangles).closed
     assert (areas(vertices, found.triangles) > 0.0).all()
     a, b, c = np.moveaxis(vertices[found.triangles], 1, 0)
     volume = abs(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)

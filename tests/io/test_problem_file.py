@@ -207,7 +207,7 @@ def test_scene_is_carried_into_the_base_frame(tmp_path: Path) -> None:
         wall.normal @ wall.point, abs=1e-14
     )
     assert isinstance(part, scene.Mesh)
-    assert part.watertight
+    assert part.closed_mesh.closed
     placed = 500 * TETRAHEDRON.reshape(-1, 3)[:, [2, 1, 0]] * [1, 1, -1] + [0, 900, 0]
     corners = part.vertices[part.triangles].reshape(-1, 3)
     np.testing.assert_allclose(corners, base(*placed.tolist()), **close)

@@ -341,7 +341,7 @@ class OracleWriter:
             for i, other in self.partners()
         ]
         return {
-            "vdsm_certificate": 2,
+            "vdsm_certificate": 3,
             "problem_sha256": self.file.sha256,
             "trajectory_sha256": sha256(self.trajectory_path.read_bytes()),
             "urdf_sha256": "0" * 64,
@@ -354,6 +354,7 @@ class OracleWriter:
             "n_rows": self.trajectory.n_samples,
             "pairs": pairs,
             "pieces": self.pieces(),
+            "joined": {},
             "limits": {
                 "alpha_rad": float(np.abs(alpha).max()),
                 "theta_rad": float(np.abs(theta).max()),

@@ -21,7 +21,6 @@ def judged(assumed: str, *notes: str) -> Verification:
         "Wing <b>",
         np.eye(3),
         np.array([[0, 1, 2]]),
-        False,
         assumed_size=assumed,
         notes=notes,
     )

@@ -72,5 +72,5 @@ def test_a_large_mesh_is_drawn_with_few_triangles() -> None:
     faces = np.vstack(
         [np.stack([k, k + 1, k + n], 1), np.stack([k + 1, k + n + 1, k + n], 1)]
     )
-    skin = surface(Mesh("m", points @ np.stack([X, Y, X + Y]), faces, False), 1.0)
+    skin = surface(Mesh("m", points @ np.stack([X, Y, X + Y]), faces), 1.0)
     assert 1_000 < len(skin.triangles) <= 20_000

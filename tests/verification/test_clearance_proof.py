@@ -14,7 +14,7 @@ from vdsm_pin.scene import Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Scene, 
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.hasty import is_certified
-from vdsm_pin.verification.inside import check_inside
+from vdsm_pin.verification.inside import check_inside, locate_arm
 from vdsm_pin.verification.records import ClearanceChunk, ErrorBox, Verdict
 from vdsm_pin.verification.verify import verify
 
@@ -218,26 +218,27 @@ def cube(half: float, centre: FloatArray) -> Mesh:
         [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
         [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
     ]  # fmt: skip
-    return Mesh("cube", centre + half * corners, np.array(faces), True)
+    return Mesh("cube", centre + half * corners, np.array(faces))
 
 
 def test_an_arm_inside_a_closed_mesh_is_refuted() -> None:
+    """The proof speaks of the surface, the row beside it of the inside."""
     still = trajectory(np.zeros(1), np.zeros((1, 8)), np.zeros((1, 8)))
     for half, verdict in ((5.0, Verdict.REFUTED), (0.2, Verdict.CERTIFIED)):
         centre = np.array([0.0, 0.0, 0.0 if half > 1.0 else 1.0])
         problem = problem_with(cube(half, centre))
         proof, _ = prove(problem, still)
         assert proof.counts[:, 0].sum() == proof.counts.sum()
-        (check,) = check_inside(problem, still)
+        (check,) = check_inside(locate_arm(problem, still))
         assert check.verdict is verdict
 
 
-def test_an_open_mesh_is_judged_as_a_surface_and_the_row_says_so() -> None:
+def test_a_mesh_said_to_be_a_surface_is_judged_as_one_and_the_row_says_so() -> None:
     still = trajectory(np.zeros(1), np.zeros((1, 8)), np.zeros((1, 8)))
-    mesh = replace(cube(5.0, np.zeros(3)), watertight=False)
+    mesh = replace(cube(5.0, np.zeros(3)), solid=False)
     problem = problem_with(mesh)
-    assert check_inside(problem, still) == ()
+    assert check_inside(locate_arm(problem, still)) == ()
     rows = {row.name: row for row in verify(problem, still, load_robot(ARM)).checks}
     clearance = rows["clearance from obstacles"]
     assert clearance.verdict is Verdict.CERTIFIED
-    assert "cube is not closed: judged as a surface" in clearance.where
+    assert "'cube' as a surface only" in clearance.where

@@ -97,7 +97,7 @@ def obstacle_of(shape: str, rng: np.random.Generator) -> scene.Obstacle:
             normal = axis_of(rng)
             return scene.HalfSpace(shape, np.array([0.6, 0, 0]) - normal, normal)
     corners = centre + size * (1.0 + rng.normal(size=(4, 3)))
-    return scene.Mesh(shape, corners, TETRAHEDRON, True)
+    return scene.Mesh(shape, corners, TETRAHEDRON)
 
 
 def problem_of(*obstacles: scene.Obstacle, required: float = 0.0) -> PlanningProblem:

@@ -171,10 +171,10 @@ def test_one_unusable_part_makes_the_whole_unusable(
 HRM8 = built_in("hrm8")
 
 
-def room(half: float, watertight: bool) -> PlanningProblem:
+def room(half: float, solid: bool) -> PlanningProblem:
     """The arm inside a closed mesh whose skin is far away."""
     shell = trimesh.creation.box(extents=[12.0, 2.0 * half, 2.0 * half])
-    mesh = Mesh("room", shell.vertices, shell.faces, watertight)
+    mesh = Mesh("room", shell.vertices, shell.faces, solid)
     tip = np.array([HRM8.total_length, 0.0, 0.0])
     path = DesiredPath(tip, tip[None])
     return PlanningProblem("in", HRM8, Scene((mesh,)), path, 0.0035, np.eye(4))

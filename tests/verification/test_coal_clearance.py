@@ -58,7 +58,7 @@ def obstacle_of(shape: str, rng: np.random.Generator) -> scene.Obstacle:
             return scene.Prism(shape, centre, turn, np.array(corners), (-1.0, 1.0))
         case _:
             part = trimesh.creation.icosphere(subdivisions=2, radius=size)
-            return scene.Mesh(shape, part.vertices + centre, part.faces, True)
+            return scene.Mesh(shape, part.vertices + centre, part.faces)
 
 
 SHAPES = [

@@ -41,7 +41,7 @@ def tunnel(radius: float, around: int = 24, along: int = 30) -> Mesh:
     k, j = np.meshgrid(np.arange(along), np.arange(around), indexing="ij")
     a, b = k * around + j, k * around + (j + 1) % around
     faces = np.stack([a, b, a + around, b, b + around, a + around], axis=-1)
-    return Mesh("tunnel", points.reshape(-1, 3), faces.reshape(-1, 3), False)
+    return Mesh("tunnel", points.reshape(-1, 3), faces.reshape(-1, 3), solid=False)
 
 
 def problem_of(mesh: Mesh, required: float = 0.0) -> PlanningProblem:

@@ -17,11 +17,11 @@ from vdsm_pin.certificate_checker.solids import Mesh, Solid, solid
 from vdsm_pin.problem import Order, PlanningProblem, Posture
 from vdsm_pin.trajectory import Trajectory
 
-VERSION: Final = 2
+VERSION: Final = 3
 SLACK: Final = 1e-9  # claims may understate by this, limits be passed; [m], [rad], [-]
 KEYS: Final = set(
     "vdsm_certificate problem_sha256 trajectory_sha256 urdf_sha256 versions n_rows "
-    "required_clearance_m required_self_clearance_m errors pairs pieces limits "
+    "required_clearance_m required_self_clearance_m errors pairs pieces joined limits "
     "tip_deviation_m coverage".split()
 )
 ERRORS: Final = "joint_rad", "base_m", "obstacle_m"
@@ -106,6 +106,8 @@ class Check:
         named = {one.name: one for one in self.solids}
         for name in header["pieces"]:
             named[name].cut(header["pieces"][name])
+        for name, (corners, seams) in header["joined"].items():
+            named[name].join(corners, seams)
         expected = [[pair.link + 1, pair.solid.name] for pair in self.pairs]
         claim(header["pairs"] == expected, "the pairs are not those of the problem")
 
@@ -162,7 +164,9 @@ class Check:
         if rows[0] == 0:
             base = [float(self.joints[0, 0]), 0.0, 0.0]
             for mesh in (one for one in self.solids if isinstance(one, Mesh)):
-                claim(mesh.excludes(base), f"the arm is not proved outside {mesh.name}")
+                why = mesh.surface.not_outside(base, self.arm.link_radius)
+                outside = mesh.surface_only or not why
+                claim(outside, f"the arm is not proved outside {mesh.name}: {why}")
             self._end("start", problem.begin, 0, tips[0])
         if rows[1] == self.rows.n_samples - 1:
             self._end("goal", problem.goal, rows[1], tips[1])

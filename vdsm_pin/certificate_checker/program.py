@@ -48,7 +48,7 @@ class Outcome:
         reason: Empty, or the claim that fails with its interval and pair.
         n_intervals: Intervals found good.
         n_claims: Clearances recomputed and found good.
-        surfaces: Meshes without an inside: only their surface is proved clear.
+        surfaces: Meshes of which the problem means the surface only.
     """
 
     accepted: bool
@@ -116,7 +116,7 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
             text, at = f"cannot be read as a certificate: {error}", check.place
             raise InvalidFile(file=certificate, where=at, problem=text) from None
     meshes = [mesh for mesh in check.solids if isinstance(mesh, Mesh)]
-    surfaces = tuple(mesh.name for mesh in meshes if not mesh.has_inside)
+    surfaces = tuple(mesh.name for mesh in meshes if mesh.surface_only)
     return Outcome(not reason, reason, check.n_intervals, check.n_claims, surfaces)
 
 

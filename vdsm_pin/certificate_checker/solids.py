@@ -1,4 +1,4 @@
-"""Solids as the checker sees them: support functions, and the inside of a mesh.
+"""Solids as the checker sees them: support functions.
 
 A solid is the union of convex pieces, and a piece the hull of a few points grown by a
 ball or a disc. Of a half-space the point that its plane goes through is enough.
@@ -14,6 +14,7 @@ from flint import arb
 
 from vdsm_pin import scene
 from vdsm_pin.certificate_checker.balls import Ball, Matrix, claim, column, dot, unit
+from vdsm_pin.certificate_checker.inside import Surface
 
 ROUNDING: Final = 2.0**-46
 """Error of a height in doubles over the extent of the points; [-].
@@ -21,12 +22,6 @@ ROUNDING: Final = 2.0**-46
 A point is a sum of four terms and off by 28 units of 2^-53 at most, its product with a
 rounded n by seven: 35 in all, and this is 128.
 """
-
-DOUBT: Final = 2.0**-44
-"""Error of a triple product over the lengths of its factors: 20 units, this is 512."""
-
-RAYS: Final = np.array([[0.53, 0.63, 0.56], [-0.28, 0.92, 0.27], [0.71, -0.13, -0.69]])
-"""Directions without symmetry, shorter than 1, to cross a mesh along; [-]."""
 
 
 class Solid:
@@ -66,6 +61,10 @@ class Solid:
         claim(all(abs(x) <= 1e-9 for x in off), "n is not the half-space's -normal")
         return -self.normal
 
+    def join(self, corners: Any, seams: Any) -> None:
+        """Take the certificate's joined corners of a mesh, and its seams."""
+        claim(False, f"{self.name} is no mesh: nothing is joined")
+
     def cut(self, pieces: list[Any]) -> None:
         """Take the certificate's pieces: parts of a prism, or the mesh's in its order.
 
@@ -98,33 +97,15 @@ def boundary(loops: Iterable[Sequence[int]]) -> dict[tuple[int, int], int]:
 
 
 class Mesh(Solid):
-    """Triangles, with an inside where they enclose one."""
+    """Triangles; of a surface only the problem says that it has no inside."""
 
-    def __init__(self, name: str, triangles: Any) -> None:
+    def __init__(self, name: str, triangles: Any, *, surface_only: bool) -> None:
         super().__init__(name, triangles)
-        self.faces = self.points[(self.points != self.points[:, :1]).any(axis=(1, 2))]
-        corners = self.points.reshape(-1, 3) + 0.0  # makes -0 and 0 equal
-        names = np.unique(corners, axis=0, return_inverse=True)[1].reshape(-1, 3)
-        edges = boundary(names.tolist())
-        self.oriented = not edges
-        self.has_inside = not any(times % 2 for times in edges.values())
+        self.surface, self.surface_only = Surface(triangles), surface_only
 
-    def excludes(self, point: Any) -> bool:
-        """Whether a point, shape (3,), is proved not to lie inside."""
-        corners = self.faces - point
-        size = float(np.linalg.norm(corners, axis=2).max(initial=0.0))
-        normals = np.cross(corners, np.roll(corners, -1, axis=1))
-        heights = (normals[:, 0] * corners[:, 2]).sum(axis=1)
-        ahead = np.sign(heights) * (abs(heights) > DOUBT * size**3)
-        for ray in RAYS if self.has_inside else ():
-            turns = normals @ ray
-            signs = np.sign(turns) * (abs(turns) > DOUBT * size**2)
-            missed = (signs.min(axis=1) < 0) & (signs.max(axis=1) > 0)
-            met = (abs(signs.sum(axis=1)) == 3) & (ahead != 0)
-            if (missed | met).all():
-                crossed = signs[met & (ahead == signs[:, 0]), 0]
-                return len(crossed) % 2 == 0 and not (self.oriented and crossed.sum())
-        return not self.has_inside
+    def join(self, corners: Any, seams: Any) -> None:
+        """Take them."""
+        self.surface.join(corners, seams)
 
 
 def solid(obstacle: scene.Obstacle) -> Solid:
@@ -156,5 +137,6 @@ def solid(obstacle: scene.Obstacle) -> Solid:
             found = Solid(name, [[[float(entry) for entry in foot.entries()]]])
             found.normal = normal
         case scene.Mesh():
-            found = Mesh(name, obstacle.vertices[obstacle.triangles])
+            corners = obstacle.vertices[obstacle.triangles]
+            found = Mesh(name, corners, surface_only=obstacle.solid is False)
     return found

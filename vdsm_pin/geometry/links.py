@@ -12,7 +12,7 @@ from vdsm_pin.geometry.obstacles import (
     STACK,
     box_distance,
     box_of,
-    crossings,
+    encloses,
     obstacle_bracket,
 )
 from vdsm_pin.geometry.pieces import PackedPieces
@@ -31,18 +31,9 @@ class _Desk(NamedTuple):
 
 
 @compiled
-def _inside(pieces: PackedPieces, obstacle: int, point: FloatArray) -> bool:
-    root = pieces.root[obstacle]
-    for c in range(3):
-        if not pieces.node_low[root, c] <= point[c] <= pieces.node_high[root, c]:
-            return False
-    return crossings(pieces, obstacle, point[0], point[1], point[2]) % 2 == 1
-
-
-@compiled
 def link_clearances(
     pieces: PackedPieces,
-    closed: FloatArray,
+    covers: IntArray,
     centres: FloatArray,
     radius: float,
     pad: float,
@@ -52,7 +43,7 @@ def link_clearances(
 
     Args:
         pieces: The scene.
-        closed: 1 where an obstacle is a mesh with an inside, shape (n_obstacles,).
+        covers: As for `encloses`.
         centres: Joint centres, shape (n_samples, N + 1, 3); [m].
         radius: Radius of the links; [m].
         pad: Bound of all rounding; [m].
@@ -68,14 +59,14 @@ def link_clearances(
         np.zeros(STACK, np.int64), np.zeros(BRACKET + 4), np.zeros(BRACKET + 4),
         np.ones((pieces.root.size, n_links, 3)),
     )  # fmt: skip
-    _measure(pieces, closed, centres, radius + pad, goal, desk, result)
+    _measure(pieces, covers, centres, radius + pad, goal, desk, result)
     return result
 
 
 @compiled
 def _measure(
     pieces: PackedPieces,
-    closed: FloatArray,
+    covers: IntArray,
     centres: FloatArray,
     off: float,
     goal: float,
@@ -100,7 +91,7 @@ def _measure(
                 )
                 desk.normals[o, link] = out[NORMAL : NORMAL + 3]
                 gap = out[LOWER]
-                if closed[o] > 0.0 and gap > 0.0 and _inside(pieces, o, body.points[0]):
+                if gap > 0.0 and encloses(pieces, covers, o, body.points[0]):
                     gap = -gap
                 best = min(best, gap)
             result[sample, link] = best - off

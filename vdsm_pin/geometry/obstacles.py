@@ -7,6 +7,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.bodies import RADIUS, Body, body_reach
+from vdsm_pin.geometry.closed_meshes import SIGNED, SINGLE, SOLID
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import (
     LOWER,
@@ -263,8 +264,8 @@ def _left_of(a: FloatArray, b: FloatArray, x: float, y: float) -> bool:
 
 
 @compiled
-def _passes(pieces: PackedPieces, p: int, x: float, y: float, z: float) -> bool:
-    """Whether the ray from a point along +z passes through a triangle."""
+def _passes(pieces: PackedPieces, p: int, x: float, y: float, z: float) -> int:
+    """Sense in which the ray from a point along +z passes a triangle, 0 for none."""
     start = pieces.first_point[p]
     a, b, c = (
         pieces.points[start],
@@ -272,25 +273,42 @@ def _passes(pieces: PackedPieces, p: int, x: float, y: float, z: float) -> bool:
         pieces.points[start + 2],
     )
     if not _left_of(a, b, x, y) ^ _left_of(b, c, x, y) ^ _left_of(c, a, x, y):
-        return False
+        return 0
     u = (b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)
     v = (c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)
     w = (a[0] - x) * (b[1] - y) - (a[1] - y) * (b[0] - x)
     whole = u + v + w
-    return bool(whole != 0.0 and (u * a[2] + v * b[2] + w * c[2]) / whole > z)
+    if whole == 0.0 or (u * a[2] + v * b[2] + w * c[2]) / whole <= z:
+        return 0
+    return 1 if whole > 0.0 else -1
 
 
 @compiled
-def crossings(pieces: PackedPieces, obstacle: int, x: float, y: float, z: float) -> int:
-    """Triangles of a mesh that the ray from a point along +z passes through.
+def encloses(
+    pieces: PackedPieces, covers: IntArray, obstacle: int, point: FloatArray
+) -> bool:
+    """Whether an obstacle is a mesh that winds round a point.
+
+    The ray from the point along +z is followed.
 
     Edges count half-open: a ray through an edge or corner that two triangles share
-    crosses once. Heights are rounded; `verification/inside.py` is exact.
+    crosses once. Heights are rounded; `geometry/winding.py` is exact.
+
+    Args:
+        pieces: The scene.
+        covers: What `ClosedMesh.covers` says of each piece, 0 of what is no mesh,
+            shape (n_pieces,).
+        obstacle: The mesh.
+        point: Shape (3,); [m].
     """
     apart()
+    x, y, z = point[0], point[1], point[2]
     stack = np.zeros(STACK, np.int64)
-    stack[0] = pieces.root[obstacle]
-    waiting, count = 1, 0
+    root = pieces.root[obstacle]
+    if not covers[pieces.node_range[root, 0]] & SOLID:
+        return False
+    stack[0] = root
+    waiting, winding, count = 1, 0, 0
     while waiting > 0:
         waiting -= 1
         node = stack[waiting]
@@ -302,5 +320,9 @@ def crossings(pieces: PackedPieces, obstacle: int, x: float, y: float, z: float)
             stack[waiting], stack[waiting + 1] = node + 1, pieces.node_right[node]
             waiting += 2
         else:
-            count += _passes(pieces, first, x, y, z)
-    return count
+            sense = _passes(pieces, first, x, y, z)
+            if covers[first] & SIGNED:
+                winding += sense
+            if covers[first] & SINGLE:
+                count += sense
+    return winding != 0 or count % 2 != 0

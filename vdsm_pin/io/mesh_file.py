@@ -51,7 +51,6 @@ class MeshData:
     Args:
         vertices: Shape (n, 3), in the unit of the file.
         triangles: Vertex indices, shape (m, 3), m >= 1.
-        watertight: Whether the triangles enclose an inside, see `is_closed`.
         unit: Metres per unit of the file; None where its format states none.
         bend: How far the least flat face of more than three corners is off its plane,
             in the unit of the file.
@@ -60,7 +59,6 @@ class MeshData:
 
     vertices: FloatArray
     triangles: IntArray
-    watertight: bool
     unit: float | None = None
     bend: float = 0.0
     notes: tuple[str, ...] = ()
@@ -91,22 +89,7 @@ def read_mesh(path: Path, digest: Digest | None = None) -> MeshData:
     used[raw.triangles] = True
     vertices, index = _joined(raw.vertices[used])
     triangles = index[(np.cumsum(used) - 1)[raw.triangles]]
-    closed = is_closed(triangles)
-    return MeshData(vertices, triangles, closed, raw.unit, raw.bend, raw.notes)
-
-
-def is_closed(triangles: IntArray) -> bool:
-    """Whether every edge belongs to an even number of triangles, none degenerate.
-
-    Then a ray from a point crosses the triangles an even number of times or an odd one,
-    whatever its direction: the triangles part space into an outside and an inside.
-    """
-    starts, ends = triangles.reshape(-1), np.roll(triangles, -1, axis=1).reshape(-1)
-    if (starts == ends).any() or starts.size % 2:
-        return False
-    low, high = np.minimum(starts, ends), np.maximum(starts, ends)
-    edges = np.sort(low * (int(high.max()) + 1) + high)
-    return bool((edges[0::2] == edges[1::2]).all())
+    return MeshData(vertices, triangles, raw.unit, raw.bend, raw.notes)
 
 
 def _joined(points: FloatArray) -> tuple[FloatArray, IntArray]:

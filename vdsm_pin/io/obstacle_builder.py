@@ -188,14 +188,18 @@ class ObstacleBuilder:
         corners = self.frame.placed(
             mesh.vertices, size.scale, model.rpy_deg, model.center
         )
-        return scene.Mesh(
+        found = scene.Mesh(
             model.name,
             corners,
             mesh.triangles,
-            mesh.watertight,
+            model.solid,
             assumed_size="" if size.stated else size.shown,
             notes=(*mesh.notes, *size.bent(mesh.bend)),
         )
+        if model.solid and not found.closed_mesh.closed:
+            problem = f"is true, but {model.file!r} {found.closed_mesh.why_open}"
+            raise self.document.invalid((*at, "solid"), problem)
+        return found
 
     def _unit(self, vector: list[float], at: Location) -> FloatArray:
         unit = unit_vector(np.array(vector))

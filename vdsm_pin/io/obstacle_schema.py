@@ -90,7 +90,7 @@ class HalfSpaceModel(_Named):
 
 
 class MeshModel(_Named):
-    """Triangles from an STL or OBJ file; solid if watertight, else a surface."""
+    """Triangles from an STL or OBJ file, solid where they close."""
 
     shape: Literal["mesh"]
     file: Annotated[str, Field(min_length=1, max_length=4096)] = Field(
@@ -110,6 +110,12 @@ class MeshModel(_Named):
     )
     rpy_deg: Vector = Field(
         default=[0.0, 0.0, 0.0], description="Roll, pitch, yaw, R = Rz Ry Rx [deg]."
+    )
+    solid: bool | None = Field(
+        default=None,
+        description="true: the mesh must close, else it is refused; false: only its "
+        "surface is meant, it has no inside; left out: a mesh that does not close is "
+        "undecided.",
     )
     check_size: bool = Field(
         default=True,

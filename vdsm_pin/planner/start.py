@@ -2,12 +2,14 @@
 
 import numpy as np
 
-from vdsm_pin.errors import StartBlocked
+from vdsm_pin.errors import InsideUnknown, StartBlocked, StartInside
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.winding import Side, locate
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.upper_clearance import culprit
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.scene import Mesh
 
 
 def start_centres(problem: PlanningProblem) -> FloatArray:
@@ -27,6 +29,24 @@ def start_centres(problem: PlanningProblem) -> FloatArray:
     return np.column_stack([along, across])
 
 
+def _check_outside(problem: PlanningProblem, base: FloatArray) -> None:
+    """Refuse a start inside a mesh, and a mesh whose inside cannot be told.
+
+    Args:
+        problem: Arm and scene.
+        base: First joint centre of the arm as it starts, shape (3,); [m].
+    """
+    radius = problem.manipulator.link_radius
+    for mesh in problem.scene.obstacles:
+        if not isinstance(mesh, Mesh) or mesh.is_surface:
+            continue
+        found = locate(mesh.closed_mesh, base, radius)
+        if found.side is Side.INSIDE:
+            raise StartInside(obstacle=mesh.name)
+        if found.side is Side.UNKNOWN:
+            raise InsideUnknown(obstacle=mesh.name, reason=found.words(mesh.name))
+
+
 def check_start(problem: PlanningProblem, clearance: LinkClearance) -> None:
     """Refuse a start that is too close to an obstacle.
 
@@ -38,11 +58,16 @@ def check_start(problem: PlanningProblem, clearance: LinkClearance) -> None:
         clearance: Clearance of links at given joint centres.
 
     Raises:
+        StartInside: Where it is inside a mesh.
         StartBlocked: With the link, the obstacle and the clearance between them.
+        InsideUnknown: Where the inside of a mesh cannot be told.
     """
     centres = start_centres(problem)
     required = problem.required_clearance
-    if np.isfinite(centres).all() and not clearance(centres[None]).min() >= required:
+    if not np.isfinite(centres).all():
+        return
+    _check_outside(problem, centres[0])
+    if not clearance(centres[None]).min() >= required:
         link, obstacle, room = culprit(problem, centres)
         bent = problem.path.start_joints is not None
         raise StartBlocked(

@@ -31,6 +31,8 @@ from vdsm_pin.report.run_record import RunRecord, machine, versions
 from vdsm_pin.report.words import check_title, depth, percent, place, quantity
 from vdsm_pin.tolerances import TOLERANCES, UNITS
 from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.inside import NAME as INSIDE
+from vdsm_pin.verification.inside import surfaces
 from vdsm_pin.verification.records import (
     Check,
     ClosestApproach,
@@ -198,11 +200,13 @@ def reason(verification: Verification) -> str:
     found = (
         f"{check_title(first.name)} is {depth(first.worst, first.deeper, first.unit)}"
     )
-    if math.isnan(first.worst):
+    if first.name == INSIDE:
+        found = first.where
+    elif math.isnan(first.worst):
         found = f'there is no evidence for "{check_title(first.name)}"'
     elif not math.isnan(first.limit):
         found += f" against a limit of {quantity(first.limit, first.unit)}"
-    at = place(finite(first.moment), first.where)
+    at = place(finite(first.moment), "" if first.name == INSIDE else first.where)
     if at:
         found += f" ({at})"
     share = f"{len(bad)} of {len(verification.checks)} checks"
@@ -248,13 +252,15 @@ def _certified_sentence(verification: Verification) -> str:
             f"All {count} checks passed over the whole motion; no obstacle is there; "
             f"{drawn}."
         )
-    required = quantity(verification.problem.required_clearance, "m")
+    problem = verification.problem
+    required = quantity(problem.required_clearance, "m")
     box = asdict(verification.errors)
     errors = ", with any error of the error box," if any(box.values()) else ""
     return (
         f"All {count} checks passed; at every instant of the motion{errors} the arm "
         f"keeps at least {quantity(smallest.lower_m, 'm')} from every obstacle, "
         f"{required} are required; {drawn}."
+        + "".join(f" {name!r} is a surface only." for name in surfaces(problem))
     )
 
 
@@ -277,8 +283,8 @@ def verification_file(
         problem=problem.name,
         verdict=verification.verdict.value,
         reason=reason(verification),
-        assumed_sizes=assumed_sizes(verification.problem),
-        notes=input_notes(verification.problem, verification.trajectory),
+        assumed_sizes=assumed_sizes(problem),
+        notes=input_notes(problem, verification.trajectory),
         checks=tuple(check_row(check) for check in verification.checks),
         min_clearance=min_clearance(verification),
         required_clearance_m=problem.required_clearance,

@@ -6,6 +6,7 @@ from typing import Final
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.scene import Mesh
 from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.inside import mesh_notes
 
 _NAMED: Final = 3
 """Sizes that one line names; the JSON files have all of them."""
@@ -30,9 +31,10 @@ def assumption(sizes: Sequence[str]) -> str:
 
 
 def input_notes(problem: PlanningProblem, trajectory: Trajectory) -> tuple[str, ...]:
-    """What the readers of meshes and trajectory have to say, one sentence each."""
+    """What there is to say of meshes and trajectory as read, one sentence each."""
     meshes = (mesh for mesh in problem.scene.obstacles if isinstance(mesh, Mesh))
     of_meshes = (
         f"mesh {mesh.name!r}: {note}" for mesh in meshes for note in mesh.notes
     )
-    return (*of_meshes, *(f"trajectory: {note}" for note in trajectory.notes))
+    of_trajectory = (f"trajectory: {note}" for note in trajectory.notes)
+    return (*mesh_notes(problem), *of_meshes, *of_trajectory)

@@ -23,7 +23,7 @@ from vdsm_pin.simulation.settings import Settings
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.clearance_check import check_clearance
-from vdsm_pin.verification.inside import check_inside
+from vdsm_pin.verification.inside import arm_inside, check_inside, locate_arm
 from vdsm_pin.verification.records import ErrorBox, combine
 
 EXECUTED: Final = "executed.csv"
@@ -146,16 +146,16 @@ def cleared(
 ) -> Cleared:
     """What is proved of a motion's clearance over continuous time."""
     proof = prove_clearance(problem, trajectory, errors)
-    rows = [
-        *check_clearance(problem, proof, ()),
-        *check_inside(problem, trajectory),
-    ]
+    located = locate_arm(problem, trajectory)
+    rows = [*check_clearance(problem, proof, ()), *check_inside(located)]
     verdict = combine(tuple(row.verdict for row in rows))
     near = [
         float(row[LOW])
         for pair, row in zip(proof.pairs, proof.best, strict=True)
         if pair.obstacle
     ]
+    if arm_inside(located):
+        near.append(-problem.manipulator.link_radius)
     least = finite(min(near, default=float("inf")))
     return Cleared(verdict=verdict.value, min_clearance_m=least)
 

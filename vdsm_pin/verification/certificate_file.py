@@ -41,7 +41,7 @@ class ClaimedLimits(LineModel):
 class HeaderLine(LineModel):
     """Line 1."""
 
-    vdsm_certificate: Literal[2] = Field(default=2, description="version of the format")
+    vdsm_certificate: Literal[3] = Field(default=3, description="version of the format")
     problem_sha256: Sha256 = Field(description="problem file and the meshes it names")
     trajectory_sha256: Sha256 = Field(description="trajectory.csv")
     urdf_sha256: Sha256 = Field(description="told, not proved")
@@ -57,6 +57,14 @@ class HeaderLine(LineModel):
     pieces: dict[str, list[Number] | list[list[Number]]] = Field(
         description="numbers of a mesh's triangles, or corner numbers of a prism's, in "
         "the order in which planes count them"
+    )
+    joined: dict[
+        str,
+        tuple[list[tuple[Number, Number]], list[tuple[Number, Number, Number, Number]]],
+    ] = Field(
+        description="by mesh the corners joined to close it, [corner, the one it is "
+        "joined with], and seams, [three corners, where the edge beside them begins]; "
+        "corner 3 k + i is corner i of triangle k, both from 0"
     )
     limits: ClaimedLimits
     tip_deviation_m: Annotated[FiniteFloat, Field(ge=0.0)] | None = Field(

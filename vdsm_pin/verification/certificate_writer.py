@@ -25,7 +25,7 @@ from vdsm_pin.proof.desk import new_desk
 from vdsm_pin.proof.layouts import FIRST, LAST, PLANE_NORMAL, RECORD
 from vdsm_pin.proof.recording import record
 from vdsm_pin.proof.terms import Motion, Task
-from vdsm_pin.scene import Prism
+from vdsm_pin.scene import Mesh, Prism
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.certificate_file import (
@@ -117,6 +117,7 @@ def _header(
         n_rows=trajectory.n_samples,
         pairs=_pairs(problem),
         pieces=_pieces(problem, pieces),
+        joined=_joined(problem),
         limits=ClaimedLimits(
             alpha_rad=found.alpha,
             theta_rad=found.theta,
@@ -154,6 +155,31 @@ def _pieces(problem: PlanningProblem, pieces: PackedPieces) -> dict[str, list[An
         elif (np.diff(order) != 1).any():
             result[obstacle.name] = order.tolist()
     return result
+
+
+def _joined(problem: PlanningProblem) -> dict[str, tuple[list[Any], list[Any]]]:
+    """By mesh the corners that are joined to close it, and its seams."""
+    result = {}
+    for mesh in problem.scene.obstacles:
+        if isinstance(mesh, Mesh) and mesh.has_inside:
+            joined = _corners_and_seams(mesh)
+            if any(joined):
+                result[mesh.name] = joined
+    return result
+
+
+def _corners_and_seams(mesh: Mesh) -> tuple[list[Any], list[Any]]:
+    """Both by numbers of corners: 3 k + i is corner i of the file's triangle k."""
+    closed, given = mesh.closed_mesh, mesh.triangles.reshape(-1)
+    count = len(given)
+    at = np.zeros(len(mesh.vertices), np.int64)
+    at[given[::-1]] = np.arange(count)[::-1]  # where a vertex occurs first
+    names = closed.triangles.reshape(-1)
+    away = (mesh.vertices[names[:count]] != mesh.vertices[given]).any(axis=1)
+    moved = np.flatnonzero(away)
+    corners = np.stack([moved, at[names[moved]]], axis=1)
+    seams = np.column_stack([at[names[count:]].reshape(-1, 3), closed.beside])
+    return corners.tolist(), seams.tolist()
 
 
 def _triangles(prism: Prism) -> list[list[int]]:

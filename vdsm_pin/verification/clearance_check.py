@@ -10,9 +10,9 @@ from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.layouts import AT_UPPER, LOW, TIME, UP
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED
-from vdsm_pin.scene import Mesh
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.clearance import ClearanceProof
+from vdsm_pin.verification.inside import surfaces
 from vdsm_pin.verification.records import Check, Counterexample, Verdict, is_deepest
 
 
@@ -47,13 +47,9 @@ def check_clearance(
                 if bool(found.pair.obstacle) == bool(of_obstacles[mine][0])
             ]
             rows.append(_refuted(row, against[0]) if against else row)
-    surfaces = [
-        f"; {obstacle.name} is not closed: judged as a surface without an inside"
-        for obstacle in problem.scene.obstacles
-        if isinstance(obstacle, Mesh) and not obstacle.watertight
-    ]
-    if surfaces:
-        rows[0] = replace(rows[0], where=rows[0].where + "".join(surfaces))
+    said = "".join(f"; {name!r} as a surface only" for name in surfaces(problem))
+    if said:
+        rows[0] = replace(rows[0], where=rows[0].where + said)
     return tuple(rows)
 
 

@@ -11,7 +11,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.links import link_clearances
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scene import Mesh
+from vdsm_pin.scene import covers_of
 from vdsm_pin.tolerances import TOLERANCES
 
 
@@ -45,13 +45,13 @@ def link_clearance(problem: PlanningProblem) -> Callable[[FloatArray], FloatArra
     """
     obstacles = problem.scene.obstacles
     pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
-    closed = np.array([float(isinstance(o, Mesh) and o.watertight) for o in obstacles])
+    covers = covers_of(obstacles, pieces)
     radius, pad = problem.manipulator.link_radius, arithmetic_pad(problem, pieces)
 
     def clearances(centres: FloatArray) -> FloatArray:
         rows = np.ascontiguousarray(centres, dtype=np.float64)
         return link_clearances(
-            pieces, closed, rows, radius, pad, TOLERANCES.bracket_gap
+            pieces, covers, rows, radius, pad, TOLERANCES.bracket_gap
         )
 
     return clearances

@@ -8,16 +8,24 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput, OutOfTime, VdsmError
 from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.winding import Side
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.layouts import AT_UPPER, LOW, OTHER, OWN, TIME, UP
 from vdsm_pin.robot_model import RobotModel
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification import cable_check, coal_clearance, coal_links, fk, inside
+from vdsm_pin.verification import cable_check, coal_clearance, coal_links, fk
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.clearance_check import check_clearance
 from vdsm_pin.verification.counterexample import find_counterexamples
+from vdsm_pin.verification.enclosed import (
+    EnclosedSink,
+    enclosed_approaches,
+    enclosed_checks,
+    enclosed_profile,
+)
+from vdsm_pin.verification.inside import arm_inside, check_inside, locate_arm
 from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.records import (
     Check,
@@ -72,8 +80,11 @@ def verify(
     """
     box = errors or ErrorBox()
     _check_input(problem, trajectory, box)
-    kept = _Lowers(problem, trajectory)
-    wanted = [*sinks, kept.keep] if kept.fits else list(sinks)
+    located = locate_arm(problem, trajectory)
+    around, kept = arm_inside(located), _Lowers(problem, trajectory)
+    wanted = [EnclosedSink(sink, problem, around) if around else sink for sink in sinks]
+    if kept.fits:
+        wanted.append(kept.keep)
     proof = prove_clearance(problem, trajectory, box, wanted, deadline=deadline)
     besides = _Besides()
     none: tuple[Counterexample, ...] = ()
@@ -90,8 +101,10 @@ def verify(
         *_guarded(fk.NAME, lambda: fk.check_fk(robot, problem, trajectory, deadline)),
         *check_limits(problem, trajectory),
         *tip.checks,
-        *check_clearance(problem, proof, found, deadline),
-        *_guarded(inside.NAME, lambda: inside.check_inside(problem, trajectory)),
+        *check_inside(located),
+        *enclosed_checks(
+            check_clearance(problem, proof, found, deadline), problem, around
+        ),
         *_by_coal(robot, problem, trajectory, proved, deadline),
         *_guarded(
             cable_check.NAME,
@@ -99,26 +112,18 @@ def verify(
         ),
     ]
     largest = refuted = nan
-    if joint_error:
-        largest = besides.take(
-            "largest joint error",
-            lambda: largest_joint_error(problem, trajectory, box, deadline),
-            nan,
-        )
-    if not np.isnan(largest):
-        refuted = besides.take(
-            "joint error that loses the clearance",
-            lambda: refuted_joint_error(problem, trajectory, box, largest, deadline),
-            nan,
-        )
+    if joint_error and all(where.side is Side.OUTSIDE for where in located.values()):
+        largest, refuted = _joint_errors(problem, trajectory, box, deadline, besides)
+    elif joint_error:
+        largest = 0.0
     return Verification(
         problem=problem,
         trajectory=trajectory,
         errors=box,
         pairs=proof.pairs,
         checks=tuple(checks),
-        approaches=closest_approaches(problem, trajectory, proof),
-        profile=proof.profile,
+        approaches=closest_approaches(problem, trajectory, proof, around),
+        profile=enclosed_profile(proof.profile, problem, around),
         tip_deviation=tip.deviation,
         coverage=tip.coverage,
         undrawn=tip.undrawn,
@@ -169,6 +174,29 @@ def _by_coal(
             lambda: coal_links.check_coal_links(robot, problem, trajectory, deadline),
         ),
     )
+
+
+def _joint_errors(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    box: ErrorBox,
+    deadline: Deadline,
+    besides: _Besides,
+) -> tuple[float, float]:
+    """The largest joint error that is survived and the least that is not; [rad]."""
+    largest = besides.take(
+        "largest joint error",
+        lambda: largest_joint_error(problem, trajectory, box, deadline),
+        nan,
+    )
+    if np.isnan(largest):
+        return nan, nan
+    refuted = besides.take(
+        "joint error that loses the clearance",
+        lambda: refuted_joint_error(problem, trajectory, box, largest, deadline),
+        nan,
+    )
+    return largest, refuted
 
 
 class _Lowers:
@@ -236,18 +264,29 @@ def _station(
 
 
 def closest_approaches(
-    problem: PlanningProblem, trajectory: Trajectory, proof: ClearanceProof
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    proof: ClearanceProof,
+    around: Sequence[str] = (),
 ) -> tuple[ClosestApproach, ...]:
     """The pairs that come nearest, by their upper bounds; obstacles first.
 
     Links keep near each other all the time, which is rarely news. The lower bound of
     the nearest is narrowed; another may lie below it by the width of that bracket.
+
+    Args:
+        problem: Arm and scene.
+        trajectory: The motion.
+        proof: Of its distances.
+        around: Names of the meshes that the arm is inside of.
     """
-    rows = []
+    rows = list(enclosed_approaches(problem, trajectory, around))
     of_links = np.array([not pair.obstacle for pair in proof.pairs])
     seen = np.flatnonzero(np.isfinite(proof.best[:, UP]))
     for k in seen[np.lexsort((proof.best[seen, UP], of_links[seen]))][:CLOSEST]:
         pair, row = proof.pairs[k], proof.best[k]
+        if pair.obstacle in around:
+            continue
         points = row[OWN:OTHER], row[OTHER : OTHER + 3]
         # In a pair of links the sweep moves the second one against the first.
         mine, theirs = points if pair.obstacle else points[::-1]
@@ -264,4 +303,4 @@ def closest_approaches(
                 deeper=is_deepest(float(row[UP]), problem.manipulator.link_radius),
             )
         )
-    return tuple(rows)
+    return tuple(rows[:CLOSEST])

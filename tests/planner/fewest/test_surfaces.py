@@ -15,12 +15,12 @@ REACH = 0.3
 
 def mesh(solid: trimesh.Trimesh, centre: tuple[float, float, float]) -> Mesh:
     vertices = np.asarray(solid.vertices) + np.array(centre)
-    return Mesh("part", vertices, np.asarray(solid.faces), bool(solid.is_watertight))
+    return Mesh("part", vertices, np.asarray(solid.faces))
 
 
 RING = mesh(trimesh.creation.torus(0.4, 0.1, 24, 12), (2.0, 0.1, -0.2))
 BRICK = mesh(trimesh.creation.box([3.0, 0.5, 0.4]), (1.5, 0.0, 0.3))
-SHEET = Mesh("sheet", BRICK.vertices, BRICK.triangles[:7], False)
+SHEET = Mesh("sheet", BRICK.vertices, BRICK.triangles[:7])
 
 
 def beside_an_edge(

@@ -14,11 +14,11 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.compiled import borrowed, clock, compiled
-from vdsm_pin.geometry.obstacles import STACK, crossings
+from vdsm_pin.geometry.obstacles import STACK, encloses
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.geometry.segments import squared_gap
-from vdsm_pin.scene import Mesh, Obstacle
+from vdsm_pin.scene import Mesh, Obstacle, covers_of
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 
 STEP: Final = 1e-6
@@ -39,12 +39,14 @@ class Surfaces:
         first: Where the triangles of each ball begin, and where they end, shape (b, 2).
         balls: Centres and radii, shape (b, 4); [m].
         solids: The meshes that have an inside.
+        covers: What `encloses` asks of their pieces.
     """
 
     corners: FloatArray
     first: IntArray
     balls: FloatArray
     solids: PackedPieces
+    covers: IntArray
 
     def least(
         self, ends: FloatArray, enough: float, deadline: Deadline = NO_LIMIT
@@ -69,7 +71,7 @@ class Surfaces:
         )
         deadline.check()
         bound -= STEP
-        bound[buried(self.solids, ends, bound > 0.0)] = -np.inf
+        bound[buried(self.solids, self.covers, ends, bound > 0.0)] = -np.inf
         return bound
 
 
@@ -78,8 +80,9 @@ def surfaces_of(obstacles: tuple[Obstacle, ...]) -> Surfaces:
     meshes = [obstacle for obstacle in obstacles if isinstance(obstacle, Mesh)]
     corners = np.concatenate([np.zeros((0, 3, 3)), *(m.pieces.corners for m in meshes)])
     corners = corners[coherent_order(corners.mean(axis=1))]
-    solids = pack_pieces([mesh.pieces for mesh in meshes if mesh.watertight])
-    return Surfaces(corners, *_balls(corners), solids)
+    solid = [mesh for mesh in meshes if mesh.has_inside]
+    pieces = pack_pieces([mesh.pieces for mesh in solid])
+    return Surfaces(corners, *_balls(corners), pieces, covers_of(solid, pieces))
 
 
 def _balls(corners: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -222,11 +225,14 @@ def nearest_triangles(
 
 
 @compiled
-def buried(solids: PackedPieces, ends: FloatArray, asked: BoolArray) -> BoolArray:
+def buried(
+    solids: PackedPieces, covers: IntArray, ends: FloatArray, asked: BoolArray
+) -> BoolArray:
     """Which of the segments asked for begin within a solid, shape (n,).
 
     Args:
-        solids: Watertight meshes.
+        solids: Meshes with an inside.
+        covers: As for `encloses`.
         ends: Shape (n, 2, 3); [m].
         asked: Shape (n,).
     """
@@ -235,8 +241,7 @@ def buried(solids: PackedPieces, ends: FloatArray, asked: BoolArray) -> BoolArra
     for n in range(ends.shape[0]):
         if not asked[n]:
             continue
-        x, y, z = ends[n, 0]
         for o in range(solids.root.size):
-            if crossings(solids, o, x, y, z) % 2 == 1:
+            if encloses(solids, covers, o, ends[n, 0]):
                 inside[n] = True
     return inside

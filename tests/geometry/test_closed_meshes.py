@@ -1,0 +1,245 @@
+"""Where a point lies of meshes written well and badly, against solid angles."""
+
+from collections import Counter
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import trimesh
+from oracles.closed_solids import (
+    CLEAN,
+    DOUBTFUL,
+    GAPS,
+    Made,
+    made,
+    sample_points,
+    spoiled,
+)
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.closed_meshes import close_mesh
+from vdsm_pin.geometry.winding import Location, Side, locate
+
+RADIUS = 0.02
+ORIGIN = np.zeros(3)
+
+
+def box(half: float, centre: tuple[float, float, float] = (0, 0, 0)) -> FloatArray:
+    solid = trimesh.creation.box(np.full(3, 2.0 * half))
+    return np.asarray(solid.triangles) + np.array(centre)
+
+
+def inwards(corners: FloatArray) -> FloatArray:
+    return corners[:, ::-1]
+
+
+def where(*parts: FloatArray, point: FloatArray = ORIGIN) -> Location:
+    vertices, triangles = Made(np.concatenate(parts), [], []).indexed()
+    return locate(close_mesh(vertices, triangles), point, RADIUS)
+
+
+TINY = np.array([[[0.3, 0.2, 0.1]] * 3])
+EQUAL = box(5.0)[:1][:, [0, 0, 1]]
+IN_LINE = np.array([[[1.0, 2.0, 3.0], [2.0, 3.0, 4.0], [3.0, 4.0, 5.0]]])
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        (box(5),),
+        (inwards(box(5)),),
+        (box(5), box(6)),
+        (inwards(box(5)), inwards(box(6))),
+        (box(5), box(5, (1, 0.5, 0.3))),
+        (box(5), box(5)),
+        (box(5), inwards(box(5))),
+        (box(5), box(5)[:1]),
+        (box(5), EQUAL, TINY),
+        (box(5), IN_LINE),
+        (box(5), box(5, (10, 0, 0))),
+        (box(5), box(6)[[0, 1]], inwards(box(6)[[0, 1]])),
+        (box(5), box(1, (8, 0, 0)), inwards(box(1, (8, 0, 0)))),
+    ],
+    ids=[
+        *("plain", "inverted", "nested", "both inverted", "overlap", "twice"),
+        *("double sided", "a face twice", "equal corners", "in line", "a wall twice"),
+        *("beside a sheet", "beside a double-sided box"),
+    ],
+)
+def test_these_are_around_the_arm(parts: tuple[FloatArray, ...]) -> None:
+    found = where(*parts)
+    expected = Side.UNKNOWN if len(parts) == 3 and len(parts[1]) == 2 else Side.INSIDE
+    assert found.side is expected
+
+
+def test_a_body_turned_inwards_within_another_is_a_cavity() -> None:
+    assert where(box(6), inwards(box(5))) == Location(Side.OUTSIDE)
+    assert where(inwards(box(6)), box(5)) == Location(Side.OUTSIDE)
+    wall = np.array([5.5, 0.1, 0.2])
+    assert where(box(6), inwards(box(5)), point=wall).side is Side.INSIDE
+
+
+def test_bodies_turned_opposite_ways_that_overlap_leave_no_cavity() -> None:
+    """The winding number is 0 there, as in a cavity."""
+    found = where(box(5), inwards(box(6, (2, 0.5, 0.3))))
+    assert found.side is Side.UNKNOWN
+    assert "fronts" in found.reason
+
+
+def test_a_face_drawn_twice_a_little_apart_is_no_thin_wall() -> None:
+    """In single precision both covers close, and cancel."""
+    off = box(5) * (1.0 - 1e-7)
+    assert where(box(5), inwards(off)).side is Side.UNKNOWN
+    assert where(box(5), inwards(0.999 * box(5))).side is Side.OUTSIDE
+
+
+def test_a_face_turned_round_leaves_the_parity() -> None:
+    corners = box(5).copy()
+    corners[3] = corners[3, ::-1]
+    assert where(corners).side is Side.INSIDE
+    assert where(corners, point=np.array([0.0, 0.0, 5.5])).side is Side.OUTSIDE
+    within = where(corners, box(6))
+    assert within.side is Side.UNKNOWN
+    assert "opposite ways" in within.reason
+
+
+def test_a_hole_leaves_the_inside_unknown_also_in_what_is_drawn_from_both_sides() -> (
+    None
+):
+    for corners in (box(5)[1:], np.concatenate([box(5)[1:], inwards(box(5)[1:])])):
+        found = where(corners)
+        assert found.side is Side.UNKNOWN
+        assert found.reason == "it is not closed: 3 edges have no partner"
+
+
+def test_a_point_on_the_surface_is_unknown() -> None:
+    assert where(box(5), point=np.array([5.0, 0.1, 0.2])).side is Side.UNKNOWN
+    assert where(box(5), point=np.array([5.0, 5.0, 5.0])).side is Side.UNKNOWN
+
+
+@pytest.mark.parametrize("gap", [1e-9, 1e-7, 1e-6, 1e-5, 1e-4])
+def test_gaps_are_joined_and_their_width_is_told(gap: float) -> None:
+    corners = box(5)
+    size = np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0))
+    upper = corners.mean(axis=1)[:, 2] > 0.0
+    corners[upper] += [0.0, 0.0, gap * size]
+    found = close_mesh(*Made(corners, [], []).indexed())
+    assert found.closed
+    assert found.gap == pytest.approx(gap * size, rel=1e-3)
+    assert locate(found, ORIGIN, RADIUS).side is Side.INSIDE
+    assert locate(found, ORIGIN, found.gap).side is Side.UNKNOWN
+    assert not close_mesh(*Made(corners * [1, 1, 1.001], [], []).indexed()).n_open
+
+
+def test_wider_gaps_are_not_joined() -> None:
+    corners = box(5)
+    upper = corners.mean(axis=1)[:, 2] > 0.0
+    corners[upper] += [0.0, 0.0, 1e-3 * 17.3]
+    assert where(corners).side is Side.UNKNOWN
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-9, 1e-4, 2e-3])
+def test_a_corner_on_an_edge_is_joined_to_it(off: float) -> None:
+    corners = box(5)
+    a, b, c = corners[0]
+    middle = 0.3 * a + 0.7 * b + off
+    found = close_mesh(
+        *Made(
+            np.concatenate([corners[1:], [[a, middle, c], [middle, b, c]]]), [], []
+        ).indexed()
+    )
+    assert found.closed
+    assert len(found.beside) == 1
+    assert found.gap <= off * np.sqrt(3.0)
+    assert locate(found, ORIGIN, RADIUS).side is Side.INSIDE
+
+
+def test_thin_plates_are_not_joined() -> None:
+    """Only open edges are: a plate thinner than the gap stays a plate."""
+    solid = trimesh.creation.box([10.0, 10.0, 1e-4])
+    found = close_mesh(np.asarray(solid.vertices), np.asarray(solid.faces))
+    assert found.gap == 0.0
+    assert found.signed.all()
+
+
+def test_closedness_is_what_counting_edges_gives() -> None:
+    """Oracle: counting in dictionaries, over sets of few random triangles."""
+    rng = np.random.default_rng(3)
+    vertices = rng.normal(size=(5, 3))
+    solid = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    seen: Counter[bool] = Counter()
+    for _ in range(500):
+        extra = [rng.permutation(5)[:3].tolist() for _ in range(rng.integers(0, 3))]
+        triangles = solid[: rng.integers(3, 5)] + extra
+        faces = {frozenset(t): t for t in triangles}
+        once = {tuple(np.roll(t, -int(np.argmin(t))).tolist()) for t in triangles}
+        even = not border(list(faces.values()), signed=False)
+        balanced = not border(triangles) or not border([list(t) for t in once])
+        found = close_mesh(vertices, np.array(triangles))
+        assert found.turned == (found.closed and len(once) > len(faces))
+        if len(once) == len(faces):
+            assert found.closed == (even or balanced)
+        else:  # what is given in both senses must end on others besides
+            assert found.closed in ({even, True} if balanced else {even})
+        seen[found.closed] += 1
+    assert min(seen[True], seen[False]) > 20
+
+
+def border(triangles: list[list[int]], *, signed: bool = True) -> set[frozenset[int]]:
+    times: Counter[frozenset[int]] = Counter()
+    for triangle in triangles:
+        for i in range(3):
+            a, b = triangle[i], triangle[(i + 1) % 3]
+            times[frozenset((a, b))] += 1 if a < b or not signed else -1
+    return {edge for edge, n in times.items() if (n if signed else n % 2)}
+
+
+# ---- by the hundred ------------------------------------------------------------------
+
+
+def hold_to_truth(
+    seed: int, faults: tuple[Callable[..., None], ...], count: int = 4
+) -> Counter[tuple[str, Side]]:
+    """Random points of one random mesh against solid angles.
+
+    Never outside where the shells wind round the point, never inside where none does;
+    with faults that lose nothing the answer is exact.
+    """
+    rng = np.random.default_rng(seed)
+    mesh = made(rng)
+    if faults:
+        spoiled(mesh, rng, faults)
+    closed, seen = close_mesh(*mesh.indexed()), Counter[tuple[str, Side]]()
+    for point in sample_points(mesh, rng, count):
+        windings, side = mesh.windings(point), locate(closed, point, RADIUS).side
+        told = f"seed {seed}, {mesh.faults}, {windings}"
+        if sum(windings):
+            kind, allowed = "in a solid", {Side.INSIDE, Side.UNKNOWN}
+        elif any(windings):
+            kind, allowed = "in a cavity", {*Side}
+        else:
+            kind, allowed = "outside", {Side.OUTSIDE, Side.UNKNOWN}
+        if faults is not DOUBTFUL and kind != "in a cavity":
+            allowed -= {Side.UNKNOWN}
+        assert side in allowed, told
+        seen[kind, side] += 1
+    return seen
+
+
+GROUPS = pytest.mark.parametrize(
+    "faults", [(), CLEAN, GAPS, DOUBTFUL], ids=["none", "clean", "gaps", "doubtful"]
+)
+
+
+@GROUPS
+def test_random_meshes(faults: tuple[Callable[..., None], ...]) -> None:
+    seen = sum((hold_to_truth(seed, faults) for seed in range(60)), Counter())
+    assert seen["in a solid", Side.INSIDE] > 10
+    assert seen["outside", Side.OUTSIDE] > 50
+
+
+@pytest.mark.slow
+@GROUPS
+def test_many_random_meshes(faults: tuple[Callable[..., None], ...]) -> None:
+    seen = sum((hold_to_truth(seed, faults) for seed in range(60, 3000)), Counter())
+    assert seen["in a solid", Side.INSIDE] > 500

@@ -1,0 +1,268 @@
+"""Verifier, certificate checker and start of a plan hold to one inside of meshes."""
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from oracles.certificate_oracle import sealed, sha256
+from oracles.closed_solids import (
+    CLEAN,
+    DOUBTFUL,
+    GAPS,
+    Made,
+    made,
+    sample_points,
+    spoiled,
+)
+
+from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.errors import InsideUnknown, InvalidFile, StartInside
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.problem_file import ProblemFile, read_problem
+from vdsm_pin.io.trajectory_file import read_trajectory
+from vdsm_pin.planner.start import check_start
+from vdsm_pin.report.inputs import input_notes
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
+from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.records import ClearanceChunk, Verdict, Verification
+from vdsm_pin.verification.verify import verify
+
+RADIUS = 0.002
+STEP = 0.001
+
+
+def obj(corners: FloatArray) -> str:
+    """An OBJ file of triangles, every corner a vertex of its own."""
+    points = (" ".join(map(repr, p)) for p in corners.reshape(-1, 3).tolist())
+    lines = [f"v {point}" for point in points]
+    lines += [f"f {3 * k + 1} {3 * k + 2} {3 * k + 3}" for k in range(len(corners))]
+    return "\n".join(lines) + "\n"
+
+
+def written(
+    folder: Path, corners: FloatArray, solid: bool | None = None
+) -> tuple[Path, Path]:
+    """Problem and trajectory of a tiny arm at the origin beside or inside a mesh."""
+    (folder / "part.obj").write_text(obj(corners))
+    part = {"name": "housing", "shape": "mesh", "file": "part.obj", "check_size": False}
+    problem = {
+        "vdsm_problem": 1,
+        "length_unit": "m",
+        "manipulator": {
+            "link_lengths": [0.01, 0.01],
+            "link_radius": RADIUS,
+            "max_link_angle_deg": 45,
+            "max_joint_angle_deg": 45,
+            "base_range": [-20, 20],
+        },
+        "obstacles": [part if solid is None else part | {"solid": solid}],
+        "tip_path": {"start": [0.02, 0, 0], "points": [[0.02, 0, 0], [0.021, 0, 0]]},
+        "required_clearance": 0.001,
+    }  # fmt: skip
+    header = (
+        "waypoint,on_path,path_m,x0_m,alpha1_rad,theta1_rad,alpha2_rad,theta2_rad\n"
+    )
+    path = folder / f"{solid}.yaml"
+    path.write_text(json.dumps(problem))
+    rows = [f"{k},1,{k * STEP},{k * STEP},0.0,0.0,0.0,0.0\n" for k in range(2)]
+    (folder / "t.csv").write_text(header + "".join(rows))
+    return path, folder / "t.csv"
+
+
+def verified(
+    problem: Path, rows: Path, **more: Any
+) -> tuple[ProblemFile, Verification]:
+    file = read_problem(problem)
+    arm = file.problem.manipulator
+    found = verify(file.problem, read_trajectory(rows, arm), load_robot(arm), **more)
+    return file, found
+
+
+def certificate(folder: Path, corners: FloatArray, solid: bool | None) -> Path:
+    """A certificate of the motion where the mesh is what the problem then says."""
+    problem, rows = written(folder, corners, solid)
+    file, found = verified(problem, rows)
+    path = folder / "c.certificate"
+    write_certificate(
+        path, found, Hashes(file.sha256, sha256(rows.read_bytes()), "0" * 64)
+    )
+    return path
+
+
+def start_of(file: ProblemFile) -> str:
+    """What a planner says of the start."""
+    try:
+        check_start(file.problem, link_clearance(file.problem))
+    except StartInside:
+        return "refuted"
+    except InsideUnknown:
+        return "undecided"
+    return "certified"
+
+
+def hold(folder: Path, corners: FloatArray) -> str:
+    """The verdict, which all three must agree on.
+
+    A certificate of the surface alone, sealed again for the mesh as it is, must not be
+    accepted where the verdict is another than certified.
+    """
+    problem, rows = written(folder, corners)
+    file, found = verified(problem, rows)
+    assert start_of(file) == found.verdict
+    alone = found.verdict is not Verdict.CERTIFIED
+    path = certificate(folder, corners, False if alone else None)
+    if alone:
+        lines = [json.loads(line) for line in path.read_text().splitlines()]
+        lines[0]["problem_sha256"] = file.sha256
+        path.write_bytes(sealed(lines[:-1]))
+    outcome = check_certificate(path, problem, rows)
+    assert outcome.accepted is not alone, outcome.reason
+    assert not alone or "not proved outside housing" in outcome.reason
+    return found.verdict.value
+
+
+def box(half: float) -> FloatArray:
+    return np.asarray(trimesh.creation.box(np.full(3, 2.0 * half)).triangles)
+
+
+def spoil(seed: int) -> tuple[Made, FloatArray | None]:
+    """A random mesh and a point of the arm's base, if there is room for the arm."""
+    rng = np.random.default_rng(seed)
+    mesh, faults = made(rng), ((), CLEAN, GAPS, DOUBTFUL)[seed % 4]
+    if faults:
+        spoiled(mesh, rng, faults)
+    points = sample_points(mesh, rng, 3)
+    wound = [p for p in points if any(mesh.windings(p))]
+    return mesh, next(iter(wound or points), None)
+
+
+def hold_random(folder: Path, seed: int) -> tuple[str, str]:
+    """Truth in words and the verdict on one random mesh."""
+    mesh, point = spoil(seed)
+    if point is None:
+        return "no room", "none"
+    verdict, windings = hold(folder, mesh.corners - point), mesh.windings(point)
+    told = f"seed {seed}, {mesh.faults}, {windings}"
+    if sum(windings):
+        truth = "inside"
+        assert verdict != "certified", told
+    elif any(windings):
+        truth = "cavity"
+    else:
+        truth = "outside"
+        assert verdict != "refuted", told
+    return truth, verdict
+
+
+def test_planner_verifier_and_checker_hold_to_the_truth(tmp_path: Path) -> None:
+    seen = Counter(hold_random(tmp_path, seed) for seed in range(24))
+    assert seen["inside", "refuted"] >= 5
+    assert seen["outside", "certified"] >= 5
+
+
+@pytest.mark.slow
+def test_they_hold_to_the_truth_by_the_hundred(tmp_path: Path) -> None:
+    seen = Counter(hold_random(tmp_path, seed) for seed in range(24, 900))
+    assert seen["inside", "refuted"] >= 100
+    assert seen["outside", "certified"] >= 100
+
+
+def test_a_certificate_of_a_mesh_with_gaps_says_how_they_are_joined(
+    tmp_path: Path,
+) -> None:
+    corners = box(0.5) + np.array([0.0, 0.0, 2.0])
+    upper = corners.mean(axis=1)[:, 2] > 2.0
+    corners[upper] += [0.0, 0.0, 1e-5]
+    a, b, c = corners[0]
+    middle = 0.5 * (a + b) + 1e-6
+    corners = np.concatenate([corners[1:], [[a, middle, c], [middle, b, c]]])
+    assert hold(tmp_path, corners) == "certified"
+    lines = [
+        json.loads(x) for x in (tmp_path / "c.certificate").read_text().splitlines()
+    ]
+    moved, seams = lines[0]["joined"]["housing"]
+    assert moved
+    assert len(seams) == 1
+    files = tmp_path / "None.yaml", tmp_path / "t.csv"
+    for joined, reason in (
+        ([moved[1:], seams], "not closed"),
+        ([moved, []], "not closed"),
+        ([[*moved, [0, 30]], seams], "far apart"),
+        ([moved, [[*seams[0][:3], 20]]], "far apart"),
+        ([[], []], "not closed"),
+    ):
+        lines[0]["joined"]["housing"] = joined
+        path = tmp_path / "forged"
+        path.write_bytes(sealed(lines[:-1]))
+        outcome = check_certificate(path, *files)
+        assert not outcome.accepted
+        assert reason in outcome.reason
+
+
+def test_gaps_are_a_note_of_every_result(tmp_path: Path) -> None:
+    corners = box(0.5).copy()
+    corners[corners.mean(axis=1)[:, 2] > 0.0] += [0.0, 0.0, 1e-5]
+    file, found = verified(*written(tmp_path, corners))
+    assert found.verdict is Verdict.REFUTED
+    (note,) = input_notes(file.problem, found.trajectory)
+    assert "gaps of 'housing', up to 0.01 mm wide, were joined" in note
+
+
+def test_an_arm_inside_has_the_clearance_of_an_arm_inside(tmp_path: Path) -> None:
+    chunks: list[ClearanceChunk] = []
+    paths = written(tmp_path, box(0.5))
+    _, found = verified(*paths, sinks=(chunks.append,), joint_error=True)
+    rows = {row.name: row for row in found.checks}
+    assert rows["clearance from obstacles"].worst == -RADIUS
+    assert rows["clearance from obstacles"].where == "the arm is inside 'housing'"
+    assert rows["arm outside the meshes"].where == "the arm is inside 'housing'"
+    assert [(one.lower, one.upper) for one in found.approaches] == [(-RADIUS,) * 2] * 2
+    assert (found.profile.obstacle_upper == -RADIUS).all()
+    assert (found.profile.link_lower == -RADIUS).all()
+    (chunk,) = chunks
+    assert (chunk.lower == -RADIUS).all()
+    assert (chunk.upper == -RADIUS).all()
+    assert (chunk.verdict == 1).all()
+    assert found.joint_error == 0.0
+
+
+def test_an_arm_that_leaves_a_mesh_is_inside_until_it_meets_the_surface(
+    tmp_path: Path,
+) -> None:
+    chunks: list[ClearanceChunk] = []
+    problem, rows = written(tmp_path, box(0.5))
+    header, first, _ = rows.read_text().splitlines()
+    later = [f"{k},0,0.0,{0.2 * k},0.0,0.0,0.0,0.0" for k in range(1, 6)]
+    rows.write_text("\n".join([header, first, *later]) + "\n")
+    verified(problem, rows, sinks=(chunks.append,))
+    (chunk,) = chunks
+    assert (chunk.upper[:2] == -RADIUS).all()
+    assert (chunk.lower == -RADIUS).all()
+    assert (chunk.upper[3:] > 0.09).all()
+
+
+@pytest.mark.parametrize("solid", [None, True, False])
+def test_what_an_open_mesh_is_the_problem_says(
+    solid: bool | None, tmp_path: Path
+) -> None:
+    problem, rows = written(tmp_path, box(0.5)[1:], solid)
+    if solid:
+        with pytest.raises(InvalidFile, match="is not closed: 3 edges have no partner"):
+            read_problem(problem)
+        return
+    file, found = verified(problem, rows, joint_error=True)
+    notes = input_notes(file.problem, found.trajectory)
+    if solid is None:
+        assert found.verdict is Verdict.UNDECIDED
+        (row,) = (row for row in found.checks if row.verdict is Verdict.UNDECIDED)
+        assert "3 edges have no partner; `solid: false` says" in row.where
+        assert found.joint_error == 0.0
+        assert notes == ()
+    else:
+        assert found.verdict is Verdict.CERTIFIED
+        assert "is a surface only" in notes[0]
