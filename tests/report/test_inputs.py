@@ -9,6 +9,7 @@ import pytest
 
 from vdsm_pin.report.facts import batch_row, verification_file
 from vdsm_pin.report.html import write_report
+from vdsm_pin.report.inputs import BEHIND
 from vdsm_pin.report.terminal import show_verification
 from vdsm_pin.scene import Mesh, Scene
 from vdsm_pin.verification.records import Verification
@@ -50,7 +51,8 @@ def test_nothing_is_said_where_nothing_was_assumed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = verification_file(judged(""), made_up.RECORD)
-    assert file.assumed_sizes == file.notes == ()
+    assert file.assumed_sizes == ()
+    assert file.notes == (BEHIND,)  # there is an obstacle
     show_verification(file, tmp_path)
     assert "assuming" not in capsys.readouterr().out
     assert batch_row("f", "fewest", file).reason == file.reason

@@ -11,6 +11,12 @@ from vdsm_pin.verification.inside import mesh_notes
 _NAMED: Final = 3
 """Sizes that one line names; the JSON files have all of them."""
 
+BEHIND: Final = (
+    "not checked: what lies behind the base; the arm is judged from O₁ to its tip, and "
+    "whatever feeds it along the rail is no body"
+)
+"""Where there are obstacles, one may stand in the way of the feed."""
+
 
 def assumed_sizes(problem: PlanningProblem) -> tuple[str, ...]:
     """The meshes whose unit nobody states, with the size they were taken to have."""
@@ -31,10 +37,11 @@ def assumption(sizes: Sequence[str]) -> str:
 
 
 def input_notes(problem: PlanningProblem, trajectory: Trajectory) -> tuple[str, ...]:
-    """What there is to say of meshes and trajectory as read, one sentence each."""
+    """What the readers have to say and what is behind the base, a sentence each."""
     meshes = (mesh for mesh in problem.scene.obstacles if isinstance(mesh, Mesh))
     of_meshes = (
         f"mesh {mesh.name!r}: {note}" for mesh in meshes for note in mesh.notes
     )
-    of_trajectory = (f"trajectory: {note}" for note in trajectory.notes)
-    return (*mesh_notes(problem), *of_meshes, *of_trajectory)
+    of_rows = (f"trajectory: {note}" for note in trajectory.notes)
+    behind = (BEHIND,) if problem.scene.obstacles else ()
+    return (*behind, *mesh_notes(problem), *of_meshes, *of_rows)
