@@ -27,6 +27,7 @@ urdf: $(VENV)/.installed
 figures: $(VENV)/.installed
 	$(BIN)/python analysis/figures.py --out reports/paper
 	$(BIN)/python analysis/readme_animation.py --out reports
+	$(BIN)/python analysis/conventions.py
 
 report: figures
 	$(BIN)/python analysis/paper_table.py --out reports/paper

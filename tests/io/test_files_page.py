@@ -1,13 +1,17 @@
 """The page about files tells the truth: its examples are read, its defaults hold."""
 
 import re
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
+import numpy as np
 from problem_texts import edited
 
+from vdsm_pin.cables import cable_lengths
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.manipulator import paper_hole_angles
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.manipulator import built_in, paper_hole_angles
 
 PAGE = Path(__file__).parents[2] / "docs" / "files.md"
 EXAMPLE, ARM, ENDS = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(), re.DOTALL)
@@ -64,3 +68,54 @@ def test_the_start_and_goal_shown_are_read_without_a_path(tmp_path: Path) -> Non
     assert problem.start is not None
     assert problem.goal is not None
     assert problem.goal.tip.tolist() == [1.5, 0.3, 0.0]
+
+
+def test_angles_turn_and_holes_lie_as_the_page_says() -> None:
+    """Oracle: the page's own formulas, held against kinematics and cables."""
+    arm, rng = built_in("hrm8"), np.random.default_rng(0)
+    for alpha, theta in rng.uniform(-0.6, 0.6, (50, 2)):
+        angles = np.zeros((2, 1, 8))
+        angles[0, 0, 0], angles[1, 0, 0] = alpha, theta
+        x0 = rng.uniform(-1.0, 1.0, 1)
+        centres = joint_centres(arm, x0, *angles)[0]
+        np.testing.assert_allclose(centres[0], [x0[0], 0.0, 0.0], atol=1e-15)
+        points = np.array(
+            [
+                np.cos(alpha) * np.cos(theta),
+                np.sin(alpha) * np.cos(theta),
+                -np.sin(theta),
+            ]
+        )
+        link = (centres[1] - centres[0]) / arm.link_lengths[0]
+        np.testing.assert_allclose(link, points, rtol=0.0, atol=1e-14)
+        assert np.sign(centres[-1, 1:]).tolist() == [np.sign(alpha), -np.sign(theta)]
+
+
+def test_cables_shorten_on_the_side_the_page_names() -> None:
+    quarter = np.tile(np.deg2rad([0.0, 90.0, 180.0]), (8, 1))
+    arm = built_in("hrm8")
+    arm = replace(arm, cables=replace(arm.cables, hole_angles=quarter))
+    d, r = arm.cables.half_gap, arm.cables.hole_radius
+
+    def change(alpha: float, theta: float) -> FloatArray:
+        rows = np.zeros((2, 2, 8))
+        rows[0, 1, 0], rows[1, 1, 0] = alpha, theta
+        lengths = cable_lengths(arm, *rows)
+        return np.asarray(lengths[1, 0] - lengths[0, 0])
+
+    # A hole at distance s from the bending axis, on the side turned towards: its span
+    # is 2 (d cos(psi / 2) - s sin(psi / 2)).
+    turn = 0.3
+    spans = [
+        2.0 * (d * np.cos(turn / 2.0) - s * np.sin(turn / 2.0)) for s in (-r, 0, r)
+    ]
+    outer, middle, inner = (span - 2.0 * d for span in spans)
+    np.testing.assert_allclose(change(0.0, turn), [outer, middle, inner], atol=1e-12)
+    np.testing.assert_allclose(change(turn, 0.0), [middle, inner, middle], atol=1e-12)
+    np.testing.assert_allclose(change(0.0, -turn), [inner, middle, outer], atol=1e-12)
+
+
+def test_the_picture_is_what_its_script_draws() -> None:
+    made = PAGE.with_name("conventions.svg").read_text(encoding="utf-8")
+    assert "conventions.svg" in PAGE.read_text(encoding="utf-8")
+    assert made.startswith("<?xml")
