@@ -55,8 +55,9 @@ ONE_VALUE: list[tuple[tuple[Any, ...], Any, str]] = [
     (("length_unit",), 1, "length_unit (line 3): is 1, expected 'mm' or 'm'"),
     (("vdsm_problem",), 2, "vdsm_problem (line 1): is 2, expected 1"),
     (("vdsm_problem",), True, "vdsm_problem (line 1): is 'true', expected 1"),
-    (("name",), "../up", "name (line 2): is '../up', expected letters"),
-    (("name",), "a/b", "name (line 2): is 'a/b', expected letters"),
+    (("name",), "a\nb", "name (line 2): is 'a\\nb', expected signs that can be seen"),
+    (("name",), "\u202eb", "name (line 2): is '\\u202eb', expected signs that can be"),
+    (("name",), "=1+2", "name (line 2): is '=1+2', expected signs that can be seen, "),
     (("colour",), "red", "colour (line 43): is not a known key; known: vdsm_problem"),
     (("manipulator",), "hrm9", "manipulator (line 4): is 'hrm9'; known: hrm8"),
     (
@@ -360,7 +361,7 @@ def test_missing_and_damaged_meshes_name_file_and_field(tmp_path: Path) -> None:
     message = refusal(mesh_problem(tmp_path, good[:-1]))
     assert "'part.stl': is damaged: its header promises 4 triangles" in message
     message = refusal(mesh_problem(tmp_path, good, file="."))
-    assert "'.': has the ending '', expected .stl or .obj" in message
+    assert "'.': has the ending '', expected .stl, .obj, " in message
 
 
 @pytest.mark.parametrize(("unit", "size"), [("mm", 500.0), ("m", 0.5)])

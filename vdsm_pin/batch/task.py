@@ -44,7 +44,7 @@ WRITTEN: Final = frozenset({*PLANNED, *JUDGED, PICTURE, MANIFEST, TIMING})
 
 
 LONGEST_NAME: Final = 100
-"""Characters of a folder's name that come from the problem's."""
+"""Bytes of a folder's name that come from the problem's."""
 
 ALL: Final = "all"
 FAILED: Final = "failed"
@@ -214,7 +214,7 @@ def _plain_name(problem: str) -> str:
     path = Path(problem)
     stem = path.stem if path.suffix in (".yaml", ".yml") else problem.strip("/")
     kept = "".join(c if c.isalnum() or c in "-_." else "-" for c in stem).strip(".-")
-    return kept[:LONGEST_NAME] or "problem"
+    return kept.encode()[:LONGEST_NAME].decode(errors="ignore") or "problem"
 
 
 def _hash(problem: str) -> str:

@@ -6,8 +6,8 @@ from pydantic import Discriminator, Field, Tag
 
 from vdsm_pin.io.schema_types import (
     FileModel,
+    Name,
     Number,
-    ObstacleName,
     Positive,
     Range,
     Vector,
@@ -21,7 +21,7 @@ Axis: TypeAlias = Annotated[
 
 
 class _Named(FileModel):
-    name: ObstacleName = Field(description="Unique name of the obstacle.")
+    name: Name = Field(description="Unique name of the obstacle.")
 
 
 class _Round(_Named):

@@ -9,7 +9,7 @@ from pydantic_core import ErrorDetails
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io import obstacle_schema as shapes
 from vdsm_pin.io import problem_schema as schema
-from vdsm_pin.io.schema_types import FOLDER_PATTERN, OBSTACLE_PATTERN, FileModel
+from vdsm_pin.io.schema_types import NAME_PATTERN, FileModel
 from vdsm_pin.io.yaml_reader import Data, Location, YamlDocument
 
 _SHAPES: Final = ("cylinder", "prism", "sphere", "capsule", "box", "half_space", "mesh")
@@ -43,8 +43,7 @@ _EITHER: Final[Mapping[str | int, str]] = {
 """What fields of two forms take."""
 
 _NAMES: Final = {
-    FOLDER_PATTERN: "letters, digits and _.+- only, a letter or digit first",
-    OBSTACLE_PATTERN: "letters, digits, spaces, _.()#+- only, a letter or digit first",
+    NAME_PATTERN: "signs that can be seen, no space or = + - @ first",
 }
 
 

@@ -65,7 +65,7 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
         model = ProblemModel.model_validate(document.data)
     except ValidationError as error:
         raise first_error(error, document) from None
-    stem = "".join(c if c.isascii() and c.isalnum() else "_" for c in path.stem[:100])
+    stem = "".join(c if c.isalnum() else "_" for c in path.stem[:100])
     digest = hashlib.sha256(content)
     problem = build_problem(
         model, document, name=stem, folder=path.parent, digest=digest

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag
 from vdsm_pin.io.obstacle_schema import ObstacleModel
 from vdsm_pin.io.schema_types import (
     FileModel,
-    FolderName,
+    Name,
     NotNegative,
     Number,
     Positive,
@@ -63,7 +63,7 @@ class CablesModel(FileModel):
 class ManipulatorModel(FileModel):
     """An arm of N links on a rail along the x axis of its base."""
 
-    name: FolderName = Field(default="custom", description="Name for reports.")
+    name: Name = Field(default="custom", description="Name for reports.")
     link_lengths: Lengths = Field(
         description="L_1..L_N between joint centres, 2 to 40 of them [length_unit]."
     )
@@ -204,8 +204,8 @@ class ProblemModel(FileModel):
     vdsm_problem: Annotated[Literal[1], BeforeValidator(_not_bool)] = Field(
         description="Version of this format."
     )
-    name: FolderName | None = Field(
-        default=None, description="Name for reports and folders. Default: the file's."
+    name: Name | None = Field(
+        default=None, description="Name for reports. Default: the file's."
     )
     length_unit: Literal["mm", "m"] = Field(
         description="Unit of every length in this file. Angles are in degrees."

@@ -13,12 +13,15 @@ NotNegative: TypeAlias = Annotated[float, Field(ge=0.0, le=LARGEST)]
 Vector: TypeAlias = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Range: TypeAlias = Annotated[list[Number], Field(min_length=2, max_length=2)]
 
-FOLDER_PATTERN: Final = r"^[A-Za-z0-9_][A-Za-z0-9_.+-]*$"
-OBSTACLE_PATTERN: Final = r"^[A-Za-z0-9_][A-Za-z0-9_ .()#+-]*$"
-FolderName: TypeAlias = Annotated[str, Field(pattern=FOLDER_PATTERN, max_length=100)]
-ObstacleName: TypeAlias = Annotated[
-    str, Field(pattern=OBSTACLE_PATTERN, max_length=100)
-]
+_UNSEEN: Final = (
+    r"\x00-\x1f\x7f-\x9f\xad\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ufeff"
+)
+"""Signs that cannot be seen, end lines or turn the direction of writing."""
+
+NAME_PATTERN: Final = f"^[^\\s=+@{_UNSEEN}-][^{_UNSEEN}]*$"
+"""Names in any alphabet. Spreadsheets take what begins with = + - @ for a formula."""
+
+Name: TypeAlias = Annotated[str, Field(pattern=NAME_PATTERN, max_length=100)]
 
 
 def text_or_not(value: Any) -> str:

@@ -2,7 +2,8 @@
 
 Works on parse events, one by one, so that neither a tag can build an object, nor deep
 nesting exhaust the stack, nor an alias expand without end. Plain scalars are read by
-the core schema of YAML 1.2: `1e-3` is a number, and `no` and `12:30` are text.
+the core schema of YAML 1.2: `1e-3` is a number, and `no` and `12:30` are text. Lines
+end as they do there: U+0085, U+2028 and U+2029 are signs like any other.
 """
 
 import re
@@ -21,6 +22,11 @@ Location: TypeAlias = tuple[str | int, ...]
 MAX_DEPTH: Final = 32
 MAX_VALUES: Final = 1_000_000
 MAX_INTEGER_DIGITS: Final = 300
+
+_NO_ENDS: Final = "\x85\u2028\u2029"
+"""Signs that end a line in YAML 1.1, which the parser is for, and not in 1.2."""
+
+_PRIVATE: Final = range(0xF0000, 0xFFFFE)
 
 _INTEGER: Final = re.compile(r"[-+]?[0-9]+")
 _FLOAT: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
@@ -85,9 +91,11 @@ def read_yaml(text: str, *, file: object) -> YamlDocument:
         InvalidFile: If it is not YAML, holds not exactly one document, repeats a key,
             names a tag of another language, nests too deep or is too large.
     """
-    events = yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+    stand_ins = _stand_ins(text)
+    plain = text.translate({ord(sign): code for code, sign in stand_ins.items()})
+    events = yaml.parse(plain, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
     try:
-        return _Builder(events, file).document()
+        return _Builder(events, file, stand_ins).document()
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f"line {mark.line + 1}" if mark else ""
@@ -98,12 +106,29 @@ def read_yaml(text: str, *, file: object) -> YamlDocument:
         raise InvalidFile(file=file, problem=problem) from None
 
 
+def _stand_ins(text: str) -> dict[int, str]:
+    """Codes that the text does not use for the signs that the parser mistakes."""
+    signs = [sign for sign in _NO_ENDS if sign in text]
+    if not signs:
+        return {}
+    used = set(text)
+    free = (code for code in _PRIVATE if chr(code) not in used)
+    return dict(zip(free, signs, strict=False))
+
+
 @dataclass
 class _Builder:
-    """Recursive descent over events, with a budget."""
+    """Recursive descent over events, with a budget.
+
+    Args:
+        events: Of the parser.
+        file: For messages.
+        stand_ins: Signs of the text by the codes that stand for them.
+    """
 
     events: Iterator[yaml.Event]
     file: object
+    stand_ins: dict[int, str]
     lines: dict[Location, int] = field(default_factory=dict)
 
     def document(self) -> YamlDocument:
@@ -147,7 +172,8 @@ class _Builder:
         if self.lines.get(at[:-1]) != _line(event):
             self.lines.setdefault(at, _line(event))
         if isinstance(event, yaml.ScalarEvent):
-            return _scalar(event.value) if event.implicit[0] else str(event.value)
+            value = str(event.value).translate(self.stand_ins)
+            return _scalar(value) if event.implicit[0] else value
         mapping = isinstance(event, yaml.MappingStartEvent)
         return self._mapping(at) if mapping else self._sequence(at)
 
@@ -156,7 +182,7 @@ class _Builder:
         while not isinstance(key := next(self.events), yaml.MappingEndEvent):
             if not isinstance(key, yaml.ScalarEvent):
                 raise self._invalid(key, "a key is not plain text")
-            name = str(key.value)
+            name = str(key.value).translate(self.stand_ins)
             if name in data:
                 problem = f"the key {name!r} appears twice"
                 raise self._invalid(key, problem)

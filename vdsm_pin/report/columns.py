@@ -35,8 +35,9 @@ def write_columns(path: Path, rows: Sequence[BatchRow]) -> bool:
     )
     columns = [[getattr(row, name) for row in rows] for name in fields]
     table = pyarrow.table(columns, schema=schema)
-    with atomic_path(path) as aside:
-        parquet.write_table(table, aside, compression="zstd")
+    # Opened here: pyarrow takes no path that is not UTF-8.
+    with atomic_path(path) as aside, aside.open("wb") as file:
+        parquet.write_table(table, file, compression="zstd")
     return True
 
 
