@@ -18,6 +18,7 @@ from vdsm_pin.planner.fewest.levels import Insert
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.nearby import FAR, nearby
 from vdsm_pin.planner.fewest.route import path_rows
+from vdsm_pin.planner.fewest.sparsify import sparser
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.tip_ways import TipSpace, resampled
 from vdsm_pin.planner.fewest.ways_in import ways_in
@@ -72,7 +73,8 @@ def judge_of(task: PlanningProblem) -> Judge:
 
 
 def space_of(task: PlanningProblem) -> TipSpace:
-    return TipSpace(judge_of(task), link_clearance(task))
+    required = judge_of(task).required
+    return TipSpace(task, link_clearance(task), required, 0.06, 60_000)
 
 
 def length_of(way: FloatArray) -> float:
@@ -147,12 +149,12 @@ def test_points_along_a_way_are_even_and_keep_its_ends() -> None:
 def test_the_tip_finds_windows_and_no_way_where_they_are_shut(half: float) -> None:
     task = two_windows(half)
     goal = task.path.points[0]
-    (way, *_) = space_of(task).ways(np.array(START), goal, 1, 0.06)
+    (way, *_) = space_of(task).ways(goal, 1)
     room = link_clearance(task)(np.stack([way[:-1], way[1:]], axis=1))[:, 0]
     assert room.min() >= task.required_clearance
     np.testing.assert_array_equal(way[[0, -1]], [START, goal])
     shut = two_windows(ARM.link_radius + 0.003)
-    assert not list(space_of(shut).ways(np.array(START), goal, 1, 0.06))
+    assert not list(space_of(shut).ways(goal, 1))
 
 
 def test_a_second_way_takes_the_other_window() -> None:
@@ -170,7 +172,7 @@ def test_a_second_way_takes_the_other_window() -> None:
     task = problem(
         *bars, *lintels, points=ends[1:], start=(0.0, 0.0, 0.0), closed=False
     )
-    one, other = space_of(task).ways(*ends, 2, 0.05)
+    one, other = space_of(task).ways(ends[1], 2)
     sides = [way[np.abs(way[:, 0] - 1.0).argmin(), 1] for way in (one, other)]
     assert sorted(np.sign(sides)) == [-1.0, 1.0]
     assert length_of(one) < length_of(other) + 0.2
@@ -179,12 +181,12 @@ def test_a_second_way_takes_the_other_window() -> None:
 def test_what_is_inserted_keeps_clearance_limits_and_layers() -> None:
     task = two_windows(0.08)
     judge = judge_of(task)
-    (way, *_) = space_of(task).ways(np.array(START), task.path.points[0], 1, 0.06)
+    (way, *_) = space_of(task).ways(task.path.points[0], 1)
     play = np.full(len(way), 0.02)
     play[[0, -1]] = 0.0
     rng = np.random.default_rng(0)
     root = np.zeros((ARM.n_links + 1, 2))
-    chain = Insertion(judge, Layers(way, play), rng, 24, Projections()).grow(root)
+    chain = Insertion(judge, Layers(way, play), rng, 24, Projections()).grow(root, 3)
     assert chain.layer[-1] == len(way) - 1
     assert (np.diff(chain.layer) >= 0).all()
     np.testing.assert_array_equal(chain.tips[[0, -1]], way[[0, -1]])
@@ -201,7 +203,7 @@ def test_nothing_is_inserted_through_a_wall() -> None:
     layers = Layers(tips, np.zeros(30))
     root = np.zeros((ARM.n_links + 1, 2))
     rng = np.random.default_rng(0)
-    chain = Insertion(judge, layers, rng, 24, Projections()).grow(root)
+    chain = Insertion(judge, layers, rng, 24, Projections()).grow(root, 3)
     assert chain.tips[-1, 0] < 0.65
 
 
@@ -213,10 +215,9 @@ def test_a_path_behind_a_pipe_is_drawn_in_visits_that_come_home() -> None:
         pipe, *wall(0.4, 0.0, 0.0, 0.16), points=points, closed=False, start=START
     )
     judge, rows = judge_of(task), path_rows(task.path)
-    clearance = nearby(task, link_clearance(task)).up_to(FAR)
     closed = np.zeros(len(rows.tips), dtype=np.bool_)
-    effort = Insert(step=0.02, population=24, ways=2, seed=0)
-    found = ways_in(judge, clearance, rows, closed, effort)
+    effort = Insert(step=0.02, population=24, ways=2, returns=3, seed=0)
+    found = ways_in(judge, space_of(task), rows, closed, effort)
     assert found is not None
     assert judge.clear(found.knots.pick(np.arange(len(found.knots.drawn)))).all()
     drawn = found.knots.drawn
@@ -224,6 +225,25 @@ def test_a_path_behind_a_pipe_is_drawn_in_visits_that_come_home() -> None:
     assert way[drawn].sum() == pytest.approx(task.path.length - found.missing)
     on_line = found.knots.tips[:-1][drawn]
     np.testing.assert_allclose(on_line[:, [0, 2]] - [2.4, 0.0], 0.0, atol=1e-12)
+
+
+def test_knees_are_taken_away_and_the_motion_stays_clear() -> None:
+    task = two_windows(0.09)
+    judge, rows = judge_of(task), path_rows(task.path)
+    effort = Insert(step=0.02, population=10, ways=1, returns=2, seed=0, directed=True)
+    closed = np.zeros(len(rows.tips), dtype=np.bool_)
+    found = ways_in(judge, space_of(task), rows, closed, effort)
+    assert found is not None
+    assert not found.missing > 0.0
+    fewer = sparser(judge, found.knots)
+    assert judge.clear(fewer.pick(np.arange(len(fewer.drawn)))).all()
+    np.testing.assert_array_equal(fewer.tips, found.knots.tips)
+    on = fewer.drawn.nonzero()[0]
+    counts = [
+        judge.look(knots.tips[on], knots.offsets[on])[1]
+        for knots in (found.knots, fewer)
+    ]
+    assert counts[1].mean() < 0.7 * counts[0].mean()
 
 
 @pytest.mark.parametrize("half", [0.09, 0.075])

@@ -35,7 +35,8 @@ from vdsm_pin.planner.fewest.search import (
 )
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes
 from vdsm_pin.planner.fewest.taper import kept_by_links
-from vdsm_pin.planner.fewest.ways_in import ways_in
+from vdsm_pin.planner.fewest.tip_ways import TipSpace
+from vdsm_pin.planner.fewest.ways_in import tip_space, ways_in
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -112,6 +113,7 @@ def explore(
     least_ease = min(1.0, bent / link_limit(problem))
     unreached, kept = False, kept_by_links(problem.manipulator, taste.taper)
     stuck: NoWayOut | None = None
+    spaces: dict[tuple[float, float, int], TipSpace] = {}
     for level in effort.levels:
         if unreached and isinstance(level, Level) and level.back == 0.0:
             continue
@@ -125,7 +127,10 @@ def explore(
         found: Found | None = None
         try:
             if isinstance(level, Insert):
-                found = ways_in(judge, clearance, rows, best.proof.closed, level)
+                key = judge.required, level.step, level.cells
+                if key not in spaces:
+                    spaces[key] = tip_space(judge, clearance, level)
+                found = ways_in(judge, spaces[key], rows, best.proof.closed, level)
             else:
                 found = _look(judge, level, rows, best.proof, taste)
                 unreached |= level.ease == 1.0 and _unreached(found)

@@ -25,8 +25,6 @@ UNCHANGED: Final = 0.3
 """Part of these that are not varied besides; [-]."""
 RESTS: Final = 4
 """Rounds of change at rest before a population that dwindles goes back."""
-RETURNS: Final = 5
-"""Times a population goes back, each time twice as far as before."""
 WIDE: Final = 0.5
 """Room beyond this part of the body's radius is worth nothing more; [-]."""
 
@@ -125,11 +123,12 @@ class Insertion:
         self.room = np.append(self.room, room)
         return _Crowd(number, tips, offsets)
 
-    def grow(self, root: FloatArray) -> Chain:
+    def grow(self, root: FloatArray, most_returns: int) -> Chain:
         """The motion from a configuration at the first layer that comes farthest.
 
         Args:
             root: Its shape coordinates.
+            most_returns: Times the population may go back, each time twice as far.
         """
         self._forget(root)
         tip, none = self.layers.tips[:1], np.full(1, -1)
@@ -146,7 +145,7 @@ class Insertion:
                     farthest = len(crowds) - 1
                     best = int(crowd.number[0])
                 continue
-            if returns == RETURNS:
+            if returns == most_returns:
                 break
             back = min(len(crowds) - 1, 2**returns)
             crowds = crowds[: len(crowds) - back]

@@ -22,7 +22,9 @@ from vdsm_pin.planner.fewest.levels import FULL, LEANING, QUICK, Effort
 from vdsm_pin.planner.fewest.motion import Knots, Rows, dense_rows
 from vdsm_pin.planner.fewest.nearby import FAR, Nearby, nearby
 from vdsm_pin.planner.fewest.roadmap import Taste
+from vdsm_pin.planner.fewest.search import Searched
 from vdsm_pin.planner.fewest.smooth import lifted, smooth, straightened
+from vdsm_pin.planner.fewest.sparsify import sparser
 from vdsm_pin.planner.fewest.taper import levers
 from vdsm_pin.planner.fewest.unbend import (
     from_there,
@@ -220,7 +222,10 @@ def _written(
     """What was found, smoothed and row by row."""
     assert outcome.found is not None
     judge, arm = outcome.judge, problem.manipulator
-    knots = smooth(judge, outcome.found.knots, taste)
+    knots = outcome.found.knots
+    if not isinstance(outcome.found, Searched):
+        knots = sparser(judge, knots)
+    knots = smooth(judge, knots, taste)
     knots = lifted(judge, straightened(knots))
     turn = problem.planned_row_change
     rows = dense_rows(arm, knots, problem.path.spacing, turn, judge.slack)

@@ -9,6 +9,7 @@ first. These are proposals for the search of the arm's motion: nothing is proved
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from typing import Final
 
 import numpy as np
@@ -22,22 +23,22 @@ from vdsm_pin.planner.fewest.cells import (
     holders,
     places,
 )
-from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.problem import PlanningProblem
 
 FIRST_LEVEL: Final = 4
 """Level of the cells begun with."""
-MOST_CELLS: Final = 60_000
-"""Cells at which a search ends."""
 LEAST: Final = 0.05
 """Cells smaller than this part of the body's radius are not halved; [-]."""
 NARROW: Final = 0.3
 """Room below this part of the body's radius makes a way costly; [-]."""
-DETOUR: Final = 1.05
+DETOUR: Final = 0.01
 """Doubtful cells on ways that cost so much more than the best are halved too; [-]."""
+MORE: Final = 5.0
+"""How many times more that is at the largest number of cells; [-]."""
 AVOIDED: Final = 30.0
 """Cost of the cells near the narrowest place of a way before, in their own; [-]."""
-CAP: Final = 0.5
+CAP: Final = 0.6
 """Room below this part of what is narrow costs no more; [-]."""
 PULLS: Final = 30
 """Rounds of pulling a way to the middle of its openings."""
@@ -58,6 +59,7 @@ class _Cells:
         corner: Lowest corner of the whole, shape (3,); [m].
         side: Side of the whole; [m].
         reach: Largest distance of a tip from the rail; [m].
+        most: Cells at which a search ends.
     """
 
     clearance: LinkClearance
@@ -66,6 +68,7 @@ class _Cells:
     corner: FloatArray
     side: float
     reach: float
+    most: int
 
     def __post_init__(self) -> None:
         """Begin with cells of one size."""
@@ -142,11 +145,13 @@ class _Cells:
             if not np.isfinite(best):
                 return None
             back = doubt_to(ends[1:], first, neighbours, cost)
-            good = doubt & (there + back <= DETOUR * best + cost)
+            # The more cells there are, the more are halved at once.
+            wide = 1.0 + DETOUR * (1.0 + MORE * self.codes.size / self.most)
+            good = doubt & (there + back <= wide * best + cost)
             way = self._traced(int(ends[1]), int(ends[0]), there, first, neighbours)
             if not doubt[way].any():
                 return np.vstack([start, self._through(way), goal])
-            if self.codes.size > MOST_CELLS:
+            if self.codes.size > self.most:
                 return None
             self.split(np.flatnonzero(good))
 
@@ -170,41 +175,60 @@ class _Cells:
 
 
 class TipSpace:
-    """Where the tip can be, and ways through it.
+    """Where the tip can be, and ways through it, each looked for once.
 
     Args:
-        judge: Says what is clear.
+        problem: Arm and limits.
         clearance: The clearance function, exact also where it is too small.
+        required: Clearance that the tip must keep; [m].
+        spacing: Largest distance of the points of a way; [m].
+        most: Cells at which the search for a way ends.
     """
 
-    def __init__(self, judge: Judge, clearance: LinkClearance) -> None:
-        self.judge, self.clearance = judge, clearance
-        self.arm = judge.problem.manipulator
+    def __init__(
+        self,
+        problem: PlanningProblem,
+        clearance: LinkClearance,
+        required: float,
+        spacing: float,
+        most: int,
+    ) -> None:
+        self.arm, self.start = problem.manipulator, problem.path.start
+        self.clearance, self.required = clearance, required
+        self.spacing, self.most = spacing, most
+        self.known: dict[bytes, list[FloatArray]] = {}
+        self.searches: dict[bytes, Iterator[FloatArray]] = {}
 
-    def ways(
-        self, start: FloatArray, goal: FloatArray, most: int, spacing: float
-    ) -> Iterator[FloatArray]:
-        """Ways of the tip from start to goal, the best first.
+    def ways(self, goal: FloatArray, most: int) -> Iterator[FloatArray]:
+        """Ways of the tip from the start to a goal, the best first.
 
         Args:
-            start: Where they begin, shape (3,); [m].
             goal: Where they end, shape (3,); [m].
             most: Largest number of ways.
-            spacing: Largest distance of their points; [m].
 
         Yields:
             Points, shape (k, 3), both ends included; [m].
         """
+        key = goal.tobytes()
+        known = self.known.setdefault(key, [])
+        search = self.searches.setdefault(key, self._search(goal))
+        for number in range(most):
+            if number == len(known):
+                known.extend(islice(search, 1))
+            if number == len(known):
+                return
+            yield known[number]
+
+    def _search(self, goal: FloatArray) -> Iterator[FloatArray]:
+        """Ways to a goal without end, as long as there are any."""
+        start = self.start
         if not (start != goal).any():
             yield start[None]
             return
         cells = self._cells(np.stack([start, goal]))
-        for _ in range(most):
-            way = cells.cheapest(start, goal)
-            if way is None:
-                return
-            way = self._pulled(resampled(way, spacing))
-            yield resampled(way, spacing)
+        while (way := cells.cheapest(start, goal)) is not None:
+            way = self._pulled(resampled(way, self.spacing))
+            yield resampled(way, self.spacing)
             cells.avoided.append(self._narrowest(way))
 
     def _cells(self, ends: FloatArray) -> _Cells:
@@ -216,14 +240,14 @@ class TipSpace:
         side = max(high - low, 2.0 * reach)
         corner = np.array([low, -side / 2.0, -side / 2.0])
         return _Cells(
-            self.clearance, self.judge.required, self.arm.link_radius, corner, side,
-            reach,
+            self.clearance, self.required, self.arm.link_radius, corner, side, reach,
+            self.most,
         )  # fmt: skip
 
     def _spare(self, points: FloatArray) -> FloatArray:
         """What the tip has to spare at points, shape (n,); [m]."""
         room = self.clearance(np.stack([points, points], axis=1))[:, 0]
-        return room - self.judge.required
+        return np.asarray(room - self.required)
 
     def _narrowest(self, way: FloatArray) -> FloatArray:
         """The place of a way, its ends left out, with the least room, shape (3,)."""

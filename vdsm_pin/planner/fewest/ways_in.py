@@ -6,12 +6,13 @@ it came, and goes in again to where it left the path, by another way or in anoth
 posture. What cannot be drawn at all is skipped.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.fewest.charts import Chart, Directions, Projections
 from vdsm_pin.planner.fewest.home import checked_start
 from vdsm_pin.planner.fewest.insertion import Chain, Insertion, Layers
@@ -25,6 +26,8 @@ from vdsm_pin.planner.fewest.tip_ways import TipSpace
 
 PLAY: Final = 0.3
 """How far the tip may be from its way off the path, over the body's radius; [-]."""
+AHEAD: Final = (3, 8, 20)
+"""Layers ahead of a place of the path by way of which it is come to."""
 FAILURES: Final = 3
 """Places of the path at which the arm is not got in before the search gives up."""
 
@@ -51,13 +54,13 @@ class _Visit:
 
 
 def ways_in(
-    judge: Judge, clearance: Nearby, rows: PathRows, closed: BoolArray, effort: Insert
+    judge: Judge, space: TipSpace, rows: PathRows, closed: BoolArray, effort: Insert
 ) -> Found | None:
     """A motion that draws what it can, going in as often as it takes.
 
     Args:
         judge: Says what is clear.
-        clearance: The clearance function.
+        space: Has the ways of the tip.
         rows: The desired path row by row.
         closed: Rows that nobody can reach, shape (r,).
         effort: How thoroughly to look.
@@ -70,25 +73,27 @@ def ways_in(
     """
     step = effort.step * judge.problem.manipulator.total_length
     route = tip_route(judge.problem, rows, closed, step, 0.0)
-    search = _Search(judge, clearance, route, effort, step)
-    return search.found()
+    return _Search(judge, space, route, effort).found()
+
+
+def tip_space(judge: Judge, clearance: Nearby, effort: Insert) -> TipSpace:
+    """The ways of the tip for an effort."""
+    problem = judge.problem
+    # How far a blocked place is from a clear one tells where to look for a hole.
+    exact = replace(clearance, floor=-np.inf)
+    step = effort.step * problem.manipulator.total_length
+    return TipSpace(problem, exact, judge.required, step, effort.cells)
 
 
 class _Search:
     """The visits of one route."""
 
     def __init__(
-        self,
-        judge: Judge,
-        clearance: Nearby,
-        route: TipRoute,
-        effort: Insert,
-        step: float,
+        self, judge: Judge, space: TipSpace, route: TipRoute, effort: Insert
     ) -> None:
-        self.judge, self.route, self.effort, self.step = judge, route, effort, step
+        self.judge, self.space = judge, space
+        self.route, self.effort = route, effort
         self.tips = route.tips[route.layers]
-        # How far a blocked place is from a clear one tells where to look for a hole.
-        self.space = TipSpace(judge, replace(clearance, floor=-np.inf))
         self.chart: Chart = Directions() if effort.directed else Projections()
         self.root = checked_start(judge, route.tips[:1], self.chart)
         self.rng = np.random.default_rng(effort.seed)
@@ -120,8 +125,8 @@ class _Search:
         shut = np.flatnonzero(self.route.closed[k + 1 :])
         end = k + 1 + int(shut[0]) if len(shut) else len(self.tips)
         best: _Visit | None = None
-        start, path = self.route.tips[0], self.tips[k:end]
-        for way in self.space.ways(start, path[0], self.effort.ways, self.step):
+        path = self.tips[k:end]
+        for way in self._ways(path):
             before = len(way) - 1
             play = np.zeros(before + len(path))
             play[1:before] = PLAY * self.judge.problem.manipulator.link_radius
@@ -129,12 +134,23 @@ class _Search:
             grown = Insertion(
                 self.judge, layers, self.rng, self.effort.population, self.chart
             )
-            visit = _Visit(k, before, grown.grow(self.root))
+            visit = _Visit(k, before, grown.grow(self.root, self.effort.returns))
             if best is None or visit.last > best.last:
                 best = visit
             if best.last == end - 1:
                 break
         return best
+
+    def _ways(self, path: FloatArray) -> Iterator[FloatArray]:
+        """Ways of the tip to a path's first point, also by way of points after it.
+
+        Who comes from there arrives in a posture that goes on to there.
+        """
+        yield from self.space.ways(path[0], self.effort.ways)
+        for ahead in AHEAD:
+            if ahead < len(path):
+                for way in self.space.ways(path[ahead], 1):
+                    yield np.vstack([way, path[ahead - 1 :: -1]])
 
     def _knots(self, visits: list[_Visit]) -> Knots:
         """The visits one after the other, out by the way in after all but the last."""
