@@ -103,6 +103,7 @@ def check_row(check: Check) -> CheckRow:
         limit=finite(check.limit),
         unit=check.unit,
         moment=finite(check.moment),
+        first_moment=finite(check.first),
         where=check.where,
         deeper=check.deeper,
     )

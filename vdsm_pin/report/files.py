@@ -66,6 +66,11 @@ class CheckRow(FileModel):
     limit: FiniteFloat | None = Field(description="its limit; null: there is none")
     unit: str = Field(description="m, rad, share (of a whole, 0 to 1) or - (a number)")
     moment: FiniteFloat | None = Field(description=_MOMENT)
+    first_moment: FiniteFloat | None = Field(
+        default=None,
+        description="when a clearance is first lost; null where it is not, or was not "
+        f"looked for; {_MOMENT}",
+    )
     where: str = Field(description="place of the worst case in words, without moment")
     deeper: bool = Field(description=f"of worst: {_DEEPER}")
 

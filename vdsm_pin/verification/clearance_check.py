@@ -12,6 +12,7 @@ from vdsm_pin.proof.layouts import AT_UPPER, LOW, TIME, UP
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.clearance import ClearanceProof
+from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import surfaces
 from vdsm_pin.verification.records import Check, Counterexample, Verdict, is_deepest
 
@@ -20,6 +21,7 @@ def check_clearance(
     problem: PlanningProblem,
     proof: ClearanceProof,
     counterexamples: tuple[Counterexample, ...],
+    contacts: tuple[FirstContact, ...] = (),
     deadline: Deadline = NO_LIMIT,
 ) -> tuple[Check, ...]:
     """One row for the obstacles, one for the links among themselves.
@@ -28,6 +30,7 @@ def check_clearance(
         problem: Required clearances.
         proof: Of every motion within the error box.
         counterexamples: Motions within it that refute what the proof left undecided.
+        contacts: Where the clearance is first lost.
         deadline: When the proof had to end.
     """
     late = f": {OutOfTime(deadline.limit)}" if proof.late else ""
@@ -46,6 +49,9 @@ def check_clearance(
                 for found in counterexamples
                 if bool(found.pair.obstacle) == bool(of_obstacles[mine][0])
             ]
+            for contact in contacts:
+                if bool(contact.pair.obstacle) == bool(of_obstacles[mine][0]):
+                    row = _first(row, contact)
             rows.append(_refuted(row, against[0]) if against else row)
     said = "".join(f"; {name!r} as a surface only" for name in surfaces(problem))
     if said:
@@ -79,6 +85,15 @@ def _row(
         where=where,
         moment=float(row[AT_UPPER] + row[TIME]) if np.isfinite(row[UP]) else nan,
     )
+
+
+def _first(row: Check, contact: FirstContact) -> Check:
+    """The row with the beginning of what it names at its worst."""
+    found = "first too close" if contact.clear_before else "first found too close"
+    pair = f"link {contact.pair.link} and {contact.pair.label}"
+    moment = f"{contact.moment:.6f}".rstrip("0").rstrip(".")
+    where = f"{row.where}; {found} at waypoint {moment}: {pair}"
+    return replace(row, where=where, first=contact.moment)
 
 
 def _refuted(row: Check, found: Counterexample) -> Check:

@@ -137,6 +137,7 @@ def enclosed_checks(
         worst=worst,
         where="; ".join(f"the arm is inside {name!r}" for name in around),
         moment=0.0,
+        first=0.0,
         deeper=True,
     )
     return refuted, *rows[1:]

@@ -50,6 +50,7 @@ class Check:
             13; NaN where it has no time.
         deeper: Whether `worst` is a depth at which the link's axis meets the body: it
             may be deeper, since no depth beyond the link's radius is measured.
+        first: When the limit is first broken, where that was looked for; NaN else.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Check:
     where: str = ""
     moment: float = nan
     deeper: bool = False
+    first: float = nan
 
 
 def is_deepest(clearance: float, link_radius: float) -> bool:

@@ -25,6 +25,7 @@ from vdsm_pin.verification.enclosed import (
     enclosed_checks,
     enclosed_profile,
 )
+from vdsm_pin.verification.first_contact import FirstContact, first_contacts
 from vdsm_pin.verification.inside import arm_inside, check_inside, locate_arm
 from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.records import (
@@ -93,6 +94,12 @@ def verify(
         lambda: find_counterexamples(problem, trajectory, box, proof, deadline),
         none,
     )
+    nowhere: tuple[FirstContact, ...] = ()
+    contacts = besides.take(
+        "first contact",
+        lambda: first_contacts(problem, trajectory, box, proof, deadline),
+        nowhere,
+    )
     if sinks and proof.sent < proof.n_intervals:
         besides.note(f"clearance.csv from interval {proof.sent} on", deadline)
     tip = check_tip(problem, trajectory)
@@ -103,7 +110,7 @@ def verify(
         *tip.checks,
         *check_inside(located),
         *enclosed_checks(
-            check_clearance(problem, proof, found, deadline), problem, around
+            check_clearance(problem, proof, found, contacts, deadline), problem, around
         ),
         *_by_coal(robot, problem, trajectory, proved, deadline),
         *_guarded(
