@@ -120,6 +120,12 @@ def verify(
         typer.Option(help="Print the report to this file; needs Chromium or Chrome."),
     ] = None,
     time_limit: TimeLimit = None,
+    all_pairs: Annotated[
+        bool,
+        typer.Option(
+            "--all-pairs", help="Every pair at every interval in clearance.csv."
+        ),
+    ] = False,
 ) -> None:
     """Verify a trajectory of any planner.
 
@@ -142,6 +148,7 @@ def verify(
             certificate=certificate,
             pdf=pdf,
             deadline=deadline,
+            all_pairs=all_pairs,
         )
     )
     file = verified.file

@@ -28,6 +28,7 @@ from vdsm_pin.report.tables import ClearanceCsv, write_cables, write_link_angles
 from vdsm_pin.robot_model import RobotModel, load_robot
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.coal_clearance import reach_of
 from vdsm_pin.verification.records import ErrorBox, Verdict, Verification
 from vdsm_pin.verification.task import all_pairs
 from vdsm_pin.verification.verify import verify
@@ -60,6 +61,8 @@ class VerifyOrder:
         certificate: Where the certificate of a certified motion goes; None for none.
         pdf: Where the report on paper goes; None for none.
         deadline: When to give up what is left; it is then undecided.
+        all_pairs: Whether clearance.csv has every pair at every interval, not the near
+            ones and the least of each alone.
     """
 
     source: ProblemFile
@@ -70,6 +73,7 @@ class VerifyOrder:
     certificate: Path | None = None
     pdf: Path | None = None
     deadline: Deadline = NO_LIMIT
+    all_pairs: bool = False
 
 
 @dataclass(frozen=True)
@@ -167,7 +171,8 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
     record = _record(order, robot)
     with staged(order.folder) as aside:
         pairs = all_pairs(problem)
-        with ClearanceCsv(aside / CLEARANCE, problem, pairs) as clearance:
+        reach = math.inf if order.all_pairs else reach_of(problem)
+        with ClearanceCsv(aside / CLEARANCE, problem, pairs, reach) as clearance:
             verification = verify(
                 problem,
                 trajectory,
@@ -176,7 +181,10 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
                 sinks=(clearance,),
                 joint_error=True,
                 deadline=order.deadline,
+                reach=reach,
             )
+            if verification.least is not None:
+                clearance.write_least(verification.least)
         write_link_angles(aside / LINK_ANGLES, verification)
         write_cables(aside / CABLES, verification)
         file = verification_file(verification, record)

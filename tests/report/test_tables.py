@@ -1,6 +1,7 @@
 """Oracle: the tables read back by the csv module against the records."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import made_up
@@ -15,7 +16,8 @@ from vdsm_pin.report.tables import (
     write_link_angles,
     write_summary,
 )
-from vdsm_pin.verification.records import Pair
+from vdsm_pin.report.thinning import nearest_obstacles
+from vdsm_pin.verification.records import LeastClearances, Pair
 
 
 def read(path: Path) -> list[dict[str, str]]:
@@ -82,3 +84,47 @@ def test_a_summary_reads_back_as_it_was(tmp_path: Path) -> None:
     )
     write_summary(tmp_path / "s.csv", [row, short])
     assert read_summary(tmp_path / "s.csv") == (row, short)
+
+
+def test_far_pairs_have_one_row_and_near_ones_a_row_an_interval(tmp_path: Path) -> None:
+    judged = made_up.verification()
+    pairs, chunk = judged.pairs, made_up.chunk(0, 4, len(judged.pairs))
+    reach = float(np.median(chunk.lower))
+    numbers = np.arange(len(pairs))
+    least = LeastClearances(
+        interval=numbers % 4,
+        time=np.full(len(pairs), 0.25),
+        lower=np.full(len(pairs), 7.0),
+        upper=np.full(len(pairs), 8.0),
+        verdict=np.zeros(len(pairs), np.int64),
+        link_point=np.zeros((len(pairs), 3)),
+        other_point=np.ones((len(pairs), 3)),
+    )
+    with ClearanceCsv(tmp_path / "c.csv", judged.problem, pairs, reach) as sink:
+        sink(chunk)
+        sink.write_least(least)
+    rows = read(tmp_path / "c.csv")
+    found = [
+        (int(r["interval"]), r["link"], r["obstacle"], r["other_link"]) for r in rows
+    ]
+    expected = [
+        (i, str(pairs[k].link), pairs[k].obstacle, str(pairs[k].other_link or ""))
+        for i, k in np.argwhere(chunk.lower <= reach).tolist()
+    ]
+    far = np.flatnonzero(~(chunk.lower <= reach).any(axis=0))
+    assert 0 < len(expected) < chunk.lower.size
+    assert found[: len(expected)] == expected
+    assert [float(row["lower_m"]) for row in rows[len(expected) :]] == [7.0] * far.size
+    assert len({one[1:] for one in found}) == len(pairs)
+
+
+@pytest.mark.parametrize("most", [1, 3, 100])
+def test_pages_show_the_nearest_obstacles(most: int) -> None:
+    judged = made_up.verification()
+    obstacles, n_links = judged.problem.scene.obstacles, 8
+    lower = np.linspace(1.0, 0.0, len(obstacles)).repeat(n_links)
+    nan = np.full(lower.shape, np.nan)
+    least = LeastClearances(nan, nan, lower, lower, nan, nan, nan)
+    chosen = nearest_obstacles(replace(judged, least=least), most)
+    count = min(most, len(obstacles))
+    assert chosen.tolist() == list(range(len(obstacles)))[-count:]

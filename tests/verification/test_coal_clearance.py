@@ -246,14 +246,18 @@ def test_a_wrong_sign_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_an_interval_proof_above_coal_is_noticed() -> None:
     problem = ball_near_link_4(0.01)
-    proved = np.full((1, 8), -1.0)
-    proved[0, 3] = 0.01 - 1e-6
-    (check,) = check_coal(ROBOT, problem, STRAIGHT, proved)
-    assert check.verdict is Verdict.CERTIFIED
-    proved[0, 3] = 0.01 + 1e-5
-    (check,) = check_coal(ROBOT, problem, STRAIGHT, proved)
-    assert check.verdict is Verdict.UNDECIDED
-    assert "link 4 and ball" in check.where
+    interval, none = np.full((1, 8), -1.0), np.full(8, -1)
+    interval[0, 3] = 0.01 - 1e-6
+    least = interval[0].copy()
+    # A bound of the interval, or of the whole motion where there is none.
+    for column, bound in ((np.arange(8), interval[0]), (none, least)):
+        proved = coal_clearance.ProvedLowers(least, column, interval)
+        (check,) = check_coal(ROBOT, problem, STRAIGHT, proved)
+        assert check.verdict is Verdict.CERTIFIED
+        bound[3] = 0.01 + 1e-5
+        (check,) = check_coal(ROBOT, problem, STRAIGHT, proved)
+        assert check.verdict is Verdict.UNDECIDED
+        assert "link 4 and ball" in check.where
 
 
 def test_poses_come_from_pinocchio_and_match_the_centres() -> None:

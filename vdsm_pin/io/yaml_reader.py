@@ -20,7 +20,7 @@ Data: TypeAlias = "Scalar | list[Data] | dict[str, Data]"
 Location: TypeAlias = tuple[str | int, ...]
 
 MAX_DEPTH: Final = 32
-MAX_VALUES: Final = 1_000_000
+MAX_VALUES: Final = 4_000_000
 MAX_INTEGER_DIGITS: Final = 300
 
 _NO_ENDS: Final = "\x85\u2028\u2029"

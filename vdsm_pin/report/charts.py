@@ -11,7 +11,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import link_angles
 from vdsm_pin.report.facts import cables, changed_angles, min_clearance, straight_arm
 from vdsm_pin.report.palette import link_colours, obstacle_colours
-from vdsm_pin.report.thinning import Thinned
+from vdsm_pin.report.thinning import MOST_PLOTTED, Thinned, nearest_obstacles
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.records import Verification
 
@@ -106,7 +106,10 @@ def _clearance_charts(
     least = min_clearance(verification)
     proved = -np.inf if least is None or least.lower_m is None else least.lower_m
     link_lower = np.maximum(profile.link_lower, proved)
-    obstacle_lower = np.maximum(profile.obstacle_lower, proved)
+    near = nearest_obstacles(verification, MOST_PLOTTED)
+    obstacle_lower = np.maximum(profile.obstacle_lower[:, near], proved)
+    whole = near.size == len(scene.names)
+    which = "Of" if whole else f"Of the {near.size} nearest obstacles,"
     return [
         common
         | {
@@ -124,12 +127,12 @@ def _clearance_charts(
         | {
             "id": "clearance-obstacle",
             "title": "Clearance from each obstacle",
-            "note": f"Of the nearest link. {note}",
+            "note": f"{which} the nearest link. {note}",
             "series": _brackets(
-                list(scene.names),
-                obstacle_colours(len(scene.names)),
+                [scene.names[k] for k in near],
+                obstacle_colours(near.size),
                 shown.least(obstacle_lower, profile.first_interval),
-                shown.least(profile.obstacle_upper, profile.first_interval),
+                shown.least(profile.obstacle_upper[:, near], profile.first_interval),
             ),
         },
     ]

@@ -19,6 +19,7 @@ from vdsm_pin.report.facts import failing, nearest_to_obstacle
 from vdsm_pin.report.files import BatchRow, PlanFile, Point, VerificationFile
 from vdsm_pin.report.inputs import assumption
 from vdsm_pin.report.page_data import report_data, view_data
+from vdsm_pin.report.thinning import MOST_DRAWN
 from vdsm_pin.report.words import (
     BASE_ERROR,
     MISSING,
@@ -154,6 +155,7 @@ def write_report(
         plan=plan,
         problem=verification.problem,
         data=data.text,
+        most_drawn=MOST_DRAWN,
         charts=data.charts,
         complete=data.complete,
         worst=nearest_to_obstacle(verification),
@@ -171,7 +173,9 @@ def view_page(problem: PlanningProblem, trajectory: Trajectory, live: str = "") 
         live: State of the files shown; with it the page asks its server for changes.
     """
     data = view_data(problem, trajectory)
-    return _rendered("view.html.j2", problem=problem, data=data, live=live)
+    return _rendered(
+        "view.html.j2", problem=problem, data=data, live=live, most_drawn=MOST_DRAWN
+    )
 
 
 def message_page(message: str, live: str) -> str:

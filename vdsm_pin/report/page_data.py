@@ -1,6 +1,7 @@
 """What a page's scripts read: the scene, the motion, the plots, as one JSON value."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -12,17 +13,25 @@ from vdsm_pin.report.charts import charts, packed
 from vdsm_pin.report.facts import failing
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import detail, surface
-from vdsm_pin.report.thinning import Thinned, thinned
+from vdsm_pin.report.thinning import (
+    MOST_DRAWN,
+    Thinned,
+    nearest_obstacles,
+    thinned,
+)
+from vdsm_pin.scene import Obstacle
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import ClosestApproach, Verification
 
 
-def scene_data(problem: PlanningProblem) -> dict[str, Any]:
-    """The arm, the obstacles and the desired path; base frame, [m]."""
+def scene_data(
+    problem: PlanningProblem, obstacles: Sequence[Obstacle]
+) -> dict[str, Any]:
+    """The arm, some obstacles and the desired path; base frame, [m]."""
     arm = problem.manipulator
-    extent, fine = arm.total_length, detail(len(problem.scene.obstacles))
+    extent, fine = arm.total_length, detail(len(obstacles))
     solids = []
-    for obstacle in problem.scene.obstacles:
+    for obstacle in obstacles:
         skin = surface(obstacle, extent, fine)
         solids.append(
             {
@@ -94,9 +103,11 @@ def report_data(verification: Verification) -> PageData:
     )
     shown = thinned(verification.trajectory, np.concatenate([intervals, intervals + 1]))
     plots = charts(verification, shown)
+    obstacles = verification.problem.scene.obstacles
+    drawn = [obstacles[k] for k in nearest_obstacles(verification, MOST_DRAWN)]
     text = _embedded(
         {
-            "scene": scene_data(verification.problem),
+            "scene": scene_data(verification.problem, drawn),
             "motion": motion_data(verification.problem, verification.trajectory, shown),
             "closest": [closest_data(row) for row in verification.approaches],
             "marks": [
@@ -113,7 +124,7 @@ def view_data(problem: PlanningProblem, trajectory: Trajectory) -> str:
     shown = thinned(trajectory, np.zeros(0, dtype=np.int64))
     return _embedded(
         {
-            "scene": scene_data(problem),
+            "scene": scene_data(problem, problem.scene.obstacles[:MOST_DRAWN]),
             "motion": motion_data(problem, trajectory, shown),
             "closest": [],
             "marks": [],

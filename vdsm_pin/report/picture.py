@@ -9,6 +9,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import surface
+from vdsm_pin.report.thinning import MOST_DRAWN, nearest_obstacles
 from vdsm_pin.scene import HalfSpace
 from vdsm_pin.verification.records import Verification
 
@@ -62,7 +63,9 @@ def picture(verification: Verification) -> str:
 
 def _outlines(verification: Verification) -> list[FloatArray]:
     found = []
-    for obstacle in verification.problem.scene.obstacles:
+    obstacles = verification.problem.scene.obstacles
+    for k in nearest_obstacles(verification, MOST_DRAWN):
+        obstacle = obstacles[k]
         if isinstance(obstacle, HalfSpace):
             continue  # covers all or nothing of a flat picture
         hull = MultiPoint(_view(surface(obstacle, 1.0).vertices)).convex_hull

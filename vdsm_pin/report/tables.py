@@ -1,7 +1,9 @@
 """CSV tables; every header carries its unit, links and joints count from 1."""
 
 import csv
+import math
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import fields
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Final, Self
@@ -9,13 +11,18 @@ from typing import IO, Any, Final, Self
 import numpy as np
 
 from vdsm_pin.cables import cable_lengths
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.decimals import WORD
 from vdsm_pin.kinematics import link_angles, position_angles
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.row_text import Form
-from vdsm_pin.verification.records import ClearanceChunk, Pair, Verification
+from vdsm_pin.verification.records import (
+    ClearanceChunk,
+    LeastClearances,
+    Pair,
+    Verification,
+)
 
 _VERDICTS: Final = ("certified", "refuted", "undecided")
 _CLEARANCE_HEADER: Final = (
@@ -54,11 +61,17 @@ class ClearanceCsv(_OwnFile):
     Args:
         path: The file.
         problem: For the frame of the witness points.
-        pairs: Column order of the chunks.
+        pairs: Every pair, as chunks number them.
+        reach: Rows are written of intervals over which a pair is not proved farther
+            apart; inf for all; [m].
     """
 
     def __init__(
-        self, path: Path, problem: PlanningProblem, pairs: Sequence[Pair]
+        self,
+        path: Path,
+        problem: PlanningProblem,
+        pairs: Sequence[Pair],
+        reach: float = math.inf,
     ) -> None:
         pose = problem.T_world_base
         self._rotation, self._shift = pose[:3, :3].T, pose[:3, 3]
@@ -68,27 +81,50 @@ class ClearanceCsv(_OwnFile):
         ]
         self._form = Form(_CLEARANCE_DECIMALS, _CLEARANCE_ROUNDING,
                           (*_VERDICTS, *partners))  # fmt: skip
+        self._reach, self._written = reach, np.zeros(len(pairs), dtype=np.bool_)
         self._file = path.open("wb")
         self._file.write(_CLEARANCE_HEADER.encode())
 
     def __call__(self, chunk: ClearanceChunk) -> None:
-        """Write one chunk."""
-        n, m = chunk.lower.shape
-        intervals = (np.arange(n) + float(chunk.first_interval))[:, None]
+        """Write the rows of one chunk that are within reach."""
+        row, column = np.nonzero(chunk.lower <= self._reach)
+        pairs = column if chunk.pairs is None else chunk.pairs[column]
+        part = LeastClearances(
+            interval=row + chunk.first_interval,
+            time=chunk.time[row, column],
+            lower=chunk.lower[row, column],
+            upper=chunk.upper[row, column],
+            verdict=chunk.verdict[row, column],
+            link_point=chunk.link_point[row, column],
+            other_point=chunk.other_point[row, column],
+        )
+        self._written[pairs] = True
+        self._write(pairs, part)
+
+    def write_least(self, least: LeastClearances) -> None:
+        """Write the least of every pair that has no row so far."""
+        rest = np.flatnonzero(~self._written)
+        for first in range(0, rest.size, _CHUNK):
+            pairs = rest[first : first + _CHUNK]
+            values = (getattr(least, one.name)[pairs] for one in fields(least))
+            self._write(pairs, LeastClearances(*values))
+
+    def _write(self, pairs: IntArray, rows: LeastClearances) -> None:
+        """Write rows, of which each has a pair."""
         columns = [
-            np.broadcast_to(intervals, (n, m)),
-            chunk.time + intervals,
-            np.broadcast_to(np.arange(m) + float(len(_VERDICTS)), (n, m)),
-            chunk.lower,
-            chunk.upper,
-            chunk.verdict,
+            rows.interval,
+            rows.interval + rows.time,
+            pairs + len(_VERDICTS),
+            rows.lower,
+            rows.upper,
+            rows.verdict,
         ]
         points = [
             point @ self._rotation + self._shift
-            for point in (chunk.link_point, chunk.other_point)
+            for point in (rows.link_point, rows.other_point)
         ]
-        table = np.concatenate([np.stack(columns, axis=2), *points], axis=2)
-        self._file.write(self._form.rows(table.reshape(n * m, table.shape[2])))
+        table = np.column_stack([*columns, *points]).astype(np.float64)
+        self._file.write(self._form.rows(table))
 
 
 def write_link_angles(path: Path, verification: Verification) -> None:

@@ -1,4 +1,4 @@
-"""Which rows a page shows: all of them, or few enough and every remarkable one."""
+"""Which rows and obstacles a page shows: all, or few enough and the remarkable ones."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -7,11 +7,31 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.records import Verification
 
 MOST_ROWS: Final = 2_000
 """Rows of a motion that a page shows at most, besides remarkable ones."""
 
 _MOST_CHANGES: Final = 500  # changes between path and detour that are kept
+
+MOST_DRAWN: Final = 2_000
+"""Obstacles that a page or a picture shows."""
+
+MOST_PLOTTED: Final = 100
+"""Obstacles with a curve of their own."""
+
+
+def nearest_obstacles(verification: Verification, most: int) -> IntArray:
+    """Numbers of the obstacles that come nearest, in file order; `most` of them.
+
+    The first ones where nobody knows how near they come.
+    """
+    count, least = len(verification.problem.scene.obstacles), verification.least
+    if count <= most or least is None:
+        return np.arange(min(count, most))
+    n_links = verification.problem.manipulator.n_links
+    lowers = least.lower[: count * n_links].reshape(count, n_links).min(axis=1)
+    return np.sort(np.argpartition(lowers, most)[:most])
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,9 @@ The compiled sweep judges every pair over every interval; what may hold the leas
 clearance is subdivided further until its bracket is narrow.
 """
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -30,7 +31,7 @@ from vdsm_pin.proof.layouts import (
     UP,
 )
 from vdsm_pin.proof.narrowing import narrow
-from vdsm_pin.proof.results import Dense, Results
+from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.search import Witnesses
 from vdsm_pin.proof.terms import (
@@ -38,9 +39,11 @@ from vdsm_pin.proof.terms import (
     CERTIFIED,
     LINKS,
     OBSTACLES,
+    REFUTED,
     UNDECIDED,
 )
 from vdsm_pin.proof.witnesses import place_best
+from vdsm_pin.scene import Scene
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.proving import (
@@ -56,6 +59,7 @@ from vdsm_pin.verification.records import (
     ClearanceProfile,
     ClearanceSink,
     ErrorBox,
+    LeastClearances,
     Pair,
 )
 from vdsm_pin.verification.task import all_pairs
@@ -93,19 +97,23 @@ class ClearanceProof:
     sent: int
 
 
-def _chunk(proving: Proving, dense: Dense, first: int, count: int) -> ClearanceChunk:
+def _chunk(
+    proving: Proving, first: int, count: int, least: FloatArray, pairs: IntArray
+) -> ClearanceChunk:
+    dense = proving.results.dense
     own, other = dense.own[:count], dense.other[:count]
     # In a pair of links the sweep moves the second one against the first.
     swapped = (proving.task.pairs.frame != BASE)[None, :, None]
     return ClearanceChunk(
         first_interval=first,
         # No interval is worse than what narrowing proved of all of them.
-        lower=frozen(np.maximum(dense.lower[:count], proving.results.best[:, LOW])),
+        lower=frozen(np.maximum(dense.lower[:count], least)),
         upper=frozen(dense.upper[:count]),
         time=frozen(dense.time[:count]),
         verdict=frozen(dense.verdict[:count], np.int64),
         link_point=frozen(np.where(swapped, other, own)),
         other_point=frozen(np.where(swapped, own, other)),
+        pairs=pairs,
     )
 
 
@@ -129,6 +137,7 @@ def prove_clearance(
     sinks: Sequence[ClearanceSink] = (),
     pieces: PackedPieces | None = None,
     deadline: Deadline = NO_LIMIT,
+    reach: float = math.inf,
 ) -> ClearanceProof:
     """Bracket the clearance of every pair over every interval.
 
@@ -139,6 +148,8 @@ def prove_clearance(
         sinks: Receive the brackets in chunks, in order, once all is proved.
         pieces: `pack_scene(problem)`, where it is known already.
         deadline: What is not judged by then is undecided.
+        reach: Obstacles that no link is proved nearer to than this, at any time, are
+            left out of what the sinks receive; [m].
 
     Returns:
         The proof, its least brackets narrowed unless the time ended before.
@@ -151,7 +162,9 @@ def prove_clearance(
     _own_up(proving)
     for group in (OBSTACLES, LINKS):
         _narrow(proving, group)
-    sent = _send(proving, sinks)
+    sent = 0
+    if sinks:
+        sent = _send(problem, trajectory, errors, proving, sinks, reach)
     order = np.lexsort((results.best[:, TIME], results.best[:, AT_UPPER]))
     place_best(proving.task, proving.motion, proving.desk.ends, results.best, order)
     return ClearanceProof(
@@ -252,31 +265,69 @@ def _narrow(proving: Proving, group: int) -> None:
         np.maximum(lower, proved.min(), out=lower)
 
 
-def _send(proving: Proving, sinks: Sequence[ClearanceSink]) -> int:
-    """Sweep once more, closely and for the sinks, now that the least is known.
+def _send(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    errors: ErrorBox,
+    proving: Proving,
+    sinks: Sequence[ClearanceSink],
+    reach: float,
+) -> int:
+    """Sweep the near obstacles once more, closely and for the sinks.
 
     Returns:
         Number of intervals sent.
     """
-    if not sinks:
-        return 0
-    n_intervals, n_pairs = proving.n_intervals, proving.task.pairs.link.size
-    length = CHUNK_VALUES // max(1, n_pairs) // BLOCK * BLOCK
-    length = min(CHUNK, n_intervals, max(BLOCK, length))
-    again = proving.results._replace(
-        best=proving.results.best.copy(),
-        counts=np.zeros((n_pairs, 3), np.int64),
+    known, n_links = proving.results, problem.manipulator.n_links
+    obstacles = problem.scene.obstacles
+    n_outer = n_links * len(obstacles)
+    lowers = known.best[:n_outer, LOW].reshape(-1, n_links)
+    near = np.flatnonzero((lowers <= reach).any(axis=1))
+    if near.size < len(obstacles):
+        scene = Scene(tuple(obstacles[k] for k in near))
+        near_problem = replace(problem, scene=scene)
+        proving = new_proving(
+            near_problem, trajectory, errors, deadline=proving.deadline
+        )
+    outer = (near[:, None] * n_links + np.arange(n_links)).ravel()
+    pairs = frozen(np.append(outer, np.arange(n_outer, len(known.best))), np.int64)
+    length = CHUNK_VALUES // max(1, pairs.size) // BLOCK * BLOCK
+    length = min(CHUNK, proving.n_intervals, max(BLOCK, length))
+    results = proving.results._replace(
+        best=known.best[pairs],
+        counts=np.zeros((pairs.size, 3), np.int64),
         profile=np.full_like(proving.results.profile, np.inf),
+        limit=known.limit,
         candidates=room_for(0),
         tally=np.zeros(TALLY, np.int64),
-        dense=dense_rows(length, n_pairs),
+        dense=dense_rows(length, pairs.size),
     )
-    for first in range(0, n_intervals, length):
-        last = min(first + length, n_intervals)
-        proving.sweep(again, first, last)
-        if proving.deadline.passed:
+    again = replace(proving, results=results)
+    for first in range(0, proving.n_intervals, length):
+        last = min(first + length, proving.n_intervals)
+        again.sweep(results, first, last)
+        if again.deadline.passed:
             return first
-        chunk = _chunk(proving, again.dense, first, last - first)
+        chunk = _chunk(again, first, last - first, known.best[pairs, LOW], pairs)
         for sink in sinks:
             sink(chunk)
-    return n_intervals
+    return proving.n_intervals
+
+
+def least_clearances(proof: ClearanceProof) -> LeastClearances:
+    """The least bounds of every pair, with their witnesses."""
+    best, counts = proof.best, proof.counts
+    verdict = np.where(counts[:, UNDECIDED] > 0, UNDECIDED, CERTIFIED)
+    verdict[counts[:, REFUTED] > 0] = REFUTED
+    own, other = best[:, OWN:OTHER], best[:, OTHER : OTHER + 3]
+    # In a pair of links the sweep moves the second one against the first.
+    swapped = np.array([not pair.obstacle for pair in proof.pairs], bool)[:, None]
+    return LeastClearances(
+        interval=frozen(best[:, AT_UPPER], np.int64),
+        time=frozen(best[:, TIME]),
+        lower=frozen(best[:, LOW]),
+        upper=frozen(best[:, UP]),
+        verdict=frozen(verdict, np.int64),
+        link_point=frozen(np.where(swapped, other, own)),
+        other_point=frozen(np.where(swapped, own, other)),
+    )

@@ -41,6 +41,9 @@ CHUNK_BOUNDS: Final = 1 << 17
 CHUNK_PAIRS: Final = 1 << 10
 """Pairs measured between two looks at the time."""
 
+MANY: Final = 10_000
+"""Of more obstacles than this only the nearest link of each is measured when far."""
+
 
 @dataclass(frozen=True)
 class CoalDistances:
@@ -80,6 +83,29 @@ class CoalDistances:
         return np.where(np.isfinite(self.distance), outside, np.inf)
 
 
+@dataclass(frozen=True)
+class ProvedLowers:
+    """Proved lower bounds of the pairs over intervals, or else over the whole motion.
+
+    Args:
+        least: Over the motion, shape (n_pairs,); [m].
+        column: Column of a pair in `lower`, below 0 for none, shape (n_pairs,).
+        lower: Over each interval, shape (n_intervals, n_columns); [m].
+    """
+
+    least: FloatArray
+    column: IntArray
+    lower: FloatArray
+
+    def at(self, waypoint: IntArray, pair: IntArray) -> FloatArray:
+        """The larger bound of the two intervals that meet at a row, shape (m,); [m]."""
+        column = self.column[pair]
+        last = len(self.lower) - 1
+        before = self.lower[np.minimum(np.maximum(waypoint - 1, 0), last), column]
+        after = self.lower[np.minimum(waypoint, last), column]
+        return np.where(column < 0, self.least[pair], np.maximum(before, after))
+
+
 NAME: Final = "distances by Coal against the proved brackets"
 """Name of the row."""
 
@@ -88,7 +114,7 @@ def check_coal(
     robot: RobotModel,
     problem: PlanningProblem,
     trajectory: Trajectory,
-    proved: FloatArray | None = None,
+    proved: ProvedLowers | None = None,
     deadline: Deadline = NO_LIMIT,
 ) -> tuple[Check, ...]:
     """Hold Coal's distances to the obstacles against the proved brackets.
@@ -97,9 +123,8 @@ def check_coal(
         robot: The arm in Pinocchio and Coal.
         problem: The scene.
         trajectory: What is judged.
-        proved: Proved lower bounds over the intervals for the pairs of links and
-            obstacles, obstacle by obstacle, shape (n_intervals, n_obstacles * N); Coal
-            must not fall below them at either end of an interval; [m].
+        proved: Proved lower bounds; Coal must not fall below them at either end of an
+            interval.
         deadline: When to give up.
 
     Returns:
@@ -172,7 +197,8 @@ def coal_distances(
 
     Yields:
         Distances in the order of the rows; last the pairs that were not measured, each
-        at the row where its coarse bound is least.
+        at the row where its coarse bound is least; of more than `MANY` obstacles each
+        with the link that is nearest then.
 
     Raises:
         OutOfTime: If the time is over.
@@ -204,6 +230,8 @@ def coal_distances(
                 yield _measured(
                     robot, trajectory, arm.link_radius, pieces, bodies, some
                 )
+    if len(obstacles) > MANY:  # of the far ones the nearest link alone
+        seen |= np.arange(arm.n_links)[:, None] != np.argmin(least, axis=0)
     unseen = np.argwhere(~seen)
     if unseen.size:
         rows = nearest[unseen[:, 0], unseen[:, 1]]
@@ -299,11 +327,10 @@ def capsule_transforms(
     return (coal.Transform3s(R, p) for R, p in zip(turned, shifted, strict=True))
 
 
-def _below_proof(found: CoalDistances, proved: FloatArray, n_links: int) -> FloatArray:
+def _below_proof(
+    found: CoalDistances, proved: ProvedLowers, n_links: int
+) -> FloatArray:
     """By how much Coal falls below what was proved over the intervals at a row; [m]."""
-    column = found.obstacle * n_links + found.link
-    before = np.maximum(found.waypoint - 1, 0)
-    after = np.minimum(found.waypoint, len(proved) - 1)
-    bound = np.maximum(proved[before, column], proved[after, column])
+    bound = proved.at(found.waypoint, found.obstacle * n_links + found.link)
     # Where bodies meet only the sign counts.
     return np.asarray(bound - np.maximum(found.distance, 0.0))

@@ -5,7 +5,7 @@ negative all over its inside: as for every other obstacle around a link's axis i
 reported as minus the link's radius, whatever the depth.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -21,6 +21,7 @@ from vdsm_pin.verification.records import (
     ClearanceProfile,
     ClearanceSink,
     ClosestApproach,
+    LeastClearances,
     Pair,
     Verdict,
 )
@@ -97,6 +98,28 @@ def enclosed_profile(
         link_upper=of_links(profile.link_upper, inside),
         obstacle_lower=frozen(lower),
         obstacle_upper=frozen(upper),
+    )
+
+
+def enclosed_least(
+    least: LeastClearances,
+    pairs: Sequence[Pair],
+    problem: PlanningProblem,
+    around: Collection[str],
+) -> LeastClearances:
+    """The least clearances with the meshes around the arm as solids."""
+    if not around:
+        return least
+    inside = np.array([pair.obstacle in around for pair in pairs], bool)
+    depth = -problem.manipulator.link_radius
+    return replace(
+        least,
+        lower=frozen(np.where(inside, depth, least.lower)),
+        upper=frozen(np.where(inside, depth, least.upper)),
+        verdict=frozen(np.where(inside, REFUTED, least.verdict), np.int64),
+        other_point=frozen(
+            np.where(inside[:, None], least.link_point, least.other_point)
+        ),
     )
 
 

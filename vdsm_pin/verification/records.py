@@ -92,7 +92,7 @@ class ErrorBox:
     base_turn: float = 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Pair:
     """A body of the arm and what it must stay clear of: an obstacle, or another body.
 
@@ -202,12 +202,37 @@ class ClearanceChunk:
         verdict: 0 certified, 1 refuted, 2 undecided, shape (m, n_pairs).
         link_point: Witnesses on the links, base frame, shape (m, n_pairs, 3); [m].
         other_point: Witnesses on the partners, shape (m, n_pairs, 3); [m].
+        pairs: Numbers of the pairs of the columns; None for all pairs in order.
     """
 
     first_interval: int
     lower: FloatArray
     upper: FloatArray
     time: FloatArray
+    verdict: IntArray
+    link_point: FloatArray
+    other_point: FloatArray
+    pairs: IntArray | None = None
+
+
+@dataclass(frozen=True)
+class LeastClearances:
+    """The least clearance of every pair over the whole motion.
+
+    Args:
+        interval: Where the upper bound was found, shape (n_pairs,).
+        time: Its place in the interval, 0 to 1, shape (n_pairs,); [-].
+        lower: Proved lower bound over the motion, shape (n_pairs,); [m].
+        upper: Proved upper bound, shape (n_pairs,); [m].
+        verdict: 0 certified, 1 refuted, 2 undecided, shape (n_pairs,).
+        link_point: Witnesses on the links, base frame, shape (n_pairs, 3); [m].
+        other_point: Witnesses on the partners, shape (n_pairs, 3); [m].
+    """
+
+    interval: IntArray
+    time: FloatArray
+    lower: FloatArray
+    upper: FloatArray
     verdict: IntArray
     link_point: FloatArray
     other_point: FloatArray
@@ -245,7 +270,7 @@ class Verification(Summarised):
         problem: What was asked.
         trajectory: What was judged.
         errors: The error box the clearance proof covers.
-        pairs: Every pair judged, in the column order of the chunks.
+        pairs: Every pair judged, in the order that chunks number them.
         checks: One row per check, in a fixed order.
         approaches: The closest approaches over the whole motion, nearest first, one per
             pair at most, ten at most; the first is the minimum clearance.
@@ -264,6 +289,7 @@ class Verification(Summarised):
         not_done: What the time limit left out besides checks, which have their rows;
             in words, one thing each.
         time_limit: How long all of it was allowed to take; [s].
+        least: The least clearance of every pair; None where nobody worked it out.
     """
 
     problem: PlanningProblem
@@ -281,6 +307,7 @@ class Verification(Summarised):
     counterexamples: tuple[Counterexample, ...] = ()
     not_done: tuple[str, ...] = ()
     time_limit: float = float("inf")
+    least: LeastClearances | None = None
 
     @property
     def verdict(self) -> Verdict:

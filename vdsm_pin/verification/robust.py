@@ -14,9 +14,11 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.proof.terms import UNDECIDED
+from vdsm_pin.scene import Scene
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
@@ -44,6 +46,15 @@ SOUGHT: Final = 3
 AROUND: Final = 16
 """So many intervals before and after the first that is lost are searched."""
 
+MANY: Final = 1_000
+"""Of more obstacles than this the far ones are left out first."""
+
+FEW: Final = 64
+"""Obstacles that are asked about before the others."""
+
+SPARE: Final = 1e-6
+"""What an obstacle that is left out keeps beyond what is asked for; [m]."""
+
 LOOKS: Final = 8
 """Slices of an interval that tell well enough where a pair is near."""
 
@@ -53,6 +64,7 @@ def largest_joint_error(
     trajectory: Trajectory,
     errors: ErrorBox,
     deadline: Deadline = NO_LIMIT,
+    clearances: FloatArray | None = None,
 ) -> float:
     """The largest joint error for which the clearance proof still goes through.
 
@@ -61,6 +73,8 @@ def largest_joint_error(
         trajectory: The motion.
         errors: Base and obstacle errors to assume besides; its joint error is ignored.
         deadline: When to give up.
+        clearances: Proved least clearance of each obstacle from the nominal motion,
+            shape (n_obstacles,), which spares looking at far ones; [m].
 
     Returns:
         A joint error that was proved, within `TOLERANCES.joint_error` of one that was
@@ -69,9 +83,54 @@ def largest_joint_error(
     Raises:
         OutOfTime: If the time is over.
     """
-    proof = HastyProof(problem, trajectory, deadline)
-    end = proof.n_intervals
     largest = LARGEST
+    if clearances is not None and len(clearances) > MANY:
+        # No motion survives more than what the nearest obstacles leave it.
+        bound = float(np.partition(clearances, FEW)[FEW])
+        some = _without_far(problem, clearances, bound)
+        largest = _largest_of_all(some, trajectory, errors, largest, deadline)
+        problem = within_reach(problem, clearances, replace(errors, joint=largest))
+    return _largest_of_all(problem, trajectory, errors, largest, deadline)
+
+
+def within_reach(
+    problem: PlanningProblem, clearances: FloatArray, errors: ErrorBox
+) -> PlanningProblem:
+    """The problem without the obstacles that no error within a box brings too near.
+
+    A joint angle that is off by E moves what is beyond it by E times its distance at
+    most, which is the sum of the links between: two angles a joint make 2 E sum l L_l.
+
+    Args:
+        problem: Arm, scene, required clearances.
+        clearances: Proved of each obstacle and the nominal motion, (n_obstacles,); [m].
+        errors: The box.
+    """
+    lengths = problem.manipulator.link_lengths
+    lever = 2.0 * float(np.arange(1, lengths.size + 1) @ lengths)
+    moved = errors.joint * lever + errors.base + errors.obstacle
+    return _without_far(problem, clearances, problem.required_clearance + moved + SPARE)
+
+
+def _without_far(
+    problem: PlanningProblem, clearances: FloatArray, bound: float
+) -> PlanningProblem:
+    """The problem without the obstacles of more clearance than a bound."""
+    near = np.flatnonzero(~(clearances > bound))
+    obstacles = problem.scene.obstacles
+    return replace(problem, scene=Scene(tuple(obstacles[k] for k in near)))
+
+
+def _largest_of_all(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    errors: ErrorBox,
+    most: float,
+    deadline: Deadline,
+) -> float:
+    """As `largest_joint_error`, but not above `most`."""
+    proof = HastyProof(problem, trajectory, deadline)
+    end, largest = proof.n_intervals, most
     for first in _shuffled(range(0, end, STRETCH)):
         last = min(first + STRETCH, end)
         largest = _largest(partial(_holds, proof, errors, first, last), largest)
@@ -142,6 +201,7 @@ def refuted_joint_error(
     errors: ErrorBox,
     certified: float,
     deadline: Deadline = NO_LIMIT,
+    clearances: FloatArray | None = None,
 ) -> float:
     """A joint error at which the clearance is lost, the smallest that is found.
 
@@ -151,6 +211,7 @@ def refuted_joint_error(
         errors: As for `largest_joint_error`.
         certified: What that one found; [rad].
         deadline: When to give up.
+        clearances: As for `largest_joint_error`.
 
     Returns:
         The largest offset of a counterexample; NaN where none was found; [rad].
@@ -158,15 +219,21 @@ def refuted_joint_error(
     Raises:
         OutOfTime: If the time is over.
     """
-    proof = HastyProof(problem, trajectory, deadline)
     above = certified + TOLERANCES.joint_error
+
+    def near(joint: float) -> PlanningProblem:
+        if clearances is None or len(clearances) <= MANY:
+            return problem
+        return within_reach(problem, clearances, replace(errors, joint=joint))
+
+    proof = HastyProof(near(above), trajectory, deadline)
     lost = _first_lost(partial(_holds, proof, errors, joint=above), proof.n_intervals)
     if lost is None:
         return nan
     weakest = trajectory.part(max(0, lost - AROUND), lost + AROUND + 2)
     for factor in FACTORS:
         box = replace(errors, joint=factor * above)
-        found = _smallest(problem, weakest, box, deadline)
+        found = _smallest(near(box.joint), weakest, box, deadline)
         if found:
             return min(found)
     return nan

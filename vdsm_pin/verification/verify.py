@@ -1,5 +1,6 @@
 """The judgement of a trajectory: every check, one row each, in a fixed order."""
 
+import math
 from collections.abc import Callable, Sequence
 from math import nan
 from typing import Final, TypeVar
@@ -16,13 +17,18 @@ from vdsm_pin.robot_model import RobotModel
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification import cable_check, coal_clearance, coal_links, fk
-from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
+from vdsm_pin.verification.clearance import (
+    ClearanceProof,
+    least_clearances,
+    prove_clearance,
+)
 from vdsm_pin.verification.clearance_check import check_clearance
 from vdsm_pin.verification.counterexample import find_counterexamples
 from vdsm_pin.verification.enclosed import (
     EnclosedSink,
     enclosed_approaches,
     enclosed_checks,
+    enclosed_least,
     enclosed_profile,
 )
 from vdsm_pin.verification.first_contact import FirstContact, first_contacts
@@ -60,6 +66,7 @@ def verify(
     sinks: Sequence[ClearanceSink] = (),
     joint_error: bool = False,
     deadline: Deadline = NO_LIMIT,
+    reach: float | None = None,
 ) -> Verification:
     """Judge a trajectory against a problem.
 
@@ -71,6 +78,8 @@ def verify(
         sinks: Receive the clearance brackets in chunks, in order.
         joint_error: Whether to find the largest joint error that is still certified.
         deadline: When to give up what is left.
+        reach: The sinks hear of obstacles within it, see `prove_clearance`; as far as
+            Coal looks where not given; [m].
 
     Returns:
         All rows of evidence. A check that could not be carried out, or not in time, is
@@ -84,9 +93,13 @@ def verify(
     located = locate_arm(problem, trajectory)
     around, kept = arm_inside(located), _Lowers(problem, trajectory)
     wanted = [EnclosedSink(sink, problem, around) if around else sink for sink in sinks]
-    if kept.fits:
+    if sinks or kept.fits:
         wanted.append(kept.keep)
-    proof = prove_clearance(problem, trajectory, box, wanted, deadline=deadline)
+    near = coal_clearance.reach_of(problem) if reach is None else reach
+    near = math.inf if around else near
+    proof = prove_clearance(
+        problem, trajectory, box, wanted, deadline=deadline, reach=near
+    )
     besides = _Besides()
     none: tuple[Counterexample, ...] = ()
     found = besides.take(
@@ -103,7 +116,7 @@ def verify(
     if sinks and proof.sent < proof.n_intervals:
         besides.note(f"clearance.csv from interval {proof.sent} on", deadline)
     tip = check_tip(problem, trajectory)
-    proved = kept.proved if proof.sent == proof.n_intervals else None
+    proved = kept.proved(proof)
     checks = [
         *_guarded(fk.NAME, lambda: fk.check_fk(robot, problem, trajectory, deadline)),
         *check_limits(problem, trajectory),
@@ -120,7 +133,11 @@ def verify(
     ]
     largest = refuted = nan
     if joint_error and all(where.side is Side.OUTSIDE for where in located.values()):
-        largest, refuted = _joint_errors(problem, trajectory, box, deadline, besides)
+        survival = _Survival(problem, trajectory, box, proof, deadline)
+        largest = besides.take("largest joint error", survival.largest, nan)
+        if not np.isnan(largest):
+            name = "joint error that loses the clearance"
+            refuted = besides.take(name, lambda: survival.refuted(largest), nan)
     elif joint_error:
         largest = 0.0
     return Verification(
@@ -139,7 +156,34 @@ def verify(
         counterexamples=found,
         not_done=tuple(besides.not_done),
         time_limit=deadline.limit,
+        least=enclosed_least(least_clearances(proof), proof.pairs, problem, around),
     )
+
+
+class _Survival:
+    """The joint error that the clearance survives, from both sides."""
+
+    def __init__(
+        self,
+        problem: PlanningProblem,
+        trajectory: Trajectory,
+        errors: ErrorBox,
+        proof: ClearanceProof,
+        deadline: Deadline,
+    ) -> None:
+        self._asked, self._deadline = (problem, trajectory, errors), deadline
+        n_links = problem.manipulator.n_links
+        outer = proof.best[: n_links * len(problem.scene.obstacles), LOW]
+        self._least = outer.reshape(-1, n_links).min(axis=1)
+
+    def largest(self) -> float:
+        """The largest that is proved; [rad]."""
+        return largest_joint_error(*self._asked, self._deadline, self._least)
+
+    def refuted(self, largest: float) -> float:
+        """One that is lost, the smallest found; [rad]."""
+        known = self._deadline, self._least
+        return refuted_joint_error(*self._asked, largest, *known)
 
 
 class _Besides:
@@ -165,7 +209,7 @@ def _by_coal(
     robot: RobotModel,
     problem: PlanningProblem,
     trajectory: Trajectory,
-    proved: FloatArray | None,
+    proved: coal_clearance.ProvedLowers,
     deadline: Deadline,
 ) -> tuple[Check, ...]:
     """The second opinions on distances."""
@@ -183,47 +227,32 @@ def _by_coal(
     )
 
 
-def _joint_errors(
-    problem: PlanningProblem,
-    trajectory: Trajectory,
-    box: ErrorBox,
-    deadline: Deadline,
-    besides: _Besides,
-) -> tuple[float, float]:
-    """The largest joint error that is survived and the least that is not; [rad]."""
-    largest = besides.take(
-        "largest joint error",
-        lambda: largest_joint_error(problem, trajectory, box, deadline),
-        nan,
-    )
-    if np.isnan(largest):
-        return nan, nan
-    refuted = besides.take(
-        "joint error that loses the clearance",
-        lambda: refuted_joint_error(problem, trajectory, box, largest, deadline),
-        nan,
-    )
-    return largest, refuted
-
-
 class _Lowers:
-    """Collects the proved bounds against obstacles, where they fit into memory."""
+    """Collects the proved bounds of the intervals, where they fit into memory."""
 
     def __init__(self, problem: PlanningProblem, trajectory: Trajectory) -> None:
         n_intervals = max(1, trajectory.n_samples - 1)
-        n_obstacles = len(problem.scene.obstacles)
-        self.columns = n_obstacles * problem.manipulator.n_links
-        self.fits = 0 < n_intervals * self.columns <= COMPARED
-        self.parts: list[FloatArray] = []
+        columns = len(problem.scene.obstacles) * problem.manipulator.n_links
+        self.fits = 0 < n_intervals * columns <= COMPARED
+        self._parts: list[FloatArray] = []
+        self._pairs, self._size = np.zeros(0, np.int64), 0
 
     def keep(self, chunk: ClearanceChunk) -> None:
         """Receive a chunk."""
-        self.parts.append(chunk.lower[:, : self.columns])
+        self._size += chunk.lower.size
+        if self._size <= COMPARED and chunk.pairs is not None:
+            self._parts.append(chunk.lower)
+            self._pairs = chunk.pairs
 
-    @property
-    def proved(self) -> FloatArray | None:
-        """Lower bounds of all intervals, shape (n_intervals, columns); [m]."""
-        return np.concatenate(self.parts) if self.parts else None
+    def proved(self, proof: ClearanceProof) -> coal_clearance.ProvedLowers:
+        """The bounds of the intervals, and of the whole motion for other pairs."""
+        column = np.full(len(proof.best), -1)
+        lower = np.zeros((1, 1))
+        whole = proof.sent == proof.n_intervals and self._size <= COMPARED
+        if self._pairs.size and whole:
+            column[self._pairs] = np.arange(self._pairs.size)
+            lower = np.concatenate(self._parts)
+        return coal_clearance.ProvedLowers(proof.best[:, LOW], column, lower)
 
 
 def _check_input(

@@ -1,0 +1,125 @@
+"""Far obstacles are left out only of what they cannot change.
+
+Oracle: the same asked about all of them.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vdsm_pin.geometry.arrays import rotation_from_rpy
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.manipulator import built_in
+from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.proof.layouts import LOW
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.scene import Box, Obstacle, Scene
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification import coal_clearance, robust
+from vdsm_pin.verification.clearance import least_clearances, prove_clearance
+from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.records import ClearanceChunk, ErrorBox, Verdict
+
+ARM = built_in("hrm8")
+REACH = 0.3
+
+
+def cloud(seed: int, n: int = 120) -> PlanningProblem:
+    """Boxes along the arm, most of them far."""
+    rng = np.random.default_rng(seed)
+    boxes: list[Obstacle] = []
+    for k in range(n):
+        away, turn = 0.25 + rng.exponential(0.8), rng.uniform(0.0, 2.0 * np.pi)
+        centre = [rng.uniform(0, 3.2), away * np.cos(turn), away * np.sin(turn)]
+        rotation = rotation_from_rpy(rng.uniform(-3, 3, 3))
+        size = rng.uniform(0.01, 0.05, 3)
+        boxes.append(Box(f"box{k}", np.array(centre), rotation, size))
+    tip = np.array([3.126, 0.0, 0.0])
+    path = DesiredPath(tip, tip[None])
+    return PlanningProblem("p", ARM, Scene(tuple(boxes)), path, 0.002, np.eye(4))
+
+
+def swaying(n_rows: int = 60) -> Trajectory:
+    t = np.linspace(0.0, 5.0, n_rows)[:, None] + np.arange(8.0)
+    x0, off = 0.02 * np.sin(t[:, 0]), np.zeros(n_rows, bool)
+    return Trajectory(off, off, x0, 0.01 * np.sin(t), 0.01 * np.cos(1.3 * t))
+
+
+def lowers(problem: PlanningProblem, motion: Trajectory) -> np.ndarray:
+    best = prove_clearance(problem, motion, ErrorBox()).best
+    n = len(problem.scene.obstacles)
+    return np.asarray(best[: 8 * n, LOW].reshape(n, 8).min(axis=1))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_largest_joint_error_is_the_same(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem, motion = cloud(seed), swaying()
+    box = ErrorBox(base=0.001, obstacle=0.0005)
+    whole = robust.largest_joint_error(problem, motion, box)
+    lost = robust.refuted_joint_error(problem, motion, box, whole)
+    monkeypatch.setattr(robust, "MANY", 10)
+    monkeypatch.setattr(robust, "FEW", 4)
+    least = lowers(problem, motion)
+    found = robust.largest_joint_error(problem, motion, box, clearances=least)
+    assert found == pytest.approx(whole, abs=2.0 * TOLERANCES.joint_error)
+    again = robust.refuted_joint_error(problem, motion, box, found, clearances=least)
+    assert np.isnan(again) == np.isnan(lost)
+    assert not again <= found
+    # What is left out is what made it quick.
+    kept = robust.within_reach(problem, least, replace(box, joint=found))
+    assert 0 < len(kept.scene.obstacles) < len(problem.scene.obstacles)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_error_brings_a_far_obstacle_too_near(seed: int) -> None:
+    problem, motion, rng = cloud(seed), swaying(), np.random.default_rng(seed)
+    box = ErrorBox(joint=10.0 ** rng.uniform(-3, -0.7), base=0.01)
+    near = robust.within_reach(problem, lowers(problem, motion), box).scene.names
+    far = tuple(o for o in problem.scene.obstacles if o.name not in near)
+    if not far:
+        return
+    clearance = link_clearance(replace(problem, scene=Scene(far)))
+    for _ in range(20):
+        signs = rng.choice([-1.0, 1.0], (3, 60, 8)) * box.joint
+        x0 = motion.x0 + rng.uniform(-box.base, box.base)
+        centres = joint_centres(
+            ARM, x0, motion.alpha + signs[0], motion.theta + signs[1]
+        )
+        assert clearance(centres).min() > problem.required_clearance
+
+
+def test_sinks_hear_of_near_obstacles_what_they_hear_of_all() -> None:
+    problem, motion = cloud(1), swaying()
+    everything: list[ClearanceChunk] = []
+    near: list[ClearanceChunk] = []
+    proof = prove_clearance(problem, motion, ErrorBox(), [everything.append])
+    prove_clearance(problem, motion, ErrorBox(), [near.append], reach=REACH)
+    pairs, all_lower = near[0].pairs, everything[0].lower
+    assert pairs is not None
+    assert 21 < pairs.size < all_lower.shape[1]
+    close = all_lower[:, : 8 * 120] <= REACH
+    assert set(np.flatnonzero(close.any(axis=0))) <= set(pairs.tolist())
+    ours, theirs = near[0].lower, all_lower[:, pairs]
+    both = theirs <= REACH
+    # Two proofs of one clearance: either bracket holds, so they overlap.
+    assert (ours <= everything[0].upper[:, pairs] + 1e-9).all()
+    assert (theirs <= near[0].upper + 1e-9).all()
+    assert (near[0].verdict == everything[0].verdict[:, pairs])[both].all()
+    least = least_clearances(proof)
+    assert (least.lower <= all_lower.min(axis=0) + 1e-12).all()
+    assert least.verdict.shape == (len(proof.pairs),)
+
+
+def test_of_very_many_obstacles_coal_measures_the_nearest_link_of_far_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    problem, motion, robot = cloud(2), swaying(), load_robot(ARM)
+    (full,) = coal_clearance.check_coal(robot, problem, motion)
+    monkeypatch.setattr(coal_clearance, "MANY", 100)
+    (fewer,) = coal_clearance.check_coal(robot, problem, motion)
+    assert full.verdict is fewer.verdict is Verdict.CERTIFIED
+    assert 120 <= fewer.count < full.count
