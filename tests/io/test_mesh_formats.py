@@ -397,6 +397,16 @@ def test_damage_of_ply_and_dae_is_named(
     assert expected in str(caught.value)
 
 
+@pytest.mark.parametrize("kind", ["stl", "ply", "glb"])
+def test_a_number_that_signals_it_is_none_is_refused_in_one_message(
+    tmp_path: Path, kind: str
+) -> None:
+    corner = trimesh.creation.box((1.5, 1.5, 1.5)).export(file_type=kind)
+    wrong = corner.replace(np.float32(0.75).tobytes(), b"\1\0\xa0\x7f")
+    with pytest.raises(InvalidFile, match="a coordinate that is not a number"):
+        read_mesh(write(tmp_path, f"a.{kind}", wrong))
+
+
 def test_a_binary_ply_that_promises_more_than_it_has_is_refused(tmp_path: Path) -> None:
     box = trimesh.creation.box()
     content = box.export(file_type="ply", encoding="binary")

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.io.meshes.raw import MeshStream, RawMesh
+from vdsm_pin.io.meshes.raw import MeshStream, RawMesh, doubles
 from vdsm_pin.io.meshes.scene import Part, Placed, composed
 from vdsm_pin.io.schema_types import LARGEST
 
@@ -274,7 +274,7 @@ class _Reader:
         shaped = np.ndarray(
             (accessor.count, width), kind, self._data, start, (stride, kind.itemsize)
         )
-        values = shaped.astype(np.float64)
+        values = doubles(shaped)
         if accessor.normalized and kind.kind != "f":
             bits = 8 * kind.itemsize - (kind.kind == "i")
             values = np.maximum(values / (2.0**bits - 1.0), -1.0)

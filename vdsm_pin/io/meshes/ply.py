@@ -10,7 +10,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.io.meshes.faces import cut_faces
-from vdsm_pin.io.meshes.raw import MAX_LINE, MeshStream, RawMesh
+from vdsm_pin.io.meshes.raw import MAX_LINE, MeshStream, RawMesh, doubles
 
 _KINDS: Final = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -232,7 +232,7 @@ class _Binary:
         self._offset = start + element.count * kind.itemsize
         return {
             one.name: _Column(
-                table[f"p{k}"].astype(np.float64).reshape(-1),
+                doubles(table[f"p{k}"]).reshape(-1),
                 np.full(element.count, sizes[k]),
             )
             for k, one in enumerate(element.properties)
@@ -252,7 +252,7 @@ class _Binary:
                 self._offset = last
         return {
             one.name: _Column(
-                np.frombuffer(chunks[k], self._sign + one.kind).astype(np.float64),
+                doubles(np.frombuffer(chunks[k], self._sign + one.kind)),
                 np.array(sizes[k]),
             )
             for k, one in enumerate(element.properties)

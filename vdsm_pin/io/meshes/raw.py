@@ -20,6 +20,12 @@ _BOM: Final = "\xef\xbb\xbf"  # of UTF-8, as Latin-1
 _UTF_16: Final = ("\xff\xfe", "\xfe\xff")
 
 
+def doubles(values: Any) -> FloatArray:
+    """Numbers of any kind as doubles; a NaN that signals is a NaN, without a word."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(values, dtype=np.float64)
+
+
 @dataclass(frozen=True)
 class RawMesh:
     """Triangles as a file has them.

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io.meshes.raw import MeshStream, RawMesh
+from vdsm_pin.io.meshes.raw import MeshStream, RawMesh, doubles
 
 _HEADER: Final = 80
 _START: Final = _HEADER + 4
@@ -51,7 +51,7 @@ def _binary(stream: MeshStream, promised: int) -> RawMesh:
     for first in range(0, count, _BLOCK):
         last = min(first + _BLOCK, count)
         block = stream.content.read((last - first) * _RECORD.itemsize)
-        corners[first:last] = np.frombuffer(block, dtype=_RECORD)["corners"]
+        corners[first:last] = doubles(np.frombuffer(block, _RECORD)["corners"])
     return _mesh(stream, corners, notes)
 
 
