@@ -1,7 +1,7 @@
 """Tensions that hold the arm: bounded least squares, and how stiff the cables make it.
 
 With J = dL/dq of the cable lengths the tensions T act on the joints by -J^T T. Held
-against gravity g(q) they solve J^T T = -g with 0 <= T <= T_max, as near to the
+against gravity g(q) they solve J^T T = -g with T_min <= T <= T_max, as near to the
 pretension as that leaves free (Stark and Parker's bounded least squares).
 """
 
@@ -71,7 +71,7 @@ class Statics:
         even = np.full(len(slopes), cables.pretension_n)
         rows = np.vstack([slopes.T, EVENNESS * np.eye(len(slopes))])
         aims = np.concatenate([-torque, EVENNESS * even])
-        bounds = (0.0, cables.largest_tension_n)
+        bounds = (cables.least_tension_n, cables.largest_tension_n)
         return np.asarray(lsq_linear(rows, aims, bounds, tol=1e-10).x)
 
     def least_stiffness(self, angles: FloatArray, tensions: FloatArray) -> float:

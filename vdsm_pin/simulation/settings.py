@@ -52,6 +52,9 @@ class Cables(Part):
     largest_tension_n: Positive = Field(
         default=4000.0, description="of a cable; below the rope's breaking load"
     )
+    least_tension_n: NotNegative = Field(
+        default=30.0, description="held in every cable: a slack one gives no stiffness"
+    )
     pretension_n: NotNegative = Field(
         default=100.0, description="aimed at where gravity asks for no more"
     )
@@ -75,8 +78,8 @@ class Sensors(Part):
 class Controller(Part):
     """PID on the joint angles; its output goes through the cable kinematics.
 
-    The gains are those with which a kicked arm comes to rest: with twice the derivative
-    it swings for ever once cables go slack, with none it swings up.
+    The gains are those with which a kicked arm comes to rest; with no derivative it
+    swings up.
     """
 
     period_s: Positive = Field(default=0.005, description="200 Hz; assumed")
