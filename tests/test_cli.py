@@ -216,7 +216,7 @@ def test_less_coverage_is_enough_where_the_problem_says_so(
     problem, out = write_problem(tmp_path / "wall.yaml", text), tmp_path / "out"
     ran = vdsm("plan", problem, "--out", out)
     assert (ran.status, ran.out.split()[:2]) == (0, ["✓", "certified"])
-    assert re.search(r"not drawn +from 0\.\d+ m to 2\.5000 m", ran.out)
+    assert re.search(r"not drawn +from \d+\.\d+ mm to 2500\.000 mm", ran.out)
     ran = vdsm("verify", problem, "--trajectory", out / "trajectory.csv", "--out", out)
     assert ran.status == 0
     assert re.search(r"1\d\.\d % of the desired path is drawn", ran.out)
@@ -304,7 +304,7 @@ def test_a_search_in_vain_tells_how_far_it_came_and_how_long_it_took(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def in_vain(*_: object) -> None:
-        message = "drew 0.100 m of 0.400 m"
+        message = "drew 100.000 mm of 400.000 mm"
         raise NoPlanFound(message)
 
     monkeypatch.setattr("vdsm_pin.workflow.plan_to_folder", in_vain)
@@ -314,7 +314,7 @@ def test_a_search_in_vain_tells_how_far_it_came_and_how_long_it_took(
     assert ended.value.code == 1
     said = capsys.readouterr().err
     assert re.search(
-        r"no plan found: drew 0\.100 m of .*; searched for \d+\.\d s", said
+        r"no plan found: drew 100\.000 mm of .*; searched for \d+\.\d s", said
     )
 
 

@@ -24,6 +24,7 @@ Messages say what, where, how much and against what; the same facts are attribut
 """
 
 from vdsm_pin.text import printable
+from vdsm_pin.units import MM_PER_M, in_mm
 
 
 class VdsmError(Exception):
@@ -71,7 +72,8 @@ class InconsistentCables(InvalidInput):
         self.residual, self.tolerance = residual, tolerance
         message = (
             f"waypoint {waypoint}: the cable lengths of link {link} fit no joint "
-            f"angles; the nearest leave {residual:.3e} m (tolerance {tolerance:.1e} m)"
+            f"angles; the nearest leave {residual * MM_PER_M:.3e} mm (tolerance "
+            f"{tolerance * MM_PER_M:.1e} mm)"
         )
         super().__init__(message)
 
@@ -95,8 +97,8 @@ class OutOfReach(Infeasible):
     ) -> None:
         self.place, self.distance, self.reach = place, distance, reach
         message = (
-            f"{place} lies {distance:.6f} m from the rail, beyond the reach of "
-            f"{reach:.6f} m ({reason})"
+            f"{place} lies {in_mm(distance)} from the rail, beyond the reach of "
+            f"{in_mm(reach)} ({reason})"
         )
         super().__init__(message)
 
@@ -107,8 +109,9 @@ class LinkTooShort(Infeasible):
     def __init__(self, *, waypoint: int, link: int, gap: float, length: float) -> None:
         self.waypoint, self.link, self.gap, self.length = waypoint, link, gap, length
         message = (
-            f"waypoint {waypoint}: projected gap {gap:.6f} m exceeds "
-            f"link {link} of length {length:.6f} m (excess {gap - length:.3e} m)"
+            f"waypoint {waypoint}: projected gap {in_mm(gap)} exceeds "
+            f"link {link} of length {in_mm(length)} (excess "
+            f"{(gap - length) * MM_PER_M:.3e} mm)"
         )
         super().__init__(message)
 
@@ -152,8 +155,8 @@ class StartBlocked(Infeasible):
         self.clearance, self.required = clearance, required
         message = (
             f"at its start link {link} of the {'' if bent else 'straight '}arm has "
-            f"{clearance * 1e3:.3f} mm to obstacle {obstacle!r}, required are "
-            f"{required * 1e3:.3f} mm"
+            f"{in_mm(clearance)} to obstacle {obstacle!r}, required are "
+            f"{in_mm(required)}"
         )
         if not bent:
             message += "; `start: {joints: ...}` states a start that is bent"
@@ -200,7 +203,7 @@ class CutOff(Infeasible):
     def __init__(self, *, station: float, narrowest: str = "") -> None:
         self.station, self.narrowest = station, narrowest
         message = (
-            f"proved: every way of the tip to {station:.4f} m along the path is "
+            f"proved: every way of the tip to {in_mm(station)} along the path is "
             "narrower than the body and its clearance"
         )
         super().__init__(f"{message}; {narrowest}" if narrowest else message)
@@ -216,7 +219,7 @@ class HemmedIn(Infeasible):
     def __init__(self, *, station: float) -> None:
         self.station = station
         super().__init__(
-            f"proved: with the tip at {station:.4f} m along the path the last link is "
+            f"proved: with the tip at {in_mm(station)} along the path the last link is "
             "too close to an obstacle in every direction the joint limits leave it"
         )
 

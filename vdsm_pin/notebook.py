@@ -1,9 +1,7 @@
 """How results show themselves in a console and in a notebook."""
 
 from html import escape
-from math import floor, isfinite
-
-from vdsm_pin.units import MM_PER_M
+from math import floor
 
 
 class Summarised:
@@ -32,8 +30,3 @@ class Summarised:
 def in_percent(share: float) -> str:
     """A share from 0 to 1 in words, rounded down; rounding noise is nothing."""
     return f"{floor(round(share, 9) * 1000.0) / 10.0:.1f} %"
-
-
-def in_mm(length: float) -> str:
-    """A length in words; [m] to mm."""
-    return f"{length * MM_PER_M:.3f} mm" if isfinite(length) else "-"

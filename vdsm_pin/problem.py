@@ -10,9 +10,10 @@ import numpy as np
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, frozen, running_sums
 from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.notebook import Summarised, in_mm
+from vdsm_pin.notebook import Summarised
 from vdsm_pin.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.units import MM_PER_M, in_mm
 
 
 class Approach(StrEnum):
@@ -273,6 +274,12 @@ class PlanningProblem(Summarised):
             message = f"problem {self.name!r} has no tip_path: there is nothing to draw"
             raise InvalidInput(message)
         return self.tip_path
+
+    def in_file(self, point: FloatArray) -> str:
+        """A point of the base frame as messages tell it: in the file's frame, in mm."""
+        moved = self.T_world_base[:3, :3] @ point + self.T_world_base[:3, 3]
+        moved = MM_PER_M * moved
+        return f"({', '.join(f'{value:.1f}' for value in moved.round(1) + 0.0)}) mm"
 
     @property
     def begin(self) -> Posture | None:

@@ -23,6 +23,7 @@ from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import RobotModel
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.units import in_mm
 from vdsm_pin.verification.coal_missing import coal_missing
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import ErrorBox, Verdict, Verification
@@ -248,7 +249,7 @@ def _measured(margins: FloatArray, adjustments: tuple[Adjustment, ...]) -> Round
     """A round that Coal ended."""
     worst = min(adjustments, key=lambda one: one.distance)
     reason = (
-        f"Coal measures {worst.distance:.6g} m between link {worst.link} and "
+        f"Coal measures {in_mm(worst.distance)} between link {worst.link} and "
         f"{worst.obstacle} at waypoint {worst.moment:.0f}"
     )
     return Round(_largest(margins), None, worst.distance, reason, adjustments)
@@ -282,7 +283,7 @@ def _largest(margins: FloatArray) -> float:
 def _story(rounds: list[Round]) -> str:
     """The rounds in one sentence."""
     parts = [
-        f"round {k} with a margin of {one.margin * 1e3:.3f} mm was "
+        f"round {k} with a margin of {in_mm(one.margin)} was "
         f"{one.verdict or 'too near'} ({one.reason})"
         for k, one in enumerate(rounds, start=1)
     ]

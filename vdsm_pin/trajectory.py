@@ -7,8 +7,9 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
-from vdsm_pin.notebook import Summarised, in_mm
+from vdsm_pin.notebook import Summarised
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.units import in_mm
 
 MAX_ROWS: Final = 5_000_000
 """Largest number of rows of one trajectory."""

@@ -1,6 +1,7 @@
 """Conversion between SI and what people type; for readers and writers only."""
 
 from collections.abc import Mapping
+from math import isfinite
 from typing import Final
 
 UNITS_PER_METRE: Final[Mapping[str, float]] = {"m": 1.0, "mm": 1e3}
@@ -11,3 +12,8 @@ Readers divide by these: 206 / 1e3 is the number closest to 0.206, 206 * 1e-3 is
 
 MM_PER_M: Final = 1e3
 """Millimetres in a metre."""
+
+
+def in_mm(length: float) -> str:
+    """A length as people read it, in messages and notes; [m] to mm."""
+    return f"{length * MM_PER_M:.3f} mm" if isfinite(length) else "-"

@@ -12,6 +12,7 @@ import numpy as np
 from vdsm_pin.errors import OutOfReach
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.problem import DesiredPath
+from vdsm_pin.units import in_mm
 
 
 def curled_reach(manipulator: Manipulator) -> float:
@@ -48,5 +49,5 @@ def check_feasibility(manipulator: Manipulator, path: DesiredPath) -> None:
         reason = "every joint at its limit, Eq. 4"
         raise OutOfReach(place=place, distance=distance, reach=curled, reason=reason)
     if distance > straight:
-        reason = f"straight arm; curled up it would reach {curled:.6f} m"
+        reason = f"straight arm; curled up it would reach {in_mm(curled)}"
         raise OutOfReach(place=place, distance=distance, reach=straight, reason=reason)

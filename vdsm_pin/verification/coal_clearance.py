@@ -27,6 +27,7 @@ from vdsm_pin.scene import Obstacle
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.coal_bodies import (
     CoalBody,
     coal_bodies,
@@ -149,8 +150,9 @@ def check_coal(
             worst, moment = float(excess[k]), float(found.waypoint[k])
             where = (
                 f"link {found.link[k] + 1} and {scene.names[found.obstacle[k]]}: "
-                f"Coal {found.distance[k]:.9g} m, "
-                f"proved [{found.lower[k]:.9g}, {found.upper[k]:.9g}] m"
+                f"Coal {found.distance[k] * MM_PER_M:.6f} mm, "
+                f"proved [{found.lower[k] * MM_PER_M:.6f}, "
+                f"{found.upper[k] * MM_PER_M:.6f}] mm"
             )
     total = trajectory.n_samples * n_links * len(scene.obstacles)
     agreed = worst <= TOLERANCES.coal_agreement

@@ -18,6 +18,7 @@ from vdsm_pin.robot_model import RobotModel
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.coal_bodies import CoalBody, distance_request, measure
 from vdsm_pin.verification.coal_clearance import capsule_transforms, in_turns
 from vdsm_pin.verification.records import Check, Verdict
@@ -93,8 +94,8 @@ def check_coal_links(
             worst, moment = float(excess[k]), float(found.waypoint[k])
             where = (
                 f"link {found.link[k] + 1} and link {found.other[k] + 1}: "
-                f"Coal {found.distance[k]:.9g} m, "
-                f"closed form {found.expected[k]:.9g} m"
+                f"Coal {found.distance[k] * MM_PER_M:.6f} mm, "
+                f"closed form {found.expected[k] * MM_PER_M:.6f} mm"
             )
     agreed = worst <= TOLERANCES.coal_agreement
     check = Check(

@@ -7,10 +7,11 @@ from math import inf, nan
 from typing import TypeAlias
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.notebook import Summarised, in_mm, in_percent
+from vdsm_pin.notebook import Summarised, in_percent
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.units import in_mm
 
 
 class Verdict(StrEnum):

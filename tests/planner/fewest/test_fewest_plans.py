@@ -253,7 +253,7 @@ def test_a_time_limit_stops_and_tells_how_far_it_came_and_never_steers() -> None
         return clearance(centres)
 
     with pytest.raises(
-        OutOfTime, match=r"limit of 0\.5 s came first; drew 0\.000 m of 6\.000 m"
+        OutOfTime, match=r"limit of 0\.5 s came first; drew 0\.000 mm of 6000\.000 mm"
     ):
         plan_fewest(task, slow, 0.0)
     with pytest.raises(OutOfTime, match="limit of 0 s"):

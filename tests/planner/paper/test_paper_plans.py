@@ -174,7 +174,7 @@ def test_obs2_begins_and_ends_at_its_equidistant_point() -> None:
 
 def test_undrawn_stretches_are_told() -> None:
     plan = plan_of("obs2")
-    assert any("from 2.2000 m" in stretch for stretch in plan.undrawn)
+    assert any("from 2200.000 mm" in stretch for stretch in plan.undrawn)
     failing = replace(plan.problem.path, blocked=Blocked.FAIL)
     with pytest.raises(PathBlocked, match="blocked: fail"):
         planned(replace(plan.problem, tip_path=failing))

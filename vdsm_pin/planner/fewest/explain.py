@@ -31,6 +31,7 @@ from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.units import in_mm
 
 
 def refuse_proved(problem: PlanningProblem, outcome: Outcome) -> None:
@@ -92,7 +93,7 @@ def _proved(
         distance = np.hypot(rows.tips[:, 1], rows.tips[:, 2])
         worst = int(np.argmax(distance))
         return OutOfReach(
-            place=f"the tip at {rows.stations[worst]:.4f} m along the path",
+            place=f"the tip at {in_mm(rows.stations[worst])} along the path",
             distance=float(distance[worst]),
             reach=curled_reach(problem.manipulator),
             reason="every joint at its limit, Eq. 4",
@@ -108,9 +109,9 @@ def _proved(
     return PathBlocked(
         obstacle=name,
         reason=(
-            f"at {rows.stations[first]:.4f} m along the path the tip itself would have "
-            f"at most {room * 1e3:.3f} mm to it, required are "
-            f"{problem.required_clearance * 1e3:.3f} mm"
+            f"at {in_mm(rows.stations[first])} along the path the tip itself would "
+            f"have at most {in_mm(room)} to it, required are "
+            f"{in_mm(problem.required_clearance)}"
         ),
     )
 
@@ -129,10 +130,10 @@ def _cut_off(
         scene, required = problem.scene.obstacles, problem.required_clearance
         near = [o.name for o, r in zip(scene, room, strict=True) if r < required]
         words = (
-            f"the widest way tried has at most {room.min() * 1e3:.3f} mm to "
+            f"the widest way tried has at most {in_mm(room.min())} to "
             f"{', '.join(map(repr, near))} at "
-            f"({', '.join(f'{value:.3f}' for value in place)}) m, required are "
-            f"{required * 1e3:.3f} mm"
+            f"{problem.in_file(place)}, required are "
+            f"{in_mm(required)}"
         )
     return CutOff(station=float(rows.stations[first]), narrowest=words)
 
@@ -150,9 +151,9 @@ def how_far(problem: PlanningProblem, outcome: Outcome) -> str:
             station = float(route.stations[skipped[0] - 1])
             tip = route.tips[route.layers[skipped[0]]]
     words = (
-        f"drew {drawn:.3f} m of {problem.path.length:.3f} m; the first stretch not "
-        f"drawn begins at {station:.3f} m along the path, tip "
-        f"({', '.join(f'{value:.3f}' for value in tip)}) m"
+        f"drew {in_mm(drawn)} of {in_mm(problem.path.length)}; the first stretch not "
+        f"drawn begins at {in_mm(station)} along the path, tip "
+        f"{problem.in_file(tip)}"
     )
     zero = np.zeros((1, problem.manipulator.n_links + 1, 2))
     straight = Intervals(tip[None], tip[None], zero, zero)
@@ -161,8 +162,7 @@ def how_far(problem: PlanningProblem, outcome: Outcome) -> str:
     if problem.scene.obstacles and np.isfinite(centres).all():
         link, name, room = culprit(problem, centres)
         words += (
-            f"; link {link} of the straight arm there has {room * 1e3:.1f} mm to "
-            f"{name!r}"
+            f"; link {link} of the straight arm there has {in_mm(room)} to {name!r}"
         )
     return words
 
@@ -215,8 +215,8 @@ def notes_of(
     back = _farthest_back(trajectory, centres[:, -1], ways)
     if back > retreat + TOLERANCES.tip_on_path:
         notes.append(
-            f"off the path the tip steps back by up to {back:.3f} m, more than the "
-            f"retreat of {retreat:.3f} m: no change of sides was found within it"
+            f"off the path the tip steps back by up to {in_mm(back)}, more than the "
+            f"retreat of {in_mm(retreat)}: no change of sides was found within it"
         )
     return tuple(notes)
 
@@ -245,7 +245,7 @@ def _order(outcome: Outcome) -> list[str]:
     ends = _pieces(outcome.found.knots)
     if all(np.diff(np.array(ends).ravel()) >= 0.0):
         return []
-    pieces = ", then ".join(f"from {a:.4f} m to {b:.4f} m" for a, b in ends)
+    pieces = ", then ".join(f"from {in_mm(a)} to {in_mm(b)}" for a, b in ends)
     return [f"drawn in another order than given, as the problem allows: {pieces}"]
 
 
@@ -280,7 +280,7 @@ def undrawn(problem: PlanningProblem, outcome: Outcome) -> tuple[str, ...]:
         why = "no way was found, which proves nothing"
         if route.closed[k]:
             why = f"proved: {_closed_by(problem, outcome, a, b)}"
-        stretches.append(f"from {a:.4f} m to {b:.4f} m along the path ({why})")
+        stretches.append(f"from {in_mm(a)} to {in_mm(b)} along the path ({why})")
         stretch = []
     return tuple(stretches)
 

@@ -38,6 +38,7 @@ from vdsm_pin.planner.start import check_start
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.units import in_mm
 
 FEWEST: Final = Taste()
 CLEAREST: Final = Taste(angle=0.2, room=0.2, room_cost=8.0)
@@ -76,10 +77,7 @@ def plan_clearest(
     if not problem.scene.obstacles:
         return plan
     most = search.kept + reserve
-    note = (
-        f"of the plans tried none with a clearance above {most * 1e3:.1f} mm draws as "
-        "much"
-    )
+    note = f"of the plans tried none with a clearance above {in_mm(most)} draws as much"
     return replace(plan, notes=(*plan.notes, note))
 
 

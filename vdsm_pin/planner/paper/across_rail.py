@@ -105,9 +105,10 @@ class AcrossRail:
         )
         if np.isnan(moves).any():
             row = int(np.argmax(np.isnan(moves)))
+            tip = np.array([tip_x[row], *reference[row, -1]])
             reason = (
                 f"joint {self.bend} cannot lead the arm round it within the limit of "
-                f"psi_1 with the tip at {reference[row, -1].tolist()} m"
+                f"psi_1 with the tip at {self.problem.in_file(tip)}"
             )
             raise PathBlocked(obstacle=self.region.name, reason=reason)
         return np.asarray(self.side * moves)

@@ -28,6 +28,7 @@ from vdsm_pin.planner.paper.side_rules import (
 )
 from vdsm_pin.planner.paper.tip_path import Route
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.units import in_mm
 
 ROUNDINGS: Final = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.75, 1.0)
 """How far corners are blunted, tried in this order; [-]."""
@@ -98,8 +99,8 @@ def along_rail(
         distance = float(forbidden.core_distance(np.stack([point, point])[None])[0])
         if not distance > forbidden.radius:
             reason = (
-                f"{what} lies in its danger region: {distance - section.radius:.4f} m "
-                f"from it seen along the rail, {growth:.4f} m needed"
+                f"{what} lies in its danger region: {in_mm(distance - section.radius)} "
+                f"from it seen along the rail, {in_mm(growth)} needed"
             )
             raise PathBlocked(obstacle=section.name, reason=reason)
     shapes = _shapes(problem, section, growth)

@@ -32,6 +32,7 @@ from vdsm_pin.planner.paper.tip_path import (
 )
 from vdsm_pin.problem import Approach, DesiredPath
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.units import in_mm
 
 Judge: TypeAlias = Callable[[FloatArray, int], BoolArray]
 """(tip positions (n, 3), side) to whether the arm can stand there so, shape (n,)."""
@@ -120,7 +121,7 @@ def detour_route(
         )
     undrawn = length_of(undrawn_by(path, pieces))
     if not undrawn < missing:
-        reason = f"{undrawn:.4f} m of the path cannot be drawn"
+        reason = f"{in_mm(undrawn)} of the path cannot be drawn"
         raise PathBlocked(obstacle=region.name, reason=reason)
     start = _End(path.start, 0, path.start[None, 1:])
     ways: list[Rows] = []

@@ -21,6 +21,7 @@ from vdsm_pin.planner.start import check_start
 from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.units import in_mm
 
 SUBDIVISIONS: Final = 6
 """Rounds of inserting waypoints; a motion still too fast after them has a jump."""
@@ -75,8 +76,8 @@ def plan_paper(
         trajectory,
         cables,
         tuple(
-            f"from {a:.4f} m to {b:.4f} m along the path (left out by the paper's rule "
-            f"on its way round {problem.scene.names[0]!r}; nothing is proved)"
+            f"from {in_mm(a)} to {in_mm(b)} along the path (left out by the paper's "
+            f"rule on its way round {problem.scene.names[0]!r}; nothing is proved)"
             for a, b in motion.route.undrawn
         ),
         motion.route.notes,
@@ -185,8 +186,8 @@ def _motion(problem: PlanningProblem, avoidance: Avoidance, route: Route) -> Mot
 def _refuse_touch(problem: PlanningProblem, clearance: float) -> None:
     if not clearance >= problem.required_clearance:
         message = (
-            f"off the path the links come within {clearance:.6f} m of the obstacle, "
-            f"{problem.required_clearance:.6f} m are required"
+            f"off the path the links come within {in_mm(clearance)} of the obstacle, "
+            f"{in_mm(problem.required_clearance)} are required"
         )
         raise NoPlanFound(message)
 
@@ -195,7 +196,7 @@ def _refuse_gaps(problem: PlanningProblem, motion: Motion) -> None:
     if problem.path.blocked is Blocked.FAIL and len(motion.route.undrawn):
         first, last = motion.route.undrawn[0]
         reason = (
-            f"the desired path cannot be drawn from {first:.4f} m to {last:.4f} m, and "
-            "the problem allows no detour (blocked: fail)"
+            f"the desired path cannot be drawn from {in_mm(first)} to {in_mm(last)}, "
+            "and the problem allows no detour (blocked: fail)"
         )
         raise PathBlocked(obstacle=problem.scene.names[0], reason=reason)
