@@ -11,6 +11,7 @@ from problem_texts import TETRAHEDRON, binary_stl
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.closed_meshes import close_mesh
 from vdsm_pin.io.mesh_file import MeshData, read_mesh
+from vdsm_pin.io.meshes import raw
 from vdsm_pin.io.source import BLOCK
 
 
@@ -148,6 +149,19 @@ def test_lines_and_points_of_an_obj_have_no_surface_and_are_counted(
     mesh = read_mesh(write(tmp_path, "a.obj", text))
     assert len(mesh.triangles) == 1
     assert mesh.notes == ("lines and points left out: 2",)
+
+
+def test_more_than_there_may_be_is_refused_while_it_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(raw, "MAX_CORNERS", 20)
+    for name, text in (
+        ("a.obj", "v 0 0 0\n" * 21),
+        ("a.obj", "v 0 0 0\n" + "f 1 1 1\n" * 7),
+        ("a.stl", text_stl(np.zeros((7, 3, 3)))),
+    ):
+        with pytest.raises(InvalidFile, match="has more than 20 vertices or corners"):
+            read_mesh(write(tmp_path, name, text))
 
 
 def test_vertices_that_no_face_uses_do_not_count(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from vdsm_pin.io.schema_types import LARGEST
 _LOOKS: Final = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_")
 _KNOWN: Final = frozenset({"KHR_mesh_quantization", "KHR_xmp_json_ld", "KHR_xmp"})
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_MOST_JSON: Final = 64 << 20
 _NUMBERS: Final[dict[int, np.dtype[Any]]] = {
     5120: np.dtype("<i1"),
     5121: np.dtype("<u1"),
@@ -121,6 +122,9 @@ def read_glb(stream: MeshStream) -> RawMesh:
         InvalidFile: If it is damaged, or has triangles in a form that is not read.
     """
     text, data = _chunks(stream)
+    if len(text) > _MOST_JSON:
+        problem = f"has more than {_MOST_JSON >> 20} MiB of JSON"
+        raise stream.invalid(problem)
     try:
         document = _Document.model_validate(json.loads(text))
     except ValidationError as error:

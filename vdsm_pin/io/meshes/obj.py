@@ -40,6 +40,7 @@ def read_obj(stream: MeshStream) -> RawMesh:
         match words[0] if words else "":
             case "v":
                 faces.vertices.extend(stream.numbers(words[1:4], 3, number))
+                stream.check_room(len(faces.vertices) // 3)
             case "f" | "fo":
                 _read_face(words[1:], faces, stream, number)
             case "l" | "p":
@@ -105,3 +106,4 @@ def _read_face(words: list[str], faces: _Faces, stream: MeshStream, line: int) -
             raise stream.invalid(problem, line=line)
         faces.corners.append(index)
     faces.sizes.append(len(words))
+    stream.check_room(0, len(faces.corners))

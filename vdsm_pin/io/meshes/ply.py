@@ -125,6 +125,7 @@ def _header(stream: MeshStream) -> _Header:
             case ["format", name, _] if name in _FORMATS:
                 order = _FORMATS[name]
             case ["element", name, count] if count.isdecimal() and len(count) < 12:
+                stream.check_room(int(count))
                 elements[name] = _Element(name, int(count))
                 latest = elements[name].properties
             case ["property", kind, name] if latest is not None and kind in _KINDS:

@@ -13,6 +13,9 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.io.schema_types import LARGEST
 
 MAX_TRIANGLES: Final = 5_000_000
+MAX_CORNERS: Final = 3 * MAX_TRIANGLES
+"""Most vertices of a file, used or not, and most corners of all its faces."""
+
 MAX_LINE: Final = 1 << 20
 """Longest line of a text format; [characters]."""
 
@@ -114,6 +117,16 @@ class MeshStream:
         """
         if triangles > MAX_TRIANGLES:
             problem = f"has {triangles} triangles, the most is {MAX_TRIANGLES}"
+            raise self.invalid(problem)
+
+    def check_room(self, vertices: int, corners: int = 0) -> None:
+        """Refuse more than there may be, while it is read.
+
+        Raises:
+            InvalidFile: If there are more vertices or corners.
+        """
+        if max(vertices, corners) > MAX_CORNERS:
+            problem = f"has more than {MAX_CORNERS} vertices or corners of faces"
             raise self.invalid(problem)
 
     def check_numbers(

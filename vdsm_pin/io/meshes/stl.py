@@ -83,6 +83,7 @@ def _text(stream: MeshStream) -> RawMesh:
             in_loop = len(numbers)
         elif last == "vertex":
             numbers.extend(stream.numbers(words[1:], 3, number))
+            stream.check_room(len(numbers) // 3)
         elif last == "endloop" and len(numbers) - in_loop != 9:
             found = (len(numbers) - in_loop) // 3
             problem = f"the facet has {found} corners, expected 3"
