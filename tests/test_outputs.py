@@ -21,7 +21,7 @@ vdsm_problem: 1
 length_unit: m
 manipulator: {link_lengths: [1, 1], link_radius: 0.05,
   max_link_angle_deg: 45, max_joint_angle_deg: 45}
-obstacles: [{name: part, shape: mesh, file: part.stl, center: [1, 1, 0]}]
+obstacles: [{name: part, shape: mesh, file: part.stl, center: [1, 1, 0], solid: false}]
 tip_path: {start: [2, 0, 0], points: [[2, 0, 0], [2.01, 0, 0]]}
 required_clearance: 0
 """
