@@ -98,5 +98,5 @@ def test_the_tip_of_a_plan_is_never_hemmed_in() -> None:
 def test_a_tip_that_is_hemmed_in_is_refused_with_its_place() -> None:
     keep = built_in("hrm8").link_radius + 0.0035
     task = shelf_above(keep + 0.01, 0.3)
-    with pytest.raises(HemmedIn, match=r"0\.0000 m along the path the last link"):
+    with pytest.raises(HemmedIn, match=r"0\.000 mm along the path the last link"):
         plan_fewest(task, link_clearance(task), 0.0)
