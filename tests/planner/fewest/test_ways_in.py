@@ -26,6 +26,7 @@ from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.scene import Box, Cylinder, Obstacle, Sphere
+from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.verify import verify
@@ -219,6 +220,11 @@ def test_a_path_behind_a_pipe_is_drawn_in_visits_that_come_home() -> None:
     effort = Insert(step=0.02, population=24, ways=2, returns=3, seed=0)
     found = ways_in(judge, space_of(task), rows, closed, effort)
     assert found is not None
+    # Late, one visit is enough, but not none.
+    late = Deadline(1.0, 0.0)
+    soon = ways_in(judge, space_of(task), rows, closed, effort, late)
+    assert soon is not None
+    assert found.missing <= soon.missing < task.path.length
     assert judge.clear(found.knots.pick(np.arange(len(found.knots.drawn)))).all()
     drawn = found.knots.drawn
     way = np.linalg.norm(np.diff(found.knots.tips, axis=0), axis=1)

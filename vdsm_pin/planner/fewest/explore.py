@@ -38,6 +38,7 @@ from vdsm_pin.planner.fewest.taper import kept_by_links
 from vdsm_pin.planner.fewest.tip_ways import TipSpace
 from vdsm_pin.planner.fewest.ways_in import tip_space, ways_in
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 
 LOG: Final = logging.getLogger(__name__)
@@ -84,6 +85,7 @@ def explore(
     margin: float,
     taste: Taste,
     effort: Effort = FULL,
+    soon: Deadline = NO_LIMIT,
 ) -> Iterator[Outcome]:
     """Search level by level until all that can be drawn is drawn.
 
@@ -93,6 +95,7 @@ def explore(
         margin: Kept beyond the required clearance; [m].
         taste: What the strategy prefers.
         effort: How much is done before giving up.
+        soon: From when on what has been found will do.
 
     Yields:
         Outcomes, of which each draws more or has more proved than the one before; the
@@ -130,7 +133,9 @@ def explore(
                 key = judge.required, level.step, level.cells
                 if key not in spaces:
                     spaces[key] = tip_space(judge, clearance, level)
-                found = ways_in(judge, spaces[key], rows, best.proof.closed, level)
+                found = ways_in(
+                    judge, spaces[key], rows, best.proof.closed, level, soon
+                )
             else:
                 found = _look(judge, level, rows, best.proof, taste)
                 unreached |= level.ease == 1.0 and _unreached(found)
@@ -142,7 +147,7 @@ def explore(
         if now.missing < best.missing:
             best = now
             yield best
-        if not best.missing > 0.0:
+        if not best.missing > 0.0 or (best.found is not None and soon.passed):
             return
         if level is first and effort.proves:
             # Seldom needed, so only now: can it be done at all?

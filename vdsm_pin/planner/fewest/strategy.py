@@ -1,5 +1,6 @@
 """The strategies `fewest`, `clearest`, `sturdiest`: search, smooth, write, explain."""
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
@@ -35,11 +36,15 @@ from vdsm_pin.planner.fewest.unbend import (
 from vdsm_pin.planner.fewest.widest import drawn_length, widest
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan, TipPath
 from vdsm_pin.planner.start import check_start
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.planner.time_limit import deadline_of
+from vdsm_pin.problem import Blocked, PlanningProblem
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import in_mm
 
+SEARCHED: Final = 0.6
+"""Part of the time after which a search ends that has found something; [-]."""
 FEWEST: Final = Taste()
 CLEAREST: Final = Taste(angle=0.2, room=0.2, room_cost=8.0)
 
@@ -199,7 +204,8 @@ def _plan(
     quick = nearby(problem, clearance).up_to(FAR + most)
     best: Outcome | None = None
     try:
-        for outcome in explore(problem, quick, margin, taste, effort):
+        soon = _soon(problem, clearance)
+        for outcome in explore(problem, quick, margin, taste, effort, soon):
             best = outcome
             refuse_proved(problem, best)
         assert best is not None
@@ -208,6 +214,14 @@ def _plan(
     except OutOfTime as ended:
         reached = "" if best is None else how_far(problem, best)
         raise OutOfTime(ended.limit, reached) from None
+
+
+def _soon(problem: PlanningProblem, clearance: LinkClearance) -> Deadline:
+    """From when on a part of the path will do, so that its proof is in time."""
+    deadline, now = deadline_of(clearance), time.monotonic()
+    if problem.path.blocked is Blocked.FAIL:
+        return NO_LIMIT
+    return Deadline(deadline.limit, now + SEARCHED * (deadline.end - now))
 
 
 def _written(

@@ -23,6 +23,7 @@ from vdsm_pin.planner.fewest.nearby import Nearby
 from vdsm_pin.planner.fewest.route import PathRows, TipRoute, tip_route
 from vdsm_pin.planner.fewest.search import Found
 from vdsm_pin.planner.fewest.tip_ways import TipSpace
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 
 PLAY: Final = 0.3
 """How far the tip may be from its way off the path, over the body's radius; [-]."""
@@ -54,7 +55,12 @@ class _Visit:
 
 
 def ways_in(
-    judge: Judge, space: TipSpace, rows: PathRows, closed: BoolArray, effort: Insert
+    judge: Judge,
+    space: TipSpace,
+    rows: PathRows,
+    closed: BoolArray,
+    effort: Insert,
+    soon: Deadline = NO_LIMIT,
 ) -> Found | None:
     """A motion that draws what it can, going in as often as it takes.
 
@@ -64,6 +70,7 @@ def ways_in(
         rows: The desired path row by row.
         closed: Rows that nobody can reach, shape (r,).
         effort: How thoroughly to look.
+        soon: From when on what is not drawn yet is skipped, if something is drawn.
 
     Returns:
         None if nothing is drawn.
@@ -73,7 +80,7 @@ def ways_in(
     """
     step = effort.step * judge.problem.manipulator.total_length
     route = tip_route(judge.problem, rows, closed, step, 0.0)
-    return _Search(judge, space, route, effort).found()
+    return _Search(judge, space, route, effort).found(soon)
 
 
 def tip_space(judge: Judge, clearance: Nearby, effort: Insert) -> TipSpace:
@@ -98,13 +105,17 @@ class _Search:
         self.root = checked_start(judge, route.tips[:1], self.chart)
         self.rng = np.random.default_rng(effort.seed)
 
-    def found(self) -> Found | None:
+    def found(self, soon: Deadline) -> Found | None:
         """Visits until the path's end is reached or too many are in vain."""
         visits: list[_Visit] = []
         skipped: list[int] = []
         k, failures, last = 0, 0, len(self.tips) - 1
         while k < last:
-            if self.route.closed[k + 1] or failures == FAILURES:
+            if (
+                self.route.closed[k + 1]
+                or failures == FAILURES
+                or (visits and soon.passed)
+            ):
                 k += 1
                 skipped.append(k)
                 continue
