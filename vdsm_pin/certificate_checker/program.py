@@ -28,7 +28,15 @@ from vdsm_pin.text import printable, show_everything
 PRECISION: Final = 128
 """Bits of a ball: lengths are known to about 1e-35 m."""
 
-DAMAGE: Final = ValueError, TypeError, LookupError, ArithmeticError, RecursionError
+DAMAGE: Final = (
+    ValueError,
+    TypeError,
+    AttributeError,
+    LookupError,
+    ArithmeticError,
+    RecursionError,
+    AttributeError,
+)
 """What a file of another make raises where it is taken for a certificate."""
 
 
