@@ -72,7 +72,7 @@ def test_a_limit_of_processor_time_goes_by_the_processors_clock(monkeypatch) -> 
 def test_the_page_names_what_was_missed_and_what_was_not_run() -> None:
     settings = {
         "time_limit_s": 60.0, "versions": {"numpy": "2"}, "benchmark": 3,
-        "processor": "p", "processes": 1, "python": "3",
+        "processor": "p", "code": "c", "processes": 1, "python": "3",
     }  # fmt: skip
     page = document([GOOD, replace(GOOD, number=1, answer="not found")], settings)
     assert "| port | fewest | 1/2 (50%) |" in page
