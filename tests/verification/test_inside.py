@@ -209,7 +209,8 @@ def test_gaps_are_a_note_of_every_result(tmp_path: Path) -> None:
     corners[corners.mean(axis=1)[:, 2] > 0.0] += [0.0, 0.0, 1e-5]
     file, found = verified(*written(tmp_path, corners))
     assert found.verdict is Verdict.REFUTED
-    (note,) = input_notes(file.problem, found.trajectory)
+    notes = input_notes(file.problem, found.trajectory)
+    (note,) = (note for note in notes if "gaps" in note)
     assert "gaps of 'housing', up to 0.01 mm wide, were joined" in note
 
 
@@ -262,7 +263,7 @@ def test_what_an_open_mesh_is_the_problem_says(
         (row,) = (row for row in found.checks if row.verdict is Verdict.UNDECIDED)
         assert "3 edges have no partner; `solid: false` says" in row.where
         assert found.joint_error == 0.0
-        assert notes == ()
+        assert not any("surface only" in note for note in notes)
     else:
         assert found.verdict is Verdict.CERTIFIED
-        assert "is a surface only" in notes[0]
+        assert any("is a surface only" in note for note in notes)
