@@ -31,7 +31,6 @@ PRECISION: Final = 128
 DAMAGE: Final = (
     ValueError,
     TypeError,
-    AttributeError,
     LookupError,
     ArithmeticError,
     RecursionError,
