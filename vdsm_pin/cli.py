@@ -299,11 +299,14 @@ def urdf(
 ) -> None:
     """Write the URDF of an arm."""
     from vdsm_pin.io.atomic import atomic_path
-    from vdsm_pin.io.problem_file import read_problem
-    from vdsm_pin.manipulator import BUILT_IN
+    from vdsm_pin.io.problem_file import built_in_names, read_problem
+    from vdsm_pin.manipulator import BUILT_IN, built_in
     from vdsm_pin.report.folder import check_output_file
     from vdsm_pin.urdf_writer import urdf_text
 
+    known = name in BUILT_IN or name in built_in_names() or Path(name).exists()
+    if not known:
+        built_in(name)  # which says what arms there are
     arm = BUILT_IN.get(name) or read_problem(name).problem.manipulator
     text = urdf_text(arm)
     check_output_file(out)
