@@ -58,7 +58,10 @@ READING = {
 }
 """What the certificate checker shares: files as they were read."""
 
-WORKED_OUT = {"pieces", "convex_sections", "closed_mesh", "corner_stations"}
+WORKED_OUT = {
+    *("axis_spans", "axis_radii", "axis_names"),
+    *("pieces", "convex_sections", "closed_mesh", "corner_stations"),
+}
 """What those types work out for planner and verifier; the checker does it again."""
 
 NOT_FOR_THE_CHECKER = (

@@ -14,7 +14,7 @@ from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
-from vdsm_pin.manipulator import PART, TOOL, LinkBody, Manipulator
+from vdsm_pin.manipulator import PART, LinkBody, Manipulator
 from vdsm_pin.scene import Mesh
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -82,15 +82,12 @@ class SelfPairs:
 def arm_bodies(arm: Manipulator) -> tuple[ArmBody, ...]:
     """Every convex body: links 1 to N, the tool, then the others in file order."""
     found = []
-    for i, length in enumerate(arm.link_lengths.tolist(), start=1):
-        tool = arm.tool.length if arm.tool and i == arm.n_links else 0.0
-        axis = np.array([[0.0, 0.0, 0.0], [length - tool, 0.0, 0.0]])
-        solid = Hull(axis, arm.radius_of(i))
-        found.append(ArmBody(f"link {i}", i, solid, axial=tool == 0.0))
-    if arm.tool:
-        end = float(arm.link_lengths[-1])
-        axis = np.array([[end - arm.tool.length, 0.0, 0.0], [end, 0.0, 0.0]])
-        found.append(ArmBody(TOOL, arm.n_links, Hull(axis, arm.tool.radius)))
+    for k, (name, span) in enumerate(zip(arm.axis_names, arm.axis_spans, strict=True)):
+        link, axis = min(k + 1, arm.n_links), np.zeros((2, 3))
+        axis[:, 0] = span
+        whole = span[0] == 0.0 and span[1] == arm.link_lengths[link - 1]
+        solid = Hull(axis, float(arm.axis_radii[k]))
+        found.append(ArmBody(name, link, solid, axial=bool(whole)))
     for body in arm.bodies:
         pieces = convex_cover(body)
         for k, piece in enumerate(pieces, start=1):
@@ -180,8 +177,9 @@ def _distance(body: ArmBody, point: FloatArray) -> float:
     """Distance of a point from the core of a body, from above; [m]."""
     core = body.piece
     if isinstance(core, Hull):
-        if (core.points == point).all(axis=1).any():
-            return 0.0
+        if len(core.points) == 2 and not (core.points[:, 1:].any() or point[1:].any()):
+            start, end = core.points[:, 0]  # an axis along x, as those of the links
+            return max(0.0, float(start - point[0]), float(point[0] - end))
         core = Hull(core.points)
     pieces = pack_pieces([[core]])
     ends = np.repeat(point[None, None], 2, axis=1)

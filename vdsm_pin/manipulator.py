@@ -225,6 +225,10 @@ class Manipulator:
         """Radius of a link, counted from 1; [m]."""
         return self.link_radius if self.radii is None else float(self.radii[link - 1])
 
+    def radius_at(self, link: int, body: str) -> float:
+        """Radius of a link, counted from 1, or of the tool on it; [m]."""
+        return self.tool.radius if self.tool and body == TOOL else self.radius_of(link)
+
     def ignores(self, one: str, other: str) -> bool:
         """Whether two named bodies, or parts of bodies, are not to be held apart."""
         names = {one, one.split(PART)[0]}, {other, other.split(PART)[0]}
@@ -238,11 +242,54 @@ class Manipulator:
         """Whether the arm is equal capsules and nothing else."""
         return self.radii is None and self.tool is None and not self.bodies
 
+    @cached_property
+    def axis_radii(self) -> FloatArray:
+        """Radii of the links and then of the tool, if there is one; [m]."""
+        radii = [self.radius_of(i + 1) for i in range(self.n_links)]
+        return frozen([*radii, self.tool.radius] if self.tool else radii)
+
+    @cached_property
+    def axis_spans(self) -> FloatArray:
+        """Where axes of links and tool start and end along their links, (n, 2); [m]."""
+        spans = [[0.0, length] for length in self.link_lengths.tolist()]
+        if self.tool:
+            start = spans[-1][1] - self.tool.length
+            spans = [*spans[:-1], [0.0, start], [start, spans[-1][1]]]
+        return frozen(spans)
+
+    @property
+    def axis_names(self) -> tuple[str, ...]:
+        """Names of the links and of the tool: `link 1`, .., `tool`."""
+        links = [f"link {i + 1}" for i in range(self.n_links)]
+        return (*links, TOOL) if self.tool else tuple(links)
+
     @property
     def least_radius(self) -> float:
-        """Radius within which every point of the arm's axis has matter; [m]."""
-        radii = [self.radius_of(i + 1) for i in range(self.n_links)]
-        return min(*radii, self.tool.radius if self.tool else np.inf)
+        """Within it every place along the arm's axis has matter; [m]."""
+        return float(self.axis_radii.min())
+
+    @property
+    def most_radius(self) -> float:
+        """Within it of the arm's axis is all matter of links and tool; [m]."""
+        return float(self.axis_radii.max())
+
+    def axes(self, centres: FloatArray) -> FloatArray:
+        """Ends of the axes of the links and of the tool, one after the other.
+
+        Args:
+            centres: Joint centres, shape (n_samples, N + 1, 3); [m].
+
+        Returns:
+            The same, with the place where the tool begins before the last one, if there
+            is a tool, shape (n_samples, n_axes + 1, 3); [m].
+        """
+        if self.tool is None:
+            return centres
+        start, end = self.axis_spans[-1]
+        share = (end - start) / end
+        tip = centres[:, -1:]
+        foot = tip + share * (centres[:, -2:-1] - tip)
+        return np.concatenate([centres[:, :-1], foot, tip], axis=1)
 
     @cached_property
     def stations(self) -> FloatArray:

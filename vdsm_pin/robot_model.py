@@ -51,9 +51,9 @@ class RobotModel:
         urdf_sha256: Hash of the URDF's bytes.
         model: pinocchio.Model.
         data: pinocchio.Data, overwritten by every call of `link_poses`.
-        capsules: One coal.Capsule per link, along its own z axis.
-        T_link_capsule: Pose of each capsule in its link frame, shape (N, 4, 4); [m]
-            in its last column.
+        capsules: One coal.Capsule per link and one for the tool, along its own z axis.
+        T_link_capsule: Pose of each capsule in its link frame, shape (n_axes, 4, 4);
+            [m] in its last column.
         p_link_tip: The tip in the frame of link N, shape (3,); [m].
     """
 
@@ -173,13 +173,12 @@ def read_robot(manipulator: Manipulator, text: str) -> RobotModel:
         raise VerificationFailed(message) from error
     _check_joints(manipulator, model)
     _check_bodies(manipulator, model, bodies)
-    lengths = manipulator.link_lengths
-    capsules = tuple(
-        coal.Capsule(manipulator.link_radius, length) for length in lengths
-    )
-    T_link_capsule = np.tile(np.eye(4), (lengths.size, 1, 1))
+    starts, ends = manipulator.axis_spans.T
+    radii = manipulator.axis_radii
+    capsules = tuple(map(coal.Capsule, radii.tolist(), (ends - starts).tolist()))
+    T_link_capsule = np.tile(np.eye(4), (radii.size, 1, 1))
     T_link_capsule[:, :3, :3] = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
-    T_link_capsule[:, 0, 3] = lengths / 2.0
+    T_link_capsule[:, 0, 3] = (starts + ends) / 2.0
     tip = model.frames[_frame_id(model, "tip")].placement
     return RobotModel(
         manipulator=manipulator,
@@ -230,16 +229,16 @@ def _check_joints(manipulator: Manipulator, model: Any) -> None:
 def _check_bodies(manipulator: Manipulator, model: Any, bodies: Any) -> None:
     """Hold the shapes Pinocchio loaded against one rod and two balls per link."""
     found = sorted(_described(body) for body in bodies.geometryObjects)
-    radius = manipulator.link_radius
-    expected = []
-    for i, length in enumerate(manipulator.link_lengths.tolist(), start=1):
-        joint = model.getJointId(f"theta{i}")
-        expected += [(joint, x, radius, 0.0) for x in (0.0, length)]
-        expected.append((joint, length / 2.0, radius, length))
+    n_links = manipulator.n_links
+    expected, radii = [], manipulator.axis_radii.tolist()
+    for k, (start, end) in enumerate(manipulator.axis_spans.tolist()):
+        joint, size = model.getJointId(f"theta{min(k + 1, n_links)}"), end - start
+        expected += [(joint, start + x, radii[k], 0.0) for x in (0.0, size)]
+        expected.append((joint, start + size / 2.0, radii[k], size))
     if found != sorted(expected):
         message = (
             f"Pinocchio loaded {len(found)} collision shapes, expected a cylinder and "
-            f"two spheres for each of {manipulator.n_links} links in the arm's sizes"
+            f"two spheres for each of {len(radii)} links and tools in the arm's sizes"
         )
         raise VerificationFailed(message)
 

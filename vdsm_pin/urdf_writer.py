@@ -48,23 +48,28 @@ def urdf_text(manipulator: Manipulator) -> str:
 
     Returns:
         XML text that ends with a newline. Links `rail`, `base`, `yaw<i>`, `link<i>`,
-        `tip`; joints `x0`, `alpha<i>`, `theta<i>`, `tip_mount`.
+        `tip`, and `tool` where there is one; joints `x0`, `alpha<i>`, `theta<i>`,
+        `tip_mount`, `tool_mount`.
     """
     robot = ET.Element("robot", name=manipulator.name)
     ET.SubElement(robot, "link", name="rail")
     low, high = manipulator.base_range
     _joint(robot, "x0", "prismatic", ("rail", "base"), 0.0, "1 0 0", (low, high))
-    radius = manipulator.link_radius
-    _ball(ET.SubElement(robot, "link", name="base"), radius)
+    radii, spans = manipulator.axis_radii.tolist(), manipulator.axis_spans.tolist()
+    _ball(ET.SubElement(robot, "link", name="base"), radii[0])
     parent, offset = "base", 0.0
     box = (-manipulator.max_joint_angle, manipulator.max_joint_angle)
     for i, length in enumerate(manipulator.link_lengths.tolist(), start=1):
         cross, link = f"yaw{i}", f"link{i}"
         _joint(robot, f"alpha{i}", "revolute", (parent, cross), offset, "0 0 1", box)
-        _ball(ET.SubElement(robot, "link", name=cross), radius / 2.0)
+        _ball(ET.SubElement(robot, "link", name=cross), radii[i - 1] / 2.0)
         _joint(robot, f"theta{i}", "revolute", (cross, link), 0.0, "0 1 0", box)
-        _capsule_link(robot, link, length, radius)
+        _capsule_link(robot, link, spans[i - 1][1], radii[i - 1])
         parent, offset = link, length
+    if manipulator.tool:
+        start, end = spans[-1]
+        _joint(robot, "tool_mount", "fixed", (parent, "tool"), start)
+        _capsule_link(robot, "tool", end - start, radii[-1])
     _joint(robot, "tip_mount", "fixed", (parent, "tip"), offset)
     ET.SubElement(robot, "link", name="tip")
     ET.indent(robot)

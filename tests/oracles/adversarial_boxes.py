@@ -208,7 +208,7 @@ def attacked(
     radius, limit = float(batch.arm.link_radius), batch.required[found] - UNSURE
     link, frame = batch.link[found], batch.frame[found]
     if frame[0] != BASE:
-        gaps = link_gaps(centres, radius)[:, frame, link]
+        gaps = link_gaps(centres, np.full(centres.shape[1] - 1, radius))[:, frame, link]
         return (gaps < limit).any(axis=0)
     for corner in centres:
         ends = np.stack([corner[link], corner[link + 1]], axis=1)

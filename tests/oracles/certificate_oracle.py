@@ -335,9 +335,9 @@ class OracleWriter:
             np.cos(theta) * np.cos(alpha),
         )
         pairs = [
-            [other + 1, f"link {i + 1}"]
+            [f"link {other + 1}", f"link {i + 1}"]
             if isinstance(other, int)
-            else [i + 1, other.name]
+            else [f"link {i + 1}", other.name]
             for i, other in self.partners()
         ]
         return {

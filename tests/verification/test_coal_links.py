@@ -45,7 +45,7 @@ def test_closed_form_is_inside_the_proved_bracket(size: float) -> None:
     arm = coiling_arm(6)
     motion = trajectory_of(arm, 25, size)
     centres = joint_centres(arm, motion.x0, motion.alpha, motion.theta)
-    gaps = link_gaps(centres, arm.link_radius)
+    gaps = link_gaps(centres, arm.axis_radii)
     for m in range(25):
         for i in range(6):
             for k in range(6):

@@ -91,12 +91,12 @@ def test_slopes_between_links_are_those_of_differences() -> None:
         pair = Pair(link + 1, other_link=other + 1)
         gaps, slopes = asked(Scene(), pair, q)
         gaps += 2.0 * ARM.link_radius
-        known = link_gaps(centres(q), 0.0)[:, link, other]
+        known = link_gaps(centres(q), np.zeros(ARM.n_links))[:, link, other]
         np.testing.assert_allclose(gaps, known, atol=1e-9)
         for j in range(q.shape[1]):
             step = STEP * np.eye(q.shape[1])[j]
             around = [
-                link_gaps(centres(q + k * step), 0.0)[:, link, other]
+                link_gaps(centres(q + k * step), np.zeros(ARM.n_links))[:, link, other]
                 for k in (0, 1, -1)
             ]
             found, smooth = differences(around)

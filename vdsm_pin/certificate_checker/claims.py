@@ -28,12 +28,40 @@ ERRORS: Final = "joint_rad", "base_m", "obstacle_m"
 LIMITS: Final = "alpha_rad", "theta_rad", "psi_rad", "x0_min_m", "x0_max_m"
 
 
-class Pair(NamedTuple):
-    """A link and a solid that rests in the base frame, or in that of link first - 1."""
+class Body(NamedTuple):
+    """A link or the tool: what lies within a radius of [start, end] along a link."""
 
+    name: str
     link: int
+    start: float
+    end: float
+    radius: float
+
+
+class Pair(NamedTuple):
+    """A body and a solid that rests in the base frame, or in that of link first - 1."""
+
+    body: Body
     solid: Solid
     first: int
+
+
+def bodies_of(arm: Any) -> list[Body]:
+    """The links, then the tool that is mounted on the last one."""
+    ends, tool, radii = arm.link_lengths.tolist(), arm.tool, arm.radii
+    last, tip = len(ends) - 1, ends[-1]
+    ends[last] = tip - tool.length if tool else tip
+    radii = [arm.link_radius] * len(ends) if radii is None else radii.tolist()
+    rows = enumerate(zip(ends, radii, strict=True))
+    found = [Body(f"link {i + 1}", i, 0.0, end, radius) for i, (end, radius) in rows]
+    return [*found, Body("tool", last, ends[-1], tip, tool.radius)] if tool else found
+
+
+def parts(one: Body, other: Body, length: float) -> bool:
+    """Whether a body farther out can part from another, on a link of that length."""
+    if other.link == one.link + 1:
+        return (length - one.end) + other.start > one.radius + other.radius
+    return other.link > one.link
 
 
 class Check:
@@ -55,12 +83,15 @@ class Check:
         self.joints, self.arm = trajectory.joints, problem.manipulator
         self.lengths = [arb(length) for length in self.arm.link_lengths.tolist()]
         self.solids = [solid(obstacle) for obstacle in problem.scene.obstacles]
-        links = range(len(self.lengths))
-        self.pairs = [Pair(link, one, 0) for one in self.solids for link in links]
-        for i in links:
-            axis = [[[0.0, 0.0, 0.0], [self.arm.link_lengths[i], 0.0, 0.0]]]
-            body = Solid(f"link {i + 1}", axis, radius=self.arm.link_radius)
-            self.pairs += [Pair(link, body, i + 1) for link in links[i + 2 :]]
+        bodies = bodies_of(self.arm)
+        self.thinnest = min(body.radius for body in bodies)
+        self.pairs = [Pair(body, one, 0) for one in self.solids for body in bodies]
+        for i, body in enumerate(bodies):
+            axis = [[[body.start, 0.0, 0.0], [body.end, 0.0, 0.0]]]
+            rest = Solid(body.name, axis, radius=body.radius)
+            length, link = float(self.arm.link_lengths[body.link]), body.link
+            later = (other for other in bodies[i + 1 :] if parts(body, other, length))
+            self.pairs += [Pair(other, rest, link + 1) for other in later]
         path = problem.tip_path
         self.drawing = None if path is None else Drawing(path)
         self.ordered = path is not None and path.order is Order.AS_GIVEN
@@ -108,7 +139,7 @@ class Check:
             named[name].cut(header["pieces"][name])
         for name, (corners, seams) in header["joined"].items():
             named[name].join(corners, seams)
-        expected = [[pair.link + 1, pair.solid.name] for pair in self.pairs]
+        expected = [[pair.body.name, pair.solid.name] for pair in self.pairs]
         claim(header["pairs"] == expected, "the pairs are not those of the problem")
 
     def _interval(self, k: int, line: dict[str, Any]) -> None:
@@ -122,7 +153,7 @@ class Check:
         here, proofs, n_pairs = self.place, line["proofs"], len(self.pairs)
         claim(len(proofs) == n_pairs, f"{len(proofs)} of {n_pairs} pairs")
         for pair, proof in zip(self.pairs, proofs, strict=True):
-            self.place = f"{here}, link {pair.link + 1} and {pair.solid.name}"
+            self.place = f"{here}, {pair.body.name} and {pair.solid.name}"
             self._proof(pair, proof)
         self.place = here
         self._rows(rows)
@@ -145,11 +176,11 @@ class Check:
         """Check that a plane proves what it claims, not much more, and enough."""
         x, y, z, lower = map(number, plane)
         n = pair.solid.direction(unit(column(x, y, z)))
-        lost, required = arb(self.arm.link_radius), self.problem.required_self_clearance
+        lost, required = arb(pair.body.radius), self.problem.required_self_clearance
         if pair.first == 0:
             lost += self.base + self.obstacle
             required = self.problem.required_clearance
-        reach = self.motion.reach(pair.link, pair.first, times, n)
+        reach = self.motion.reach(pair.body, pair.first, times, n)
         proved = pair.solid.support(n, *pieces) - reach - lost
         holds = required <= lower <= proved <= lower + SLACK
         values = lower, proved, required
@@ -164,7 +195,7 @@ class Check:
         if rows[0] == 0:
             base = [float(self.joints[0, 0]), 0.0, 0.0]
             for mesh in (one for one in self.solids if isinstance(one, Mesh)):
-                why = mesh.surface.not_outside(base, self.arm.link_radius)
+                why = mesh.surface.not_outside(base, self.thinnest)
                 outside = mesh.surface_only or not why
                 claim(outside, f"the arm is not proved outside {mesh.name}: {why}")
             self._end("start", problem.begin, 0, tips[0])
@@ -206,7 +237,8 @@ class Check:
                 forwards = ahead >= -same - SLACK or not self.ordered
                 claim(forwards, "the path is drawn {} m backwards", -ahead)
         if on.all():
-            drawing.draw(stations, tips, self.motion.bounds(0)[-1][0] / 8)
+            end = len(self.lengths) - 1, 0, float(self.arm.link_lengths[-1])
+            drawing.draw(stations, tips, self.motion.bounds(*end)[0] / 8)
         else:
             drawing.last = None
 

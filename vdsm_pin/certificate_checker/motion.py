@@ -4,6 +4,7 @@ Links and joint centres count from 0 in here: link i joins centres i and i + 1.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 from flint import arb, arb_mat
 
@@ -42,15 +43,19 @@ class Pose:
             self.centres.append(self.centres[i] + along)
         self.origins = [column(0, 0, 0), *self.centres]
 
-    def height(self, n: Matrix, first: int, j: int) -> Ball:
-        """n.O_j from the origin of frame `first`, in which n is."""
-        return dot(self.frames[first] * n, self.centres[j] - self.origins[first])
+    def point(self, link: int, along: float) -> Matrix:
+        """A point of a link's axis, so far along it."""
+        return self.centres[link] + self.frames[link + 1] * column(along, 0, 0)
 
-    def gain(self, n: Matrix, first: int, j: int) -> Ball:
-        """G_j: how fast n.O_j grows at most with the angles of joints first..j-1."""
+    def height(self, n: Matrix, first: int, point: Matrix) -> Ball:
+        """n.p from the origin of frame `first`, in which n is."""
+        return dot(self.frames[first] * n, point - self.origins[first])
+
+    def gain(self, n: Matrix, first: int, link: int, point: Matrix) -> Ball:
+        """G: how fast n.p grows at most with the angles of joints first..link."""
         total, turned = arb(0), self.frames[first] * n
-        for i in range(first, j):
-            lever = cross(self.centres[j] - self.centres[i], turned)
+        for i in range(first, link + 1):
+            lever = cross(point - self.centres[i], turned)
             for frame, axis in ((self.frames[i], 2), (self.frames[i + 1], 1)):
                 total += abs(dot(column(*(frame[k, axis] for k in range(3))), lever))
         return total
@@ -71,7 +76,6 @@ class Interval:
         self.lengths, self.start, self.error = lengths, ends[0], error
         self.change = [b - a for a, b in zip(*ends, strict=True)]
         self.poses: dict[float, Pose] = {}
-        self._bounds: dict[int, list[tuple[Ball, Ball, Ball]]] = {}
 
     def pose(self, time: float) -> Pose:
         """The configuration at a time in [0, 1]; pairs share most of their times."""
@@ -83,26 +87,26 @@ class Interval:
             self.poses[time] = Pose(self.lengths, joints)
         return self.poses[time]
 
-    def bounds(self, first: int) -> list[tuple[Ball, Ball, Ball]]:
-        """M_j, D_j and the second order in E, by j, where joints first.. move O_j."""
-        if first not in self._bounds:
-            rate = bend = drift = second = arb(0)
-            found = [(bend, drift, second)] * (first + 1)
-            for i in range(first, len(self.lengths)):
-                length, angles = self.lengths[i], 2 * (i - first + 1)
-                rate += abs(self.change[2 * i + 1]) + abs(self.change[2 * i + 2])
-                bend += length * rate * rate
-                drift += angles * length * rate
-                second += length * (angles * self.error) ** 2 / 2
-                found.append((bend, drift, second))
-            self._bounds[first] = found
-        return self._bounds[first]
+    def bounds(self, link: int, first: int, along: float) -> tuple[Ball, Ball, Ball]:
+        """M, D and the second order in E of a point, so far along a link.
 
-    def reach(self, link: int, first: int, times: Sequence[float], n: Matrix) -> Ball:
-        """Largest n.x over the axis of a link, a slice [a, b] and all joint errors.
+        Only joints from `first` on move it.
+        """
+        rate = error = bend = drift = second = arb(0)
+        for i in range(first, link + 1):
+            length = arb(along) if i == link else self.lengths[i]
+            rate += abs(self.change[2 * i + 1]) + abs(self.change[2 * i + 2])
+            error += 2 * self.error
+            bend += length * rate * rate
+            drift += length * rate * error
+            second += length * error * error / 2
+        return bend, drift, second
+
+    def reach(self, body: Any, first: int, times: Sequence[float], n: Matrix) -> Ball:
+        """Largest n.x over the axis of a body, a slice [a, b] and all joint errors.
 
         Args:
-            link: The link.
+            body: Its link, and where its axis starts and ends along it.
             first: Of the poses' frames the one that n and x are in; only the joints
                 from this one on move the link in it.
             times: a and b.
@@ -110,12 +114,13 @@ class Interval:
         """
         a, b = map(self.pose, times)
         h, tops = arb(times[1]) - times[0], []
-        for j in (link, link + 1):
-            bend, drift, second = self.bounds(first)[j]
-            top = a.height(n, first, j).max(b.height(n, first, j))
+        for along in (body.start, body.end):
+            bend, drift, second = self.bounds(body.link, first, along)
+            p, q = a.point(body.link, along), b.point(body.link, along)
+            top = a.height(n, first, p).max(b.height(n, first, q))
             top += bend * h * h / 8 + second
             if self.error > 0:
-                gain = a.gain(n, first, j) + b.gain(n, first, j)
-                top += self.error * (gain + h * drift) / 2
+                gain = a.gain(n, first, body.link, p) + b.gain(n, first, body.link, q)
+                top += (self.error * gain + h * drift) / 2
             tops.append(top)
         return tops[0].max(tops[1])

@@ -36,19 +36,19 @@ def _box_gap(pieces: PackedPieces, o: int, x: float, y: float, z: float) -> floa
 
 @compiled
 def coarse_bounds(
-    pieces: PackedPieces, centres: FloatArray, radius: float
+    pieces: PackedPieces, centres: FloatArray, radii: FloatArray
 ) -> FloatArray:
     """Lower bounds of the clearance of every link from every obstacle.
 
     Args:
         pieces: The scene.
         centres: Joint centres, shape (n_samples, N + 1, 3); [m].
-        radius: Of the links; [m].
+        radii: Of the links, shape (N,); [m].
 
     Returns:
         Shape (n_samples, N, n_obstacles); [m].
     """
-    pieces, centres = borrowed(pieces), borrowed(centres)
+    pieces, centres, radii = borrowed(pieces), borrowed(centres), borrowed(radii)
     n_samples, n_links, n_obstacles = (
         centres.shape[0],
         centres.shape[1] - 1,
@@ -59,7 +59,7 @@ def coarse_bounds(
         for i in range(n_links):
             start, end = centres[k, i], centres[k, i + 1]
             dx, dy, dz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
-            ball = radius + 0.5 * sqrt(dx * dx + dy * dy + dz * dz) / BALLS
+            ball = radii[i] + 0.5 * sqrt(dx * dx + dy * dy + dz * dz) / BALLS
             for o in range(n_obstacles):
                 for b in range(BALLS):
                     t = (b + 0.5) / BALLS
@@ -135,7 +135,7 @@ def _crossing_gap(p: FloatArray, q: FloatArray, r: FloatArray, s: FloatArray) ->
 
 
 @compiled
-def link_gaps(centres: FloatArray, radius: float) -> FloatArray:
+def link_gaps(centres: FloatArray, radii: FloatArray) -> FloatArray:
     """Clearance between links two or more apart, in closed form.
 
     The squared distance of two segments is convex, so it is least in the inside of both
@@ -144,13 +144,13 @@ def link_gaps(centres: FloatArray, radius: float) -> FloatArray:
 
     Args:
         centres: Joint centres, shape (n_samples, N + 1, 3); [m].
-        radius: Of the links; [m].
+        radii: Of the links, shape (N,); [m].
 
     Returns:
         Shape (n_samples, N, N), for links i and k >= i + 2 counted from 0; the others
         are inf; negative where they meet; [m].
     """
-    centres = borrowed(centres)
+    centres, radii = borrowed(centres), borrowed(radii)
     n_samples, n_links = centres.shape[0], centres.shape[1] - 1
     gaps = np.full((n_samples, n_links, n_links), np.inf)
     for m in range(n_samples):
@@ -165,5 +165,5 @@ def link_gaps(centres: FloatArray, radius: float) -> FloatArray:
                     _point_gap(r, p, q),
                     _point_gap(s, p, q),
                 )
-                gaps[m, i, k] = sqrt(square) - 2.0 * radius
+                gaps[m, i, k] = sqrt(square) - (radii[i] + radii[k])
     return gaps

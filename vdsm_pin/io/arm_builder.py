@@ -4,7 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TypeAlias
 
+import numpy as np
+
 from vdsm_pin.errors import InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.source import Digest
@@ -14,6 +17,7 @@ from vdsm_pin.manipulator import (
     BUILT_IN,
     CableLayout,
     Manipulator,
+    Tool,
     built_in,
     paper_hole_angles,
 )
@@ -55,7 +59,12 @@ class ArmBuilder:
             return built_in(model)
         if isinstance(model, schema.UrdfManipulatorModel):
             return self._from_urdf(model)
-        lengths = self.frame.metres(model.link_lengths)
+        lengths, radii = self.frame.metres(model.link_lengths), self._radii(model)
+        tool = None
+        if model.tool:
+            size = model.tool.length, model.tool.radius
+            tool = Tool(*(float(x) for x in self.frame.metres(size)))
+            lengths[-1] += tool.length
         stroke = DEFAULT_STROKE * float(lengths.sum())
         low, high = -stroke, stroke
         if model.base_range is not None:
@@ -64,18 +73,32 @@ class ArmBuilder:
                 problem = f"is {model.base_range}, expected the smaller value first"
                 raise self.document.invalid(("manipulator", "base_range"), problem)
         self._check_extent(float(lengths.sum()), max(-low, high))
+        thinnest = float(np.min(model.link_radius))
         try:
             return Manipulator(
                 model.name,
                 lengths,
-                float(self.frame.metres(model.link_radius)),
+                float(radii.max()),
                 float(radians(model.max_link_angle_deg)),
                 float(radians(model.max_joint_angle_deg)),
                 (low, high),
-                self._cables(model.cables, model.link_lengths, model.link_radius),
+                self._cables(model.cables, model.link_lengths, thinnest),
+                radii=radii if isinstance(model.link_radius, list) else None,
+                tool=tool,
             )
         except InvalidInput as error:
             raise self.document.invalid(("manipulator",), str(error)) from None
+
+    def _radii(self, model: schema.ManipulatorModel) -> FloatArray:
+        """Radius of every link; [m]."""
+        count = len(model.link_lengths)
+        if not isinstance(model.link_radius, list):
+            return np.full(count, self.frame.metres(model.link_radius))
+        if len(model.link_radius) != count:
+            found = len(model.link_radius)
+            problem = f"has {found} values, expected {count}, one per link"
+            raise self.document.invalid(("manipulator", "link_radius"), problem)
+        return self.frame.metres(model.link_radius)
 
     def _from_urdf(self, model: schema.UrdfManipulatorModel) -> Manipulator:
         """The arm of a URDF; its bytes belong to the problem as those of meshes do."""

@@ -115,12 +115,12 @@ def _check_links_apart(
     arm: Manipulator, self_clearance: float, frame: Frame, document: YamlDocument
 ) -> None:
     """A link between two others must keep them apart while the arm is straight."""
-    needed = 2.0 * arm.link_radius + self_clearance
     for i in range(1, arm.n_links - 1):
+        needed = arm.radius_of(i) + arm.radius_of(i + 2) + self_clearance
         if not arm.link_lengths[i] > needed:
             problem = (
                 f"is {frame.shown(arm.link_lengths[i])}, expected above "
-                f"{frame.shown(needed)}: twice the body radius and the self-clearance, "
-                "else the links on either side of it always touch"
+                f"{frame.shown(needed)}: the radii of its neighbours and the "
+                "self-clearance, else the links on either side of it always touch"
             )
             raise document.invalid(("manipulator", "link_lengths", i), problem)

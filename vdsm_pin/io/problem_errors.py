@@ -21,6 +21,7 @@ _MODELS: Final[Mapping[str | int, type[FileModel]]] = {
     "manipulator": schema.ManipulatorModel,
     "value": schema.ManipulatorModel,
     "cables": schema.CablesModel,
+    "tool": schema.ToolModel,
     "base": schema.BasePoseModel,
     "tip_path": schema.TipPathModel,
     "joints": schema.JointsModel,

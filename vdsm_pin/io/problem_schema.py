@@ -21,6 +21,13 @@ from vdsm_pin.io.schema_types import (
 )
 from vdsm_pin.manipulator import MAX_LINKS
 
+Radii: TypeAlias = Annotated[
+    Annotated[Positive, Tag("one")]
+    | Annotated[list[Positive], Field(min_length=2, max_length=MAX_LINKS), Tag("each")],
+    Discriminator(lambda value: "each" if isinstance(value, list) else "one"),
+]
+"""One radius of all links, or one of each."""
+
 Lengths: TypeAlias = Annotated[
     list[Positive], Field(min_length=2, max_length=MAX_LINKS)
 ]
@@ -60,6 +67,15 @@ class CablesModel(FileModel):
     )
 
 
+class ToolModel(FileModel):
+    """A straight extension of the last link, a capsule about the same axis."""
+
+    length: Positive = Field(
+        description="From the end of the last link to the tip [length_unit]."
+    )
+    radius: Positive = Field(description="Of the capsule [length_unit].")
+
+
 class ManipulatorModel(FileModel):
     """An arm of N links on a rail along the x axis of its base."""
 
@@ -67,8 +83,9 @@ class ManipulatorModel(FileModel):
     link_lengths: Lengths = Field(
         description="L_1..L_N between joint centres, 2 to 40 of them [length_unit]."
     )
-    link_radius: Positive = Field(
-        description="Radius of the body; a link is a capsule [length_unit]."
+    link_radius: Radii = Field(
+        description="Radius of the links, or one for each; a link is a capsule "
+        "[length_unit]."
     )
     max_link_angle_deg: float = Field(
         gt=0.0, lt=90.0, description="Largest link angle psi, a cone [deg]."
@@ -83,8 +100,13 @@ class ManipulatorModel(FileModel):
     )
     cables: CablesModel | None = Field(
         default=None,
-        description="Cable holes. Default: on 0.8 of the body radius, half gap 0.1 of "
-        "the shortest link.",
+        description="Cable holes. Default: on 0.8 of the body radius (of the thinnest "
+        "link), half gap 0.1 of the shortest link.",
+    )
+    tool: ToolModel | None = Field(
+        default=None,
+        description="What is mounted at the end of the last link; its end draws the "
+        "path. Default: nothing.",
     )
 
 

@@ -36,7 +36,7 @@ def _check_outside(problem: PlanningProblem, base: FloatArray) -> None:
         problem: Arm and scene.
         base: First joint centre of the arm as it starts, shape (3,); [m].
     """
-    radius = problem.manipulator.link_radius
+    radius = problem.manipulator.least_radius
     for mesh in problem.scene.obstacles:
         if not isinstance(mesh, Mesh) or mesh.is_surface:
             continue

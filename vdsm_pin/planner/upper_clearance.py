@@ -66,7 +66,7 @@ def upper_clearance(problem: PlanningProblem, segments: FloatArray) -> FloatArra
         return np.full((len(segments), 0), np.inf)
     pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
     upper = upper_bounds(pieces, np.ascontiguousarray(segments), np.inf)
-    return np.asarray(upper - problem.manipulator.link_radius)
+    return np.asarray(upper - problem.manipulator.least_radius)
 
 
 def culprit(problem: PlanningProblem, centres: FloatArray) -> tuple[int, str, float]:

@@ -46,7 +46,7 @@ class Runs(NamedTuple):
         growth: What errors add to n.corner, shape (corners, BLOCK); [m].
         axis: Axis of the disc in the partner's frame, shape (3, BLOCK + 1); [-].
         own: The witness on the body, shape (3, BLOCK + 1); [m].
-        work: Working space, shape (3, BLOCK + 1).
+        work: Working space, shape (4, BLOCK + 1).
     """
 
     lower: FloatArray
@@ -74,7 +74,7 @@ def new_runs(corners: int) -> Runs:
         np.zeros((corners, BLOCK)),
         np.zeros((3, BLOCK + 1)),
         np.zeros((3, BLOCK + 1)),
-        np.zeros((3, BLOCK + 1)),
+        np.zeros((4, BLOCK + 1)),
     )
 
 
@@ -197,13 +197,13 @@ def bound_below(
         first: First interval of the block to look at.
         last: One past the last.
         lower: Result, shape (BLOCK,); [m].
-        work: Working space, shape (3, BLOCK + 1).
+        work: Working space, shape (4, BLOCK + 1).
     """
     apart()
     gap, low = plane[SUPPORT] - lost, lower[first:last]
     most, along = work[0, first:last], work[2, first : last + 1]
     for k in range(corners):
-        reach = work[min(k, 1), first:last]
+        reach = work[k if k < 2 else 3, first:last]
         place = points[k, :, first : last + 1]
         _reach(place, sags[k, first:last], growth[k, first:last], plane, along, reach)
         if k > 1:

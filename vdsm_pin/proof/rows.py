@@ -29,7 +29,7 @@ class Rows(NamedTuple):
     Args:
         frames: R_base_frame, shape (N + 1, 3, 3, BLOCK + 1); [-].
         centres: O_j in a frame, shape (N + 1, N + 1, 3, BLOCK + 1); of frame f + 1
-            only the centres behind its link; [m].
+            only the end of its link and the centres behind it; [m].
         sags: M/8, how far O_j may leave its chord with joints before f at rest, at
             [f, j], shape (N + 1, N + 1, BLOCK); [m].
         drifts: D at [f, j], only where joints may err, the same shape; [m].
@@ -123,11 +123,12 @@ def _place(motion: Motion, rules: Rules, rows: Rows, first: int, n: int) -> None
 
 
 @compiled
-def _localise(rows: Rows, n: int) -> None:
-    """Joint centres in the frames of the links two or more before them."""
+def _localise(rules: Rules, rows: Rows, n: int) -> None:
+    """Joint centres in the frames of the links before them."""
     apart()
     n_links = rows.frames.shape[0] - 1
     for f in range(1, n_links):
+        rows.centres[f, f, 0, :n] = rules.lengths[f - 1]
         for j in range(f + 1, n_links + 1):
             for c in range(3):
                 o, p = rows.centres[0, f - 1, c, :n], rows.centres[0, j, c, :n]
@@ -181,7 +182,7 @@ def fill_rows(motion: Motion, rules: Rules, rows: Rows, first: int, count: int) 
     """Configurations of rows first .. first + count; the last row may repeat."""
     apart()
     _place(motion, rules, rows, first, count + 1)
-    _localise(rows, count + 1)
+    _localise(rules, rows, count + 1)
     _bend(motion, rules, rows, first, count)
 
 

@@ -1,11 +1,13 @@
 """Records to file models: one place where a verification becomes words and rows."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from vdsm_pin.arm_bodies import arm_bodies, self_pairs
 from vdsm_pin.cables import cable_lengths
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.kinematics import link_angles
@@ -19,6 +21,7 @@ from vdsm_pin.report.files import (
     CounterexampleRow,
     ErrorBoxRow,
     Hashes,
+    LeftOutRow,
     MinClearance,
     MotionFacts,
     PlanFile,
@@ -115,8 +118,10 @@ def closest_row(verification: Verification, approach: ClosestApproach) -> Closes
         interval=approach.interval,
         moment=approach.moment,
         link=approach.pair.link,
+        body=approach.pair.body or None,
         obstacle=approach.pair.obstacle or None,
         other_link=approach.pair.other_link or None,
+        other_body=approach.pair.other_body or None,
         lower_m=finite(approach.lower),
         upper_m=finite(approach.upper),
         station_m=finite(approach.station),
@@ -133,8 +138,10 @@ def counterexample_row(
     return CounterexampleRow(
         moment=found.moment,
         link=found.pair.link,
+        body=found.pair.body or None,
         obstacle=found.pair.obstacle or None,
         other_link=found.pair.other_link or None,
+        other_body=found.pair.other_body or None,
         x0_m=float(found.joints[0]),
         x0_error_m=float(found.offsets[0]),
         angles_rad=tuple(found.joints[1:].tolist()),
@@ -172,6 +179,29 @@ def nearest_to_obstacle(verification: Verification) -> int | None:
     return next(near, None)
 
 
+def left_out(problem: PlanningProblem) -> tuple[LeftOutRow, ...]:
+    """The bodies of an arm that are not held apart."""
+    arm = problem.manipulator
+    rows = self_pairs(arm, arm_bodies(arm)).left_out
+    return tuple(
+        LeftOutRow(body=row.body, other=row.other, reason=row.reason) for row in rows
+    )
+
+
+def left_out_words(rows: Sequence[LeftOutRow]) -> str:
+    """The same in one sentence, each reason of links next to each other once."""
+    words, joints = [], 0
+    for row in rows:
+        if row.reason.startswith("meet at joint") and row.other.startswith("link"):
+            joints += 1
+        else:
+            words.append(f"{row.body} and {row.other} ({row.reason})")
+    if joints:
+        meet = "links next to each other, which meet at their joint in every pose"
+        words.insert(0, meet)
+    return "; ".join(words)
+
+
 def min_clearance(verification: Verification) -> MinClearance | None:
     """The smallest clearance from any obstacle; None where there is no obstacle."""
     index = nearest_to_obstacle(verification)
@@ -183,6 +213,7 @@ def min_clearance(verification: Verification) -> MinClearance | None:
         upper_m=finite(row.upper),
         moment=row.moment,
         link=row.pair.link,
+        body=row.pair.body or None,
         obstacle=row.pair.obstacle,
         deeper=row.deeper,
     )
@@ -304,6 +335,7 @@ def verification_file(
         refuted_joint_error_rad=finite(verification.refuted_joint_error),
         time_limit_s=finite(verification.time_limit),
         not_done=verification.not_done,
+        left_out=left_out(problem),
         counterexamples=tuple(
             counterexample_row(verification, found)
             for found in verification.counterexamples

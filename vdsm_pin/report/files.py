@@ -83,8 +83,10 @@ class ClosestRow(FileModel):
     )
     moment: FiniteFloat = Field(description=f"when upper_m was found; {_MOMENT}")
     link: int = Field(description=_LINK)
+    body: str | None = Field(description="`tool` where it is that; null for the link")
     obstacle: str | None = Field(description="its name; null in a pair of links")
     other_link: int | None = Field(description="null unless a pair of links")
+    other_body: str | None = Field(description="as body, of the other link")
     lower_m: FiniteFloat | None = Field(description="proved lower bound")
     upper_m: FiniteFloat | None = Field(description="proved upper bound")
     station_m: FiniteFloat | None = Field(
@@ -102,8 +104,17 @@ class MinClearance(FileModel):
     upper_m: FiniteFloat | None = Field(description="proved upper bound")
     moment: FiniteFloat = Field(description=f"when upper_m was found; {_MOMENT}")
     link: int = Field(description=_LINK)
+    body: str | None = Field(description="`tool` where it is that; null for the link")
     obstacle: str = Field(description="name of the obstacle")
     deeper: bool = Field(description=f"of both bounds: {_DEEPER}")
+
+
+class LeftOutRow(FileModel):
+    """Two bodies of the arm that are not held apart."""
+
+    body: str = Field(description="`link 1` and so on, or `tool`")
+    other: str = Field(description="the other one")
+    reason: str = Field(description="why they are not")
 
 
 class ErrorBoxRow(FileModel):
@@ -119,8 +130,10 @@ class CounterexampleRow(FileModel):
 
     moment: FiniteFloat = Field(description=f"when it does; {_MOMENT}")
     link: int = Field(description=_LINK)
+    body: str | None = Field(description="`tool` where it is that; null for the link")
     obstacle: str | None = Field(description="its name; null in a pair of links")
     other_link: int | None = Field(description="null unless a pair of links")
+    other_body: str | None = Field(description="as body, of the other link")
     x0_m: FiniteFloat = Field(description="base position then, its error included")
     x0_error_m: FiniteFloat = Field(description="of it, off the nominal one")
     angles_rad: tuple[FiniteFloat, ...] = Field(
@@ -212,6 +225,9 @@ class VerificationFile(FileModel):
     )
     not_done: tuple[str, ...] = Field(
         description="what the time limit left out besides checks, which have their rows"
+    )
+    left_out: tuple[LeftOutRow, ...] = Field(
+        description="bodies of the arm that are not held apart, with a reason each"
     )
     counterexamples: tuple[CounterexampleRow, ...] = Field(
         description="errors within the box that lose the clearance where it is refuted "

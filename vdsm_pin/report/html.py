@@ -15,7 +15,7 @@ from markupsafe import Markup
 from vdsm_pin import __version__, kept
 from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.report.facts import failing, nearest_to_obstacle
+from vdsm_pin.report.facts import failing, left_out_words, nearest_to_obstacle
 from vdsm_pin.report.files import BatchRow, PlanFile, Point, VerificationFile
 from vdsm_pin.report.inputs import assumption
 from vdsm_pin.report.page_data import report_data, view_data
@@ -160,6 +160,7 @@ def write_report(
         complete=data.complete,
         worst=nearest_to_obstacle(verification),
         failing=failing(verification),
+        left_out=left_out_words(file.left_out),
     )
     path.write_text(page, encoding="utf-8")
 

@@ -45,6 +45,12 @@ def scene_data(
     return {
         "lengths": arm.link_lengths.tolist(),
         "radius": arm.link_radius,
+        "axes": [
+            [min(k + 1, arm.n_links) - 1, *span, radius]
+            for k, (span, radius) in enumerate(
+                zip(arm.axis_spans.tolist(), arm.axis_radii.tolist(), strict=True)
+            )
+        ],
         "colours": list(link_colours(arm.n_links)),
         "pose": problem.T_world_base.ravel().tolist(),
         "obstacles": solids,

@@ -76,7 +76,8 @@ class ClearanceCsv(_OwnFile):
         pose = problem.T_world_base
         self._rotation, self._shift = pose[:3, :3].T, pose[:3, 3]
         partners = [
-            f"{pair.link},{_quoted(pair.obstacle)},{pair.other_link or ''}"
+            f"{pair.body or pair.link},{_quoted(pair.obstacle)},"
+            f"{pair.other_body or pair.other_link or ''}"
             for pair in pairs
         ]
         self._form = Form(_CLEARANCE_DECIMALS, _CLEARANCE_ROUNDING,

@@ -155,7 +155,7 @@ def cleared(
         if pair.obstacle
     ]
     if arm_inside(located):
-        near.append(-problem.manipulator.link_radius)
+        near.append(-problem.manipulator.least_radius)
     least = finite(min(near, default=float("inf")))
     return Cleared(verdict=verdict.value, min_clearance_m=least)
 

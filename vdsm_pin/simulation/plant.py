@@ -79,7 +79,7 @@ def _bodies(manipulator: Manipulator, settings: Settings) -> list[str]:
             f"<joint name='alpha{i}' type='hinge' axis='0 0 1' {axis}/>",
             f"<joint name='theta{i}' type='hinge' axis='0 1 0' {axis}/>",
             f"<geom type='capsule' fromto='0 0 0 {float(length)!r} 0 0'"
-            f" size='{manipulator.link_radius}' mass='{density * float(length)!r}'"
+            f" size='{manipulator.radius_of(i)}' mass='{density * float(length)!r}'"
             " contype='0' conaffinity='0'/>",
             *_sites(manipulator, i, d, "in", i),
         ]

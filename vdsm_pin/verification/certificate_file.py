@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, RootModel
 Number = Annotated[int, Field(ge=0)]
 Share = Annotated[FiniteFloat, Field(ge=0.0, le=1.0)]
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-Pair = tuple[Annotated[int, Field(ge=1)], str]
+Pair = tuple[str, str]
 Plane = tuple[Number, Number, FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat]
 Slice = tuple[Share, Share, Annotated[list[Plane], Field(min_length=1)]]
 
@@ -51,8 +51,8 @@ class HeaderLine(LineModel):
     errors: ErrorLimits
     n_rows: int = Field(ge=1, description="rows of the trajectory")
     pairs: list[Pair] = Field(
-        description="moving link, counted from 1, and what it is proved clear of: an "
-        "obstacle's name, or `link 1` and so on at rest"
+        description="moving body, `link 1` and so on or `tool`, and what it is proved "
+        "clear of: an obstacle's name, or another body at rest"
     )
     pieces: dict[str, list[Number] | list[list[Number]]] = Field(
         description="numbers of a mesh's triangles, or corner numbers of a prism's, in "

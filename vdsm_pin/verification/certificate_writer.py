@@ -131,11 +131,9 @@ def _header(
 
 
 def _pairs(problem: PlanningProblem) -> list[Pair]:
-    """The moving link of each pair and what it is proved clear of."""
+    """The moving body of each pair and what it is proved clear of."""
     return [
-        (pair.link, pair.obstacle)
-        if pair.obstacle
-        else (pair.other_link, f"link {pair.link}")
+        (pair.own, pair.obstacle) if pair.obstacle else (pair.label, pair.own)
         for pair in all_pairs(problem)
     ]
 

@@ -278,19 +278,16 @@ def _send(
     Returns:
         Number of intervals sent.
     """
-    known, n_links = proving.results, problem.manipulator.n_links
-    obstacles = problem.scene.obstacles
-    n_outer = n_links * len(obstacles)
-    lowers = known.best[:n_outer, LOW].reshape(-1, n_links)
-    near = np.flatnonzero((lowers <= reach).any(axis=1))
+    known, obstacles = proving.results, problem.scene.obstacles
+    outer, obstacle = proving.task.pairs.frame == BASE, proving.task.pairs.obstacle
+    near = np.unique(obstacle[outer & (known.best[:, LOW] <= reach)])
+    pairs = frozen(np.flatnonzero(~outer | np.isin(obstacle, near)), np.int64)
     if near.size < len(obstacles):
         scene = Scene(tuple(obstacles[k] for k in near))
         near_problem = replace(problem, scene=scene)
         proving = new_proving(
             near_problem, trajectory, errors, deadline=proving.deadline
         )
-    outer = (near[:, None] * n_links + np.arange(n_links)).ravel()
-    pairs = frozen(np.append(outer, np.arange(n_outer, len(known.best))), np.int64)
     length = CHUNK_VALUES // max(1, pairs.size) // BLOCK * BLOCK
     length = min(CHUNK, proving.n_intervals, max(BLOCK, length))
     results = proving.results._replace(

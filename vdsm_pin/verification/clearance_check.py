@@ -42,7 +42,7 @@ def check_clearance(
     ):
         if mine.any():
             row = _row(proof, np.flatnonzero(mine), name, needed, late)
-            radius = problem.manipulator.link_radius
+            radius = problem.manipulator.least_radius
             row = replace(row, deeper=is_deepest(row.worst, radius))
             against = [
                 found
@@ -72,7 +72,7 @@ def _row(
     column = UP if verdict is Verdict.REFUTED else LOW
     pair = int(mine[np.argmin(proof.best[mine, column])])
     row = proof.best[pair]
-    where = f"link {proof.pairs[pair].link} and {proof.pairs[pair].label}"
+    where = f"{proof.pairs[pair].own} and {proof.pairs[pair].label}"
     if verdict is Verdict.UNDECIDED:
         where += f"; {int(counts[UNDECIDED])} of {int(counts.sum())} undecided{late}"
     return Check(
@@ -98,7 +98,7 @@ def _first(row: Check, contact: FirstContact) -> Check:
 
 def _refuted(row: Check, found: Counterexample) -> Check:
     """The row of an undecided proof that a counterexample decides."""
-    pair = f"link {found.pair.link} and {found.pair.label}"
+    pair = f"{found.pair.own} and {found.pair.label}"
     return replace(
         row,
         verdict=Verdict.REFUTED,

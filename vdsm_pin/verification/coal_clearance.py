@@ -52,7 +52,7 @@ class CoalDistances:
 
     Args:
         waypoint: Row of the trajectory, from 0, shape (m,).
-        link: Link, from 0, shape (m,).
+        link: Link, from 0, or N for the tool, shape (m,).
         obstacle: Number of the obstacle in the scene, from 0, shape (m,).
         distance: By Coal; -inf where its answer is unusable, shape (m,); [m].
         lower: Proved lower bound at the row; [m].
@@ -134,7 +134,7 @@ def check_coal(
     Raises:
         OutOfTime: If the time is over.
     """
-    scene, n_links = problem.scene, problem.manipulator.n_links
+    scene, names = problem.scene, problem.manipulator.axis_names
     if not scene.obstacles:
         return ()
     count, worst, where, moment = 0, -np.inf, "", float("nan")
@@ -142,19 +142,19 @@ def check_coal(
     for found in coal_distances(robot, problem, trajectory, reach, travel, deadline):
         excess = found.disagreement
         if proved is not None:
-            excess = np.maximum(excess, _below_proof(found, proved, n_links))
+            excess = np.maximum(excess, _below_proof(found, proved, len(names)))
         excess = np.where(np.isnan(excess), np.inf, excess)
         count += excess.size
         k = int(np.argmax(excess))
         if excess[k] > worst:
             worst, moment = float(excess[k]), float(found.waypoint[k])
             where = (
-                f"link {found.link[k] + 1} and {scene.names[found.obstacle[k]]}: "
+                f"{names[found.link[k]]} and {scene.names[found.obstacle[k]]}: "
                 f"Coal {found.distance[k] * MM_PER_M:.6f} mm, "
                 f"proved [{found.lower[k] * MM_PER_M:.6f}, "
                 f"{found.upper[k] * MM_PER_M:.6f}] mm"
             )
-    total = trajectory.n_samples * n_links * len(scene.obstacles)
+    total = trajectory.n_samples * len(names) * len(scene.obstacles)
     agreed = worst <= TOLERANCES.coal_agreement
     alone = "" if proved is not None else "; against brackets of the rows alone"
     check = Check(
@@ -175,7 +175,7 @@ def reach_of(problem: PlanningProblem) -> float:
 
     The required clearance and the arm's own radius past it.
     """
-    return problem.required_clearance + problem.manipulator.link_radius
+    return problem.required_clearance + problem.manipulator.most_radius
 
 
 def coal_distances(
@@ -208,7 +208,7 @@ def coal_distances(
     arm, obstacles = problem.manipulator, problem.scene.obstacles
     pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
     bodies = [_bodies_of(obstacle, deadline) for obstacle in obstacles]
-    least = np.full((arm.n_links, len(obstacles)), np.inf)
+    least = np.full((arm.axis_radii.size, len(obstacles)), np.inf)
     nearest = np.zeros(least.shape, dtype=np.int64)
     seen = np.zeros(least.shape, dtype=np.bool_)
     moved = _Moved(travel)
@@ -218,7 +218,8 @@ def coal_distances(
         part = slice(first, first + step)
         joints = trajectory.x0[part], trajectory.alpha[part], trajectory.theta[part]
         centres = joint_centres(arm, *joints)
-        bounds = coarse_bounds(pieces, centres, arm.link_radius)
+        axes = np.ascontiguousarray(arm.axes(centres))
+        bounds = coarse_bounds(pieces, axes, arm.axis_radii)
         here = np.argmin(bounds, axis=0)
         value = np.take_along_axis(bounds, here[None], axis=0)[0]
         nearer = value < least
@@ -229,17 +230,15 @@ def coal_distances(
         if close.size:
             close[:, 0] += first
             for some in in_turns(close, deadline):
-                yield _measured(
-                    robot, trajectory, arm.link_radius, pieces, bodies, some
-                )
+                yield _measured(robot, trajectory, pieces, bodies, some)
     if len(obstacles) > MANY:  # of the far ones the nearest link alone
-        seen |= np.arange(arm.n_links)[:, None] != np.argmin(least, axis=0)
+        seen |= np.arange(len(least))[:, None] != np.argmin(least, axis=0)
     unseen = np.argwhere(~seen)
     if unseen.size:
         rows = nearest[unseen[:, 0], unseen[:, 1]]
         far = np.column_stack([rows, unseen])
         for some in in_turns(far, deadline):
-            yield _measured(robot, trajectory, arm.link_radius, pieces, bodies, some)
+            yield _measured(robot, trajectory, pieces, bodies, some)
 
 
 def _bodies_of(obstacle: Obstacle, deadline: Deadline) -> tuple[CoalBody, ...]:
@@ -286,7 +285,6 @@ class _Moved:
 def _measured(
     robot: RobotModel,
     trajectory: Trajectory,
-    radius: float,
     pieces: PackedPieces,
     bodies: list[tuple[CoalBody, ...]],
     pairs: IntArray,
@@ -295,12 +293,14 @@ def _measured(
     rows, row_of_pair = np.unique(pairs[:, 0], return_inverse=True)
     joints = trajectory.x0[rows], trajectory.alpha[rows], trajectory.theta[rows]
     poses = robot.link_poses(*joints)
-    centres = joint_centres(robot.manipulator, *joints)
+    arm = robot.manipulator
+    centres = arm.axes(joint_centres(arm, *joints))
     link, obstacle = pairs[:, 1], pairs[:, 2]
     ends = np.stack(
         [centres[row_of_pair, link], centres[row_of_pair, link + 1]], axis=1
     )
-    bounds = row_brackets(pieces, ends, obstacle, TOLERANCES.bracket_gap) - radius
+    bounds = row_brackets(pieces, ends, obstacle, TOLERANCES.bracket_gap)
+    bounds -= arm.axis_radii[link, None]
     transforms = capsule_transforms(robot, poses, row_of_pair, link)
     request = distance_request()
     distance = np.zeros(len(pairs))
@@ -320,19 +320,18 @@ def capsule_transforms(
     """Coal's pose of a link's capsule for each (row, link), one after the other."""
     import coal
 
-    rotations = poses.rotations[row, link]
+    on = np.minimum(link, robot.manipulator.n_links - 1)  # the tool is on the last one
+    rotations = poses.rotations[row, on]
     local = robot.T_link_capsule[link]
     turned = rotations @ local[:, :3, :3]
-    shifted = poses.origins[row, link] + np.einsum(
+    shifted = poses.origins[row, on] + np.einsum(
         "nij,nj->ni", rotations, local[:, :3, 3]
     )
     return (coal.Transform3s(R, p) for R, p in zip(turned, shifted, strict=True))
 
 
-def _below_proof(
-    found: CoalDistances, proved: ProvedLowers, n_links: int
-) -> FloatArray:
+def _below_proof(found: CoalDistances, proved: ProvedLowers, n_axes: int) -> FloatArray:
     """By how much Coal falls below what was proved over the intervals at a row; [m]."""
-    bound = proved.at(found.waypoint, found.obstacle * n_links + found.link)
+    bound = proved.at(found.waypoint, found.obstacle * n_axes + found.link)
     # Where bodies meet only the sign counts.
     return np.asarray(bound - np.maximum(found.distance, 0.0))

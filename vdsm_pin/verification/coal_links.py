@@ -80,11 +80,12 @@ def check_coal_links(
     Raises:
         OutOfTime: If the time is over.
     """
-    n_links = problem.manipulator.n_links
-    n_pairs = (n_links - 1) * (n_links - 2) // 2
+    arm = problem.manipulator
+    n_axes, names = arm.axis_radii.size, arm.axis_names
+    n_pairs = (n_axes - 1) * (n_axes - 2) // 2
     if n_pairs == 0:
         return ()
-    reach = problem.required_self_clearance + problem.manipulator.link_radius
+    reach = problem.required_self_clearance + arm.most_radius
     count, worst, where, moment = 0, -np.inf, "", float("nan")
     for found in link_distances(robot, trajectory, reach, deadline):
         excess = np.where(np.isnan(found.disagreement), np.inf, found.disagreement)
@@ -93,7 +94,7 @@ def check_coal_links(
         if excess[k] > worst:
             worst, moment = float(excess[k]), float(found.waypoint[k])
             where = (
-                f"link {found.link[k] + 1} and link {found.other[k] + 1}: "
+                f"{names[found.link[k]]} and {names[found.other[k]]}: "
                 f"Coal {found.distance[k] * MM_PER_M:.6f} mm, "
                 f"closed form {found.expected[k] * MM_PER_M:.6f} mm"
             )
@@ -134,7 +135,8 @@ def link_distances(
         OutOfTime: If the time is over.
     """
     arm = robot.manipulator
-    least = np.full((arm.n_links, arm.n_links), np.inf)
+    n_axes = arm.axis_radii.size
+    least = np.full((n_axes, n_axes), np.inf)
     nearest = np.zeros(least.shape, dtype=np.int64)
     apart = np.triu(np.ones(least.shape, dtype=bool), k=2)
     step = max(1, CHUNK_GAPS // least.size)
@@ -142,7 +144,8 @@ def link_distances(
         deadline.check()
         part = slice(first, first + step)
         joints = trajectory.x0[part], trajectory.alpha[part], trajectory.theta[part]
-        gaps = link_gaps(joint_centres(arm, *joints), arm.link_radius)
+        centres = np.ascontiguousarray(arm.axes(joint_centres(arm, *joints)))
+        gaps = link_gaps(centres, arm.axis_radii)
         here = np.argmin(gaps, axis=0)
         value = np.take_along_axis(gaps, here[None], axis=0)[0]
         nearer = value < least

@@ -64,27 +64,27 @@ def coal_missing(
     """
     if not problem.scene.obstacles:
         return ()
-    reach = problem.required_clearance + NEAR * problem.manipulator.link_radius
+    reach = problem.required_clearance + NEAR * problem.manipulator.most_radius
     worst: dict[tuple[int, int], Missing] = {}
     for found in coal_distances(robot, problem, trajectory, reach, deadline=deadline):
         for k in np.flatnonzero(found.distance < problem.required_clearance):
             if not np.isfinite(found.distance[k]):
                 continue
-            one = _missing(found, int(k))
+            one = _missing(found, int(k), problem.manipulator.n_links)
             key = one.link, one.obstacle
             if key not in worst or one.distance < worst[key].distance:
                 worst[key] = one
     return tuple(worst[key] for key in sorted(worst))
 
 
-def _missing(found: CoalDistances, k: int) -> Missing:
+def _missing(found: CoalDistances, k: int, n_links: int) -> Missing:
     towards = found.link_point[k] - found.other_point[k]
     # Inside each other the witness points lie the other way round.
     towards = towards if found.distance[k] >= 0.0 else -towards
     length = float(np.linalg.norm(towards))
     return Missing(
         waypoint=int(found.waypoint[k]),
-        link=int(found.link[k]) + 1,
+        link=min(int(found.link[k]) + 1, n_links),
         obstacle=int(found.obstacle[k]),
         distance=float(found.distance[k]),
         normal=towards / length if length > 0.0 else np.zeros(3),

@@ -212,7 +212,10 @@ class Search:
             required=self.required,
             link_point=frozen(chunks[0].link_point[0, column]),
             other_point=frozen(chunks[0].other_point[0, column]),
-            deeper=is_deepest(upper, self.problem.manipulator.link_radius),
+            deeper=is_deepest(
+                upper,
+                self.problem.manipulator.radius_at(self.pair.link, self.pair.body),
+            ),
         )
 
 

@@ -48,7 +48,7 @@ class EnclosedSink:
         problem: PlanningProblem,
         around: Collection[str],
     ) -> None:
-        self.sink, self.least = sink, -problem.manipulator.link_radius
+        self.sink, self.least = sink, -problem.manipulator.least_radius
         partners = np.array([pair.obstacle for pair in all_pairs(problem)])
         self.columns = [np.flatnonzero(partners == name) for name in around]
         self.left = [False] * len(self.columns)
@@ -80,7 +80,7 @@ def enclosed_profile(
     profile: ClearanceProfile, problem: PlanningProblem, around: Collection[str]
 ) -> ClearanceProfile:
     """The profile with the meshes around the arm as solids."""
-    least = -problem.manipulator.link_radius
+    least = -problem.manipulator.least_radius
     lower, upper = profile.obstacle_lower.copy(), profile.obstacle_upper.copy()
     inside = np.zeros(len(lower), np.bool_)
     for name in around:
@@ -111,7 +111,7 @@ def enclosed_least(
     if not around:
         return least
     inside = np.array([pair.obstacle in around for pair in pairs], bool)
-    depth = -problem.manipulator.link_radius
+    depth = -problem.manipulator.least_radius
     return replace(
         least,
         lower=frozen(np.where(inside, depth, least.lower)),
@@ -135,8 +135,8 @@ def enclosed_approaches(
             interval=0,
             share=0.0,
             pair=Pair(link=link, obstacle=name),
-            lower=-arm.link_radius,
-            upper=-arm.link_radius,
+            lower=-arm.least_radius,
+            upper=-arm.least_radius,
             station=0.0,
             link_point=frozen(centres[link - 1]),
             other_point=frozen(centres[link - 1]),
@@ -153,7 +153,7 @@ def enclosed_checks(
     """The rows of the clearance, the one from obstacles first."""
     if not around:
         return rows
-    worst = min(rows[0].worst, -problem.manipulator.link_radius)
+    worst = min(rows[0].worst, -problem.manipulator.least_radius)
     refuted = replace(
         rows[0],
         verdict=Verdict.REFUTED,

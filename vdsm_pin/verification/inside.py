@@ -30,7 +30,7 @@ VERDICTS: Final = {
 def locate_arm(problem: PlanningProblem, trajectory: Trajectory) -> dict[str, Location]:
     """Where the arm is as seen from each mesh that may have an inside, by its name."""
     base = np.array([trajectory.x0[0], 0.0, 0.0])
-    radius = problem.manipulator.link_radius
+    radius = problem.manipulator.least_radius
     return {
         mesh.name: locate(mesh.closed_mesh, base, radius)
         for mesh in problem.scene.obstacles

@@ -41,17 +41,23 @@ def link_clearance(problem: PlanningProblem) -> Callable[[FloatArray], FloatArra
     Returns:
         Joint centres (n, N + 1, 3) to proved lower bounds of the distance between the
         surface of each link and the nearest obstacle, shape (n, N); negative where they
-        meet (there the sign alone is meant), infinite without obstacles; [m].
+        meet (there the sign alone is meant), infinite without obstacles; [m]. The tool
+        counts as part of the last link. Pieces of an arm, of other numbers of links,
+        are taken to be as thick as its thickest part.
     """
     obstacles = problem.scene.obstacles
     pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
-    covers = covers_of(obstacles, pieces)
-    radius, pad = problem.manipulator.link_radius, arithmetic_pad(problem, pieces)
+    covers, pad = covers_of(obstacles, pieces), arithmetic_pad(problem, pieces)
+    arm, goal = problem.manipulator, TOLERANCES.bracket_gap
+    alike = arm.least_radius == arm.most_radius
 
     def clearances(centres: FloatArray) -> FloatArray:
         rows = np.ascontiguousarray(centres, dtype=np.float64)
-        return link_clearances(
-            pieces, covers, rows, radius, pad, TOLERANCES.bracket_gap
-        )
+        if alike or rows.shape[1] != arm.n_links + 1:
+            return link_clearances(pieces, covers, rows, arm.most_radius, pad, goal)
+        axes = np.ascontiguousarray(arm.axes(rows))
+        gaps = link_clearances(pieces, covers, axes, 0.0, pad, goal) - arm.axis_radii
+        gaps[:, arm.n_links - 1] = gaps[:, arm.n_links - 1 :].min(axis=1)
+        return gaps[:, : arm.n_links]
 
     return clearances

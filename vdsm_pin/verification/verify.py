@@ -232,7 +232,7 @@ class _Lowers:
 
     def __init__(self, problem: PlanningProblem, trajectory: Trajectory) -> None:
         n_intervals = max(1, trajectory.n_samples - 1)
-        columns = len(problem.scene.obstacles) * problem.manipulator.n_links
+        columns = len(problem.scene.obstacles) * problem.manipulator.axis_radii.size
         self.fits = 0 < n_intervals * columns <= COMPARED
         self._parts: list[FloatArray] = []
         self._pairs, self._size = np.zeros(0, np.int64), 0
@@ -261,6 +261,14 @@ def _check_input(
     expected, found = problem.manipulator.n_links, trajectory.n_links
     if expected != found:
         message = f"trajectory has {found} links, the problem's arm has {expected}"
+        raise InvalidInput(message)
+    bodies = [body.name for body in problem.manipulator.bodies]
+    if bodies:
+        names = ", ".join(bodies)
+        message = f"the arm carries {names}: only `prove_clearance` takes bodies so far"
+        raise InvalidInput(message)
+    if problem.manipulator.ignore_pairs:
+        message = "the arm has ignore_pairs: only `prove_clearance` takes them so far"
         raise InvalidInput(message)
     for name in ("joint", "base", "obstacle"):
         value = getattr(errors, name)
@@ -336,7 +344,9 @@ def closest_approaches(
                 station=_station(problem, trajectory, row, pair.link, mine),
                 link_point=frozen(mine),
                 other_point=frozen(theirs),
-                deeper=is_deepest(float(row[UP]), problem.manipulator.link_radius),
+                deeper=is_deepest(
+                    float(row[UP]), problem.manipulator.radius_at(pair.link, pair.body)
+                ),
             )
         )
     return tuple(rows[:CLOSEST])

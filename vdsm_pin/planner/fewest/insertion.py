@@ -98,7 +98,7 @@ class Insertion:
         self.judge, self.layers, self.rng = judge, layers, rng
         self.population, self.chart = population, chart
         arm = judge.problem.manipulator
-        self.arm, self.radius = arm, arm.link_radius
+        self.arm, self.radius = arm, arm.most_radius
 
     def _forget(self, root: FloatArray) -> None:
         """Begin with empty records; `root` tells how arms are described."""

@@ -104,7 +104,7 @@ def nearby(problem: PlanningProblem, clearance: LinkClearance) -> Nearby:
         np.array(flat).reshape(-1, 4),
         cores_of(solid),
         surfaces_of(obstacles),
-        problem.manipulator.link_radius,
+        problem.manipulator.most_radius,
         problem.required_clearance - TOLERANCES.planned_clearance,
         deadline=deadline_of(clearance),
     )

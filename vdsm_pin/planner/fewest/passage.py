@@ -59,7 +59,7 @@ class _Cells:
         self.convex = np.array([len(solid) == 1 for solid in solids], dtype=np.bool_)
         # A way may begin and end beside its tips, and keep as much less near them.
         beside = problem.tip_tolerance
-        keep = arm.link_radius + problem.required_clearance - beside
+        keep = arm.least_radius + problem.required_clearance - beside
         self.inside = TOLERANCES.bracket_gap - keep
         self.reach = curled_reach(arm) + beside
         ahead = arm.total_length + beside

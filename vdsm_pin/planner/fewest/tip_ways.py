@@ -240,7 +240,7 @@ class TipSpace:
         side = max(high - low, 2.0 * reach)
         corner = np.array([low, -side / 2.0, -side / 2.0])
         return _Cells(
-            self.clearance, self.required, self.arm.link_radius, corner, side, reach,
+            self.clearance, self.required, self.arm.most_radius, corner, side, reach,
             self.most,
         )  # fmt: skip
 
@@ -262,7 +262,7 @@ class TipSpace:
         """
         rng, way = np.random.default_rng(len(way)), way.copy()
         for round_ in range(PULLS):
-            size = self.arm.link_radius * SIZES[round_ % len(SIZES)]
+            size = self.arm.most_radius * SIZES[round_ % len(SIZES)]
             for parity in (1, 2):
                 inner = np.arange(parity, len(way) - 1, 2)
                 if len(inner):
@@ -275,7 +275,7 @@ class TipSpace:
     ) -> FloatArray:
         """The best of some places for every other point of a way, shape (n, 3)."""
         middle = (way[inner - 1] + way[inner + 1])[:, None] / 2.0
-        own, radius = way[inner][:, None], self.arm.link_radius
+        own, radius = way[inner][:, None], self.arm.most_radius
         tried = np.concatenate([own, (own + middle) / 2.0, middle, own + shifts], 1)
         spare = self._spare(tried.reshape(-1, 3)).reshape(tried.shape[:2])
         wide = np.minimum(spare / (NARROW * radius), 1.0)

@@ -140,7 +140,7 @@ class _Search:
         for way in self._ways(path):
             before = len(way) - 1
             play = np.zeros(before + len(path))
-            play[1:before] = PLAY * self.judge.problem.manipulator.link_radius
+            play[1:before] = PLAY * self.judge.problem.manipulator.most_radius
             layers = Layers(np.vstack([way, path[1:]]), play)
             grown = Insertion(
                 self.judge, layers, self.rng, self.effort.population, self.chart

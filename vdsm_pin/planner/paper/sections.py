@@ -94,7 +94,7 @@ def section_along(obstacle: Obstacle, axis: str) -> Section | None:
 
 def grown_by(problem: PlanningProblem) -> float:
     """How far the axis of a link stays from an obstacle's surface; [m]."""
-    return problem.manipulator.link_radius + planned_gap(problem)
+    return problem.manipulator.most_radius + planned_gap(problem)
 
 
 def planned_gap(problem: PlanningProblem) -> float:

@@ -58,18 +58,25 @@ class ArmView {
   addArm() {
     const { Vector2, LatheGeometry, Mesh, SphereGeometry } = this.three;
     const r = this.scene.radius;
-    this.links = this.scene.lengths.map((length, i) => {
+    const capsule = (start, end, radius) => {
       const outline = [];
       for (let k = 0; k <= 24; k++) {
         const angle = -Math.PI / 2 + (Math.PI * k) / 24;
-        const up = k > 12 ? length : 0;
-        outline.push(new Vector2(r * Math.cos(angle), up + r * Math.sin(angle)));
+        const up = k > 12 ? end : start;
+        outline.push(new Vector2(radius * Math.cos(angle), up + radius * Math.sin(angle)));
       }
-      const capsule = new LatheGeometry(outline, 32);
-      const link = new Mesh(capsule, this.material(this.scene.colours[i]));
-      this.root.add(link);
-      return link;
-    });
+      return new LatheGeometry(outline, 32);
+    };
+    this.links = [];
+    for (const [link, start, end, radius] of this.scene.axes) {
+      const shape = capsule(start, end, radius);
+      if (link < this.links.length) {
+        this.links[link].add(new Mesh(shape, this.material(0x3b4048)));
+        continue;
+      }
+      this.links.push(new Mesh(shape, this.material(this.scene.colours[link])));
+      this.root.add(this.links[link]);
+    }
     const dot = new SphereGeometry(1.04 * r, 24, 16);
     this.joints = this.scene.lengths.map(() => {
       const joint = new Mesh(dot, this.material(0x3b4048));
