@@ -215,7 +215,7 @@ def test_a_lie_leaves_the_whole_undecided(monkeypatch: pytest.MonkeyPatch) -> No
         assert others == {Verdict.CERTIFIED}
         assert found.verdict is verdict
     assert row.worst == pytest.approx(1e-4, abs=1e-8)
-    assert "link 4 and ball: Coal 0.0101" in row.where
+    assert "link 4 and ball: Coal 10.1" in row.where
 
 
 @pytest.mark.parametrize("answer", [-np.inf, np.nan, -1.7976931348623157e308])
