@@ -3,14 +3,18 @@
     python -m analysis.mutation --sample 1000 --seed 0 --save reports/mutants.md
 
 A change that no test can notice, since it changes nothing that is promised, stands in
-`equivalent.txt` with its reason.
+`equivalent.txt` with its reason. With `--noticed FILE` a run takes up where another one
+ended: what was noticed stands in the file and is not tried again, so the file must be
+deleted where tests have been taken away.
 """
 
 import argparse
 import multiprocessing
+import multiprocessing.synchronize
 import random
 import sys
 import tempfile
+import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -43,6 +47,8 @@ GROUPS: Final = (
         (
             "tests/test_certificate_checker.py",
             "tests/verification/test_certificate_accepted.py",
+            "tests/verification/test_half_laps.py",
+            "tests/verification/test_inside.py",
             "tests/io/test_two_readers.py",
         ),
     ),
@@ -109,9 +115,10 @@ def _work(
     folder: Path,
     tasks: "multiprocessing.Queue[tuple[Change, list[str], float, str | None] | None]",
     done: "multiprocessing.Queue[Trial]",
+    stop: "multiprocessing.synchronize.Event",
 ) -> None:
     import_libraries()
-    while (task := tasks.get()) is not None:
+    while not stop.is_set() and (task := tasks.get()) is not None:
         done.put(try_change(folder, *task))
 
 
@@ -127,9 +134,10 @@ def tried(group: Group, chosen: list[Change], jobs: int) -> Iterator[Trial]:
     chosen = [*map(_as_it_is, sorted({c.module for c in chosen})), *chosen]
     tasks: multiprocessing.Queue = multiprocessing.Queue()
     done: multiprocessing.Queue = multiprocessing.Queue()
+    stop = multiprocessing.Event()
     for change in chosen:
         plain = is_compiled(change.module)
-        tests = maps[plain].asked(change.module, change.line, BUDGET)
+        tests = maps[plain].asked(change.module, change.lines, BUDGET)
         usual = sum(maps[plain].seconds[test] for test in tests)
         tasks.put((change, tests, usual, PLAIN if plain else None))
     with tempfile.TemporaryDirectory(prefix="mutants-") as place:
@@ -137,20 +145,46 @@ def tried(group: Group, chosen: list[Change], jobs: int) -> Iterator[Trial]:
         for k in range(jobs):
             copy_checkout(ROOT, Path(place) / str(k))
             tasks.put(None)
-            words = (Path(place) / str(k), tasks, done)
+            words = (Path(place) / str(k), tasks, done, stop)
             workers.append(
                 multiprocessing.Process(target=_work, args=words, daemon=True)
             )
             workers[-1].start()
-        for _ in chosen:
-            trial = done.get()
-            if trial.change.line:
-                yield trial
-            elif trial.noticed:
-                message = f"tests of {trial.change.module} fail without a change"
-                raise RuntimeError(message)
-        for worker in workers:
-            worker.join()
+        try:
+            for _ in chosen:
+                trial = done.get()
+                if trial.change.line:
+                    yield trial
+                elif trial.noticed:
+                    message = f"tests of {trial.change.module} fail without a change"
+                    raise RuntimeError(message)
+        finally:
+            stop.set()
+            for worker in workers:
+                worker.join()
+
+
+def noticed_before(path: Path | None) -> set[str]:
+    """Keys of the changes that an earlier run noticed."""
+    if path is None or not path.exists():
+        return set()
+    return {*path.read_text(encoding="utf-8").splitlines()}
+
+
+def results(
+    group: Group, chosen: list[Change], asked: argparse.Namespace, ends: float
+) -> Iterator[Trial]:
+    """What came of a group's changes until time is up; what is noticed is noted."""
+    before = noticed_before(asked.noticed)
+    yield from (Trial(c, True, 0, 0.0) for c in chosen if c.key in before)
+    left = [c for c in chosen if c.key not in before]
+    for trial in tried(group, left, asked.jobs) if left else ():
+        yield trial
+        if trial.noticed and asked.noticed:
+            with asked.noticed.open("a", encoding="utf-8") as file:
+                file.write(trial.change.key + "\n")
+        if time.monotonic() > ends:
+            return
 
 
 def page(trials: dict[str, list[Trial]], known: dict[str, str], seed: int) -> str:
@@ -193,18 +227,22 @@ def main() -> None:
         help="only these; " + ", ".join(g.name for g in GROUPS),
     )
     parser.add_argument("--module", default="", help="part of the modules' paths")
+    parser.add_argument("--minutes", type=float, default=float("inf"), help="no more")
+    parser.add_argument("--noticed", type=Path, help="what earlier runs noticed")
     parser.add_argument("--save", type=Path)
     asked = parser.parse_args()
     groups = [g for g in GROUPS if not asked.group or g.name in asked.group]
     known, trials = equivalent_changes(), {}
+    ends = time.monotonic() + 60.0 * asked.minutes
     for name, chosen in sampled(groups, asked.sample, asked.seed).items():
         group = next(g for g in groups if g.name == name)
         wanted = [c for c in chosen if asked.module in c.module]
         trials[name] = []
-        for trial in tried(group, wanted, asked.jobs):
+        for trial in results(group, wanted, asked, ends):
             trials[name].append(trial)
             if not trial.noticed and trial.change.key not in known:
-                print(f"not noticed: {trial.change.key} (line {trial.change.line})")
+                line = f"{trial.change.line}, {trial.tests} tests"
+                print(f"not noticed: {trial.change.key} (line {line})", flush=True)
     text = page(trials, known, asked.seed)
     if asked.save:
         asked.save.write_text(text, encoding="utf-8")

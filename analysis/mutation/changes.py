@@ -44,6 +44,8 @@ class Change:
         before: The changed expression as it is.
         after: The same, changed.
         content: The module with the change.
+        lines: Where it has an effect: its own, the first of its statement; of what
+            runs at import alone, the lines that use the name it gives a value.
     """
 
     module: str
@@ -52,6 +54,7 @@ class Change:
     before: str
     after: str
     content: str
+    lines: tuple[int, ...] = ()
 
     @property
     def key(self) -> str:
@@ -150,6 +153,7 @@ def changes(root: Path, module: str) -> list[Change]:
     """
     source = (root / module).read_text(encoding="utf-8")
     tree = ast.parse(source)
+    effects = _effects(tree)
     places = _Places()
     places.visit(tree)
     found = []
@@ -165,8 +169,37 @@ def changes(root: Path, module: str) -> list[Change]:
                     before=ast.unparse(node),
                     after=ast.unparse(ast.fix_missing_locations(changed)),
                     content=_with(source, node, changed),
+                    lines=effects.get(id(node), (node.lineno,)),
                 )
             )
+    return found
+
+
+def _effects(tree: ast.Module) -> dict[int, tuple[int, ...]]:
+    """Lines where each expression has an effect, by the id of its node."""
+    users: dict[str, list[int]] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
+            users.setdefault(node.id, []).append(node.lineno)
+    found: dict[int, tuple[int, ...]] = {}
+    for statement in ast.walk(tree):  # outer statements first: inner ones have the word
+        if isinstance(statement, ast.stmt):
+            for node in ast.walk(statement):
+                if hasattr(node, "lineno"):
+                    found[id(node)] = (node.lineno, statement.lineno)
+    for statement in tree.body:
+        if isinstance(statement, ast.Assign | ast.AnnAssign):
+            targets = [n.id for n in ast.walk(statement) if isinstance(n, ast.Name)
+                       and isinstance(n.ctx, ast.Store)]  # fmt: skip
+            lines = tuple(line for name in targets for line in users.get(name, []))
+            found |= dict.fromkeys(map(id, ast.walk(statement)), lines)
+    for function in ast.walk(tree):
+        if isinstance(function, ast.FunctionDef):
+            within = range(function.body[0].lineno, (function.end_lineno or 0) + 1)
+            for default in filter(
+                None, [*function.args.defaults, *function.args.kw_defaults]
+            ):
+                found |= dict.fromkeys(map(id, ast.walk(default)), tuple(within))
     return found
 
 

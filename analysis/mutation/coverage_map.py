@@ -29,11 +29,15 @@ class CoverageMap:
     tests: dict[str, dict[int, list[str]]]
     seconds: dict[str, float]
 
-    def asked(self, module: str, line: int, budget: float) -> list[str]:
-        """Tests of a line, the quickest first, that take no more than a budget."""
+    def asked(self, module: str, lines: tuple[int, ...], budget: float) -> list[str]:
+        """The quickest tests of lines that take no more than a budget.
+
+        Where no test runs any of the lines, all that run the module are asked: what
+        runs at import has an effect anywhere.
+        """
         by_line = self.tests.get(module, {})
-        # Line 0 stands for the whole module.
-        known = by_line.get(line, []) if line else set().union(*by_line.values())
+        known = set().union(*(by_line.get(line, []) for line in lines))
+        known = known or set().union(*by_line.values())
         chosen, total = [], 0.0
         for test in sorted(known, key=lambda name: (self.seconds[name], name)):
             total += self.seconds[test]

@@ -57,14 +57,29 @@ def test_text_and_annotations_stay(tmp_path: Path) -> None:
     assert not any("+" in one.before for one in changes(tmp_path, "module.py"))
 
 
+def test_what_runs_at_import_has_its_effect_where_its_name_is_used(
+    tmp_path: Path,
+) -> None:
+    module = (
+        "SIZE = 2\n\n\ndef one(x=3):\n    y = SIZE\n    return x + (\n        y * 4)\n"
+    )
+    (tmp_path / "module.py").write_text(module)
+    lines = {one.before: one.lines for one in changes(tmp_path, "module.py")}
+    assert lines["2"] == (5,)
+    assert lines["3"] == (5, 6, 7)
+    assert lines["4"] == (7, 6)
+
+
 def test_the_map_knows_which_test_runs_a_line(tmp_path: Path) -> None:
     (tmp_path / "module.py").write_text("def one():\n    return 1\n")
     test = "from module import one\n\ndef test_one():\n    assert one() == 1\n"
     (tmp_path / "test_one.py").write_text(test)
     (tmp_path / "analysis").symlink_to(ROOT / "analysis")
     seen = coverage_map(tmp_path, ["module.py"], ["test_one.py"], plain=False)
-    assert seen.asked("module.py", 2, budget=1.0) == ["test_one.py::test_one"]
-    assert seen.asked("module.py", 3, budget=1.0) == []
+    assert seen.asked("module.py", (2,), budget=1.0) == ["test_one.py::test_one"]
+    # No test runs line 3: all that run the module may see what it does at import.
+    assert seen.asked("module.py", (3,), budget=1.0) == ["test_one.py::test_one"]
+    assert seen.asked("other.py", (1,), budget=1.0) == []
 
 
 TRIED = """
