@@ -45,6 +45,7 @@ GROUPS: Final = (
         "checker",
         ("vdsm_pin/certificate_checker/*.py",),
         (
+            "tests/certificate_checker",
             "tests/test_certificate_checker.py",
             "tests/verification/test_certificate_accepted.py",
             "tests/verification/test_half_laps.py",
@@ -53,7 +54,16 @@ GROUPS: Final = (
         ),
     ),
     Group("readers", ("vdsm_pin/io/**/*.py",), ("tests/io",)),
-    Group("verification", ("vdsm_pin/verification/*.py",), ("tests/verification",)),
+    Group(
+        "verification",
+        (
+            "vdsm_pin/verification/*.py",
+            "vdsm_pin/geometry/closed_meshes.py",
+            "vdsm_pin/geometry/mesh_*.py",
+            "vdsm_pin/geometry/winding.py",
+        ),
+        ("tests/verification", "tests/geometry/test_closed_meshes.py"),
+    ),
     Group("proof", ("vdsm_pin/proof/*.py",), ("tests/verification", "tests/geometry")),
     Group(
         "arm",

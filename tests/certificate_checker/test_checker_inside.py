@@ -1,0 +1,204 @@
+"""What the certificate checker knows of the inside of meshes, by plain geometry."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from flint import arb_mat
+from oracles.closed_solids import made, sample_points
+
+from vdsm_pin.certificate_checker.balls import Rejected
+from vdsm_pin.certificate_checker.inside import (
+    GAP,
+    Surface,
+    border,
+    covers,
+    crossings,
+    heights,
+    sign,
+)
+
+BOX = np.asarray(trimesh.creation.box((2.0, 2.0, 2.0)).triangles)
+
+
+def rows_of(corners: Any) -> Any:
+    """Names of corners, equal where corners are."""
+    flat = np.reshape(corners, (-1, 3))
+    return np.unique(flat, axis=0, return_inverse=True)[1].reshape(-1, 3)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_rays_count_how_often_shells_wind_round_a_point(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    mesh = made(rng)
+    for point in sample_points(mesh, rng, 2):
+        rays = list(crossings(mesh.corners, point))
+        assert len(rays) > 12
+        for triangles, senses, away in rays:
+            assert senses.sum() == sum(mesh.windings(point))
+            assert len(triangles) == len(senses) == len(away)
+            assert (away > 0.0).all()
+
+
+@pytest.mark.parametrize("scale", [0.125, 1.0, 32.0])
+def test_crossings_of_a_ball_are_as_far_away_as_its_faces(scale: float) -> None:
+    """Every ray from the centre crosses one face, between both radii."""
+    ball = trimesh.creation.icosphere(2, scale)
+    least = (ball.face_normals * ball.triangles[:, 0]).sum(axis=1).min()
+    rays = list(crossings(ball.triangles, np.zeros(3)))
+    assert len(rays) > 12
+    for triangles, senses, away in rays:
+        assert senses.tolist() == [1]
+        assert least * (1 - 1e-12) <= away.item() <= scale * (1 + 1e-12)
+        assert 0 <= triangles.item() < len(ball.faces)
+
+
+def test_rays_point_all_around() -> None:
+    """Each face of a cube is met, whichever way the cube is turned."""
+    rng = np.random.default_rng(3)
+    for _ in range(10):
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        corners = BOX @ (turn * np.sign(np.linalg.det(turn)))
+        met = {int(t) for ts, _, _ in crossings(corners, np.zeros(3)) for t in ts}
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        assert len(np.unique(np.round(normals[[*met]], 6), axis=0)) == 6
+
+
+def test_points_in_the_planes_of_faces_are_decided() -> None:
+    """Doubles leave the side of the face in doubt there; balls do not."""
+    for far in (3.0, 1.5, 1.0 + 1e-9):
+        for point in ([far, 1.0, 0.3], [0.2, far, -1.0], [1.0, 1.0, far]):
+            rays = list(crossings(BOX, np.array(point)))
+            assert rays
+            assert {int(senses.sum()) for _, senses, _ in rays} == {0}
+
+
+def test_no_ray_is_decided_from_a_point_on_a_face() -> None:
+    for triangles, senses, _ in crossings(BOX, np.array([1.0, 0.3, 0.2])):
+        assert not triangles.size or senses.sum() in (0, 1)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_heights_are_those_of_heron(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    corners = rng.normal(size=(50, 3, 3)) * 10.0 ** rng.integers(-3, 4, (50, 1, 1))
+    a, b, c = (
+        np.linalg.norm(corners[:, i] - corners[:, j], axis=1)
+        for i, j in ((0, 1), (1, 2), (2, 0))
+    )
+    half = (a + b + c) / 2
+    area = np.sqrt(half * (half - a) * (half - b) * (half - c))
+    least = 2 * area / np.maximum(np.maximum(a, b), c)
+    assert heights(corners) == pytest.approx(least, rel=1e-6)
+    assert heights(np.zeros((1, 3, 3))).tolist() == [0.0]
+
+
+def test_the_border_of_a_closed_mesh_is_empty_and_of_a_hole_its_edges() -> None:
+    rows = rows_of(BOX)
+    assert border(rows, signed=True) == border(rows, signed=False) == set()
+    edges = {tuple(sorted((rows[4][i], rows[4][i - 1]))) for i in range(3)}
+    left = np.delete(rows, 4, axis=0)
+    assert border(left, signed=True) == border(left, signed=False) == edges
+    turned = rows.copy()
+    turned[4] = turned[4][::-1]
+    assert border(turned, signed=True) == edges
+    assert border(turned, signed=False) == set()
+    twice = np.concatenate([rows, rows[4:5]])
+    assert border(twice, signed=True) == border(twice, signed=False) == edges
+
+
+def test_covers_of_a_closed_mesh_written_badly() -> None:
+    """What closes with senses, what as a single cover, what is turned both ways."""
+    rows, every = rows_of(BOX), np.ones(12, bool)
+    signed, single, turned = covers(rows, every, 12)
+    assert signed.all()
+    assert single.all()
+    assert not turned
+
+    again = np.concatenate([rows, np.roll(rows[3:4], 1, axis=1)])  # a face twice
+    signed, single, turned = covers(again, np.ones(13, bool), 13)
+    for mask in (signed, single):
+        assert mask[[3, 12]].sum() == 1
+        assert mask.sum() == 12
+    assert not turned
+
+    both = np.concatenate([rows, rows[3:4, ::-1]])  # a face in both senses
+    signed, single, turned = covers(both, np.ones(13, bool), 13)
+    assert not signed.any() or turned
+    assert single.sum() == 12
+    assert turned
+
+    signed, single, turned = covers(rows[1:], every[1:], 11)
+    assert not signed.any()
+    assert not single.any()
+    assert not turned
+
+    seam = np.delete(rows, 5, axis=0), rows[5:6]  # the last face is a seam
+    signed, single, _ = covers(np.concatenate(seam), every, 11)
+    assert signed.all()
+    assert single.all()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_seams_are_as_wide_as_their_corners_are_off_the_edge(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    start, along = rng.normal(size=3), rng.normal(size=3)
+    aside = np.cross(along, rng.normal(size=3))
+    aside *= 1e-5 / np.linalg.norm(aside)
+    share = rng.choice([-1e-5, 0.3, 1.0, 1.0 + 1e-5])
+    off = start + share * along + aside
+    edge = int(rng.integers(3))
+    first = np.roll([start, start + along, start + 3 * rng.normal(size=3)], edge, 0)
+    second = np.array([off, *rng.normal(size=(2, 3))])
+    surface = Surface(np.stack([first, second]))
+    surface.join([], [[edge, 3, (edge + 1) % 3, edge]])
+    past = max(0.0, -share, share - 1.0) * np.linalg.norm(along)
+    assert surface.gap == pytest.approx(np.hypot(1e-5, past), rel=1e-6)
+    assert surface.at.tolist() == [*range(6), edge, 3, (edge + 1) % 3]
+
+
+@pytest.mark.parametrize(("share", "good"), [(0.99, True), (1.01, False)])
+def test_corners_farther_apart_than_stated_are_not_joined(
+    share: float, good: bool
+) -> None:
+    corners = np.array([[[0.0, 0, 0], [3, 0, 0], [0, 4, 0]], [[0, 0, 0]] * 3])
+    corners[1, 0, 0] = share * GAP * 5.0
+    surface = Surface(corners)
+    if good:
+        surface.join([[3, 0]], [])
+        assert surface.gap == pytest.approx(share * GAP * 5.0)
+        assert surface.at.tolist() == [0, 1, 2, 0, 4, 5]
+    else:
+        with pytest.raises(Rejected, match="far apart"):
+            surface.join([[3, 0]], [])
+
+
+@pytest.mark.parametrize(("radius", "good"), [(2.0, True), (0.5, False)])
+def test_an_arm_thinner_than_the_gaps_is_not_proved_outside(
+    radius: float, good: bool
+) -> None:
+    surface, point = Surface(BOX), [5.0, 0.1, 0.2]
+    assert surface.not_outside(point, radius) == ""
+    surface.gap = 1.0
+    assert (surface.not_outside(point, radius) == "") is good
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_points_of_random_solids_are_outside_or_inside(seed: int) -> None:
+    rng = np.random.default_rng(100 + seed)
+    mesh = made(rng)
+    for point in sample_points(mesh, rng, 3):
+        why, windings = (
+            Surface(mesh.corners).not_outside(point, 0.01),
+            mesh.windings(point),
+        )
+        if sum(windings):
+            assert why == "it is inside"
+        elif not any(windings):
+            assert why != "it is inside"
+
+
+def test_senses_of_three_rows() -> None:
+    x, y, z = (arb_mat([row]) for row in np.eye(3).tolist())
+    assert (sign(x, y, z), sign(y, x, z), sign(x, y, x)) == (1, -1, 0)
