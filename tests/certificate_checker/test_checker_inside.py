@@ -18,6 +18,7 @@ from vdsm_pin.certificate_checker.inside import (
     heights,
     sign,
 )
+from vdsm_pin.geometry.winding import RAYS
 
 BOX = np.asarray(trimesh.creation.box((2.0, 2.0, 2.0)).triangles)
 
@@ -202,3 +203,21 @@ def test_points_of_random_solids_are_outside_or_inside(seed: int) -> None:
 def test_senses_of_three_rows() -> None:
     x, y, z = (arb_mat([row]) for row in np.eye(3).tolist())
     assert (sign(x, y, z), sign(y, x, z), sign(x, y, x)) == (1, -1, 0)
+
+
+def test_rays_that_meet_a_corner_are_left_out() -> None:
+    """An octahedron's corner lies exactly on a ray: that one says nothing."""
+    x = np.cross(RAYS[5], [0.0, 0.0, 1.0])
+    tips = np.array([4.0 * RAYS[5], x, np.cross(RAYS[5], x), -RAYS[5]])
+    tips = np.concatenate([tips, -tips[1:3]])
+    sides = [(1, 2), (2, 4), (4, 5), (5, 1)]
+    rows = np.array(
+        [[0, *side] for side in sides] + [[3, *side[::-1]] for side in sides]
+    )
+    volume = np.linalg.det(tips[rows]).sum()
+    outwards = tips[rows] if volume > 0.0 else tips[rows][:, ::-1]
+    rays = list(crossings(outwards, np.zeros(3)))
+    assert len(rays) == len(RAYS) - 1
+    assert all(senses.tolist() == [1] for _, senses, _ in rays)
+    beside = np.array([1e-3, 2e-3, -1e-3])
+    assert len(list(crossings(outwards, beside))) == len(RAYS)
