@@ -2,8 +2,9 @@
 
 import ast
 import copy
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -46,6 +47,7 @@ class Change:
         content: The module with the change.
         lines: Where it has an effect: its own, the first of its statement; of what
             runs at import alone, the lines that use the name it gives a value.
+        number: Which it is of those alike in its function, from 1.
     """
 
     module: str
@@ -55,11 +57,13 @@ class Change:
     after: str
     content: str
     lines: tuple[int, ...] = ()
+    number: int = 1
 
     @property
     def key(self) -> str:
         """What stays the same when lines move."""
-        return f"{self.module}:{self.function}: {self.before} -> {self.after}"
+        which = f" (no. {self.number})" if self.number > 1 else ""
+        return f"{self.module}:{self.function}: {self.before} -> {self.after}{which}"
 
 
 def _swapped(node: ast.AST) -> Iterator[ast.AST]:
@@ -172,7 +176,17 @@ def changes(root: Path, module: str) -> list[Change]:
                     lines=effects.get(id(node), (node.lineno,)),
                 )
             )
-    return found
+    return _numbered(found)
+
+
+def _numbered(found: list[Change]) -> list[Change]:
+    """Changes, those alike in one function told apart."""
+    seen: Counter[str] = Counter()
+    told = []
+    for one in found:
+        seen[one.key] += 1
+        told.append(replace(one, number=seen[one.key]))
+    return told
 
 
 def _effects(tree: ast.Module) -> dict[int, tuple[int, ...]]:

@@ -52,6 +52,17 @@ def test_every_change_is_one_valid_module_that_differs(tmp_path: Path) -> None:
         assert ast.parse(one.content)
 
 
+def test_changes_alike_in_one_function_are_told_apart(tmp_path: Path) -> None:
+    module = "def one(x):\n    return x[1] + x[1]\n\n\ndef two(x):\n    return x[1]\n"
+    (tmp_path / "module.py").write_text(module)
+    keys = [one.key for one in changes(tmp_path, "module.py") if one.before == "1"]
+    assert keys == [
+        "module.py:one: 1 -> 2",
+        "module.py:one: 1 -> 2 (no. 2)",
+        "module.py:two: 1 -> 2",
+    ]
+
+
 def test_text_and_annotations_stay(tmp_path: Path) -> None:
     (tmp_path / "module.py").write_text(MODULE)
     assert not any("+" in one.before for one in changes(tmp_path, "module.py"))

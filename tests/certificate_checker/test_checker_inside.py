@@ -175,7 +175,7 @@ def test_corners_farther_apart_than_stated_are_not_joined(
             surface.join([[3, 0]], [])
 
 
-@pytest.mark.parametrize(("radius", "good"), [(2.0, True), (0.5, False)])
+@pytest.mark.parametrize(("radius", "good"), [(1.01, True), (1.0, False)])
 def test_an_arm_thinner_than_the_gaps_is_not_proved_outside(
     radius: float, good: bool
 ) -> None:
@@ -223,3 +223,20 @@ def test_rays_that_meet_a_corner_are_left_out(first: int) -> None:
     assert all(senses.tolist() == [1] for _, senses, _ in rays)
     beside = np.array([1e-3, 2e-3, -1e-3])
     assert len(list(crossings(outwards, beside))) == len(RAYS)
+
+
+def cube(half: float, aside: float = 0.0, sense: int = 1) -> Any:
+    """A cube turned outwards, or inwards for the sense -1."""
+    return (half * BOX + np.array([aside, 0.0, 0.0]))[:, ::sense]
+
+
+def test_what_is_seen_first_decides_in_a_cavity() -> None:
+    """Shells within shells: nothing winds round the point, and it sees backs alone."""
+    shells = [cube(half, sense=sense) for half, sense in ((8, 1), (6, -1))]
+    within = [cube(half, sense=sense) for half, sense in ((4, 1), (2, -1))]
+    point = [0.1, 0.2, -0.1]
+    assert Surface(np.concatenate(shells)).not_outside(point, 0.01) == ""
+    assert Surface(np.concatenate([*shells, *within])).not_outside(point, 0.01) == ""
+    across = np.concatenate([cube(4, 1.0), cube(4, -1.0, sense=-1)])
+    why = Surface(across).not_outside(point, 0.01)
+    assert why == "its faces are turned both ways"

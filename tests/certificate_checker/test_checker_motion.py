@@ -46,3 +46,46 @@ def test_the_deviation_of_a_swing_is_its_sagitta(angle: float, tmp_path: Path) -
     assert outcome.accepted, outcome.reason
     sagitta = 1.0 - np.cos(angle)
     assert case.lines[0]["tip_deviation_m"] == pytest.approx(sagitta, rel=1e-2)
+
+
+def along(folder: Path, x0: list[float], **asked: Any) -> Case:
+    """The stretched arm moves along x."""
+    data = {"vdsm_problem": 1, "length_unit": "m", "manipulator": ARM}
+    drawn = {key: asked.pop(key) for key in ("on_path", "path_m") if key in asked}
+    q = np.zeros((len(x0), 7))
+    q[:, 0] = x0
+    data |= {"obstacles": [], "required_clearance": 0.0} | asked
+    return Case(folder, data, q, (0.0, 0.0, 0.0), **drawn)
+
+
+def refusal(case: Case) -> str:
+    outcome = check_certificate(case.certificate, case.problem, case.trajectory)
+    return outcome.reason
+
+
+@pytest.mark.parametrize(("share", "good"), [(0.9, True), (1.1, False)])
+def test_an_angle_at_the_goal_counts_by_how_far_it_moves_the_tip(
+    share: float, good: bool, tmp_path: Path
+) -> None:
+    """The last of three angles, of an arm of 1 m: held as if it were the first."""
+    angle = float(np.rad2deg(1e-6 * share))
+    joints = {"x0": 0.1, "alpha_deg": [0, 0, angle], "theta_deg": [0, 0, 0]}
+    found = refusal(along(tmp_path, [0.0, 0.1], goal={"joints": joints}))
+    assert ("off their goal" in found) is not good
+    assert (found == "") is good
+
+
+@pytest.mark.parametrize(("more", "good"), [(0.0, True), (0.01, False)])
+def test_a_closed_path_left_in_between_is_drawn_once(
+    more: float, good: bool, tmp_path: Path
+) -> None:
+    """There and back along 0.4 m, one row off the path: a lap, or a little more."""
+    points = [[1.0, 0, 0], [1.2, 0, 0], [1.4, 0, 0]]
+    x0 = [0.3, 0.4, 0.4, 0.4, 0.3, 0.1, 0.0, 0.1, 0.3 + more]
+    station = [0.3, 0.4, 0.4, 0.4, 0.5, 0.7, 0.8, 0.9, 1.1 + more]
+    path = {"start": [1.3, 0, 0], "points": points, "closed": True}
+    path |= {"required_coverage": 0.5}
+    on = [1, 1, 0, 1, 1, 1, 1, 1, 1]
+    case = along(tmp_path, x0, tip_path=path, on_path=on, path_m=station)
+    assert ("begun again" in refusal(case)) is not good
+    assert (refusal(case) == "") is good

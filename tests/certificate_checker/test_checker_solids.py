@@ -1,0 +1,67 @@
+"""Support functions of the certificate checker against exact fractions."""
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from flint import arb, ctx
+
+from vdsm_pin.certificate_checker.balls import Rejected, column
+from vdsm_pin.certificate_checker.solids import Solid, boundary
+
+SQUARE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+
+
+def exactly(number: float) -> arb:
+    value = Fraction(number)
+    return arb(value.numerator) / value.denominator
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_support_surely_holds_the_exact_one(seed: int) -> None:
+    """Far points, one of them at the origin, whose heights nearly cancel."""
+    rng = np.random.default_rng(seed)
+    n = rng.normal(size=3)
+    n /= np.linalg.norm(n)
+    across = np.cross(n, rng.normal(size=(6, 3))) * 10.0 ** rng.uniform(0, 6, (6, 1))
+    points = np.concatenate([across, np.zeros((1, 3))])
+    first, last = 2, 7
+    with ctx.workprec(128):
+        solid = Solid("far", points[:, None, :], radius=0.5)
+        found = solid.support(column(*n.tolist()), first, last)
+        exact = min(
+            sum(Fraction(a) * Fraction(b) for a, b in zip(point, n, strict=True))
+            for point in points[first:last].tolist()
+        )
+        true = arb(exact.numerator) / exact.denominator - exactly(0.5)
+        assert found.contains(true)
+        assert float(found.rad()) <= 1e-12 * (1.0 + np.abs(points).max())
+
+
+def prism() -> Solid:
+    ends: Any = np.array([[[x, y, z] for x, y in SQUARE] for z in (0.0, 1.0)])
+    solid = Solid("bar", ends.reshape(1, -1, 3))
+    solid.ends = ends
+    return solid
+
+
+def test_pieces_of_a_prism_are_no_more_corners_than_its_triangles() -> None:
+    """Pieces there and back change no boundary: only their number is against them."""
+    halves = [[0, 1, 2], [0, 2, 3]]
+    solid = prism()
+    solid.cut(halves)
+    assert solid.points.shape == (2, 6, 3)
+    there_and_back = [[0, 1, 2], [2, 1, 0]]
+    prism().cut([*halves, *there_and_back])  # 12 corners of 12
+    with pytest.raises(Rejected, match="do not make up the whole"):
+        prism().cut([*halves, [0, 1, 2, 3], [3, 2, 1, 0]])
+
+
+def test_boundaries_cancel_where_loops_run_both_ways() -> None:
+    assert boundary([[0, 1, 2]]) == {(0, 1): 1, (1, 2): 1, (0, 2): -1}
+    assert boundary([[0, 1, 2], [2, 1, 0]]) == {}
+    halves = boundary([[0, 1, 2], [0, 2, 3]])
+    assert halves == boundary([[0, 1, 2, 3]])
+    assert halves != boundary([[0, 1, 2], [0, 3, 2]])
+    assert boundary([[0, 1, 2]] * 2) == {(0, 1): 2, (1, 2): 2, (0, 2): -2}
