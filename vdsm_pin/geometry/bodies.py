@@ -84,17 +84,17 @@ def _disc_reach(body: Body, instant: int, nx: float, ny: float, nz: float) -> fl
 def body_reach(body: Body, nx: float, ny: float, nz: float) -> float:
     """Largest n.x over a body, n of unit length; [m]."""
     p, reach = body.points, -np.inf
-    n_points, n_corners = body.used
+    n_points, n_corners = body.used[0], body.used[1]
     first = second = 0.0
     if body.discs[0, RADIUS] > 0.0:
         first = _disc_reach(body, 0, nx, ny, nz)
         second = _disc_reach(body, 1, nx, ny, nz)
     for corner in range(n_corners):
-        grown = _growth(body, corner, nx, ny, nz)
-        for k in range(corner, n_points, n_corners):
-            disc = first if k < n_corners else second
+        grown, disc, k = _growth(body, corner, nx, ny, nz), first, corner
+        while k < n_points:
             along = nx * p[k, 0] + ny * p[k, 1] + nz * p[k, 2]
             reach = max(reach, along + grown + disc)
+            disc, k = second, k + n_corners
     return reach
 
 
@@ -115,17 +115,20 @@ def body_support(
         The largest value; [m].
     """
     p, g = body.points, body.swings
-    n_points, n_corners = body.used
-    best, at = -np.inf, 0
-    for corner in range(n_corners):
-        grown = _growth(body, corner, nx, ny, nz)
-        for k in range(corner, n_points, n_corners):
-            value = nx * p[k, 0] + ny * p[k, 1] + nz * p[k, 2] + grown
-            if body.discs[0, RADIUS] > 0.0:
-                value += _disc_reach(body, k // n_corners, nx, ny, nz)
+    n_points, n_corners = body.used[0], body.used[1]
+    first = second = 0.0
+    has_disc = body.discs[0, RADIUS] > 0.0
+    if has_disc:
+        first = _disc_reach(body, 0, nx, ny, nz)
+        second = _disc_reach(body, 1, nx, ny, nz)
+    best, at, corner = -np.inf, 0, 0
+    for c in range(n_corners):
+        grown, disc, k = _growth(body, c, nx, ny, nz), first, c
+        while k < n_points:  # no division: this is the innermost loop of all
+            value = nx * p[k, 0] + ny * p[k, 1] + nz * p[k, 2] + grown + disc
             if value > best:
-                best, at = value, k
-    corner = at % n_corners
+                best, at, corner = value, k, c
+            disc, k = second, k + n_corners
     ball = body.balls[corner]
     x, y, z = p[at, 0] + ball * nx, p[at, 1] + ball * ny, p[at, 2] + ball * nz
     for k in range(body.sizes[corner]):
@@ -137,8 +140,8 @@ def body_support(
             z + side * g[corner, k, 2],
         )
     point[0], point[1], point[2] = x, y, z
-    if body.discs[0, RADIUS] > 0.0:
-        _add_disc(body.discs[at // n_corners], nx, ny, nz, point)
+    if has_disc:
+        _add_disc(body.discs[int(at >= n_corners)], nx, ny, nz, point)
     return best
 
 

@@ -13,6 +13,7 @@ from vdsm_pin.geometry.obstacles import (
     box_distance,
     box_of,
     encloses,
+    has_inside,
     obstacle_bracket,
 )
 from vdsm_pin.geometry.pieces import PackedPieces
@@ -91,7 +92,8 @@ def _measure(
                 )
                 desk.normals[o, link] = out[NORMAL : NORMAL + 3]
                 gap = out[LOWER]
-                if gap > 0.0 and encloses(pieces, covers, o, body.points[0]):
-                    gap = -gap
+                # Asked first: a call with the whole scene costs more than a link.
+                if gap > 0.0 and has_inside(pieces, covers, o):
+                    gap = -gap if encloses(pieces, covers, o, body.points[0]) else gap
                 best = min(best, gap)
             result[sample, link] = best - off

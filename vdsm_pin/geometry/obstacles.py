@@ -284,10 +284,16 @@ def _passes(pieces: PackedPieces, p: int, x: float, y: float, z: float) -> int:
 
 
 @compiled
+def has_inside(pieces: PackedPieces, covers: IntArray, obstacle: int) -> bool:
+    """Whether an obstacle is a mesh with an inside; arguments as for `encloses`."""
+    return bool(covers[pieces.node_range[pieces.root[obstacle], 0]] & SOLID)
+
+
+@compiled
 def encloses(
     pieces: PackedPieces, covers: IntArray, obstacle: int, point: FloatArray
 ) -> bool:
-    """Whether an obstacle is a mesh that winds round a point.
+    """Whether a mesh with an inside winds round a point.
 
     The ray from the point along +z is followed.
 
@@ -298,16 +304,13 @@ def encloses(
         pieces: The scene.
         covers: What `ClosedMesh.covers` says of each piece, 0 of what is no mesh,
             shape (n_pieces,).
-        obstacle: The mesh.
+        obstacle: A mesh for which `has_inside` holds.
         point: Shape (3,); [m].
     """
     apart()
     x, y, z = point[0], point[1], point[2]
     stack = np.zeros(STACK, np.int64)
-    root = pieces.root[obstacle]
-    if not covers[pieces.node_range[root, 0]] & SOLID:
-        return False
-    stack[0] = root
+    stack[0] = pieces.root[obstacle]
     waiting, winding, count = 1, 0, 0
     while waiting > 0:
         waiting -= 1

@@ -226,12 +226,13 @@ class Judge:
         arm, kept = self.problem.manipulator, np.ones(len(most), dtype=np.bool_)
         peak = np.maximum(bends_of(begin).max(axis=1), bends_of(end).max(axis=1))
         near = np.flatnonzero(peak > NEAR_LIMIT * most)
-        for share in (0.25, 0.5, 0.75):
+        for share in (0.25, 0.5, 0.75) if near.size else ():
             inner = intervals.centres(arm, near, np.full(len(near), share))
             kept[near] &= bends_of(inner).max(axis=1) <= most[near]
         ahead = np.minimum(begin[:, -1, 0], end[:, -1, 0])
         near = np.flatnonzero(kept & (ahead - arm.total_length < arm.base_range[0]))
-        kept[near] = self._farthest_back(intervals, near) >= arm.base_range[0]
+        if near.size:
+            kept[near] = self._farthest_back(intervals, near) >= arm.base_range[0]
         return kept
 
     def _farthest_back(self, intervals: Intervals, number: IntArray) -> FloatArray:

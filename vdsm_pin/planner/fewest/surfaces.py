@@ -14,7 +14,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.compiled import borrowed, clock, compiled
-from vdsm_pin.geometry.obstacles import STACK, encloses
+from vdsm_pin.geometry.obstacles import STACK, encloses, has_inside
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.geometry.segments import squared_gap
@@ -242,6 +242,8 @@ def buried(
         if not asked[n]:
             continue
         for o in range(solids.root.size):
-            if encloses(solids, covers, o, ends[n, 0]):
+            if has_inside(solids, covers, o) and encloses(
+                solids, covers, o, ends[n, 0]
+            ):
                 inside[n] = True
     return inside
