@@ -105,6 +105,9 @@ def main(folder: Path) -> None:
         if strategy == "paper":
             figures["fig19"] = poses(ran.problem, ran.simulation)
         style.save_all(figures, folder)
+        for name in figures:
+            if name != "fig19":  # twenty thousand points a curve: a picture is smaller
+                (folder / f"{name}.svg").unlink()
 
 
 if __name__ == "__main__":
