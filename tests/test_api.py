@@ -158,3 +158,13 @@ def test_the_papers_joint_error_touches(
     assert result.verdict is vp.Verdict.REFUTED
     worst = min(found.clearance for found in result.counterexamples)
     assert 1e3 * worst == pytest.approx(depth_mm, abs=0.1)
+
+
+def test_no_certificate_of_errors_that_it_cannot_state(tmp_path: Path) -> None:
+    problem = vp.read_problem("paper/free")
+    motion = vp.plan(problem, "paper").trajectory
+    result = vp.verify(problem, motion, errors=vp.ErrorBox(base_turn=1e-4))
+    assert result.verdict is vp.Verdict.CERTIFIED
+    vp.write_trajectory(tmp_path / "t.csv", motion)
+    with pytest.raises(VerificationFailed, match="turn of the base"):
+        vp.write_certificate(result, tmp_path / "c", tmp_path / "t.csv")

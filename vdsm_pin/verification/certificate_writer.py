@@ -85,6 +85,9 @@ def write_certificate(
         verdict = verification.verdict.value
         message = f"no certificate is written: the verdict is {verdict}"
         raise VerificationFailed(message)
+    if verification.errors.base_turn > 0.0:
+        message = "no certificate is written: it cannot state a turn of the base yet"
+        raise VerificationFailed(message)
     task = make_task(verification.problem, verification.errors, deadline=deadline)
     digest = hashlib.sha256()
     with atomic_path(path) as temporary, temporary.open("wb") as file:
