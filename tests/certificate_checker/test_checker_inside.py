@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from flint import arb_mat
+from flint import arb_mat, ctx
 from oracles.closed_solids import made, sample_points
 
 from vdsm_pin.certificate_checker.balls import Rejected
@@ -203,10 +203,12 @@ def test_points_of_random_solids_are_outside_or_inside(seed: int) -> None:
 def test_senses_of_three_rows() -> None:
     x, y, z = (arb_mat([row]) for row in np.eye(3).tolist())
     assert (sign(x, y, z), sign(y, x, z), sign(x, y, x)) == (1, -1, 0)
+    assert (sign(x * 0.1, y, z), sign(y * 0.1, x, z)) == (1, -1)
 
 
 @pytest.mark.parametrize("first", range(3))
-def test_rays_that_meet_a_corner_are_left_out(first: int) -> None:
+@pytest.mark.parametrize("sense", [1, -1])
+def test_rays_that_meet_a_corner_are_left_out(first: int, sense: int) -> None:
     """An octahedron's corner lies exactly on a ray: that one says nothing."""
     x = np.cross(RAYS[5], [0.0, 0.0, 1.0])
     tips = np.array([4.0 * RAYS[5], x, np.cross(RAYS[5], x), -RAYS[5]])
@@ -217,12 +219,16 @@ def test_rays_that_meet_a_corner_are_left_out(first: int) -> None:
     )
     volume = np.linalg.det(tips[rows]).sum()
     outwards = tips[rows] if volume > 0.0 else tips[rows][:, ::-1]
-    outwards = np.roll(outwards, first, axis=1)
-    rays = list(crossings(outwards, np.zeros(3)))
+    turned = np.roll(outwards[:, ::sense], first, axis=1)
+    rays = list(crossings(turned, np.zeros(3)))
     assert len(rays) == len(RAYS) - 1
-    assert all(senses.tolist() == [1] for _, senses, _ in rays)
-    beside = np.array([1e-3, 2e-3, -1e-3])
-    assert len(list(crossings(outwards, beside))) == len(RAYS)
+    assert all(senses.tolist() == [sense] for _, senses, _ in rays)
+    # Beside the corner by less than doubles tell apart: balls decide.
+    with ctx.workprec(128):
+        beside = np.array([1e-16, 2e-16, -1e-16])
+        rays = list(crossings(turned, beside))
+    assert len(rays) == len(RAYS)
+    assert all(senses.tolist() == [sense] for _, senses, _ in rays)
 
 
 def cube(half: float, aside: float = 0.0, sense: int = 1) -> Any:
@@ -237,6 +243,8 @@ def test_what_is_seen_first_decides_in_a_cavity() -> None:
     point = [0.1, 0.2, -0.1]
     assert Surface(np.concatenate(shells)).not_outside(point, 0.01) == ""
     assert Surface(np.concatenate([*shells, *within])).not_outside(point, 0.01) == ""
+    again = np.concatenate([*shells, shells[0][:1]])  # a face twice
+    assert Surface(again).not_outside(point, 0.01) == ""
     across = np.concatenate([cube(4, 1.0), cube(4, -1.0, sense=-1)])
     why = Surface(across).not_outside(point, 0.01)
     assert why == "its faces are turned both ways"

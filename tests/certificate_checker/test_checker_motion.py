@@ -1,12 +1,13 @@
 """What the certificate checker says of the motion between rows, by closed forms."""
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from oracles.certificate_cases import Case
-from oracles.certificate_oracle import frames_and_centres
+from oracles.certificate_oracle import frames_and_centres, sealed
 
 from vdsm_pin.certificate_checker import check_certificate
 
@@ -89,3 +90,49 @@ def test_a_closed_path_left_in_between_is_drawn_once(
     case = along(tmp_path, x0, tip_path=path, on_path=on, path_m=station)
     assert ("begun again" in refusal(case)) is not good
     assert (refusal(case) == "") is good
+
+
+def edited(case: Case, change: Any) -> str:
+    """Why the certificate is refused after a change, sealed again."""
+    lines = json.loads(json.dumps(case.lines))
+    change(lines)
+    case.certificate.write_bytes(sealed(lines))
+    return refusal(case)
+
+
+@pytest.mark.parametrize(
+    ("claimed", "good"), [(0.0, True), (1e-9, True), (2e-9, False)]
+)
+@pytest.mark.parametrize("key", ["alpha_rad", "theta_rad", "x0_max_m"])
+def test_a_limit_is_claimed_to_a_billionth(
+    key: str, claimed: float, good: bool, tmp_path: Path
+) -> None:
+    """The arm stands straight at 0: what is claimed is what it is off."""
+    case = along(tmp_path, [0.0, 0.0])
+    found = edited(case, lambda lines: lines[0]["limits"].update({key: claimed}))
+    assert (found == "") is good
+    assert good or found.startswith(f"header: {key} is 2e-09")
+
+
+@pytest.mark.parametrize(("less", "good"), [(0.0, True), (1e-12, False)])
+def test_a_clearance_claimed_is_no_less_than_required(
+    less: float, good: bool, tmp_path: Path
+) -> None:
+    """A floor half a billionth farther from the arm than required."""
+    floor = {"name": "floor", "shape": "half_space", "normal": [0, 0, 1]}
+    floor |= {"point": [0, 0, -(0.03 + 0.002 + 5e-10)]}
+    case = along(tmp_path, [0.0, 0.1], obstacles=[floor], required_clearance=0.002)
+
+    def claim(lines: Any) -> None:
+        for proof in lines[1]["proofs"][:3]:
+            for _, _, planes in proof:
+                for plane in planes:
+                    plane[-1] = 0.002 - less
+
+    assert (edited(case, claim) == "") is good
+
+
+def test_lines_of_empty_lists_are_refused_before_they_are_read(tmp_path: Path) -> None:
+    case = along(tmp_path, [0.0, 0.1])
+    case.certificate.write_bytes(b'{"a": [' + 5000 * b"[]," + b"[]]}\n")
+    assert refusal(case) == "header: a line is lists and no numbers"

@@ -108,7 +108,7 @@ def test_a_path_of_one_point_is_drawn_by_one_row() -> None:
     drawing = Drawing(DesiredPath(np.zeros(3), np.ones((1, 3)), closed=True))
     assert entries(drawing.point(arb(3.0))).tolist() == [1.0, 1.0, 1.0]
     assert float(drawing.coverage()) == 0.0
-    drawing.visit(arb(0), joined=False, same=arb(1e-6))
+    assert drawing.visit(arb(0), joined=False, same=arb(1e-6)) == 0
     assert float(drawing.coverage()) == 1.0
 
 
