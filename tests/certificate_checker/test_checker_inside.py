@@ -10,7 +10,6 @@ from oracles.closed_solids import made, sample_points
 
 from vdsm_pin.certificate_checker.balls import Rejected
 from vdsm_pin.certificate_checker.inside import (
-    GAP,
     Surface,
     border,
     covers,
@@ -20,6 +19,8 @@ from vdsm_pin.certificate_checker.inside import (
 )
 from vdsm_pin.geometry.winding import RAYS
 
+GAP = 2e-4
+"""How far corners are joined, over the diagonal (docs/certificate.md)."""
 BOX = np.asarray(trimesh.creation.box((2.0, 2.0, 2.0)).triangles)
 
 
@@ -248,3 +249,10 @@ def test_what_is_seen_first_decides_in_a_cavity() -> None:
     across = np.concatenate([cube(4, 1.0), cube(4, -1.0, sense=-1)])
     why = Surface(across).not_outside(point, 0.01)
     assert why == "its faces are turned both ways"
+
+
+def test_zeros_of_both_signs_are_one_place() -> None:
+    corners = BOX + 1.0  # from 0 to 2
+    corners[::2][corners[::2] == 0.0] = -0.0
+    assert Surface(corners).not_outside([1.0, 1.1, 1.2], 0.01) == "it is inside"
+    assert Surface(corners).not_outside([5.0, 1.1, 1.2], 0.01) == ""

@@ -136,3 +136,39 @@ def test_lines_of_empty_lists_are_refused_before_they_are_read(tmp_path: Path) -
     case = along(tmp_path, [0.0, 0.1])
     case.certificate.write_bytes(b'{"a": [' + 5000 * b"[]," + b"[]]}\n")
     assert refusal(case) == "header: a line is lists and no numbers"
+
+
+def test_the_base_at_its_goal_is_judged_beside_the_tip(tmp_path: Path) -> None:
+    """Base and angle are off such that the tip is not: the base is off by too much."""
+    goal = {"x0": 0.1, "alpha_deg": [40, 0, 0], "theta_deg": [0, 0, 0]}
+    for base, good in ((0.9e-6, True), (1.2e-6, False)):
+        q = np.zeros((2, 7))
+        q[:, 0], q[:, 1] = 0.1 + base, np.deg2rad(40) + 0.9e-6
+        data = {"vdsm_problem": 1, "length_unit": "m", "manipulator": ARM}
+        data |= {"obstacles": [], "required_clearance": 0.0, "goal": {"joints": goal}}
+        found = refusal(Case(tmp_path, data, q, (0.0, 0.0, 0.0)))
+        assert (found == "") is good
+        assert good or "the joints are 1.2" in found
+
+
+def test_slices_and_intervals_are_no_more_than_asked(tmp_path: Path) -> None:
+    case = along(tmp_path, [0.0, 0.1])
+
+    def empty(lines: Any) -> None:
+        proof = lines[1]["proofs"][0]
+        proof.insert(0, [0.0, 0.0, proof[0][2]])
+
+    assert "the slices do not tile at 0.0" in edited(case, empty)
+    more = edited(case, lambda lines: lines.append(lines[-1] | {"k": 1}))
+    assert more == "interval 1: lies beyond the last row"
+
+
+def test_a_change_is_counted_from_the_row_before(tmp_path: Path) -> None:
+    q = np.zeros((2, 7))
+    q[:, 2] = -0.01, 0.01
+    data = {"vdsm_problem": 1, "length_unit": "m", "manipulator": ARM}
+    data |= {"obstacles": [], "required_clearance": 0.0}
+    for limit, good in ((1.2, True), (1.1, False)):
+        asked = data | {"max_change_per_row_deg": limit}
+        found = refusal(Case(tmp_path, asked, q, (0.0, 0.0, 0.0)))
+        assert found == ("" if good else "interval 0: a joint turns by 0.02 rad")

@@ -132,3 +132,14 @@ def test_a_unit_vector_has_length_1_and_the_same_direction() -> None:
         assert abs(float(norm(long)) - 1.0) < TINY
     with pytest.raises(Rejected, match="length 0"):
         unit(column(0, 0, 0))
+
+
+def test_a_hair_backwards_off_a_closed_path_is_not_once_round() -> None:
+    drawing, same = line(8, closed=True), arb(1e-6)
+    drawing.visit(arb(3), joined=False, same=same)
+    back = drawing.visit(arb(3 - 2.0**-21), joined=False, same=same)
+    assert back == -(2.0**-21)
+    on = drawing.visit(arb(2), joined=False, same=same)
+    assert on == 7 + 2.0**-21
+    assert drawing.advanced == 7
+    assert drawing.left

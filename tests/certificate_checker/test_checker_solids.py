@@ -65,3 +65,8 @@ def test_boundaries_cancel_where_loops_run_both_ways() -> None:
     assert halves == boundary([[0, 1, 2, 3]])
     assert halves != boundary([[0, 1, 2], [0, 3, 2]])
     assert boundary([[0, 1, 2]] * 2) == {(0, 1): 2, (1, 2): 2, (0, 2): -2}
+
+
+def test_the_extent_is_that_of_the_points_and_where_they_come_from() -> None:
+    assert Solid("one", [[[0.5, -0.25, 0.0]]]).extent == 0.5
+    assert Solid("far", [[[0.5, 0.0, 0.0]]], origin=[0.0, -4.0, 0.0]).extent == 4.5
