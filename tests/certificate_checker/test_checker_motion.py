@@ -136,6 +136,9 @@ def test_lines_of_empty_lists_are_refused_before_they_are_read(tmp_path: Path) -
     case = along(tmp_path, [0.0, 0.1])
     case.certificate.write_bytes(b'{"a": [' + 5000 * b"[]," + b"[]]}\n")
     assert refusal(case) == "header: a line is lists and no numbers"
+    # Seven bytes a list are enough, for any number of them.
+    case.certificate.write_bytes(b'{"a": [' + 5000 * b"[1000]," + b"[]]}\n")
+    assert "version" in refusal(case)
 
 
 def test_the_base_at_its_goal_is_judged_beside_the_tip(tmp_path: Path) -> None:

@@ -134,8 +134,9 @@ def test_a_unit_vector_has_length_1_and_the_same_direction() -> None:
         unit(column(0, 0, 0))
 
 
-def test_a_hair_backwards_off_a_closed_path_is_not_once_round() -> None:
-    drawing, same = line(8, closed=True), arb(1e-6)
+@pytest.mark.parametrize("same", [1e-6, 2.0**-21])
+def test_a_hair_backwards_off_a_closed_path_is_not_once_round(same: float) -> None:
+    drawing, same = line(8, closed=True), arb(same)
     drawing.visit(arb(3), joined=False, same=same)
     back = drawing.visit(arb(3 - 2.0**-21), joined=False, same=same)
     assert back == -(2.0**-21)
