@@ -280,7 +280,8 @@ def _send(
     """
     known, obstacles = proving.results, problem.scene.obstacles
     outer, obstacle = proving.task.pairs.frame == BASE, proving.task.pairs.obstacle
-    near = np.unique(obstacle[outer & (known.best[:, LOW] <= reach)])
+    # numpy.unique imports numpy.ma, for which every process would wait.
+    near = np.flatnonzero(np.bincount(obstacle[outer & (known.best[:, LOW] <= reach)]))
     pairs = frozen(np.flatnonzero(~outer | np.isin(obstacle, near)), np.int64)
     if near.size < len(obstacles):
         scene = Scene(tuple(obstacles[k] for k in near))

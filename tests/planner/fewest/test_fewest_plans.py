@@ -198,6 +198,10 @@ def test_a_path_behind_a_wall_is_not_found_and_says_what_stands_in_the_way() -> 
     task = problem(wall, blocked=Blocked.FAIL)
     with pytest.raises(PathBlocked, match="wall"):
         planned(task)
+
+
+@pytest.mark.slow
+def test_a_path_behind_a_plate_is_looked_for_to_the_end() -> None:
     plate = Box("plate", np.array([0.0, 0.4, 0.0]), np.eye(3), np.array([9, 0.01, 9]))
     points = np.array([[3.126, 0.6, 0.0], [3.126, 0.9, 0.0]])
     with pytest.raises(NoPlanFound, match="plate"):
