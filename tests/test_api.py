@@ -168,3 +168,15 @@ def test_no_certificate_of_errors_that_it_cannot_state(tmp_path: Path) -> None:
     vp.write_trajectory(tmp_path / "t.csv", motion)
     with pytest.raises(VerificationFailed, match="turn of the base"):
         vp.write_certificate(result, tmp_path / "c", tmp_path / "t.csv")
+
+
+@pytest.mark.parametrize("scene", ["obs1", "obs3"])
+def test_the_profile_has_the_same_least_by_link_and_by_obstacle(scene: str) -> None:
+    """One obstacle: in each bin the least over the links is the obstacle's."""
+    problem = vp.read_problem(f"paper/{scene}")
+    result = vp.verify(problem, vp.plan(problem).trajectory)
+    for side in ("lower", "upper"):
+        of_links = getattr(result.profile, f"link_{side}").min(axis=1)
+        of_obstacles = getattr(result.profile, f"obstacle_{side}")[:, 0]
+        np.testing.assert_array_equal(of_links, of_obstacles)
+    assert result.profile.link_lower.min() == result.min_clearance

@@ -80,6 +80,8 @@ def enclosed_profile(
     profile: ClearanceProfile, problem: PlanningProblem, around: Collection[str]
 ) -> ClearanceProfile:
     """The profile with the meshes around the arm as solids."""
+    if not around:
+        return profile
     least = -problem.manipulator.least_radius
     lower, upper = profile.obstacle_lower.copy(), profile.obstacle_upper.copy()
     inside = np.zeros(len(lower), np.bool_)
