@@ -8,7 +8,6 @@
 'certified'
 """
 
-from math import radians
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,6 @@ from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.records import ErrorBox, Verification
 
 PYTHON = "from Python"
@@ -89,18 +87,16 @@ def error_box(
 
     Args:
         joint_deg: Largest error of every joint angle; [deg].
-        base_mm: Largest error of x0; [mm].
+        base_mm: Largest displacement of the base in any direction; [mm].
         obstacle_mm: Largest displacement of an obstacle's surface; [mm].
 
     Example:
         >>> error_box(base_mm=2.0).base
         0.002
     """
-    return ErrorBox(
-        joint=radians(joint_deg),
-        base=base_mm / MM_PER_M,
-        obstacle=obstacle_mm / MM_PER_M,
-    )
+    from vdsm_pin.workflow import error_box as from_typed
+
+    return from_typed(joint_deg, base_mm, obstacle_mm)
 
 
 def verify(
