@@ -10,8 +10,9 @@ from problem_texts import TETRAHEDRON, binary_stl
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.closed_meshes import close_mesh
-from vdsm_pin.io.mesh_file import MeshData, read_mesh
+from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.meshes import raw
+from vdsm_pin.io.meshes.raw import RawMesh
 from vdsm_pin.io.source import BLOCK
 
 
@@ -40,7 +41,7 @@ def write(folder: Path, name: str, content: str | bytes) -> Path:
     return path
 
 
-def is_closed(mesh: MeshData) -> bool:
+def is_closed(mesh: RawMesh) -> bool:
     return close_mesh(mesh.vertices, mesh.triangles).closed
 
 

@@ -13,10 +13,11 @@ from scipy.spatial import cKDTree
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.closed_meshes import close_mesh
-from vdsm_pin.io.mesh_file import MeshData, read_mesh
+from vdsm_pin.io.mesh_file import read_mesh
+from vdsm_pin.io.meshes.raw import RawMesh
 
 
-def is_closed(mesh: MeshData) -> bool:
+def is_closed(mesh: RawMesh) -> bool:
     return close_mesh(mesh.vertices, mesh.triangles).closed
 
 
@@ -40,7 +41,7 @@ def pose(rng: np.random.Generator) -> np.ndarray:
     return matrix
 
 
-def assert_same(mesh: MeshData, oracle: trimesh.Trimesh, *, close: float) -> None:
+def assert_same(mesh: RawMesh, oracle: trimesh.Trimesh, *, close: float) -> None:
     """The same triangles in any order, and the same volume with its sign."""
     found, expected = mesh.vertices[mesh.triangles], np.asarray(oracle.triangles)
     assert_same_middles(found, expected, close=close)

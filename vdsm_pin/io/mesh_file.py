@@ -6,7 +6,7 @@ that a proof about these triangles is a proof about the file.
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -44,27 +44,7 @@ _READERS: Final[dict[str, Callable[[MeshStream], RawMesh]]] = {
 }
 
 
-@dataclass(frozen=True)
-class MeshData:
-    """Triangles as a file has them.
-
-    Args:
-        vertices: Shape (n, 3), in the unit of the file.
-        triangles: Vertex indices, shape (m, 3), m >= 1.
-        unit: Metres per unit of the file; None where its format states none.
-        bend: How far the least flat face of more than three corners is off its plane,
-            in the unit of the file.
-        notes: What else was found, one phrase each.
-    """
-
-    vertices: FloatArray
-    triangles: IntArray
-    unit: float | None = None
-    bend: float = 0.0
-    notes: tuple[str, ...] = ()
-
-
-def read_mesh(path: Path, digest: Digest | None = None) -> MeshData:
+def read_mesh(path: Path, digest: Digest | None = None) -> RawMesh:
     """The triangles of a mesh file.
 
     Args:
@@ -89,7 +69,7 @@ def read_mesh(path: Path, digest: Digest | None = None) -> MeshData:
     used[raw.triangles] = True
     vertices, index = _joined(raw.vertices[used])
     triangles = index[(np.cumsum(used) - 1)[raw.triangles]]
-    return MeshData(vertices, triangles, raw.unit, raw.bend, raw.notes)
+    return replace(raw, vertices=vertices, triangles=triangles)
 
 
 def _joined(points: FloatArray) -> tuple[FloatArray, IntArray]:

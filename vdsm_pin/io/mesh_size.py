@@ -7,7 +7,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.frames import Frame
-from vdsm_pin.io.mesh_file import MeshData
+from vdsm_pin.io.meshes.raw import RawMesh
 from vdsm_pin.io.obstacle_schema import MeshModel
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
 from vdsm_pin.tolerances import TOLERANCES
@@ -36,7 +36,7 @@ class MeshSize:
     stated: bool
 
     @classmethod
-    def of(cls, mesh: MeshData, model: MeshModel, frame: Frame) -> "MeshSize":
+    def of(cls, mesh: RawMesh, model: MeshModel, frame: Frame) -> "MeshSize":
         """The size of a mesh; the problem has the first word, then the mesh's file."""
         stated, per_unit = True, 1.0
         if model.length_unit is not None:
