@@ -26,6 +26,9 @@ INTERRUPTED: Final = 130
 PIPE_CLOSED: Final = 141
 """As a shell reports whoever is ended by SIGPIPE; all files are written by then."""
 
+MOST_TOLD: Final = 20
+"""Errors of a file that are told besides the first."""
+
 # Without rich markup the help page is plain text and opens twice as fast.
 app = typer.Typer(
     rich_markup_mode=None,
@@ -423,5 +426,9 @@ def _nobody_reads() -> NoReturn:
 
 
 def _fail(error: Exception, status: int) -> NoReturn:
-    typer.echo(printable(f"vdsm: {error}"), err=True)
+    others = getattr(error, "others", ())
+    for one in (error, *others[:MOST_TOLD]):
+        typer.echo(printable(f"vdsm: {one}"), err=True)
+    if len(others) > MOST_TOLD:
+        typer.echo(f"vdsm: and {len(others) - MOST_TOLD} more", err=True)
     sys.exit(status)

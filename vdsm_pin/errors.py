@@ -46,10 +46,15 @@ class InvalidFile(InvalidInput):
         file: The file as the user named it.
         where: Field or line inside the file; empty for the file as a whole.
         problem: What is wrong and what was expected.
+
+    Attributes:
+        others: What else is wrong in the file, in its order; the message tells how
+            many there are.
     """
 
     def __init__(self, *, file: object, where: str = "", problem: str) -> None:
         self.file, self.where, self.problem = str(file), where, problem
+        self.others: tuple[InvalidFile, ...] = ()
         place = f"{file}: {where}" if where else str(file)
         super().__init__(f"{place}: {problem}")
 

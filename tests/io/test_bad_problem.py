@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from problem_texts import EVERYTHING, TETRAHEDRON, binary_stl, edited
 
+from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io import problem_file, source, yaml_reader
 from vdsm_pin.io.problem_file import built_in_text, read_problem
@@ -397,6 +398,20 @@ def test_the_first_of_several_errors_is_told_and_the_others_counted(
     message = refused_text(tmp_path, text)
     assert message.startswith("length_unit (line 3)")
     assert message.endswith("(and 1 more)")
+
+
+def test_a_command_tells_every_error_of_a_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = edited(edited(OBS1, ("length_unit",), "cm"), ("obstacles", 0, "radius"), 0)
+    path = tmp_path / "wrong.yaml"
+    path.write_text(edited(text, ("required_clearance",), -1), encoding="utf-8")
+    with pytest.raises(SystemExit) as ended:
+        main(["plan", str(path), "--out", str(tmp_path / "out")])
+    lines = capsys.readouterr().err.splitlines()
+    places = [line.split(": ")[2].split(" (line")[0] for line in lines]
+    assert ended.value.code == 2
+    assert places == ["length_unit", "obstacles[0].radius", "required_clearance"]
 
 
 def test_lines_are_those_of_the_file_not_of_the_data(tmp_path: Path) -> None:

@@ -14,7 +14,9 @@ from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in, paper_hole_angles
 
 PAGE = Path(__file__).parents[2] / "docs" / "files.md"
-EXAMPLE, ARM, ENDS = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(), re.DOTALL)
+EXAMPLE, ARM, ENDS, CURVES = re.findall(
+    r"```yaml\n(.*?)```", PAGE.read_text(), re.DOTALL
+)
 
 
 def test_the_example_is_read_with_all_shapes(tmp_path: Path) -> None:
@@ -68,6 +70,19 @@ def test_the_start_and_goal_shown_are_read_without_a_path(tmp_path: Path) -> Non
     assert problem.start is not None
     assert problem.goal is not None
     assert problem.goal.tip.tolist() == [1.5, 0.3, 0.0]
+
+
+def test_the_curves_shown_are_read_and_their_default_holds(tmp_path: Path) -> None:
+    (tmp_path / "seam.csv").write_text("x,y,z\n3126,10,-100\n")
+    given = EXAMPLE.splitlines()
+    (line,) = [i for i, text in enumerate(given) if text.startswith("  points:")]
+    corners = []
+    for curves in (CURVES, "\n".join(CURVES.splitlines()[:-1])):
+        text = "\n".join([*given[:line], curves.rstrip(), *given[line + 1 :]])
+        (tmp_path / "p.yaml").write_text(text)
+        corners.append(read_problem(tmp_path / "p.yaml").problem.path.points)
+    assert (corners[0] == corners[1]).all()
+    assert len(corners[0]) > 100
 
 
 def test_angles_turn_and_holes_lie_as_the_page_says() -> None:

@@ -1,20 +1,36 @@
 """The tip path of a problem file to a `DesiredPath` in the base frame."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.geometry import curves
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.obstacle_builder import without_repeats
+from vdsm_pin.io.path_schema import (
+    ArcPart,
+    CirclePart,
+    FilePart,
+    PathPart,
+    SplinePart,
+)
+from vdsm_pin.io.points_file import read_points
 from vdsm_pin.io.posture_builder import PostureBuilder
+from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.problem import Approach, Blocked, DesiredPath, Order
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import MAX_ROWS
+from vdsm_pin.units import UNITS_PER_METRE
+
+CURVE_TOLERANCE: Final = 0.00005
+"""How far corners may stray from a curve where the file states nothing; [m]."""
 
 DEFAULT_SPACING: Final = 0.010
 """The paper's spacing of waypoints; [m]."""
@@ -34,6 +50,8 @@ class PathBuilder:
     document: YamlDocument
     frame: Frame
     arm: Manipulator
+    folder: Path
+    digest: Digest
 
     def build(self, model: schema.TipPathModel) -> DesiredPath:
         """The desired path in the base frame.
@@ -44,8 +62,9 @@ class PathBuilder:
         """
         postures = PostureBuilder(self.document, self.frame, self.arm)
         start = postures.start(model.start, ("tip_path", "start"))
-        points = self.frame.point(model.points)
-        self._check_extent(points)
+        corners, parts = self._corners(model)
+        points = self.frame.point(corners)
+        self._check_extent(points, parts)
         path = DesiredPath(
             start.tip,
             without_repeats(points, closed=model.closed),
@@ -61,7 +80,54 @@ class PathBuilder:
         self._check_rows(path)
         return path
 
-    def _check_extent(self, points: FloatArray) -> None:
+    def _corners(self, model: schema.TipPathModel) -> tuple[FloatArray, IntArray]:
+        """All corners, shape (n, 3) in the file's frame, and whose part each is."""
+        tolerance = model.curve_tolerance
+        if tolerance is None:
+            tolerance = CURVE_TOLERANCE * UNITS_PER_METRE[self.frame.unit]
+        made: list[FloatArray] = []
+        for i, part in enumerate(model.points):
+            before = made[-1][-1] if made else None
+            try:
+                made.append(self._part(part, before, tolerance))
+            except InvalidInput as error:
+                at = ("tip_path", "points", i)
+                raise self.document.invalid(at, str(error)) from None
+        counts = [len(corners) for corners in made]
+        return np.concatenate(made), np.repeat(np.arange(len(made)), counts)
+
+    def _part(
+        self, part: PathPart, before: FloatArray | None, tolerance: float
+    ) -> FloatArray:
+        """Corners of a point or of a curve after the point before, shape (n, 3)."""
+        if isinstance(part, list):
+            return np.array([part])
+        if isinstance(part, FilePart):
+            return self._from_file(part.file)
+        if before is None:
+            message = "has no point before it, expected one where it begins"
+            raise InvalidInput(message)
+        match part:
+            case ArcPart(arc=arc):
+                through, end = np.array(arc.through), np.array(arc.to)
+                return curves.arc_through(before, through, end, tolerance)
+            case CirclePart(circle=circle):
+                centre, normal = np.array(circle.center), np.array(circle.normal)
+                turn = float(np.deg2rad(circle.turn_deg))
+                return curves.circle_from(before, centre, normal, turn, tolerance)
+            case SplinePart(spline=points):
+                through = np.vstack([before[None], np.array(points)])
+                return curves.spline_through(through, tolerance)
+
+    def _from_file(self, name: str) -> FloatArray:
+        try:
+            return read_points(self.folder / name, self.digest)
+        except InvalidFile as error:
+            place = f" {error.where}:" if error.where else ""
+            message = f"{name!r}:{place} {error.problem}"
+            raise InvalidInput(message) from None
+
+    def _check_extent(self, points: FloatArray, parts: IntArray) -> None:
         reach, limit = np.linalg.norm(points, axis=1), TOLERANCES.scene_extent
         if not (reach <= limit).all():
             worst = int(np.argmax(reach))
@@ -69,7 +135,8 @@ class PathBuilder:
                 f"lies {self.frame.shown(float(reach[worst]))} from the base, expected "
                 f"at most {self.frame.shown(limit)}"
             )
-            raise self.document.invalid(("tip_path", "points", worst), problem)
+            at = ("tip_path", "points", int(parts[worst]))
+            raise self.document.invalid(at, problem)
 
     def _check_rows(self, path: DesiredPath) -> None:
         approach = float(np.linalg.norm(path.points[0] - path.start))

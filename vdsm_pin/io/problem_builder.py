@@ -34,7 +34,7 @@ def build_problem(
         name: Name of the problem where the file gives none.
         folder: Where relative mesh paths start.
         digest: Gets the bytes of the arm's URDF, if one is named, then those of the
-            mesh files in the order of the obstacles.
+            mesh files in the order of the obstacles, then those of the path's files.
 
     Returns:
         The problem, in the base frame; [m], [rad].
@@ -49,7 +49,7 @@ def build_problem(
     obstacles = ObstacleBuilder(document, folder, frame, arm.total_length, digest)
     scene = obstacles.build_all(model.obstacles)
     _check_ends(model, document)
-    paths = PathBuilder(document, frame, arm)
+    paths = PathBuilder(document, frame, arm, folder, digest)
     postures = PostureBuilder(document, frame, arm)
     return PlanningProblem(
         name=model.name or name,

@@ -8,6 +8,7 @@ from pydantic_core import ErrorDetails
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io import obstacle_schema as shapes
+from vdsm_pin.io import path_schema as paths
 from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.schema_types import NAME_PATTERN, FileModel
 from vdsm_pin.io.yaml_reader import Data, Location, YamlDocument
@@ -24,6 +25,10 @@ _MODELS: Final[Mapping[str | int, type[FileModel]]] = {
     "tool": schema.ToolModel,
     "base": schema.BasePoseModel,
     "tip_path": schema.TipPathModel,
+    "arc": paths.ArcModel,
+    "circle": paths.CircleModel,
+    "spline": paths.SplinePart,
+    "file": paths.FilePart,
     "joints": schema.JointsModel,
     "goal": schema.GoalModel,
     "cylinder": shapes.CylinderModel,
@@ -49,10 +54,10 @@ _NAMES: Final = {
 
 
 def first_error(error: ValidationError, document: YamlDocument) -> InvalidFile:
-    """The error that most likely explains the others.
+    """The error that most likely explains the others, which it carries.
 
     A wrong version comes first and a missing key last, since a misspelt key is missing
-    too; else the one nearest to the top of the file.
+    too; else they are in the order of the file.
 
     Args:
         error: All that pydantic found.
@@ -71,9 +76,11 @@ def first_error(error: ValidationError, document: YamlDocument) -> InvalidFile:
         missing = kind == "missing"
         return at != ("vdsm_problem",) or missing, missing, document.line(at) or 0
 
-    at, details = min(found, key=rank)
-    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-    return document.invalid(at, _problem(details, at) + more)
+    first, *rest = sorted(found, key=rank)
+    more = f" (and {len(rest)} more)" if rest else ""
+    raised = document.invalid(first[0], _problem(first[1], first[0]) + more)
+    raised.others = tuple(document.invalid(at, _problem(what, at)) for at, what in rest)
+    return raised
 
 
 def _location(details: ErrorDetails, data: Data) -> Location:

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from vdsm_pin.errors import InvalidFile, UnknownName
 from vdsm_pin.io.obstacle_schema import MeshModel
+from vdsm_pin.io.path_schema import FilePart
 from vdsm_pin.io.problem_builder import build_problem
 from vdsm_pin.io.problem_errors import first_error
 from vdsm_pin.io.problem_schema import ProblemModel, UrdfManipulatorModel
@@ -76,10 +77,12 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
 
 
 def _files_named(model: ProblemModel) -> list[str]:
-    """The arm's URDF and the meshes, in the order in which the hash takes them."""
-    arm = model.manipulator
+    """Arm, meshes and path files, in the order in which the hash takes them."""
+    arm, path = model.manipulator, model.tip_path
     urdf = [arm.urdf] if isinstance(arm, UrdfManipulatorModel) else []
-    return urdf + [one.file for one in model.obstacles if isinstance(one, MeshModel)]
+    meshes = [one.file for one in model.obstacles if isinstance(one, MeshModel)]
+    parts = path.points if path else []
+    return [*urdf, *meshes, *(p.file for p in parts if isinstance(p, FilePart))]
 
 
 def find_problem(name_or_path: str | Path) -> Path:

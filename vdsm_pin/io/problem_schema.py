@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from vdsm_pin.io.obstacle_schema import ObstacleModel
+from vdsm_pin.io.path_schema import PathPart
 from vdsm_pin.io.schema_types import (
     FileModel,
     Name,
@@ -184,8 +185,16 @@ class TipPathModel(FileModel):
         description="Where the tip of the straight arm is now [length_unit], or "
         "{joints: ...} for an arm that is not straight."
     )
-    points: list[Vector] = Field(
-        min_length=1, description="Corners of the desired path [length_unit]."
+    points: list[PathPart] = Field(
+        min_length=1,
+        description="Corners of the desired path [length_unit], and arcs, circles, "
+        "splines and files of points between them; each goes on where the one before "
+        "ends.",
+    )
+    curve_tolerance: Positive | None = Field(
+        default=None,
+        description="Largest distance of the corners' polyline from an arc, circle or "
+        "spline [length_unit]. Default: 0.05 mm.",
     )
     closed: bool = Field(
         default=False, description="Whether the last corner joins the first."

@@ -12,9 +12,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from io import TextIOWrapper
 from itertools import islice
 from pathlib import Path
-from typing import Final, TextIO
+from typing import BinaryIO, Final, TextIO
 
 import numpy as np
 import pydantic_core
@@ -225,9 +226,14 @@ def open_text(file: Path) -> TextIO:
     Raises:
         OSError: If it cannot be opened.
     """
-    with file.open("rb") as stream:
-        encoding = _encoding(stream.read(4))
-    return file.open(encoding=encoding, errors="replace")
+    return as_text(file.open("rb"))
+
+
+def as_text(stream: BinaryIO) -> TextIO:
+    """A stream of bytes from its start as text, whatever it is encoded in."""
+    encoding = _encoding(stream.read(4))
+    stream.seek(0)
+    return TextIOWrapper(stream, encoding=encoding, errors="replace")
 
 
 def _encoding(head: bytes) -> str:
