@@ -7,15 +7,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 import vdsm_pin.refinement as refinement
-from vdsm_pin.errors import Infeasible, NoPlanFound
+from vdsm_pin.errors import Infeasible, InsideUnknown, NoPlanFound
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import load_robot
+from vdsm_pin.scene import Mesh, Scene
 from vdsm_pin.time_limit import NO_LIMIT
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_clearance, coal_missing
@@ -72,7 +74,7 @@ def test_a_plan_that_cannot_be_certified_is_not_handed_out(
 
     monkeypatch.setattr(refinement, "strategy", lambda name: blind)
     problem = short("obs3")
-    with pytest.raises(NoPlanFound, match="refuted"):
+    with pytest.raises(NoPlanFound, match="too near"):
         refinement.plan_and_verify(problem, "paper", load_robot(problem.manipulator))
 
 
@@ -191,3 +193,43 @@ def test_plans_keep_their_change_per_row_and_less_where_the_problem_says_so() ->
         assert row.limit == pytest.approx(np.deg2rad(most))
         steps = np.abs(np.diff(result.plan.trajectory.joints[:, 1:], axis=0))
         assert steps.max() <= np.deg2rad(most)
+
+
+# ---- meshes whose inside cannot be told ----------------------------------------------
+
+
+def with_open_box(
+    centre: tuple[float, float, float], size: float, solid: bool | None = None
+) -> PlanningProblem:
+    """A box without one of its triangles; its upper corner is nearest to the arm."""
+    made = trimesh.creation.box(np.full(3, size))
+    corners, faces = np.asarray(made.vertices) + centre, np.asarray(made.faces)
+    mesh = Mesh("crate", corners, faces[1:], solid)
+    return replace(short("obs3"), scene=Scene((mesh,)))
+
+
+def planned(problem: PlanningProblem, name: str = "fewest") -> refinement.Refinement:
+    robot = load_robot(problem.manipulator)
+    return refinement.plan_and_verify(problem, name, robot)
+
+
+@pytest.mark.parametrize("name", ["paper", "fewest"])
+def test_an_open_mesh_is_planned_round_as_its_hull(name: str) -> None:
+    found = planned(with_open_box((2.0, 0.4, -0.35), 0.3), name)
+    assert found.verification.verdict is Verdict.CERTIFIED
+    assert found.plan.problem.scene.obstacles[0].name == "crate"
+    assert isinstance(found.plan.problem.scene.obstacles[0], Mesh)
+    (note,) = (note for note in found.plan.notes if "crate" in note)
+    assert "its convex hull stands for it: write `solid: false` under" in note
+    surface = planned(with_open_box((2.0, 0.4, -0.35), 0.3, solid=False), name)
+    assert not any("convex hull" in note for note in surface.plan.notes)
+
+
+def test_within_the_hull_of_an_open_mesh_one_sentence_says_what_to_write() -> None:
+    with pytest.raises(InsideUnknown, match="write `solid: false` under 'crate'"):
+        planned(with_open_box((1.5, 0.0, 0.0), 1.0))
+
+
+def test_no_plan_round_the_hull_names_the_hull_first() -> None:
+    with pytest.raises(Infeasible, match=r"^the inside of 'crate' cannot be told"):
+        planned(with_open_box((3.126, 0.9, 0.9), 0.3))

@@ -17,6 +17,7 @@ import numpy as np
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import Plan
+from vdsm_pin.planner.start import with_known_insides
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.planner.time_limit import within_time
 from vdsm_pin.problem import PlanningProblem
@@ -129,16 +130,18 @@ def plan_and_verify(
         OutOfTime: If the time is over.
     """
     plan_with = strategy(strategy_name)
-    clearance = within_time(link_clearance(problem), deadline)
+    known = with_known_insides(problem)
+    clearance = within_time(link_clearance(known.problem), deadline)
     rounds: list[Round] = []
     margins = np.zeros((problem.manipulator.n_links, len(problem.scene.obstacles)))
     promised = _promised(problem)
     while True:
         try:
-            plan = _chosen(plan_with(problem, clearance, margins.copy()), deadline)
+            found = plan_with(known.problem, clearance, margins.copy())
+            plan = _chosen(problem, found, deadline)
         except (Infeasible, OutOfTime) as error:
-            if rounds:
-                error.args = (f"{error}; before that {_story(rounds)}",)
+            before = [f"before that {_story(rounds)}"] if rounds else []
+            error.args = ("; ".join([*known.notes, str(error), *before]),)
             raise
         adjustments = _by_coal(robot, plan, margins, deadline)
         if adjustments:
@@ -151,10 +154,11 @@ def plan_and_verify(
             rounds.append(_proved(margins, verification, adjustments))
         LOG.info("margin %.6f m: %s", rounds[-1].margin, rounds[-1].reason)
         if rounds[-1].verdict in HANDED_OUT:
-            notes = plan.notes if len(rounds) == 1 else (*plan.notes, _story(rounds))
-            return Refinement(replace(plan, notes=notes), verification, tuple(rounds))
+            story = (_story(rounds),) if len(rounds) > 1 else ()
+            plan = replace(plan, notes=(*plan.notes, *known.notes, *story))
+            return Refinement(plan, verification, tuple(rounds))
         if not adjustments or len(rounds) == MAX_ROUNDS:
-            raise NoPlanFound(_story(rounds))
+            raise NoPlanFound("; ".join([*known.notes, _story(rounds)]))
         margins = _raised(problem, margins, adjustments)
 
 
@@ -220,29 +224,35 @@ def _raised(
     return raised
 
 
-def _chosen(plan: Plan, deadline: Deadline) -> Plan:
+def _chosen(problem: PlanningProblem, plan: Plan, deadline: Deadline) -> Plan:
     """Of a plan and its rivals the one that is proved to survive the most.
+
+    Args:
+        problem: As it is asked; a plan's own may have hulls for meshes.
+        plan: With its rivals.
+        deadline: When to give up.
 
     Raises:
         OutOfTime: If the time is over.
     """
     if not plan.rivals:
-        return plan
-    plans, problem, none = (*plan.rivals, plan), plan.problem, ErrorBox()
+        return replace(plan, problem=problem)
+    plans, planned, none = (*plan.rivals, plan), plan.problem, ErrorBox()
     motions = [one.trajectory for one in plans]
-    best, error = sturdiest(problem, motions, deadline)
+    best, error = sturdiest(planned, motions, deadline)
     note = (
         f"every joint may be off by {np.rad2deg(error):.3f} deg at once (proved); of "
         f"{len(plans)} plans that draw as much none was proved to survive more"
     )
     start = plan.trajectory.part(0, 1)
-    survived = largest_joint_error(problem, start, none, deadline)
+    survived = largest_joint_error(planned, start, none, deadline)
     lost = refuted_joint_error(problem, start, none, survived, deadline)
     if np.isfinite(lost):
         note += (
             f"; the start itself does not survive {np.rad2deg(lost):.3f} deg (proved)"
         )
-    return replace(plans[best], notes=(*plans[best].notes, note), rivals=())
+    chosen = plans[best]
+    return replace(chosen, problem=problem, notes=(*chosen.notes, note), rivals=())
 
 
 def _measured(margins: FloatArray, adjustments: tuple[Adjustment, ...]) -> Round:

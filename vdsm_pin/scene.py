@@ -4,15 +4,15 @@ Everything that measures a distance works on pieces (`geometry/convex.py`). A me
 one hull per triangle plus, where they close (`geometry/closed_meshes.py`), an inside.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias, cast
 
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct, frozen
 from vdsm_pin.geometry.closed_meshes import ClosedMesh, close_mesh
 from vdsm_pin.geometry.convex import (
     FlatCylinder,
@@ -303,6 +303,12 @@ class Mesh:
         """The closed surface that the triangles make, if they do."""
         return close_mesh(self.vertices, self.triangles)
 
+    @cached_property
+    def hull(self) -> "ConvexCover":
+        """Its convex hull."""
+        corners = self.vertices[self.triangles].reshape(-1, 3)
+        return ConvexCover(self.name, (Hull(frozen(distinct(corners, axis=0))),))
+
     @property
     def is_surface(self) -> bool:
         """Whether the problem says that nothing but the surface is meant."""
@@ -312,6 +318,19 @@ class Mesh:
     def has_inside(self) -> bool:
         """Whether an inside is asked for, and there is one."""
         return not self.is_surface and self.closed_mesh.closed
+
+
+@dataclass(frozen=True)
+class ConvexCover:
+    """The convex hull of a mesh: its inside lies within, whatever counts as inside.
+
+    Args:
+        name: The mesh's.
+        pieces: The hull alone.
+    """
+
+    name: str
+    pieces: tuple[Hull]
 
 
 Obstacle: TypeAlias = Sphere | Capsule | Cylinder | Box | Prism | HalfSpace | Mesh
@@ -343,6 +362,22 @@ class Scene:
     def names(self) -> tuple[str, ...]:
         """Names in file order."""
         return tuple(obstacle.name for obstacle in self.obstacles)
+
+
+def with_hulls(scene: Scene, names: Collection[str]) -> Scene:
+    """A scene with the convex hulls of some meshes in their places.
+
+    For whoever asks obstacles for their names and pieces alone: proofs and planners.
+
+    Args:
+        scene: All obstacles.
+        names: Of meshes.
+    """
+    obstacles: list[Obstacle | ConvexCover] = [
+        one.hull if isinstance(one, Mesh) and one.name in names else one
+        for one in scene.obstacles
+    ]
+    return Scene(tuple(cast("list[Obstacle]", obstacles)))
 
 
 def covers_of(obstacles: Sequence[Obstacle], pieces: "PackedPieces") -> IntArray:

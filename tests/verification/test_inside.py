@@ -27,9 +27,15 @@ from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.planner.start import check_start
 from vdsm_pin.report.inputs import input_notes
 from vdsm_pin.robot_model import load_robot
+from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
 from vdsm_pin.verification.link_clearance import link_clearance
-from vdsm_pin.verification.records import ClearanceChunk, Verdict, Verification
+from vdsm_pin.verification.records import (
+    ClearanceChunk,
+    ErrorBox,
+    Verdict,
+    Verification,
+)
 from vdsm_pin.verification.verify import verify
 
 RADIUS = 0.002
@@ -180,7 +186,8 @@ def test_a_certificate_of_a_mesh_with_gaps_says_how_they_are_joined(
     corners[upper] += [0.0, 0.0, 1e-5]
     a, b, c = corners[0]
     middle = 0.5 * (a + b) + 1e-6
-    corners = np.concatenate([corners[1:], [[a, middle, c], [middle, b, c]]])
+    below = box(0.5) - np.array([0.0, 0.0, 2.0])  # the arm is within the hull of both
+    corners = np.concatenate([corners[1:], [[a, middle, c], [middle, b, c]], below])
     assert hold(tmp_path, corners) == "certified"
     lines = [
         json.loads(x) for x in (tmp_path / "c.certificate").read_text().splitlines()
@@ -193,7 +200,7 @@ def test_a_certificate_of_a_mesh_with_gaps_says_how_they_are_joined(
         ([moved[1:], seams], "not closed"),
         ([moved, []], "not closed"),
         ([[*moved, [0, 30]], seams], "far apart"),
-        ([moved, [[*seams[0][:3], 20]]], "far apart"),
+        ([moved, [[*seams[0][:3], 50]]], "far apart"),
         ([[], []], "not closed"),
     ):
         lines[0]["joined"]["housing"] = joined
@@ -261,9 +268,80 @@ def test_what_an_open_mesh_is_the_problem_says(
     if solid is None:
         assert found.verdict is Verdict.UNDECIDED
         (row,) = (row for row in found.checks if row.verdict is Verdict.UNDECIDED)
-        assert "3 edges have no partner; `solid: false` says" in row.where
+        assert "3 edges have no partner, and the arm is not proved clear" in row.where
+        assert "write `solid: false` under 'housing'" in row.where
         assert found.joint_error == 0.0
         assert not any("surface only" in note for note in notes)
     else:
         assert found.verdict is Verdict.CERTIFIED
         assert any("is a surface only" in note for note in notes)
+
+
+# ---- open meshes: their convex hull ----------------------------------------------
+
+
+def bowl(height: float) -> FloatArray:
+    """A box without its lid, its rim at a height; the arm is about the origin."""
+    lid = (box(0.5)[:, :, 2] == 0.5).all(axis=1)
+    return box(0.5)[~lid] + np.array([0.0, 0.0, height - 0.5])
+
+
+def test_an_arm_far_from_an_open_mesh_is_outside_whatever_its_inside(
+    tmp_path: Path,
+) -> None:
+    assert hold(tmp_path, bowl(-0.1)) == "certified"
+    lines = [
+        json.loads(x) for x in (tmp_path / "c.certificate").read_text().splitlines()
+    ]
+    outer = lines[1]["proofs"][:2]  # of the links and the mesh
+    planes = [plane for proof in outer for _, _, some in proof for plane in some]
+    assert {(first, last) for first, last, *_ in planes} == {(0, 10)}
+
+
+@pytest.mark.parametrize(
+    ("height", "verdict"),
+    [(-0.0031, "certified"), (-0.0029, "undecided"), (0.1, "undecided")],
+)
+def test_an_open_mesh_must_be_kept_clear_of_by_the_required_clearance_of_its_hull(
+    height: float, verdict: str, tmp_path: Path
+) -> None:
+    """Radius 2 mm and 1 mm of clearance above a rim that is half a metre away."""
+    assert hold(tmp_path, bowl(height)) == verdict
+
+
+def test_two_planes_for_an_open_mesh_are_no_proof(tmp_path: Path) -> None:
+    """A plane for each half proves the surface clear, not what is between."""
+    problem, rows = written(tmp_path, bowl(-0.1))
+    path = certificate(tmp_path, bowl(-0.1), None)
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    for proof in lines[1]["proofs"][:2]:
+        for _, _, planes in proof:
+            (plane,) = planes
+            planes[:] = [[0, 4, *plane[2:]], [4, 10, *plane[2:]]]
+    path.write_bytes(sealed(lines[:-1]))
+    outcome = check_certificate(path, problem, rows)
+    assert not outcome.accepted
+    assert "not proved outside housing: the mesh is not closed" in outcome.reason
+
+
+def test_errors_may_bring_the_arm_into_the_hull_of_an_open_mesh(
+    tmp_path: Path,
+) -> None:
+    problem, rows = written(tmp_path, bowl(-0.01))
+    _, found = verified(problem, rows, errors=ErrorBox(base=0.006), joint_error=True)
+    assert found.verdict is Verdict.CERTIFIED
+    assert found.joint_error == pytest.approx(0.001 / 0.03, rel=0.2)
+    _, found = verified(problem, rows, errors=ErrorBox(base=0.008))
+    assert found.verdict is Verdict.UNDECIDED
+    surface, rows = written(tmp_path, bowl(-0.01), False)
+    _, found = verified(surface, rows, errors=ErrorBox(base=0.008), joint_error=True)
+    assert found.verdict is Verdict.CERTIFIED
+    assert found.joint_error > 0.1
+
+
+def test_a_time_limit_leaves_an_open_mesh_undecided(tmp_path: Path) -> None:
+    problem, rows = written(tmp_path, bowl(-0.1))
+    _, found = verified(problem, rows, deadline=Deadline.after(0.0))
+    (row,) = (row for row in found.checks if row.name == "arm outside the meshes")
+    assert row.verdict is Verdict.UNDECIDED
+    assert "the time limit of 0 s came first" in row.where

@@ -115,6 +115,7 @@ class Check:
             self.place = f"after interval {k}"
         claim(self.n_intervals == expected, f"interval {self.n_intervals} is missing")
         self.place = "header"
+        self._outside()
         self._close()
 
     def _header(self, header: dict[str, Any]) -> None:
@@ -169,6 +170,7 @@ class Check:
                 self._clear(pair, times, (first, last), plane)
                 reached = last
             claim(reached == size, f"the pieces end at {reached} of {size}")
+            pair.solid.whole &= len(planes) == 1
             time = times[1]
         claim(time == 1.0, f"the slices end at {time}")
 
@@ -193,11 +195,6 @@ class Check:
         self.psi = self.psi.max(poses[0].psi).max(poses[1].psi)
         tips = [pose.centres[-1] for pose in poses]
         if rows[0] == 0:
-            base = [float(self.joints[0, 0]), 0.0, 0.0]
-            for mesh in (one for one in self.solids if isinstance(one, Mesh)):
-                why = mesh.surface.not_outside(base, self.thinnest)
-                outside = mesh.surface_only or not why
-                claim(outside, f"the arm is not proved outside {mesh.name}: {why}")
             self._end("start", problem.begin, 0, tips[0])
         if rows[1] == self.rows.n_samples - 1:
             self._end("goal", problem.goal, rows[1], tips[1])
@@ -241,6 +238,14 @@ class Check:
             drawing.draw(stations, tips, self.motion.bounds(*end)[0] / 8)
         else:
             drawing.last = None
+
+    def _outside(self) -> None:
+        """Check that the arm is clear of a mesh's hull, or begins outside."""
+        base = [float(self.joints[0, 0]), 0.0, 0.0]
+        for mesh in (one for one in self.solids if isinstance(one, Mesh)):
+            if not (mesh.surface_only or mesh.whole):
+                why = mesh.surface.not_outside(base, self.thinnest)
+                claim(not why, f"the arm is not proved outside {mesh.name}: {why}")
 
     def _close(self) -> None:
         """Check what is said of the whole motion, and its limits; -x bounds x below."""

@@ -47,11 +47,8 @@ class Surface:
         start, after = thin[:, 3], thin[:, 3] // 3 * 3 + (thin[:, 3] + 1) % 3
         along = self.given[after] - self.given[start]
         for corner in thin[:, :3].T:
-            away, square = (
-                self.given[corner] - self.given[start],
-                (along**2).sum(axis=1),
-            )
-            share = (away * along).sum(axis=1) / square
+            away = self.given[corner] - self.given[start]
+            share = (away * along).sum(axis=1) / (along**2).sum(axis=1)
             off = np.linalg.norm(away - share.clip(0, 1)[:, None] * along, axis=1)
             self.gap = max(self.gap, float(off.max(initial=0.0)))
         claim(self.gap <= 1.001 * GAP * self.size, "corners far apart are joined")

@@ -38,6 +38,7 @@ class Solid:
         self, name: str, points: Any, *, origin: Any = 0.0, radius: float = 0.0
     ) -> None:
         self.name, self.points, self.radius = name, np.array(points), arb(radius)
+        self.whole = True  # whether every plane so far serves all pieces
         self.disc: tuple[Matrix, Ball] | None = None  # axis and radius of a cylinder
         self.normal: Matrix | None = None  # of a half-space
         self.ends: Any = None  # of a prism: its corners at both, shape (2, c, 3)

@@ -32,7 +32,11 @@ class Side(Enum):
 
 
 class Location(NamedTuple):
-    """Where the arm lies as seen from a mesh, and where that is unknown, why."""
+    """Where the arm lies as seen from a mesh, and where that is unknown, why.
+
+    Of a mesh without known inside the convex hull decides: whatever counts as inside
+    lies in it, so that an arm that keeps clear of it is outside.
+    """
 
     side: Side
     reason: str = ""
@@ -42,8 +46,9 @@ class Location(NamedTuple):
         if self.side is not Side.UNKNOWN:
             return f"the arm is {self.side.value} {mesh!r}"
         return (
-            f"whether the arm is inside {mesh!r} cannot be decided: {self.reason}; "
-            "`solid: false` says that only its surface is meant"
+            f"whether the arm is inside {mesh!r} cannot be decided: {self.reason}, and "
+            "the arm is not proved clear of its convex hull; write `solid: false` "
+            f"under {mesh!r} in the problem file if only its surface is meant"
         )
 
 

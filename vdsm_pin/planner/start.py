@@ -1,15 +1,18 @@
 """Whether the arm may stand where the problem says that it starts."""
 
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from vdsm_pin.errors import InsideUnknown, StartBlocked, StartInside
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.winding import Side, locate
+from vdsm_pin.geometry.winding import Location, Side, locate
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.planner.upper_clearance import culprit
+from vdsm_pin.planner.upper_clearance import culprit, upper_clearance
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scene import Mesh
+from vdsm_pin.scene import Mesh, Scene, with_hulls
 
 
 def start_centres(problem: PlanningProblem) -> FloatArray:
@@ -29,22 +32,63 @@ def start_centres(problem: PlanningProblem) -> FloatArray:
     return np.column_stack([along, across])
 
 
-def _check_outside(problem: PlanningProblem, base: FloatArray) -> None:
-    """Refuse a start inside a mesh, and a mesh whose inside cannot be told.
-
-    Args:
-        problem: Arm and scene.
-        base: First joint centre of the arm as it starts, shape (3,); [m].
-    """
-    radius = problem.manipulator.least_radius
+def _located(problem: PlanningProblem) -> Iterator[tuple[Mesh, Location]]:
+    """Where the arm starts as seen from each mesh that may have an inside."""
+    base, radius = start_centres(problem)[0], problem.manipulator.least_radius
     for mesh in problem.scene.obstacles:
-        if not isinstance(mesh, Mesh) or mesh.is_surface:
-            continue
-        found = locate(mesh.closed_mesh, base, radius)
+        if isinstance(mesh, Mesh) and not mesh.is_surface and np.isfinite(base).all():
+            yield mesh, locate(mesh.closed_mesh, base, radius)
+
+
+def _check_outside(problem: PlanningProblem) -> None:
+    """Refuse a start inside a mesh, and one within the hull of an unknown inside."""
+    for mesh, found in _located(problem):
         if found.side is Side.INSIDE:
             raise StartInside(obstacle=mesh.name)
-        if found.side is Side.UNKNOWN:
+        if found.side is Side.UNKNOWN and not _clear_of_hull(problem, mesh):
             raise InsideUnknown(obstacle=mesh.name, reason=found.words(mesh.name))
+
+
+def _clear_of_hull(problem: PlanningProblem, mesh: Mesh) -> bool:
+    """Whether nothing proves that the start is too near a mesh's convex hull."""
+    centres = start_centres(problem)
+    alone = replace(problem, scene=with_hulls(Scene((mesh,)), [mesh.name]))
+    upper = upper_clearance(alone, np.stack([centres[:-1], centres[1:]], axis=1))
+    return bool(upper.min() >= problem.required_clearance)
+
+
+@dataclass(frozen=True)
+class WithHulls:
+    """A problem as it is planned: hulls stand for meshes without known inside.
+
+    Whatever counts as the inside of such a mesh lies in its convex hull.
+
+    Args:
+        problem: With the hulls.
+        notes: One sentence for each.
+    """
+
+    problem: PlanningProblem
+    notes: tuple[str, ...]
+
+
+def with_known_insides(problem: PlanningProblem) -> WithHulls:
+    """Put hulls in the places of meshes whose inside cannot be told.
+
+    Raises:
+        InsideUnknown: If the start is within one of them.
+    """
+    found = {m.name: w for m, w in _located(problem) if w.side is Side.UNKNOWN}
+    if found:
+        _check_outside(problem)
+    notes = tuple(
+        f"the inside of {name!r} cannot be told ({where.reason}), so that its convex "
+        f"hull stands for it: write `solid: false` under {name!r} in the problem file "
+        "if only its surface is meant"
+        for name, where in found.items()
+    )
+    scene = with_hulls(problem.scene, found)
+    return WithHulls(replace(problem, scene=scene) if found else problem, notes)
 
 
 def check_start(problem: PlanningProblem, clearance: LinkClearance) -> None:
@@ -60,13 +104,14 @@ def check_start(problem: PlanningProblem, clearance: LinkClearance) -> None:
     Raises:
         StartInside: Where it is inside a mesh.
         StartBlocked: With the link, the obstacle and the clearance between them.
-        InsideUnknown: Where the inside of a mesh cannot be told.
+        InsideUnknown: Where it is within the convex hull of a mesh whose inside
+            cannot be told.
     """
     centres = start_centres(problem)
     required = problem.required_clearance
     if not np.isfinite(centres).all():
         return
-    _check_outside(problem, centres[0])
+    _check_outside(problem)
     if not clearance(centres[None]).min() >= required:
         link, obstacle, room = culprit(problem, centres)
         bent = problem.path.start_joints is not None

@@ -146,7 +146,7 @@ def cleared(
 ) -> Cleared:
     """What is proved of a motion's clearance over continuous time."""
     proof = prove_clearance(problem, trajectory, errors)
-    located = locate_arm(problem, trajectory)
+    located = locate_arm(problem, trajectory, errors)
     rows = [*check_clearance(problem, proof, ()), *check_inside(located)]
     verdict = combine(tuple(row.verdict for row in rows))
     near = [

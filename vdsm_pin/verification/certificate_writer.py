@@ -6,8 +6,8 @@ to the file as they come, so that memory stays bounded.
 
 import hashlib
 import json
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import chain, pairwise
 from pathlib import Path
@@ -25,7 +25,7 @@ from vdsm_pin.proof.desk import new_desk
 from vdsm_pin.proof.layouts import FIRST, LAST, PLANE_NORMAL, RECORD
 from vdsm_pin.proof.recording import record
 from vdsm_pin.proof.terms import Motion, Task
-from vdsm_pin.scene import Mesh, Prism
+from vdsm_pin.scene import Mesh, Prism, with_hulls
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.certificate_file import (
@@ -35,6 +35,7 @@ from vdsm_pin.verification.certificate_file import (
     LastLine,
     Pair,
 )
+from vdsm_pin.verification.inside import locate_start, unlocated
 from vdsm_pin.verification.limits import extremes
 from vdsm_pin.verification.proving import BUDGET, most_corners
 from vdsm_pin.verification.records import Verdict, Verification
@@ -88,11 +89,17 @@ def write_certificate(
     if verification.errors.base_turn > 0.0:
         message = "no certificate is written: it cannot state a turn of the base yet"
         raise VerificationFailed(message)
-    task = make_task(verification.problem, verification.errors, deadline=deadline)
+    problem, trajectory = verification.problem, verification.trajectory
+    # Of a mesh without known inside the hull is proved clear, by planes for all of it.
+    hulls = unlocated(locate_start(problem, trajectory))
+    scene = with_hulls(problem.scene, hulls)
+    task = make_task(
+        replace(problem, scene=scene), verification.errors, deadline=deadline
+    )
     digest = hashlib.sha256()
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         header = _header(verification, hashes, task.pieces)
-        lines = _lines(verification, task, deadline)
+        lines = _lines(verification, task, hulls, deadline)
         for text in chain([header.model_dump_json()], lines):
             line = text.encode() + b"\n"
             digest.update(line)
@@ -200,12 +207,21 @@ def _sense(polygon: FloatArray) -> int:
     return 1 if sum(a[0] * b[1] - a[1] * b[0] for a, b in edges) > 0 else -1
 
 
-def _lines(verification: Verification, task: Task, deadline: Deadline) -> Iterator[str]:
-    """One line per interval."""
+def _lines(
+    verification: Verification,
+    task: Task,
+    hulls: Collection[str],
+    deadline: Deadline,
+) -> Iterator[str]:
+    """One line per interval; planes clear of a mesh's hull serve all its triangles."""
     trajectory = verification.trajectory
     motion = Motion(trajectory.x0, trajectory.alpha, trajectory.theta)
     n_intervals = max(1, trajectory.n_samples - 1)
     n_links, n_pairs = trajectory.n_links, task.pairs.body.size
+    whole = np.zeros(len(task.pieces.root), np.int64)
+    for k, obstacle in enumerate(verification.problem.scene.obstacles):
+        if obstacle.name in hulls:
+            whole[k] = len(obstacle.pieces)
     desk = new_desk(n_links, n_pairs, most_corners(task.bodies), BUDGET)
     records, first = np.zeros((ROOM, RECORD)), 0
     while first < n_intervals:
@@ -217,6 +233,8 @@ def _lines(verification: Verification, task: Task, deadline: Deadline) -> Iterat
                 f"interval {reached}: the proof of pair {pair} was not found again"
             )
             raise VerificationFailed(message)
+        partner = task.pairs.obstacle[records[:count, 1].astype(np.int64)]
+        records[:count, LAST] = np.maximum(records[:count, LAST], whole[partner])
         if reached == first:
             records = np.zeros((2 * len(records), RECORD))
         yield from _interval_lines(task, records[:count], first, reached)

@@ -1,7 +1,8 @@
 """The judgement of a trajectory: every check, one row each, in a fixed order."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 from math import nan
 from typing import Final, TypeVar
 
@@ -14,6 +15,7 @@ from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.layouts import AT_UPPER, LOW, OTHER, OWN, TIME, UP
 from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.scene import with_hulls
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification import cable_check, coal_clearance, coal_links, fk
@@ -32,7 +34,13 @@ from vdsm_pin.verification.enclosed import (
     enclosed_profile,
 )
 from vdsm_pin.verification.first_contact import FirstContact, first_contacts
-from vdsm_pin.verification.inside import arm_inside, check_inside, locate_arm
+from vdsm_pin.verification.inside import (
+    arm_inside,
+    check_inside,
+    locate_arm,
+    locate_start,
+    unlocated,
+)
 from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.records import (
     Check,
@@ -90,7 +98,7 @@ def verify(
     """
     box = errors or ErrorBox()
     _check_input(problem, trajectory, box)
-    located = locate_arm(problem, trajectory)
+    located = locate_arm(problem, trajectory, box, deadline)
     around, kept = arm_inside(located), _Lowers(problem, trajectory)
     wanted = [EnclosedSink(sink, problem, around) if around else sink for sink in sinks]
     if sinks or kept.fits:
@@ -133,7 +141,8 @@ def verify(
     ]
     largest = refuted = nan
     if joint_error and all(where.side is Side.OUTSIDE for where in located.values()):
-        survival = _Survival(problem, trajectory, box, proof, deadline)
+        hulls = unlocated(locate_start(problem, trajectory))
+        survival = _Survival(problem, trajectory, box, proof, deadline, hulls)
         largest = besides.take("largest joint error", survival.largest, nan)
         if not np.isnan(largest):
             name = "joint error that loses the clearance"
@@ -170,15 +179,21 @@ class _Survival:
         errors: ErrorBox,
         proof: ClearanceProof,
         deadline: Deadline,
+        hulls: Collection[str],
     ) -> None:
         self._asked, self._deadline = (problem, trajectory, errors), deadline
+        # Nothing is refuted by a hull, and nothing survives that may enter it.
+        hulled = replace(problem, scene=with_hulls(problem.scene, hulls))
+        self._with_hulls = hulled, trajectory, errors
         n_links = problem.manipulator.n_links
         outer = proof.best[: n_links * len(problem.scene.obstacles), LOW]
         self._least = outer.reshape(-1, n_links).min(axis=1)
+        near = np.array([name in hulls for name in problem.scene.names], np.bool_)
+        self._least[near] = -math.inf
 
     def largest(self) -> float:
         """The largest that is proved; [rad]."""
-        return largest_joint_error(*self._asked, self._deadline, self._least)
+        return largest_joint_error(*self._with_hulls, self._deadline, self._least)
 
     def refuted(self, largest: float) -> float:
         """One that is lost, the smallest found; [rad]."""
