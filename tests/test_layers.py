@@ -41,6 +41,8 @@ LAYERS = {
     "report": 12,
     "visualization": 12,
     "simulation": 13,
+    "doctor": 13,
+    "new_project": 13,
     "workflow": 13,
     "batch": 13,
     "certificate_checker": 13,

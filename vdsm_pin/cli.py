@@ -58,6 +58,26 @@ def _examples(*lines: str) -> str:
     return "\n".join(["\b", "Examples:", *(f"  {line}" for line in lines)])
 
 
+def _show_version(asked: bool) -> None:
+    if asked:
+        from vdsm_pin import __version__
+
+        typer.echo(f"vdsm {__version__}")
+        raise typer.Exit(PASSED)
+
+
+@app.callback()
+def vdsm(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", is_eager=True, callback=_show_version, help="Say it and end."
+        ),
+    ] = False,
+) -> None:
+    """Plan motions of hyper-redundant arms and prove that they are collision-free."""
+
+
 @app.command(epilog=_examples("vdsm plan paper/obs1 --out out/obs1"))
 def plan(
     context: typer.Context,
@@ -271,6 +291,40 @@ def problems(
 
     names = "\n".join(built_in_names()) + "\n"
     typer.echo(names if show is None else built_in_text(show), nl=False)
+
+
+@app.command(epilog=_examples("vdsm new mine", "vdsm new vessel --from port"))
+def new(
+    folder: Annotated[
+        Path, typer.Argument(metavar="NAME", help="Folder to make; names the problem.")
+    ],
+    kind: Annotated[
+        str, typer.Option("--from", help="snake, port or paper.")
+    ] = "snake",
+) -> None:
+    """Make a folder with a problem to start from."""
+    from vdsm_pin.new_project import new_project
+
+    files = new_project(folder, kind)
+    typer.echo(f"made {folder} with {', '.join(files)}; next:")
+    typer.echo(f"  vdsm plan {shlex.quote(str(folder / 'problem.yaml'))} --out out")
+
+
+@app.command(epilog=_examples("vdsm doctor"))
+def doctor() -> None:
+    """Say what this installation can do, what it lacks and how to get it.
+
+    Exit status 1 if planning or verification lacks something.
+    """
+    from vdsm_pin.doctor import examine
+
+    findings = examine()
+    for one in findings:
+        sign = "✓" if one.works else "✗" if one.needed else "–"
+        remedy = f"; {one.remedy}" if one.remedy else ""
+        typer.echo(printable(f"{sign} {one.what:<14} {one.found}{remedy}"))
+    lacking = any(one.needed and not one.works for one in findings)
+    raise typer.Exit(NOT_PASSED if lacking else PASSED)
 
 
 @app.command(epilog=_examples("vdsm schema verification"))

@@ -50,6 +50,16 @@ def keep(name: str, content: bytes) -> None:
         return
 
 
+def probe(folder: Path) -> None:
+    """Write a file into a folder and take it away again.
+
+    Raises:
+        OSError: If that cannot be done.
+    """
+    _write(folder, "probe", b"")
+    (folder / "probe").unlink()
+
+
 def _write(folder: Path, name: str, content: bytes) -> None:
     """Write a file aside, then give it its name.
 

@@ -1,0 +1,87 @@
+"""`vdsm doctor` names what is missing and how to get it."""
+
+import importlib.metadata
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from vdsm_pin import doctor, kept
+from vdsm_pin.cli import main
+from vdsm_pin.doctor import Finding, examine
+
+ROOT = Path(__file__).parents[1]
+
+
+def found(what: str) -> Finding:
+    (one,) = [finding for finding in examine() if finding.what == what]
+    return one
+
+
+def test_an_installation_that_runs_the_tests_lacks_nothing_it_needs() -> None:
+    needed = [one for one in examine() if one.needed]
+    assert len(needed) > 10
+    assert all(one.works for one in needed)
+    assert {"coal", "pin", "yourdfpy", "numba", "numpy"} <= {one.what for one in needed}
+
+
+def test_a_missing_library_is_named_with_its_remedy(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    real = importlib.metadata.version
+
+    def without_coal(name: str) -> str:
+        if name in ("coal", "distributed"):
+            raise importlib.metadata.PackageNotFoundError(name)
+        return real(name)
+
+    monkeypatch.setattr(importlib.metadata, "version", without_coal)
+    with pytest.raises(SystemExit) as ended:
+        main(["doctor"])
+    lines = capsys.readouterr().out.splitlines()
+    assert ended.value.code == 1
+    assert "✗ coal           not installed; pip install coal" in lines
+    (cluster,) = [line for line in lines if " cluster " in line]
+    assert cluster.startswith("– ")
+    assert cluster.endswith("pip install 'vdsm-pin[cluster]'")
+
+
+def test_a_missing_browser_is_no_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CHROMIUM", "no-such-program")
+    browser = found("browser")
+    assert not browser.works
+    assert not browser.needed
+    assert "CHROMIUM" in browser.remedy
+
+
+def test_machine_code_that_cannot_be_kept_is_told(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setattr(kept, "folders", lambda: [tmp_path / "file" / "kept"])
+    assert found("machine code").remedy.startswith("make ")
+    monkeypatch.setattr(kept, "folders", lambda: [tmp_path / "kept"])
+    assert "the first run compiles" in found("machine code").found
+    assert not list((tmp_path / "kept").iterdir())
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    assert found("machine code").remedy == "unset NUMBA_DISABLE_JIT"
+
+
+def test_what_is_not_installed_at_all_is_no_success(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(doctor, "_requirements", tuple)
+    assert not found("libraries").works
+
+
+def test_the_uses_told_are_the_extras_there_are() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    extras = project["project"]["optional-dependencies"]
+    assert extras.keys() - {"dev"} == doctor.USES.keys()
+
+
+def test_an_extra_of_which_nothing_is_known_is_no_success(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(doctor, "_requirements", lambda: ("numpy>=2.0",))
+    assert not found("simulation").works

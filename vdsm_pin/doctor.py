@@ -1,0 +1,141 @@
+"""What this installation can do, and what it lacks: `vdsm doctor`."""
+
+import importlib.metadata
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from typing import Final
+
+from vdsm_pin import kept
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.report.pdf import find_browser
+from vdsm_pin.report.run_record import machine, versions
+
+USES: Final = {
+    "cluster": "vdsm batch --scheduler: many machines",
+    "parquet": "rows.parquet beside the folders of a batch",
+    "simulation": "vdsm simulate: a plan in closed loop",
+    "references": "benchmarks beside other planners",
+}
+"""What the extras are for."""
+
+_DISTRIBUTION: Final = "vdsm-pin"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the examination.
+
+    Args:
+        what: What was looked at.
+        found: What was found, in words.
+        works: Whether it can be used.
+        needed: Whether planning and verification need it.
+        remedy: How to get what is missing; empty where nothing is.
+    """
+
+    what: str
+    found: str
+    works: bool
+    needed: bool = False
+    remedy: str = ""
+
+
+def examine() -> list[Finding]:
+    """Look at everything the commands use.
+
+    Returns:
+        Findings: the machine, the libraries, the machine code, the browser, the extras.
+    """
+    known = versions()
+    head = f"vdsm-pin {known['vdsm-pin']}, Python {known['python']}, {machine()}"
+    return [
+        Finding("version", head, True),
+        *_libraries(),
+        _machine_code(),
+        _browser(),
+        *_extras(),
+    ]
+
+
+def _libraries() -> Iterator[Finding]:
+    if not _requirements():
+        what = f"unknown: {_DISTRIBUTION} itself is not installed"
+        yield Finding("libraries", what, False, True, f"pip install {_DISTRIBUTION}")
+    for name in _required(""):
+        version = _version(name)
+        yield Finding(
+            name,
+            version or "not installed",
+            version is not None,
+            needed=True,
+            remedy="" if version else f"pip install {name}",
+        )
+
+
+def _machine_code() -> Finding:
+    """Whether compiled functions can be kept between two runs."""
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
+        what = "switched off by NUMBA_DISABLE_JIT: everything takes much longer"
+        return Finding("machine code", what, False, True, "unset NUMBA_DISABLE_JIT")
+    for folder in kept.folders():
+        count = sum(1 for _ in folder.glob("vdsm_pin.*")) if folder.is_dir() else 0
+        try:
+            kept.probe(folder)
+        except OSError:
+            continue
+        found = f"{count} functions kept in {folder}"
+        if not count:
+            found = f"none yet in {folder}: the first run compiles for about a minute"
+        return Finding("machine code", found, True, True)
+    tried = " or ".join(str(folder) for folder in kept.folders())
+    what = "cannot be kept: every run compiles for about a minute"
+    return Finding("machine code", what, False, True, f"make {tried} writeable")
+
+
+def _browser() -> Finding:
+    try:
+        return Finding("browser", f"{find_browser()} prints reports", True)
+    except InvalidInput:
+        remedy = "install Chromium or Chrome, or set CHROMIUM to its program"
+        return Finding("browser", "none: no --pdf", False, remedy=remedy)
+
+
+def _extras() -> Iterator[Finding]:
+    for extra, use in USES.items():
+        names = _required(extra)
+        missing = [name for name in names if _version(name) is None]
+        if names and not missing:
+            yield Finding(extra, use, True)
+            continue
+        found = f"without {', '.join(missing) or 'knowing what it needs'}: no {use}"
+        remedy = f"pip install '{_DISTRIBUTION}[{extra}]'"
+        yield Finding(extra, found, False, remedy=remedy)
+
+
+@cache
+def _requirements() -> tuple[str, ...]:
+    try:
+        return tuple(importlib.metadata.requires(_DISTRIBUTION) or ())
+    except importlib.metadata.PackageNotFoundError:
+        return ()
+
+
+def _required(extra: str) -> list[str]:
+    """Names of the distributions that an extra asks for, or the package itself."""
+    names = []
+    for line in _requirements():
+        wanted, _, condition = line.partition(";")
+        asked = re.search(r"extra\s*==\s*['\"]([\w-]+)", condition)
+        if (asked.group(1) if asked else "") == extra:
+            names.append(re.split(r"[^\w.-]", wanted.strip())[0])
+    return names
+
+
+def _version(name: str) -> str | None:
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None
