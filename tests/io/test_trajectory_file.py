@@ -191,11 +191,27 @@ def test_a_file_cut_short_inside_a_line_is_refused_wherever_the_cut_is(
     content = "\n".join(csv()) + "\n"
     whole_rows = [i + 1 for i, c in enumerate(content) if c == "\n"][1:]
     for end in range(len(content)):
-        if end not in whole_rows:
+        last = content[:end].rpartition("\n")[2]
+        if last and last[-1] != "," and last.count(",") == 7 and "\n" in content[:end]:
+            (tmp_path / "t.csv").write_text(content[:end])
+            (note,) = read_trajectory(tmp_path / "t.csv", short_arm()).notes
+            assert "the last row has no line end" in note
+        elif end not in whole_rows:
             message = refused(tmp_path, content[:end])
             assert (
                 "cut short" in message or "is empty" in message or "no row" in message
             )
+
+
+def test_a_last_row_without_line_end_is_read(tmp_path: Path) -> None:
+    (tmp_path / "plain.csv").write_text(WHOLE)
+    (tmp_path / "t.csv").write_text(WHOLE.rstrip("\n"))
+    found = read_trajectory(tmp_path / "t.csv", short_arm())
+    assert same(found, read_trajectory(tmp_path / "plain.csv", short_arm()))
+    assert "the last row has no line end" in found.notes[0]
+    for cut in ("0.5e", "0.5e-", "-", "0.5,"):
+        message = refused(tmp_path, WHOLE.rstrip("\n").rpartition(",")[0] + "," + cut)
+        assert "the line has no end: is the file cut short?" in message
 
 
 def test_what_is_no_table_is_refused(tmp_path: Path) -> None:

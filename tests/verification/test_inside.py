@@ -19,7 +19,7 @@ from oracles.closed_solids import (
     spoiled,
 )
 
-from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.certificate_checker import check_certificate, main
 from vdsm_pin.errors import InsideUnknown, InvalidFile, StartInside
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import ProblemFile, read_problem
@@ -345,3 +345,14 @@ def test_a_time_limit_leaves_an_open_mesh_undecided(tmp_path: Path) -> None:
     (row,) = (row for row in found.checks if row.name == "arm outside the meshes")
     assert row.verdict is Verdict.UNDECIDED
     assert "the time limit of 0 s came first" in row.where
+
+
+def test_the_checker_names_what_was_assumed_of_a_mesh(tmp_path: Path) -> None:
+    corners = box(0.5) + np.array([0.0, 0.0, 2.0])
+    corners[corners.mean(axis=1)[:, 2] > 2.0] += [0.0, 0.0, 1e-5]
+    path = certificate(tmp_path, corners, None)
+    notes = check_certificate(path, tmp_path / "None.yaml", tmp_path / "t.csv").notes
+    size, gaps = notes
+    assert size == "housing is taken to be 1 x 1 x 1 m; no unit is stated"
+    assert gaps == "gaps of housing, up to 0.01 mm wide, are joined"
+    assert main([str(path), str(tmp_path / "None.yaml"), str(tmp_path / "t.csv")]) == 0

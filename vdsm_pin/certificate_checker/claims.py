@@ -83,6 +83,7 @@ class Check:
         self.joints, self.arm = trajectory.joints, problem.manipulator
         self.lengths = [arb(length) for length in self.arm.link_lengths.tolist()]
         self.solids = [solid(obstacle) for obstacle in problem.scene.obstacles]
+        self.meshes = {s.name: s for s in self.solids if isinstance(s, Mesh)}
         bodies = bodies_of(self.arm)
         self.thinnest = min(body.radius for body in bodies)
         self.pairs = [Pair(body, one, 0) for one in self.solids for body in bodies]
@@ -139,7 +140,8 @@ class Check:
         for name in header["pieces"]:
             named[name].cut(header["pieces"][name])
         for name, (corners, seams) in header["joined"].items():
-            named[name].join(corners, seams)
+            claim(name in self.meshes, f"{name} is no mesh: nothing is joined")
+            self.meshes[name].surface.join(corners, seams)
         expected = [[pair.body.name, pair.solid.name] for pair in self.pairs]
         claim(header["pairs"] == expected, "the pairs are not those of the problem")
 
@@ -242,7 +244,7 @@ class Check:
     def _outside(self) -> None:
         """Check that the arm is clear of a mesh's hull, or begins outside."""
         base = [float(self.joints[0, 0]), 0.0, 0.0]
-        for mesh in (one for one in self.solids if isinstance(one, Mesh)):
+        for mesh in self.meshes.values():
             if not (mesh.surface_only or mesh.whole):
                 why = mesh.surface.not_outside(base, self.thinnest)
                 claim(not why, f"the arm is not proved outside {mesh.name}: {why}")

@@ -18,7 +18,6 @@ from flint import ctx
 
 from vdsm_pin.certificate_checker.balls import Rejected, claim
 from vdsm_pin.certificate_checker.claims import Check
-from vdsm_pin.certificate_checker.solids import Mesh
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.source import bounded_lines, check_is_file, sha256_of_file
@@ -29,12 +28,8 @@ PRECISION: Final = 128
 """Bits of a ball: lengths are known to about 1e-35 m."""
 
 DAMAGE: Final = (
-    ValueError,
-    TypeError,
-    LookupError,
-    ArithmeticError,
-    RecursionError,
-    AttributeError,
+    *(ValueError, TypeError, LookupError, ArithmeticError),
+    *(RecursionError, AttributeError),
 )
 """What a file of another make raises where it is taken for a certificate."""
 
@@ -55,14 +50,14 @@ class Outcome:
         reason: Empty, or the claim that fails with its interval and pair.
         n_intervals: Intervals found good.
         n_claims: Clearances recomputed and found good.
-        surfaces: Meshes of which the problem means the surface only.
+        notes: What was assumed of the meshes.
     """
 
     accepted: bool
     reason: str
     n_intervals: int
     n_claims: int
-    surfaces: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 def _lines(path: Path) -> Iterator[dict[str, Any]]:
@@ -122,9 +117,8 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
         except DAMAGE as error:
             text, at = f"cannot be read as a certificate: {error}", check.place
             raise InvalidFile(file=certificate, where=at, problem=text) from None
-    meshes = [mesh for mesh in check.solids if isinstance(mesh, Mesh)]
-    surfaces = tuple(mesh.name for mesh in meshes if mesh.surface_only)
-    return Outcome(not reason, reason, check.n_intervals, check.n_claims, surfaces)
+    notes = tuple(note for mesh in check.meshes.values() for note in mesh.notes())
+    return Outcome(not reason, reason, check.n_intervals, check.n_claims, notes)
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -145,6 +139,6 @@ def main(arguments: Sequence[str]) -> int:
     found = f"{outcome.n_intervals} intervals, {outcome.n_claims} clearances"
     verdict = "accepted" if outcome.accepted else "rejected"
     told = JUDGED if outcome.accepted else outcome.reason
-    notes = "".join(f"; {name} is a surface only" for name in outcome.surfaces)
-    sys.stdout.write(f"{verdict}: {told} ({found} recomputed{notes})\n")
+    notes = "; ".join([f"{found} recomputed", *outcome.notes])
+    sys.stdout.write(f"{verdict}: {told} ({notes})\n")
     return 0 if outcome.accepted else 1

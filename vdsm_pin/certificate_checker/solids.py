@@ -62,10 +62,6 @@ class Solid:
         claim(all(abs(x) <= 1e-9 for x in off), "n is not the half-space's -normal")
         return -self.normal
 
-    def join(self, corners: Any, seams: Any) -> None:
-        """Take the certificate's joined corners of a mesh, and its seams."""
-        claim(False, f"{self.name} is no mesh: nothing is joined")
-
     def cut(self, pieces: list[Any]) -> None:
         """Take the certificate's pieces: parts of a prism, or the mesh's in its order.
 
@@ -100,13 +96,20 @@ def boundary(loops: Iterable[Sequence[int]]) -> dict[tuple[int, int], int]:
 class Mesh(Solid):
     """Triangles; of a surface only the problem says that it has no inside."""
 
-    def __init__(self, name: str, triangles: Any, *, surface_only: bool) -> None:
-        super().__init__(name, triangles)
-        self.surface, self.surface_only = Surface(triangles), surface_only
+    def __init__(self, mesh: scene.Mesh) -> None:
+        super().__init__(mesh.name, mesh.vertices[mesh.triangles])
+        self.surface, self.surface_only = Surface(self.points), mesh.solid is False
+        self.assumed_size = mesh.assumed_size
 
-    def join(self, corners: Any, seams: Any) -> None:
-        """Take them."""
-        self.surface.join(corners, seams)
+    def notes(self) -> list[str]:
+        """What was assumed of it."""
+        gap, size = 1e3 * self.surface.gap, self.assumed_size
+        told = {
+            f"{self.name} is a surface only": self.surface_only,
+            f"{self.name} is taken to be {size}; no unit is stated": size != "",
+            f"gaps of {self.name}, up to {gap:.2g} mm wide, are joined": gap > 0.0,
+        }
+        return [note for note, holds in told.items() if holds]
 
 
 def solid(obstacle: scene.Obstacle) -> Solid:
@@ -138,6 +141,5 @@ def solid(obstacle: scene.Obstacle) -> Solid:
             found = Solid(name, [[[float(entry) for entry in foot.entries()]]])
             found.normal = normal
         case scene.Mesh():
-            corners = obstacle.vertices[obstacle.triangles]
-            found = Mesh(name, corners, surface_only=obstacle.solid is False)
+            return Mesh(obstacle)
     return found

@@ -44,10 +44,14 @@ class Row:
 
     file: Path
     line: int
+    ended: bool = True
 
     def invalid(self, problem: str) -> InvalidFile:
         """The error that names file and line."""
-        return InvalidFile(file=self.file, where=f"line {self.line}", problem=problem)
+        where = f"line {self.line}"
+        if not self.ended:
+            problem += "; the line has no end: is the file cut short?"
+        return InvalidFile(file=self.file, where=where, problem=problem)
 
 
 class Table:
@@ -60,6 +64,7 @@ class Table:
 
     Attributes:
         ignored: Names of the other columns.
+        open_ended: Whether the last line that was read has no line end.
 
     Raises:
         InvalidFile: If the file is empty or a column is missing or there twice.
@@ -67,6 +72,7 @@ class Table:
 
     def __init__(self, file: Path, text: TextIO, columns: Sequence[str]) -> None:
         self._file, self._text, self._columns = file, text, tuple(columns)
+        self.open_ended = False
         self._decimal = ""  # the sign of the first number that has one
         line = text.readline(MAX_LINE)
         if not line:
@@ -81,7 +87,7 @@ class Table:
         self._places = self._found(names)
 
     def _found(self, names: list[str]) -> list[int]:
-        head = Row(self._file, 1)
+        head = Row(self._file, 1, not self.open_ended)
         for name in self._columns:
             if names.count(name) > 1:
                 problem = f"has the column {name!r} {names.count(name)} times"
@@ -124,12 +130,12 @@ class Table:
             number += len(lines)
 
     def _check_ends(self, lines: list[str], number: int) -> None:
-        open_ended = [i for i, line in enumerate(lines) if line[-1] != "\n"]
-        if open_ended:
-            problem = "does not end in a line end: the file is cut short, or lacks it"
-            if len(lines[open_ended[0]]) == MAX_LINE:
-                problem = f"is longer than {MAX_LINE} characters"
-            raise Row(self._file, number + open_ended[0]).invalid(problem)
+        for i, line in enumerate(lines):
+            if line[-1] != "\n":
+                if len(line) == MAX_LINE:
+                    problem = f"is longer than {MAX_LINE} characters"
+                    raise Row(self._file, number + i).invalid(problem)
+                self.open_ended = True
 
     def _blank(self, lines: list[str], number: int, before: int) -> int:
         """Number of the first blank line, or 0; no row may follow one."""
@@ -168,7 +174,8 @@ class Table:
         return np.asarray(table[:, self._places])
 
     def _row(self, line: str, number: int) -> list[float]:
-        row, words = Row(self._file, number), _split(line, self._between)
+        row = Row(self._file, number, line.endswith("\n"))
+        words = _split(line, self._between)
         values = []
         for name, place in zip(self._columns, self._places, strict=True):
             if place < len(words):

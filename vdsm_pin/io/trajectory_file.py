@@ -2,8 +2,9 @@
 
     waypoint,on_path,path_m,x0_m,alpha1_rad,theta1_rad,..,alphaN_rad,thetaN_rad
 
-Numbers are the shortest decimals that read back as the same double. Every line ends in
-a line end, so that a file cut short anywhere but between two lines is recognised.
+Numbers are the shortest decimals that read back as the same double. Every line that is
+written ends in a line end; a last one that lacks it, as some programs write it, is read
+and named in a note.
 """
 
 import re
@@ -77,7 +78,7 @@ def read_trajectory(path: str | Path, manipulator: Manipulator) -> Trajectory:
 
     Returns:
         The trajectory; numbers as in the file to the last bit. Its notes name the
-        columns that were not read.
+        columns that were not read, and a last row without line end.
 
     Raises:
         InvalidFile: If a column is missing, a row is cut short or has a word where a
@@ -109,14 +110,17 @@ def _read(file: Path, text: TextIO, arm: Manipulator) -> Trajectory:
         tables.append(rows)
     if not tables:
         raise InvalidFile(file=file, problem="has no row")
-    note = f"columns that are not read: {listed(table.ignored)}"
+    notes = [f"columns that are not read: {listed(table.ignored)}"]
+    notes = notes if table.ignored else []
+    if table.open_ended:
+        notes.append("the last row has no line end; its last number is read as it is")
     return Trajectory(
         np.concatenate([rows[:, 1] != 0.0 for rows in tables]),
         np.concatenate([rows[:, 2] for rows in tables]),
         np.concatenate([rows[:, 3] for rows in tables]),
         np.concatenate([rows[:, 4::2] for rows in tables]),
         np.concatenate([rows[:, 5::2] for rows in tables]),
-        (note,) if table.ignored else (),
+        tuple(notes),
     )
 
 
