@@ -3,13 +3,13 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-slow lint check urdf figures report soundness mutants bench dist clean
+.PHONY: demo test test-slow lint docs check urdf figures report soundness mutants bench dist clean
 
 demo: $(VENV)/.installed
 	$(BIN)/vdsm batch --out out/demo
 
 test: $(VENV)/.installed
-	$(BIN)/pytest -n 2 -m "not slow"
+	$(BIN)/pytest -n 2 -m "not slow and not pages"
 
 test-slow: $(VENV)/.installed
 	$(BIN)/pytest -n 2 -m slow
@@ -18,6 +18,11 @@ lint: $(VENV)/.installed
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+
+docs: $(VENV)/.installed
+	$(BIN)/pytest -n 2 -m pages
+	$(BIN)/sphinx-build -q -W -n -c docs . out/site
+	@echo "open out/site/docs/index.html"
 
 check: lint test
 
@@ -28,6 +33,7 @@ figures: $(VENV)/.installed
 	$(BIN)/python analysis/figures.py --out reports/paper
 	$(BIN)/python analysis/readme_animation.py --out reports
 	$(BIN)/python analysis/conventions.py
+	$(BIN)/python analysis/theory_pictures.py
 
 report: figures
 	$(BIN)/python analysis/paper_table.py --out reports/paper

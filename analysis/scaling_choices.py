@@ -137,6 +137,8 @@ def _medians(angles: FloatArray) -> list[float | None]:
 def table(rows: list[dict[str, object]]) -> str:
     """The rows as Markdown."""
     lines = [
+        "# Other ways of scaling",
+        "",
         "| scene | tip positions | straight arm blocked | of those clear with varying "
         "ratios | with another centre | median largest psi there, ratios / centre [deg]"
         " |",

@@ -77,7 +77,7 @@ def test_what_is_not_installed_at_all_is_no_success(
 def test_the_uses_told_are_the_extras_there_are() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     extras = project["project"]["optional-dependencies"]
-    assert extras.keys() - {"dev"} == doctor.USES.keys()
+    assert extras.keys() - {"dev", "docs"} == doctor.USES.keys()
 
 
 def test_an_extra_of_which_nothing_is_known_is_no_success(

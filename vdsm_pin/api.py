@@ -59,10 +59,10 @@ def plan(
         time_limit: Until there is a plan that is proved; None for none; [s].
 
     Returns:
-        A certified plan: `trajectory`, joint `centres` of shape (n_samples, N + 1, 3)
-        in metres, `cable_lengths` of shape (n_samples, N, 3) in metres, `notes`. Where
-        it draws less of the path than required it is clear, but incomplete: `undrawn`
-        says what is left out, and `verify` gives the verdict.
+        A certified plan, with `trajectory`, joint `centres` of shape (n_samples,
+        N + 1, 3) in metres, `cable_lengths` of shape (n_samples, N, 3) in metres and
+        `notes`. Where it draws less of the path than required it is clear, but
+        incomplete: `undrawn` says what is left out, and `verify` gives the verdict.
 
     Raises:
         UnknownName: If there is no such strategy.
