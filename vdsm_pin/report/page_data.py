@@ -10,7 +10,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.charts import charts, packed
-from vdsm_pin.report.facts import failing
+from vdsm_pin.report.facts import failing, finite
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import detail, surface
 from vdsm_pin.report.thinning import (
@@ -76,12 +76,20 @@ def motion_data(
     }
 
 
-def closest_data(approach: ClosestApproach) -> dict[str, Any]:
+def closest_data(problem: PlanningProblem, approach: ClosestApproach) -> dict[str, Any]:
     """Where and when one closest approach happens; base frame, [m]."""
+    pair = approach.pair
+    needed = (
+        problem.required_clearance if pair.obstacle else problem.required_self_clearance
+    )
     return {
         "moment": approach.moment,
-        "link": approach.pair.link,
-        "other": approach.pair.label,
+        "link": pair.link,
+        "otherLink": pair.other_link,
+        "obstacle": pair.obstacle,
+        "upper": finite(approach.upper),
+        "short": bool(approach.upper < needed),
+        "deeper": approach.deeper,
         "linkPoint": _point(approach.link_point),
         "otherPoint": _point(approach.other_point),
     }
@@ -115,7 +123,10 @@ def report_data(verification: Verification) -> PageData:
         {
             "scene": scene_data(verification.problem, drawn),
             "motion": motion_data(verification.problem, verification.trajectory, shown),
-            "closest": [closest_data(row) for row in verification.approaches],
+            "closest": [
+                closest_data(verification.problem, row)
+                for row in verification.approaches
+            ],
             "marks": [
                 asdict(one) for one in failing(verification) if one.moment is not None
             ],

@@ -20,24 +20,24 @@
       pane.scrollIntoView({ behavior: "smooth", block: "center" });
   }
 
-  // Jump to a closest approach and mark its two points.
+  // Go to a moment; where two bodies come near each other then, show how near and,
+  // once the page has been seen as a whole, fly there.
+  function jump(button, moment, approach) {
+    motion.play(false);
+    motion.go(moment);
+    if (view && approach) view.showWitness(approach);
+    if (view && approach && started) view.flyToWitness();
+    reveal(button);
+  }
   for (const button of document.querySelectorAll("[data-approach]"))
     button.addEventListener("click", () => {
       const approach = data.closest[Number(button.dataset.approach)];
-      motion.play(false);
-      if (view) view.showWitness(approach);
-      motion.go(approach.moment);
-      reveal(button);
+      jump(button, approach.moment, approach);
     });
-  // Jump to the worst case of a check; where two bodies meet, mark the points.
   for (const button of document.querySelectorAll("[data-go]"))
     button.addEventListener("click", () => {
       const moment = Number(button.dataset.go);
-      const approach = data.closest.find((one) => Math.abs(one.moment - moment) < 0.01);
-      motion.play(false);
-      if (view && approach) view.showWitness(approach);
-      motion.go(moment);
-      reveal(button);
+      jump(button, moment, data.closest.find((one) => Math.abs(one.moment - moment) < 0.01));
     });
   for (const button of document.querySelectorAll("[data-look]"))
     button.addEventListener("click", () => view && view.look(button.dataset.look));

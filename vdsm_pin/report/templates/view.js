@@ -1,0 +1,238 @@
+// The scene in 3D, drawn by Meshcat's viewer and the three.js that it carries.
+"use strict";
+
+const CREASE = 32; // degrees between two faces from which on their edge is drawn
+const GLASS = 0.42; // how opaque an obstacle is that is seen through
+const GREY = 0x8a94a6;
+const MARKED = { short: 0xe03131, kept: 0x2f8ae5 }; // the two that come near each other
+const DUE = 1.5; // waypoints around its moment during which a gap is shown
+
+class ArmView {
+  constructor(pane, scene, motion) {
+    this.pane = pane;
+    this.motion = motion;
+    this.scene = scene;
+    this.three = MeshCat.THREE;
+    this.viewer = new MeshCat.Viewer(pane);
+    this.viewer.set_3d_pane_size = () => this.resize();
+    this.viewer.gui.domElement.remove();
+    this.viewer.renderer.localClippingEnabled = true;
+    for (const path of [["Grid"], ["Axes"], ["Lights"]])
+      this.viewer.set_property(path, "visible", false);
+    this.viewer.hide_background();
+
+    const { Group, Matrix4, Box3 } = this.three;
+    this.root = new Group();
+    this.root.matrixAutoUpdate = false;
+    this.root.matrix = new Matrix4().set(...scene.pose);
+    this.viewer.scene.add(this.root);
+    this.box = new Box3(); // what the side views have to show, in the base frame
+    this.addPaths();
+    this.arm = new Arm(scene);
+    this.root.add(this.arm.group);
+    this.addObstacles();
+    this.addFloor();
+    this.addLights();
+    this.cameras = new Cameras(this);
+    this.overlay = new Overlay(this);
+    const render = this.viewer.render.bind(this.viewer);
+    this.viewer.render = () => {
+      render();
+      this.overlay.draw();
+    };
+    motion.listen((time) => this.pose(time));
+    this.resize();
+    this.look("overview");
+    new ResizeObserver(() => this.resize()).observe(pane);
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.pane;
+    if (!this.cameras || !width || !height) return;
+    this.cameras.resize();
+    this.overlay.resize();
+    this.viewer.renderer.setSize(width, height);
+    this.viewer.set_dirty();
+  }
+
+  line(points, colour, opacity = 1) {
+    const { Line, BufferGeometry, LineBasicMaterial, Vector3 } = this.three;
+    const shape = new BufferGeometry().setFromPoints(points.map((p) => new Vector3(...p)));
+    const ink = { color: colour, transparent: opacity < 1, opacity };
+    return new Line(shape, new LineBasicMaterial(ink));
+  }
+
+  addObstacles() {
+    const { BufferGeometry, BufferAttribute, Mesh, EdgesGeometry } = this.three;
+    const { LineSegments, LineBasicMaterial, DoubleSide } = this.three;
+    this.obstacles = this.scene.obstacles.map((solid) => {
+      let shape = new BufferGeometry();
+      const corners = unpack(solid.vertices, Float32Array);
+      shape.setAttribute("position", new BufferAttribute(corners, 3));
+      shape.setIndex(new BufferAttribute(unpack(solid.triangles, Uint32Array), 1));
+      const edges = solid.creased ? new EdgesGeometry(shape, CREASE) : null;
+      if (!solid.round) shape = shape.toNonIndexed();
+      shape.computeVertexNormals();
+      const glass = { transparent: true, opacity: GLASS, side: DoubleSide, depthWrite: false };
+      const body = new Mesh(shape, phong(GREY, glass));
+      const ink = new LineBasicMaterial({ color: 0x5d6878 });
+      if (edges) body.add(new LineSegments(edges, ink));
+      this.root.add(body);
+      return body;
+    });
+    this.stretchBox();
+  }
+
+  // Let the side views show what stands around the motion, but not all of a long pipe.
+  stretchBox() {
+    const { Box3, Vector3 } = this.three;
+    const reach = this.box.getSize(new Vector3());
+    const near = this.box.clone().expandByScalar(0.12 * Math.max(reach.x, reach.y, reach.z));
+    for (const { geometry } of this.obstacles) {
+      geometry.computeBoundingBox();
+      const part = new Box3().copy(geometry.boundingBox).intersect(near);
+      if (!part.isEmpty()) this.box.union(part);
+    }
+  }
+
+  addPaths() {
+    const { CylinderGeometry, Mesh, MeshBasicMaterial, Vector3, Group } = this.three;
+    const flat = unpack(this.scene.path, Float32Array);
+    const corners = [];
+    for (let i = 0; i < flat.length; i += 3) corners.push(new Vector3(...flat.slice(i, i + 3)));
+    this.desired = new Group();
+    const ink = new MeshBasicMaterial({ color: 0xd9480f });
+    for (let i = 0; i + 1 < corners.length && corners.length < 400; i++) {
+      const side = corners[i + 1].clone().sub(corners[i]);
+      const rod = new Mesh(new CylinderGeometry(0.007, 0.007, side.length(), 8), ink);
+      rod.position.copy(corners[i]).addScaledVector(side, 0.5);
+      rod.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), side.normalize());
+      this.desired.add(rod);
+    }
+    this.desired.add(this.line(corners.map((p) => p.toArray()), 0xd9480f));
+    this.root.add(this.desired);
+    corners.forEach((corner) => this.box.expandByPoint(corner));
+
+    const tracks = this.scene.lengths.map(() => []);
+    tracks.push([]);
+    for (const row of this.motion.rows)
+      this.motion.centres(row).forEach((point, j) => tracks[j].push(point));
+    tracks.flat().forEach((point) => this.box.expandByPoint(new Vector3(...point)));
+    this.box.expandByScalar(this.scene.radius);
+    const colours = ["#7a7f87", ...this.scene.colours];
+    this.tracks = new Group();
+    tracks.forEach((points, j) => this.tracks.add(this.line(points, colours[j], 0.75)));
+    this.root.add(this.tracks);
+  }
+
+  addFloor() {
+    const { GridHelper, Vector3 } = this.three;
+    const [low, high] = [this.box.min, this.box.max];
+    const size = 2 * Math.ceil(Math.max(high.x - low.x, high.y - low.y) * 0.6);
+    const floor = new GridHelper(size, 2 * size, 0x8b93a1, 0x8b93a1);
+    floor.material.transparent = true;
+    floor.material.opacity = 0.22;
+    floor.rotateX(Math.PI / 2);
+    const middle = this.box.getCenter(new Vector3());
+    floor.position.set(Math.round(middle.x), Math.round(middle.y), low.z - 3 * this.scene.radius);
+    this.root.add(floor);
+    const rail = [[low.x - 0.3, 0, 0], [high.x + 0.2, 0, 0]];
+    this.root.add(this.line(rail, 0x8b93a1, 0.8));
+  }
+
+  // Meshcat turns its scene so that z points up in a world whose y points up. Cameras
+  // stay outside of the scene, in that world.
+  addLights() {
+    const { HemisphereLight, DirectionalLight } = this.three;
+    const sky = new HemisphereLight(0xffffff, 0x8d8d99, 0.8);
+    const lamp = new DirectionalLight(0xffffff, 0.45);
+    lamp.position.set(-0.5, -1.0, 1.2);
+    this.viewer.scene.add(sky, lamp);
+    this.viewer.scene.updateMatrixWorld(true);
+  }
+
+  look(name) {
+    this.cameras.look(name);
+  }
+
+  eye() {
+    return this.cameras.eye();
+  }
+
+  lookFrom(eye) {
+    this.cameras.lookFrom(eye);
+  }
+
+  pose(time) {
+    this.centres = this.motion.centres(time);
+    this.arm.pose(this.centres);
+    this.tipNow = this.centres[this.centres.length - 1];
+    if (this.cameras.name === "tip") this.cameras.fromTip();
+    this.mark(time);
+    this.viewer.set_dirty();
+  }
+
+  // Show a closest approach while the arm is there.
+  showWitness(approach) {
+    this.shown = approach && approach.linkPoint && approach.otherPoint ? approach : null;
+    this.mark(this.motion.time);
+    this.viewer.set_dirty();
+  }
+
+  mark(time) {
+    this.due = Boolean(this.shown) && Math.abs(time - this.shown.moment) < DUE;
+    const { link, otherLink, obstacle, short } = this.due ? this.shown : {};
+    const colour = short ? MARKED.short : MARKED.kept;
+    this.arm.mark([link, otherLink].map((one) => (one || 0) - 1), colour);
+    this.obstacles.forEach((body, k) => {
+      const near = this.due && this.scene.obstacles[k].name === obstacle;
+      body.material.color.setHex(near ? colour : GREY);
+    });
+  }
+
+  // Fly to the gap that is shown.
+  flyToWitness() {
+    if (!this.shown) return;
+    const { Vector3 } = this.three;
+    const [a, b] = [this.shown.linkPoint, this.shown.otherPoint].map((p) =>
+      this.root.localToWorld(new Vector3(...p)));
+    this.cameras.flyTo(a, b, Math.max(4 * a.distanceTo(b), 9 * this.scene.radius));
+  }
+
+  toggle(what, on) {
+    if (what === "tracks") this.tracks.visible = on;
+    if (what === "numbers") this.overlay.numbers = on;
+    this.viewer.set_dirty();
+  }
+
+  // A still picture, for paper and for files.
+  picture() {
+    this.viewer.render();
+    const sheet = document.createElement("canvas");
+    const drawn = this.viewer.renderer.domElement;
+    [sheet.width, sheet.height] = [drawn.width, drawn.height];
+    const pen = sheet.getContext("2d");
+    pen.fillStyle = getComputedStyle(this.pane).getPropertyValue("--card");
+    pen.fillRect(0, 0, sheet.width, sheet.height);
+    for (const layer of [drawn, this.overlay.sheet])
+      pen.drawImage(layer, 0, 0, sheet.width, sheet.height);
+    return sheet.toDataURL("image/png");
+  }
+}
+
+// Make the view, or say plainly that there is none.
+function makeView(pane, scene, motion) {
+  try {
+    const view = new ArmView(pane, scene, motion);
+    const canvas = pane.querySelector("canvas");
+    canvas.setAttribute("role", "img");
+    canvas.setAttribute("aria-label", "The arm in its scene, in 3D");
+    return view;
+  } catch (error) {
+    pane.innerHTML =
+      '<p class="no-view">This browser cannot draw in 3D (WebGL is off). ' +
+      "Plots and tables below are complete without it.</p>";
+    console.warn(error);
+    return null;
+  }
+}
