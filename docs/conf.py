@@ -26,6 +26,7 @@ include_patterns = [
     *("docs/*.md", "docs/**/*.md"),
     *("reports/*.md", "reports/**/*.md"),
     "benchmarks/hrm*/README.md",
+    "examples/README.md",
     *("ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"),
 ]
 exclude_patterns = ["**/.venv", "**/node_modules"]

@@ -121,6 +121,10 @@ class Pair:
         """The partner in words: the name of an obstacle or body, or 'link k'."""
         return self.obstacle or self.other_body or f"link {self.other_link}"
 
+    def __str__(self) -> str:
+        """Both in words."""
+        return f"{self.own} and {self.label}"
+
 
 @dataclass(frozen=True)
 class ClosestApproach:
