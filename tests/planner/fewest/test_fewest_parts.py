@@ -15,9 +15,9 @@ from vdsm_pin.planner.fewest.growth import Garden, Grown, vary
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.kernels import pose_shapes
 from vdsm_pin.planner.fewest.motion import Intervals
-from vdsm_pin.planner.fewest.nearby import FAR, nearby
+from vdsm_pin.planner.fewest.nearby import nearby
 from vdsm_pin.planner.fewest.poses import bends_of, room_along
-from vdsm_pin.planner.fewest.roadmap import Taste, build_roadmap
+from vdsm_pin.planner.fewest.roadmap import Pricing, Taste, build_roadmap
 from vdsm_pin.planner.fewest.route import path_rows, tip_route
 from vdsm_pin.planner.fewest.shapes import Shapes, one_knee_shapes
 from vdsm_pin.problem import PlanningProblem
@@ -86,9 +86,10 @@ def test_bounds_from_boxes_never_exceed_the_clearance_and_are_exact_when_near() 
     )
     exact = link_clearance(task)
     segments = rng.uniform([-1, -1.5, -1.5], [4, 1.5, 1.5], (4000, 2, 3))
-    truth, bound = exact(segments)[:, 0], nearby(task, exact)(segments)[:, 0]
+    quick = nearby(task, exact)
+    truth, bound = exact(segments)[:, 0], quick(segments)[:, 0]
     # Below zero the clearance function promises the sign alone.
-    apart, near = truth > 0.0, bound < FAR
+    apart, near = truth > 0.0, bound < quick.far
     assert (bound[apart] <= truth[apart] + 1e-8).all()
     assert (bound[~apart] <= 0.0).all()
     assert 0.1 < near.mean() < 0.9
@@ -177,8 +178,9 @@ def test_bent_arms_are_tried_only_near_where_the_straight_one_does_not_do() -> N
     shut = np.zeros(len(rows.tips), dtype=np.bool_)
     route = tip_route(task, rows, shut, 0.08, 0.0)
     shapes = one_knee_shapes(ARM, ARM.max_link_angle, 0.08, 8)
+    pricing = Pricing(0.0035, 0.74, ARM.total_length, Taste())
     every, some = (
-        build_roadmap(task, clearance, 0.0035, route, shapes, Taste(), 0.74, around)
+        build_roadmap(task, clearance, pricing, route, shapes, around)
         for around in (None, 3)
     )
     assert set(some.node.tolist()) < set(every.node.tolist())

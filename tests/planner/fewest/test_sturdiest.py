@@ -84,7 +84,7 @@ def test_each_link_keeps_its_own() -> None:
     shapes = one_knee_shapes(ARM, ARM.max_link_angle, 0.2, 8)
     judge = Judge(task, clearance, 0.0, 0.0, 2e-3, kept=kept)
     made, free = (
-        build_roadmap(task, clearance, judge.required, route, shapes, one, judge.limit)
+        build_roadmap(task, clearance, judge.pricing(one), route, shapes)
         for one in (taste, Taste())
     )
     tip, shape = np.divmod(free.node, shapes.size)

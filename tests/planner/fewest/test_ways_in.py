@@ -16,7 +16,7 @@ from vdsm_pin.planner.fewest.insertion import Insertion, Layers
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
 from vdsm_pin.planner.fewest.motion import Intervals
-from vdsm_pin.planner.fewest.nearby import FAR, nearby
+from vdsm_pin.planner.fewest.nearby import nearby
 from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.fewest.sparsify import sparser
 from vdsm_pin.planner.fewest.strategy import plan_fewest
@@ -69,7 +69,7 @@ def two_windows(half: float) -> PlanningProblem:
 
 
 def judge_of(task: PlanningProblem) -> Judge:
-    clearance = nearby(task, link_clearance(task)).up_to(FAR)
+    clearance = nearby(task, link_clearance(task))
     return Judge(task, clearance, 0.0, 3e-4, 2e-3)
 
 

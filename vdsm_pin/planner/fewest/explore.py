@@ -106,7 +106,10 @@ def explore(
     """
     rows = path_rows(problem.path)
     first = effort.levels[0]
-    judge = Judge(problem, clearance, margin, first.slack, first.finest)
+    length = problem.manipulator.total_length
+    judge = Judge(
+        problem, clearance, margin, first.slack * length, first.finest * length
+    )
     best = Outcome(judge, None, rows, prove_tips(problem, clearance, rows.tips))
     yield best
     if best.proof.closed.all():
@@ -121,11 +124,12 @@ def explore(
         if unreached and isinstance(level, Level) and level.back == 0.0:
             continue
         ease = max(level.ease, least_ease)
-        worth = problem.required_clearance + margin + level.slack + taste.room
+        worth = problem.required_clearance + margin
+        worth += (level.slack + taste.room) * length
         worth += 0.0 if kept is None else float(kept[-1])
         judge = Judge(
-            problem, clearance, margin, level.slack, level.finest, ease,
-            clearance.up_to(worth), kept,
+            problem, clearance, margin, level.slack * length, level.finest * length,
+            ease,            clearance.up_to(worth), kept,
         )  # fmt: skip
         found: Found | None = None
         try:
@@ -185,9 +189,8 @@ def _look(
     shapes = one_knee_shapes(arm, judge.limit, level.step, level.places)
     route = tip_route(problem, rows, proof.closed, coarse, back)
     roadmap = build_roadmap(
-        problem, judge.rough, judge.required, route, shapes, taste, judge.limit,
-        level.around,
-    )  # fmt: skip
+        problem, judge.rough, judge.pricing(taste), route, shapes, level.around
+    )
     roadmap, home = with_start(judge, roadmap, taste)
     rng = np.random.default_rng(SEED)
     found = search(judge, roadmap, home, level.rounds, nothing_blocked())

@@ -7,6 +7,7 @@ from vdsm_pin.planner.fewest.growth import POPULATION, Garden, Grown
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste, extended
+from vdsm_pin.planner.fewest.sequence import TURN
 
 
 def graft(
@@ -43,8 +44,8 @@ def graft(
     room, _, _ = judge.look(positions, every)
     bends = judge.bends(positions, every)
     return extended(
-        roadmap, places, bends, room, shapes.with_grown(every, np.vstack(links)),
-        judge.required, taste, judge.limit,
+        roadmap, judge.pricing(taste), places, bends, room,
+        shapes.with_grown(every, np.vstack(links)),
     )  # fmt: skip
 
 
@@ -67,12 +68,15 @@ def _ties(
         around = np.concatenate([roadmap.poses_of(arm, nodes)[1], grown[own]])
         gap = np.abs(grown[own][:, None] - around[None]).max(axis=(2, 3))
         gap[np.arange(len(own)), len(nodes) + np.arange(len(own))] = np.inf
+        turn = gap / (TURN * arm.total_length)
         near = np.argsort(gap, axis=1, kind="stable")[:, :TIES]
         mine, column = np.repeat(np.arange(len(own)), near.shape[1]), near.ravel()
         close = gap[mine, column] <= TIE_LENGTH * arm.total_length
         mine, column = mine[close], column[close]
         rows.append(
-            np.column_stack([shapes.size + own[mine], shape[column], gap[mine, column]])
+            np.column_stack(
+                [shapes.size + own[mine], shape[column], turn[mine, column]]
+            )
         )
         tips.append(np.broadcast_to(roadmap.route.tips[tip], (len(mine), 3)))
         here.append(grown[own[mine]])
@@ -96,7 +100,7 @@ def fill(
     Args:
         judge: Says what is clear.
         roadmap: The graph before.
-        lengths: Of the way from home to each node, inf if none, shape (v,); [m].
+        lengths: Of the way from home to each node, inf if none, shape (v,).
         skipped: Layers k whose stretch from layer k - 1 is not drawn.
         rng: Source of chance.
         taste: What the strategy prefers.

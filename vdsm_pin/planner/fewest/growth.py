@@ -32,6 +32,8 @@ COPIED, AT_KNEE, STRAIGHTENED = 0.05, 0.3, 0.45
 """Of a half: up to where a child is its parent, moves a knee, moves any joint; beyond,
 a joint is put in line with its neighbours; [-]."""
 STRAIGHT = TOLERANCES.straight_slope
+WIDE = 0.5
+"""Room beyond this part of the body's radius is worth nothing more; [-]."""
 SCALES = (0.008, 0.025, 0.06)
 """Sizes of a change over the arm's length; [-]."""
 
@@ -165,6 +167,12 @@ def vary(
     return result
 
 
+def lacking(judge: Judge, room: FloatArray) -> FloatArray:
+    """What clearances [m] lack of what is wanted, 0 for nothing, 1 for all; [-]."""
+    wanted = WIDE * judge.problem.manipulator.most_radius
+    return np.asarray(np.maximum(0.0, 1.0 - (room - judge.required) / wanted))
+
+
 class Garden:
     """Grows configurations along given tips.
 
@@ -213,7 +221,7 @@ class Garden:
         """Half the best, half by chance."""
         if len(room) <= POPULATION:
             return np.arange(len(room))
-        lack = np.maximum(0.0, 1.0 - (room - self.judge.required) / 0.03)
+        lack = lacking(self.judge, room)
         score = changed + 2.0 * lack**2 + self.rng.random(len(room))
         order = np.argsort(score, kind="stable")
         best, rest = order[: POPULATION // 2], order[POPULATION // 2 :]
@@ -276,7 +284,7 @@ class Garden:
             return tree.take(front)
         tips = self.tips[tree.layer[front]]
         room, changed, _ = self.judge.look(tips, tree.offsets[front])
-        lack = np.maximum(0.0, 1.0 - (room - self.judge.required) / 0.03)
+        lack = lacking(self.judge, room)
         best = np.argsort(changed + lack, kind="stable")[:KEPT]
         return tree.with_ancestors(front[best])
 

@@ -9,6 +9,7 @@ from vdsm_pin.planner.fewest.charts import Chart, Projections
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste, extended
+from vdsm_pin.planner.fewest.sequence import TURN
 from vdsm_pin.planner.start import start_centres
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
@@ -88,10 +89,11 @@ def with_start(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, i
         raise NoWayOut
     ids = np.full(int(good.sum()), shapes.size)
     there = roadmap.shapes_of(nodes[near[good]])
-    links = np.column_stack([ids, there, gap[near[good]]])
+    turn = gap[near[good]] / (TURN * judge.problem.manipulator.total_length)
+    links = np.column_stack([ids, there, turn])
     more = extended(
-        roadmap, np.zeros(1, dtype=np.int64), judge.bends(tip, offsets), room,
-        shapes.with_grown(offsets, links), judge.required, taste, judge.limit,
+        roadmap, judge.pricing(taste), np.zeros(1, dtype=np.int64),
+        judge.bends(tip, offsets), room, shapes.with_grown(offsets, links),
     )  # fmt: skip
     return more, int(more.index[shapes.size])
 

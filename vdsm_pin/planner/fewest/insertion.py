@@ -15,7 +15,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.charts import Chart
 from vdsm_pin.planner.fewest.follow import followed
-from vdsm_pin.planner.fewest.growth import FAMILY
+from vdsm_pin.planner.fewest.growth import FAMILY, lacking
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 
@@ -25,8 +25,6 @@ UNCHANGED: Final = 0.3
 """Part of these that are not varied besides; [-]."""
 RESTS: Final = 4
 """Rounds of change at rest before a population that dwindles goes back."""
-WIDE: Final = 0.5
-"""Room beyond this part of the body's radius is worth nothing more; [-]."""
 
 
 @dataclass(frozen=True)
@@ -231,9 +229,7 @@ class Insertion:
         self, room: FloatArray, changed: IntArray, bend: FloatArray
     ) -> IntArray:
         """Half the best, half by chance, the best first."""
-        lack = np.maximum(
-            0.0, 1.0 - (room - self.judge.required) / (WIDE * self.radius)
-        )
+        lack = lacking(self.judge, room)
         score = 0.5 * changed + 2.0 * lack**2 + 2.0 * (bend / self.judge.limit) ** 4
         order = np.argsort(score + self.rng.random(len(room)), kind="stable")
         if len(order) <= self.population:

@@ -14,7 +14,7 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.parts import Parts
 from vdsm_pin.planner.fewest.poses import bends_of, pieces_of, room_along
-from vdsm_pin.planner.fewest.roadmap import link_limit
+from vdsm_pin.planner.fewest.roadmap import Pricing, Taste, link_limit
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
@@ -58,6 +58,11 @@ class Judge:
         self.required = problem.required_clearance + margin + slack
         self.slack, self.finest = slack, finest
         self.limit = ease * link_limit(problem)
+
+    def pricing(self, taste: Taste) -> Pricing:
+        """What configurations keep and cost to a taste."""
+        length = self.problem.manipulator.total_length
+        return Pricing(self.required, self.limit, length, taste)
 
     def look(
         self, tips: FloatArray, offsets: FloatArray
@@ -169,7 +174,7 @@ class Judge:
         most = np.full(count, self.limit)
         if bend is not None:
             most = np.minimum(most, bend + tol)
-        knees = self._cuts(intervals)
+        knees, length = self._cuts(intervals), self.problem.manipulator.total_length
         number, low, high = np.arange(count), np.zeros(count), np.ones(count)
         every = knees[:, 1:]
         c0, r0 = self._states(intervals, number, low, most, ask, knees, every)
@@ -185,7 +190,7 @@ class Judge:
         good &= self._within(intervals, c0, c1, most)
         parts = Parts(number, low, high, c0, c1, r0, r1)
         for _ in range(CUTS):
-            counts = parts.counts(knees, need, self.finest)
+            counts = parts.counts(knees, need, self.finest, length)
             doubtful = (counts > 0).any(axis=1) & good[parts.interval]
             if not doubtful.any():
                 return good, begin

@@ -58,8 +58,8 @@ class Weights(NamedTuple):
         turn: Cost of a radian of turning.
         still: Cost of a step at rest.
         visit: Cost of a visit home.
-        way: Cost of a metre of way.
-        skip: Cost of a metre not drawn.
+        way: Cost of a length of way.
+        skip: Cost of a length not drawn.
     """
 
     turn: float
@@ -278,9 +278,10 @@ def stage_programme(
     Args:
         graph: The roadmap.
         layers: Tip numbers in drawing order, shape (l,).
-        gap: Path length from the layer before to this one, shape (l,); [m].
-        node_cost: What a metre drawn with this node costs, shape (v,).
-        home: Length of the way from the start to each node, inf if none, (v,); [m].
+        gap: Path length from the layer before to this one over the arm's length, shape
+            (l,); [-].
+        node_cost: What a length drawn with this node costs, shape (v,).
+        home: Length of the way from the start to each node, inf if none, (v,); [-].
         weights: What moves cost.
         barred: Blocked edges.
 

@@ -15,8 +15,10 @@ class Level:
         rounds: Sequences to try.
         back: How far tips are tried behind the path, over the arm's length; [-].
         grow: Rounds of growing shapes into what is not drawn.
-        slack: Clearance kept for what happens between two rows; [m].
-        finest: Way of the body between two looks at the clearance; [m].
+        slack: Clearance kept for what happens between two rows, over the arm's
+            length; [-].
+        finest: Way of the body between two looks at the clearance, over the arm's
+            length; [-].
         ease: Part of the largest link angle that may be used; [-].
         around: Bent arms are tried up to this many tips from where the straight arm
             does not do; None for everywhere.
@@ -28,8 +30,8 @@ class Level:
     rounds: int
     back: float
     grow: int
-    slack: float = 3e-4
-    finest: float = 2e-3
+    slack: float = 9.6e-5
+    finest: float = 6.4e-4
     ease: float = 1.0
     around: int | None = None
 
@@ -47,8 +49,10 @@ class Insert:
         cells: Cells at which the search for a way of the tip ends.
         directed: Whether arms are described by the directions of their links, which may
             lean backwards then, and not by their projections.
-        slack: Clearance kept for what happens between two rows; [m].
-        finest: Way of the body between two looks at the clearance; [m].
+        slack: Clearance kept for what happens between two rows, over the arm's
+            length; [-].
+        finest: Way of the body between two looks at the clearance, over the arm's
+            length; [-].
         ease: Part of the largest link angle that may be used; [-].
     """
 
@@ -59,8 +63,8 @@ class Insert:
     seed: int
     cells: int = 300_000
     directed: bool = False
-    slack: float = 3e-4
-    finest: float = 2e-3
+    slack: float = 9.6e-5
+    finest: float = 6.4e-4
     ease: float = 1.0
 
 
@@ -86,15 +90,17 @@ THOROUGH: Final[tuple[Level | Insert, ...]] = (
     Level(step=0.08, coarse=0.013, places=8, rounds=40, back=1.0, grow=3),
     Level(
         step=0.05, coarse=0.013, places=10, rounds=60, back=1.0, grow=3,
-        slack=3e-5, finest=5e-4,
+        slack=9.6e-6, finest=1.6e-4,
     ),
     Insert(step=0.02, population=60, ways=4, returns=5, seed=2),
     Insert(step=0.02, population=60, ways=4, returns=5, seed=2, directed=True),
     Insert(
-        step=0.01, population=120, ways=6, returns=6, seed=3, slack=3e-5, finest=5e-4,
+        step=0.01, population=120, ways=6, returns=6, seed=3,
+        slack=9.6e-6, finest=1.6e-4,
     ),
     Insert(
-        step=0.01, population=120, ways=6, returns=6, seed=3, slack=3e-5, finest=5e-4,
+        step=0.01, population=120, ways=6, returns=6, seed=3,
+        slack=9.6e-6, finest=1.6e-4,
         directed=True,
     ),
 )  # fmt: skip

@@ -65,6 +65,11 @@ class Knots:
             edges,
         )
 
+    def unit(self, manipulator: Manipulator) -> float:
+        """Way of the tip that one of the offsets counts for; [-], of directions [m]."""
+        directed = self.offsets.shape[2] == 3
+        return manipulator.total_length / 3.0 if directed else 1.0
+
     def pick(self, intervals: IntArray) -> "Intervals":
         """Some intervals on their own."""
         return Intervals(

@@ -23,8 +23,9 @@ from vdsm_pin.scene import Mesh, Obstacle
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 
-FAR = 0.08
-"""A bound of the clearance above this is as good as the clearance itself; [m]."""
+FAR = 0.0256
+"""A bound of the clearance above this is as good as the clearance itself, over the
+arm's length; [-]."""
 STRETCHES = 6
 """Stretches into which a link is cut for its boxes."""
 SLICES = 8
@@ -58,7 +59,7 @@ class Nearby:
     surfaces: Surfaces
     radius: float
     floor: float
-    far: float = FAR
+    far: float
     deadline: Deadline = NO_LIMIT
 
     def __call__(self, centres: FloatArray) -> FloatArray:
@@ -106,6 +107,7 @@ def nearby(problem: PlanningProblem, clearance: LinkClearance) -> Nearby:
         surfaces_of(obstacles),
         problem.manipulator.most_radius,
         problem.required_clearance - TOLERANCES.planned_clearance,
+        FAR * problem.manipulator.total_length,
         deadline=deadline_of(clearance),
     )
 

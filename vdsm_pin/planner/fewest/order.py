@@ -56,7 +56,7 @@ def reordered(planner: Planner, sequence: Sequence) -> Sequence:
 def tour_length(
     first: FloatArray, between: FloatArray, order: tuple[Visit, ...]
 ) -> float:
-    """Length of the ways of a tour; see `shortest_tour`; [m]."""
+    """Length of the ways of a tour; see `shortest_tour`."""
     number, back = order[0]
     total = float(first[number, int(back)])
     for (a, a_back), (b, b_back) in itertools.pairwise(order):
@@ -69,9 +69,9 @@ def shortest_tour(first: FloatArray, between: FloatArray) -> tuple[Visit, ...]:
     """Order and directions of pieces with the shortest ways, by subsets.
 
     Args:
-        first: Way from the start to both ends of each piece, shape (n, 2); [m].
+        first: Way from the start to both ends of each piece, shape (n, 2).
         between: Way from end e of piece a to end f of piece b at [a, e, b, f], shape
-            (n, 2, n, 2); [m].
+            (n, 2, n, 2).
     """
     n = len(first)
     # best[set, k, f]: the pieces of the set drawn, k last and entered at its end f.

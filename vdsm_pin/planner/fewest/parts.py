@@ -11,8 +11,9 @@ from vdsm_pin.planner.fewest.poses import parts_of_pieces
 MOST_PARTS: Final = 8
 """Parts of one cut. More at once takes fewer turns, but looks at more where the first
 would have shown that the way is blocked."""
-LONG_WAY: Final = 0.2
-"""Way of a piece above which the middle is looked at whatever the clearance; [m]."""
+LONG_WAY: Final = 0.064
+"""Way of a piece, over the arm's length, above which the middle is looked at whatever
+the clearance; [-]."""
 
 
 @dataclass(frozen=True)
@@ -38,14 +39,22 @@ class Parts:
     room: FloatArray
     next_room: FloatArray
 
-    def counts(self, knees: BoolArray, need: FloatArray, finest: float) -> IntArray:
+    def counts(
+        self, knees: BoolArray, need: FloatArray, finest: float, length: float
+    ) -> IntArray:
         """Into how many parts to cut for each piece, 0 where it is clear, shape (n, N).
 
         A long part may hide a bend or a curve: it is cut anyway.
+
+        Args:
+            knees: Of each interval, shape (m, N + 1).
+            need: Clearance to keep in each interval, shape (m,); [m].
+            finest: A way that is too short to matter; [m].
+            length: Of the arm; [m].
         """
         return parts_of_pieces(
             self.centres, self.next_centres, self.room, self.next_room,
-            knees, self.interval, need, finest, LONG_WAY, MOST_PARTS,
+            knees, self.interval, need, finest, LONG_WAY * length, MOST_PARTS,
         )  # fmt: skip
 
     def inner(self, counts: IntArray) -> Inner:

@@ -32,8 +32,8 @@ from vdsm_pin.tolerances import TOLERANCES
 
 MOST_CELLS: Final = 60_000
 """Cells at which a search ends; it has taken a second or two by then."""
-FINE: Final = 0.01
-"""Size to which the narrowest place is told; [m]."""
+FINE: Final = 0.0032
+"""Size to which the narrowest place is told, over the arm's length; [-]."""
 CLOSER: Final = 60
 """Rounds of coming closer to it."""
 FIRST_LEVEL: Final = 4
@@ -64,6 +64,7 @@ class _Cells:
         self.reach = curled_reach(arm) + beside
         ahead = arm.total_length + beside
         self.x_low, self.x_high = low - ahead, high + ahead
+        self.fine = FINE * arm.total_length
         self.side = max(self.x_high - self.x_low, 2.0 * self.reach)
         self.corner = np.array([self.x_low, -self.side / 2.0, -self.side / 2.0])
         count = 8**FIRST_LEVEL
@@ -256,7 +257,7 @@ def narrowest(
         place = int(on_way[np.argmin(cells.middle[on_way])])
         # Clear centres tell little of a cell that is larger than what it must keep.
         large = (cells.sizes() > -cells.inside) & (cells.state == DOUBTFUL)
-        large |= (cells.sizes() > FINE) & (cells.middle < 0.0)
+        large |= (cells.sizes() > cells.fine) & (cells.middle < 0.0)
         if not large[on_way].any() or cells.codes.size > MOST_CELLS:
             break
         cells.split(cells.closest(on_way[large[on_way]]))

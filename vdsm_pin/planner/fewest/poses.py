@@ -232,6 +232,7 @@ def on_line(
     offsets: FloatArray,
     stations: FloatArray,
     drawn: bool,
+    unit: float,
     a: int,
     b: int,
     line_tips: FloatArray,
@@ -244,9 +245,10 @@ def on_line(
 
     Args:
         tips: Shape (n, 3); [m].
-        offsets: Shape (n, N + 1, 2); [m].
+        offsets: Shape (n, N + 1, 2) [m], or directions (n, N, 3) [-].
         stations: Arc length along the desired path, shape (n,); [m].
         drawn: Whether the tip draws here.
+        unit: Way of the tip that one of these counts for; [m] or [-].
         a: The first knot.
         b: The last one.
         line_tips: Result in rows a + 1 to b - 1, shape (n, 3); [m].
@@ -258,7 +260,7 @@ def on_line(
             way = abs(stations[k + 1] - stations[k])
         else:
             turn = np.abs(offsets[k + 1] - offsets[k]).max()
-            way = np.sqrt(((tips[k + 1] - tips[k]) ** 2).sum()) + turn
+            way = np.sqrt(((tips[k + 1] - tips[k]) ** 2).sum()) + unit * turn
         share[k + 1 - a] = share[k - a] + way
     if share[-1] > 0.0:
         share /= share[-1]

@@ -15,6 +15,9 @@ from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
+STRAIN: Final = 0.032
+"""Length, over the arm's, by which a way into a configuration at its limits is longer;
+[-]."""
 KNEES: Final = slice(1, None)
 """Columns of bends past psi_1, the bend at the base."""
 
@@ -24,16 +27,17 @@ class Taste:
     """What a strategy prefers among clear configurations.
 
     Args:
-        angle: Cost of one changed angle along a metre drawn.
-        room: Clearance beyond the required one that is wanted; [m].
-        room_cost: Cost of having none of it along a metre.
+        angle: Cost of one changed angle; costs are those of a length drawn.
+        room: Clearance beyond the required one that is wanted, over the arm's length;
+            [-].
+        room_cost: Cost of having none of it.
         easy_bend: Link angles up to this cost nothing more; [rad].
-        bend_cost: Cost of bending to the limit along a metre.
+        bend_cost: Cost of bending to the limit.
         taper: Error of all joints that what each link keeps shall make up for; [rad].
     """
 
     angle: float = 1.0
-    room: float = 0.05
+    room: float = 0.016
     room_cost: float = 0.5
     easy_bend: float = float(np.deg2rad(30.0))
     bend_cost: float = 4.0
@@ -41,8 +45,46 @@ class Taste:
 
 
 @dataclass(frozen=True)
+class Pricing:
+    """What configurations must keep and what they cost.
+
+    Args:
+        required: Clearance to keep; [m].
+        limit: Largest link angle; [rad].
+        length: Of the arm; [m].
+        taste: What the strategy prefers.
+    """
+
+    required: float
+    limit: float
+    length: float
+    taste: Taste
+
+    def prices(
+        self, bends: FloatArray, room: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Cost of a length drawn, and what entering adds to a way, shape (v,) each.
+
+        Args:
+            bends: Link angles, shape (v, k); [rad].
+            room: Clearances, shape (v,); [m].
+        """
+        taste, most = self.taste, bends.max(axis=1, initial=0.0)
+        changed = (bends > TOLERANCES.changed_angle).sum(axis=1)
+        spare = (room - self.required) / self.length
+        lack = np.maximum(0.0, 1.0 - spare / taste.room)
+        over = np.maximum(0.0, most - taste.easy_bend)
+        bent = (over / max(self.limit - taste.easy_bend, 0.02)) ** 2
+        narrow, steep = taste.room_cost * lack**2, taste.bend_cost * bent
+        return (
+            np.asarray(taste.angle * changed + narrow + steep),
+            np.asarray(STRAIN * (0.2 * narrow + steep)),
+        )
+
+
+@dataclass(frozen=True)
 class Roadmap:
-    """Clear configurations (nodes) and what a metre drawn with each costs.
+    """Clear configurations (nodes) and what a length drawn with each costs.
 
     Args:
         route: The tips.
@@ -51,8 +93,9 @@ class Roadmap:
         index: Node of each (tip, shape) or -1, shape (k * n_shapes,).
         tip_nodes: Where each tip's nodes begin, shape (k + 1,).
         lean: Sum of the knees' angles without joint 1, shape (v,); [rad].
-        cost: Cost of a metre drawn, shape (v,).
-        strain: What entering a node adds to the length of a way, shape (v,); [m].
+        cost: Cost of a length drawn, shape (v,).
+        strain: What entering a node adds to the length of a way, over the arm's length,
+            shape (v,); [-].
     """
 
     route: TipRoute
@@ -105,11 +148,9 @@ def link_limit(problem: PlanningProblem) -> float:
 def build_roadmap(
     problem: PlanningProblem,
     clearance: LinkClearance,
-    required: float,
+    pricing: Pricing,
     route: TipRoute,
     shapes: Shapes,
-    taste: Taste,
-    limit: float,
     around: int | None = None,
 ) -> Roadmap:
     """Every shape at every tip that keeps limits and clearance.
@@ -117,28 +158,25 @@ def build_roadmap(
     Args:
         problem: Arm and limits.
         clearance: The clearance function.
-        required: Clearance to keep; [m].
+        pricing: What nodes keep and cost.
         route: The tips.
         shapes: The shapes.
-        taste: What the strategy prefers.
-        limit: Largest link angle; [rad].
         around: Only the straight arm is tried at tips farther than this many tips from
             where the straight arm does not do; None: every shape at every tip.
     """
-    arm, kept = problem.manipulator, kept_by_links(problem.manipulator, taste.taper)
+    arm, taste, required = problem.manipulator, pricing.taste, pricing.required
+    kept = kept_by_links(arm, taste.taper)
 
     def tried(whole: BoolArray) -> Roadmap:
         node, ends, bends = pose_shapes(
-            route.tips, whole, shapes.knees, shapes.slopes, arm.stations, limit,
+            route.tips, whole, shapes.knees, shapes.slopes, arm.stations, pricing.limit,
             *arm.base_range,
         )  # fmt: skip
         if kept is not None:
             ends = link_by_link(ends, arm.stations)
         room = _least(clearance, ends, required, kept)
         keep = room >= required
-        return _assemble(
-            route, shapes, node[keep], bends[keep], room[keep], required, taste, limit
-        )
+        return _assemble(pricing, route, shapes, node[keep], bends[keep], room[keep])
 
     count = len(route.tips)
     if around is None:
@@ -184,21 +222,14 @@ def _spread(route: TipRoute, picked: BoolArray, times: int) -> BoolArray:
 
 
 def _assemble(
+    pricing: Pricing,
     route: TipRoute,
     shapes: Shapes,
     node: IntArray,
     bends: FloatArray,
     room: FloatArray,
-    required: float,
-    taste: Taste,
-    limit: float,
 ) -> Roadmap:
-    changed = (bends > TOLERANCES.changed_angle).sum(axis=1)
-    lack = np.maximum(0.0, 1.0 - (room - required) / taste.room)
-    over = np.maximum(0.0, bends.max(axis=1, initial=0.0) - taste.easy_bend)
-    bent = (over / max(limit - taste.easy_bend, 0.02)) ** 2
-    cost = taste.angle * changed + taste.room_cost * lack**2 + taste.bend_cost * bent
-    strain = 0.02 * taste.room_cost * lack**2 + 0.1 * taste.bend_cost * bent
+    cost, strain = pricing.prices(bends, room)
     lean = bends[:, KNEES].sum(axis=1)
     lean[node % shapes.size == 0] = 0.0
     return _indexed(Roadmap(route, shapes, node, node, node, lean, cost, strain))
@@ -225,30 +256,26 @@ def _indexed(roadmap: Roadmap) -> Roadmap:
 
 def extended(
     roadmap: Roadmap,
+    pricing: Pricing,
     tips: IntArray,
     bends: FloatArray,
     room: FloatArray,
     shapes: Shapes,
-    required: float,
-    taste: Taste,
-    limit: float,
 ) -> Roadmap:
     """The roadmap with grown configurations as further nodes.
 
     Args:
         roadmap: Before.
+        pricing: What nodes keep and cost.
         tips: Tip number of each new node, shape (g,).
         bends: Link angles of each, shape (g, N); [rad].
         room: Clearance of each, shape (g,); [m].
         shapes: The shapes with the new ones at their end.
-        required: Clearance to keep; [m].
-        taste: What the strategy prefers.
-        limit: Largest link angle; [rad].
     """
     old, every = roadmap.shapes.size, np.arange(len(roadmap.node))
     same = roadmap.tips_of(every) * shapes.size + roadmap.shapes_of(every)
     fresh = tips * shapes.size + old + np.arange(len(tips))
-    more = _assemble(roadmap.route, shapes, fresh, bends, room, required, taste, limit)
+    more = _assemble(pricing, roadmap.route, shapes, fresh, bends, room)
     return _indexed(
         replace(
             roadmap,

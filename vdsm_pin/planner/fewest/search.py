@@ -43,8 +43,8 @@ class Searched(Found):
     Args:
         roadmap: The graph searched.
         home: The node the motion starts from.
-        ways: Length of the way from there to each node, inf if there is none known not
-            to be blocked, shape (v,); [m].
+        ways: Length over the arm's of the way from there to each node, inf if there is
+            none known not to be blocked, shape (v,); [-].
         blocked: Pairs of nodes whose edges were found blocked, shape (n, 2).
     """
 
@@ -69,7 +69,7 @@ def search(
     Returns:
         None if the rounds end or nothing is drawn.
     """
-    planner = Planner(roadmap, home, blocked)
+    planner = Planner(roadmap, judge.problem.manipulator.total_length, home, blocked)
     known: set[tuple[int, int]] = set()
     for _ in range(rounds):
         sequence = planner.sequence()

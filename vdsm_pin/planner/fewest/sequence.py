@@ -9,14 +9,15 @@ from vdsm_pin.planner.fewest.kernels import FROM_HOME, Labels, Weights, stage_pr
 from vdsm_pin.planner.fewest.roadmap import Roadmap, nothing_barred, with_barred
 from vdsm_pin.planner.fewest.ways import TipLinks, shortest_ways
 
-WEIGHTS = Weights(turn=0.15, still=0.02, visit=3.0, way=0.05, skip=1000.0)
-"""Costs in metres drawn with one changed angle more."""
-REST = 0.01
-"""Length that drawing a single point counts for; [m]."""
-DISTRUST = 0.05
-"""Length added, with the distance, to a way between two tips that was blocked; [m]."""
-ARM = 1.0
-"""Length by which a change of shape counts as a distance; [m]."""
+WEIGHTS = Weights(turn=0.048, still=0.0064, visit=0.96, way=0.05, skip=1000.0)
+"""Costs in arm lengths drawn with one changed angle more."""
+REST = 0.0032
+"""Length over the arm's that drawing a single point counts for; [-]."""
+DISTRUST = 0.016
+"""Length over the arm's added, with the distance, to a way between two tips that was
+blocked; [-]."""
+TURN = 0.32
+"""Length over the arm's that a change of shape by a radian counts for; [1/rad]."""
 
 
 @dataclass(frozen=True)
@@ -52,18 +53,22 @@ class Planner:
 
     Args:
         roadmap: The graph.
+        length: Of the arm; all lengths are over it; [m].
         home: The node the motion starts from.
         blocked: Pairs of nodes whose edges are known to be blocked, shape (n, 2).
     """
 
-    def __init__(self, roadmap: Roadmap, home: int, blocked: IntArray) -> None:
+    def __init__(
+        self, roadmap: Roadmap, length: float, home: int, blocked: IntArray
+    ) -> None:
         self.roadmap, self.home, self.graph = roadmap, home, roadmap.graph()
         self.barred = nothing_barred(len(roadmap.node))
         route = roadmap.route
-        self.gap = np.concatenate([[0.0], np.diff(route.stations)])
+        self.gap = np.concatenate([[0.0], np.diff(route.stations) / length])
         # Resting at a single point costs like a stretch, or it would be left out.
         self.gap[1:][self.gap[1:] == 0.0] = REST
-        self.way_gaps = route.gaps.copy()
+        self.gaps = route.gaps / length
+        self.way_gaps = self.gaps.copy()
         self._bar(blocked)
         self.from_home, self.before = self.ways(home)
 
@@ -90,14 +95,14 @@ class Planner:
             for u, v in ((a, b), (b, a)):
                 row = slice(route.first[u], route.first[u + 1])
                 link = route.links[row] == v
-                self.way_gaps[row] += link * (route.gaps[row] + DISTRUST)
+                self.way_gaps[row] += link * (self.gaps[row] + DISTRUST)
 
     def ways(self, source: int, target: int = -1) -> tuple[FloatArray, IntArray]:
         """Shortest ways from a node, off the path; see `shortest_ways`."""
         route = self.roadmap.route
         tips = TipLinks(route.first, route.links, self.way_gaps)
         return shortest_ways(
-            source, target, self.graph, tips, self.roadmap.strain, ARM, self.barred
+            source, target, self.graph, tips, self.roadmap.strain, TURN, self.barred
         )
 
     def way(self, source: int, target: int) -> tuple[int, ...]:

@@ -37,12 +37,13 @@ def _runs(knots: Knots) -> list[tuple[int, int]]:
     return list(itertools.pairwise(marks))
 
 
-def _flattened(knots: Knots, spans: list[tuple[int, int]]) -> Knots:
+def _flattened(judge: Judge, knots: Knots, spans: list[tuple[int, int]]) -> Knots:
     """Knots with every span's inner knots on the line between its ends."""
     tips, offsets, edges = knots.tips.copy(), knots.offsets.copy(), knots.edges.copy()
+    unit = knots.unit(judge.problem.manipulator)
     for a, b in spans:
-        drawn = bool(knots.drawn[a])
-        on_line(knots.tips, knots.offsets, knots.stations, drawn, a, b, tips, offsets)
+        now = knots.tips, knots.offsets, knots.stations, bool(knots.drawn[a]), unit
+        on_line(*now, a, b, tips, offsets)
         edges[a:b] = -1
     return replace(knots, tips=tips, offsets=offsets, edges=edges)
 
@@ -90,7 +91,7 @@ def _round(
     taste: Taste,
     spans: list[tuple[int, int]],
 ) -> tuple[Knots, _State]:
-    trial = _flattened(knots, spans)
+    trial = _flattened(judge, knots, spans)
     change = farthest_apart(knots.tips, knots.offsets, trial.tips, trial.offsets)
     moved = change > TOLERANCES.joint_centre
     spans = [(a, b) for a, b in spans if moved[a : b + 1].any()]
@@ -114,7 +115,7 @@ def _round(
             kept.append(span)
             taken[a + 1 : b] = True
         place += b - a
-    return _flattened(knots, kept), state.taken(new, taken)
+    return _flattened(judge, knots, kept), state.taken(new, taken)
 
 
 def _guards(
@@ -126,24 +127,25 @@ def _guards(
 ) -> tuple[FloatArray, FloatArray]:
     """Clearance to keep and angle not to exceed, interval by interval of the spans."""
     need, bend = [], []
+    wanted = taste.room * judge.problem.manipulator.total_length
     for a, b in spans:
         room = float(state.room[a : b + 1].min())
-        room = max(min(room, judge.required + taste.room / 2.0), judge.required)
+        room = max(min(room, judge.required + wanted / 2.0), judge.required)
         most = max(float(state.bend[a : b + 1].max()), taste.easy_bend)
         need += [room] * (b - a)
         bend += [most] * (b - a)
     return np.array(need), np.array(bend)
 
 
-def straightened(knots: Knots) -> Knots:
+def straightened(judge: Judge, knots: Knots) -> Knots:
     """Ways without the knots that lie on the line between their neighbours."""
     kept = np.ones(len(knots.tips), dtype=np.bool_)
     tips, offsets = knots.tips.copy(), knots.offsets.copy()
-    a = 0
+    unit, a = knots.unit(judge.problem.manipulator), 0
     for k in range(1, len(knots.tips) - 1):
         if not (knots.drawn[k - 1] or knots.drawn[k]):
-            now = knots.tips, knots.offsets, knots.stations
-            on_line(*now, False, a, k + 1, tips, offsets)
+            now = knots.tips, knots.offsets, knots.stations, False, unit
+            on_line(*now, a, k + 1, tips, offsets)
             span = slice(a + 1, k + 1)
             gap = farthest_apart(
                 knots.tips[span], knots.offsets[span], tips[span], offsets[span]

@@ -21,7 +21,7 @@ from vdsm_pin.planner.fewest.explain import (
 from vdsm_pin.planner.fewest.explore import Outcome, explore
 from vdsm_pin.planner.fewest.levels import FULL, LEANING, QUICK, Effort
 from vdsm_pin.planner.fewest.motion import Knots, Rows, dense_rows
-from vdsm_pin.planner.fewest.nearby import FAR, Nearby, nearby
+from vdsm_pin.planner.fewest.nearby import Nearby, nearby
 from vdsm_pin.planner.fewest.roadmap import Taste
 from vdsm_pin.planner.fewest.search import Searched
 from vdsm_pin.planner.fewest.smooth import lifted, smooth, straightened
@@ -46,7 +46,7 @@ from vdsm_pin.units import in_mm
 SEARCHED: Final = 0.6
 """Part of the time after which a search ends that has found something; [-]."""
 FEWEST: Final = Taste()
-CLEAREST: Final = Taste(angle=0.2, room=0.2, room_cost=8.0)
+CLEAREST: Final = Taste(angle=0.2, room=0.064, room_cost=8.0)
 
 
 def plan_fewest(
@@ -201,7 +201,8 @@ def _plan(
             effort = LEANING
     # What is kept is judged exactly, however much it is.
     most = margin + taste.taper * float(levers(problem.manipulator)[-1])
-    quick = nearby(problem, clearance).up_to(FAR + most)
+    quick = nearby(problem, clearance)
+    quick = quick.up_to(quick.far + most)
     best: Outcome | None = None
     try:
         soon = _soon(problem, clearance)
@@ -238,7 +239,7 @@ def _written(
     if not isinstance(outcome.found, Searched):
         knots = sparser(judge, knots)
     knots = smooth(judge, knots, taste)
-    knots = lifted(judge, straightened(knots))
+    knots = lifted(judge, straightened(judge, knots))
     turn = problem.planned_row_change
     rows = dense_rows(arm, knots, problem.path.spacing, turn, judge.slack)
     alpha, theta = joint_angles(arm, rows.centres)

@@ -31,6 +31,8 @@ SHIFTS: Final = (1.0, 0.5, 0.0, 1.5)
 TRIES: Final = 200
 """Ways over a configuration drawn by chance."""
 SEED: Final = 0
+STRAY: Final = 0.3
+"""How far these are from the line; the base goes by thirds of the arm; [rad]."""
 FEWEST: Final = 16
 """Intervals a straight line is begun to be looked at with."""
 MOST: Final = 2048
@@ -126,10 +128,12 @@ def unbend(
         if rows is not None:
             return rows
     rng = np.random.default_rng(SEED)
+    spread = np.full(start.shape, STRAY)
+    spread[0] *= arm.total_length / 3.0
     for _ in range(TRIES):
         target = targets[int(rng.integers(len(targets)))]
         middle = start + rng.random() * (target - start)
-        middle = middle + rng.normal(0.0, 0.3, middle.shape)
+        middle = middle + rng.normal(0.0, spread)
         if not _within(arm, middle):
             continue
         first = _line(problem, clearance, start, middle, need)

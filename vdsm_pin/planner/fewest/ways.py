@@ -16,7 +16,7 @@ class TipLinks(NamedTuple):
     Args:
         first: Where each tip's neighbours begin, shape (k + 1,).
         links: Neighbouring tips, shape (m,).
-        gaps: Distances to them, shape (m,); [m].
+        gaps: Distances to them over the arm's length, shape (m,); [-].
     """
 
     first: IntArray
@@ -31,7 +31,7 @@ def _expand(
     tips: TipLinks,
     u: int,
     strain: FloatArray,
-    arm: float,
+    turn: float,
     labels: Labels,
     barred: Barred,
 ) -> None:
@@ -42,7 +42,7 @@ def _expand(
     for e in range(begin - 1, graph.first[c + 1]):  # the first one keeps the shape
         other, turned = c, cost[u]
         if e >= begin:
-            other, turned = graph.neighbours[e], turned + arm * graph.change[e]
+            other, turned = graph.neighbours[e], turned + turn * graph.change[e]
             v = graph.place[corner + other]
             value = turned + strain[v]
             if v >= 0 and value < cost[v] and not is_blocked(u, v, barred):
@@ -63,7 +63,7 @@ def _expand(
     if c > 0 and (low < 0 or graph.lean[u] > NEAR):
         return
     for v in range(low, high):
-        value = cost[u] + arm * (graph.lean[v] + graph.lean[u]) + strain[v]
+        value = cost[u] + turn * (graph.lean[v] + graph.lean[u]) + strain[v]
         if graph.lean[v] > NEAR or not value < cost[v]:
             continue
         if not is_blocked(u, v, barred):
@@ -78,7 +78,7 @@ def shortest_ways(
     graph: Graph,
     tips: TipLinks,
     strain: FloatArray,
-    arm: float,
+    turn: float,
     barred: Barred,
 ) -> tuple[FloatArray, IntArray]:
     """Shortest ways over the whole graph from one node (Dijkstra).
@@ -91,12 +91,13 @@ def shortest_ways(
         target: Node at which to stop, or -1 for all.
         graph: The roadmap.
         tips: Which tips are beside each other.
-        strain: Length added for entering a node, shape (v,); [m].
-        arm: Length that turns a change into a distance; [m].
+        strain: Length over the arm's added for entering a node, shape (v,); [-].
+        turn: Length over the arm's that a radian of change counts for; [1/rad].
         barred: Blocked edges.
 
     Returns:
-        Length of the way to each node (inf: none) [m], and the node before.
+        Length of the way to each node over the arm's (inf: none) [-], and the node
+        before.
     """
     graph, tips, barred = borrowed(graph), borrowed(tips), borrowed(barred)
     count = graph.node.size
@@ -111,5 +112,5 @@ def shortest_ways(
         done[u] = True
         if u == target:
             break
-        _expand(heap, graph, tips, u, strain, arm, labels, barred)
+        _expand(heap, graph, tips, u, strain, turn, labels, barred)
     return labels.cost, labels.parent

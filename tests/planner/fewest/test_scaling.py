@@ -1,0 +1,176 @@
+"""A problem ten times smaller or seven times larger has the same plan in its size."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scenes_for_fewest import problem
+
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.planner.fewest.explore import explore
+from vdsm_pin.planner.fewest.levels import QUICK, THOROUGH, Effort, Insert
+from vdsm_pin.planner.fewest.motion import Knots
+from vdsm_pin.planner.fewest.nearby import nearby
+from vdsm_pin.planner.fewest.roadmap import Taste
+from vdsm_pin.planner.fewest.smooth import smooth
+from vdsm_pin.planner.fewest.strategy import CLEAREST, FEWEST
+from vdsm_pin.planner.fewest.unbend import unbend
+from vdsm_pin.problem import DesiredPath, Order, PlanningProblem
+from vdsm_pin.scene import Box, Capsule, Cylinder, Obstacle, Prism, Scene, Sphere
+from vdsm_pin.verification.link_clearance import link_clearance
+
+LENGTHS = {
+    Sphere: ("centre", "radius"),
+    Capsule: ("centre", "half_length", "radius"),
+    Cylinder: ("centre", "half_length", "radius"),
+    Box: ("centre", "half_size"),
+    Prism: ("origin", "polygon", "span"),
+}
+"""The fields of each shape that are lengths."""
+
+PILLAR = Cylinder("pillar", np.array([1.6, 0.45, 0.0]), np.array([0.0, 0, 1]), 2.0, 0.1)
+BENT = np.zeros(17)
+BENT[[4, 6, 8, 10]] = 0.7
+
+
+def longer(value: object, factor: float) -> object:
+    """A length, or some, times a factor."""
+    return tuple(np.multiply(value, factor)) if isinstance(value, tuple) else (
+        np.multiply(value, factor)
+    )  # fmt: skip
+
+
+def scaled_arm(arm: Manipulator, factor: float) -> Manipulator:
+    """The arm in another size."""
+    low, high = arm.base_range
+    return replace(
+        arm,
+        link_lengths=arm.link_lengths * factor,
+        link_radius=arm.link_radius * factor,
+        base_range=(low * factor, high * factor),
+        cables=replace(
+            arm.cables,
+            hole_radius=arm.cables.hole_radius * factor,
+            half_gap=arm.cables.half_gap * factor,
+        ),
+    )
+
+
+def scaled_obstacle(obstacle: Obstacle, factor: float) -> Obstacle:
+    """The obstacle in another size."""
+    fields = {
+        name: longer(getattr(obstacle, name), factor)
+        for name in LENGTHS[type(obstacle)]
+    }
+    return replace(obstacle, **fields)
+
+
+def scaled_path(path: DesiredPath, factor: float) -> DesiredPath:
+    """The path in another size."""
+    joints = path.start_joints
+    if joints is not None:
+        joints = joints.copy()
+        joints[0] *= factor
+    return replace(
+        path,
+        start=path.start * factor,
+        points=path.points * factor,
+        spacing=path.spacing * factor,
+        retreat=path.retreat * factor,
+        start_joints=joints,
+    )
+
+
+def scaled(task: PlanningProblem, factor: float) -> PlanningProblem:
+    """The problem in another size."""
+    return replace(
+        task,
+        manipulator=scaled_arm(task.manipulator, factor),
+        scene=Scene(tuple(scaled_obstacle(o, factor) for o in task.scene.obstacles)),
+        tip_path=scaled_path(task.path, factor),
+        required_clearance=task.required_clearance * factor,
+    )
+
+
+def found(task: PlanningProblem, taste: Taste, effort: Effort) -> Knots:
+    """The motion of the last search, smoothed."""
+    clearance = nearby(task, link_clearance(task))
+    *_, outcome = explore(task, clearance, 0.0, taste, effort)
+    assert outcome.found is not None
+    return smooth(outcome.judge, outcome.found.knots, taste)
+
+
+def frame() -> list[Obstacle]:
+    """A wall across the rail with a window off it."""
+    spans = [((-3, -0.16), (-3, 3)), ((0.04, 3), (-3, 3)), ((-0.16, 0.04), (-3, -0.05))]
+    spans.append(((-0.16, 0.04), (0.15, 3)))
+    return [
+        Box(
+            f"wall{n}", np.array([0.65, sum(y) / 2, sum(z) / 2]), np.eye(3),
+            np.array([0.03, y[1] - y[0], z[1] - z[0]]) / 2,
+        )
+        for n, (y, z) in enumerate(spans)
+    ]  # fmt: skip
+
+
+def of_one_knee() -> PlanningProblem:
+    return problem(PILLAR)
+
+
+def in_any_order() -> PlanningProblem:
+    task = problem(PILLAR, Sphere("ball", np.array([2.2, 0.2, 1.1]), 0.2), closed=False)
+    return replace(task, tip_path=replace(task.path, order=Order.FREE))
+
+
+def through_a_window() -> PlanningProblem:
+    points = np.array([[1.5, -0.2, 0.05], [1.5, -0.25, 0.15], [1.5, -0.2, 0.2]])
+    return problem(*frame(), points=points, closed=False, start=(-0.3, 0.0, 0.0))
+
+
+ROADMAPS = Effort(THOROUGH[:2], proves=True)
+INSERTED = tuple(one for one in THOROUGH if isinstance(one, Insert))
+IN_BY_PROJECTIONS = Effort(INSERTED[:1], proves=False)
+IN_BY_DIRECTIONS = Effort(INSERTED[1:2], proves=False)
+
+CASES = [
+    (of_one_knee, FEWEST, ROADMAPS, (0.1, 7.0)),
+    (of_one_knee, CLEAREST, QUICK, (0.1, 7.0)),
+    (in_any_order, FEWEST, ROADMAPS, (0.1, 7.0)),
+    # Rounding decides between ways of one length, and chance goes on from there: by
+    # powers of two there is none.
+    (through_a_window, FEWEST, IN_BY_PROJECTIONS, (0.125, 8.0)),
+    (through_a_window, FEWEST, IN_BY_DIRECTIONS, (0.125, 8.0)),
+]
+
+
+@pytest.mark.parametrize("large", [False, True])
+@pytest.mark.parametrize(("make", "taste", "effort", "factors"), CASES)
+def test_a_problem_in_another_size_has_the_same_plan_in_that_size(
+    make: Callable[[], PlanningProblem],
+    taste: Taste,
+    effort: Effort,
+    factors: tuple[float, float],
+    large: bool,
+) -> None:
+    task, factor = make(), factors[large]
+    one, other = found(task, taste, effort), found(scaled(task, factor), taste, effort)
+    assert len(one.tips) == len(other.tips)
+    np.testing.assert_array_equal(one.drawn, other.drawn)
+    np.testing.assert_allclose(other.tips, one.tips * factor, atol=1e-7 * factor)
+    # Directions have no size.
+    unit = 1.0 if one.offsets.shape[2] == 3 else factor
+    np.testing.assert_allclose(other.offsets, one.offsets * unit, atol=1e-7 * unit)
+    np.testing.assert_allclose(
+        other.stations, one.stations * factor, atol=1e-7 * factor
+    )
+
+
+@pytest.mark.parametrize("factor", [0.1, 7.0])
+def test_an_arm_in_another_size_unbends_alike(factor: float) -> None:
+    joints = BENT.copy()
+    task = problem(Sphere("ball", np.array([1.0, 0.9, 0.3]), 0.1), start_joints=joints)
+    large = scaled(task, factor)
+    one, other = (unbend(each, link_clearance(each), 0.0) for each in (task, large))
+    np.testing.assert_allclose(other[:, 1:], one[:, 1:], atol=1e-9)
+    np.testing.assert_allclose(other[:, 0], one[:, 0] * factor, atol=1e-9 * factor)
