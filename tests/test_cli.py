@@ -116,6 +116,8 @@ def test_the_installed_command_answers_before_libraries_are_loaded() -> None:
         ["batch", "--out", "x", "--jobs", "0"],
         ["batch", "--out", "x", "--time-limit", "-1"],
         ["view", "paper/free", "--port", "99999"],
+        ["convert", "paper/free", "--out", "x"],
+        ["convert", "paper/free", "--out", "x", "--cables", "a", "--centres", "b"],
     ],
 )
 def test_wrong_usage_is_status_2(vdsm: Shell, words: list[str]) -> None:
@@ -128,7 +130,8 @@ def test_a_certified_motion_has_every_file(planned: Path) -> None:
     names = {path.name for path in planned.iterdir()}
     assert names == {
         "near.yaml", "trajectory.csv", "plan.json", "verification.json",
-        "clearance.csv", "link_angles.csv", "cables.csv", "report.html",
+        "clearance.csv", "link_angles.csv", "centres.csv", "cables.csv",
+        "report.html",
     }  # fmt: skip
     for name in ("plan", "verification"):
         content = json.loads((planned / f"{name}.json").read_text(encoding="utf-8"))

@@ -44,6 +44,7 @@ LAYERS = {
     "doctor": 13,
     "new_project": 13,
     "workflow": 13,
+    "conversion": 13,
     "batch": 13,
     "certificate_checker": 13,
     "api": 14,

@@ -135,7 +135,7 @@ def test_no_file_of_a_folder_is_an_input(
     way: Callable[[Path, Path], Path], here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (here / "out").mkdir()
-    way(here / "part.stl", here / "out" / "cables.csv")
+    way(here / "part.stl", here / "out" / "link_angles.csv")
     way(here / "part.stl", here / "out" / "plan.json")
     assert run("plan", "problem.yaml", "--out", "out") == 2
     verify = ["verify", "problem.yaml", "--trajectory", "motion.csv", "--out", "out"]

@@ -88,9 +88,9 @@ def plan(
 ) -> None:
     """Plan a motion.
 
-    Writes trajectory.csv and plan.json, or nothing where there is no plan. A plan that
-    draws less of the path than required is written, is called incomplete, and ends with
-    status 1.
+    Writes trajectory.csv, centres.csv, cables.csv and plan.json, or nothing where there
+    is no plan. A plan that draws less of the path than required is written, is called
+    incomplete, and ends with status 1.
     """
     from vdsm_pin.io.problem_file import read_problem
     from vdsm_pin.report.terminal import show_plan
@@ -152,7 +152,8 @@ def verify(
 ) -> None:
     """Verify a trajectory of any planner.
 
-    Writes report.html, verification.json, clearance.csv, link_angles.csv, cables.csv.
+    Writes report.html, verification.json, clearance.csv, link_angles.csv, centres.csv
+    and cables.csv.
     """
     from vdsm_pin.io.problem_file import read_problem
     from vdsm_pin.report.terminal import show_verification
@@ -427,6 +428,38 @@ def simulate(
     show_simulation(file, out)
     passed = file.executed.verdict == "certified"
     raise typer.Exit(PASSED if passed else NOT_PASSED)
+
+
+@app.command(
+    epilog=_examples(
+        "vdsm convert paper/obs1 --trajectory out/obs1/trajectory.csv --out out/all",
+        "vdsm convert mine.yaml --cables measured.csv --out out/mine",
+    )
+)
+def convert(
+    problem: Problem,
+    out: OutFolder,
+    trajectory: Annotated[
+        Path | None, typer.Option(help="Joint angles, as trajectory.csv.")
+    ] = None,
+    centres: Annotated[
+        Path | None, typer.Option(help="Joint centres, as centres.csv.")
+    ] = None,
+    cables: Annotated[
+        Path | None, typer.Option(help="Cable lengths, as cables.csv.")
+    ] = None,
+) -> None:
+    """Convert angles, joint centres and cable lengths into one another.
+
+    Takes one of them and writes all: trajectory.csv, centres.csv and cables.csv.
+    Nothing is judged.
+    """
+    from vdsm_pin.conversion import Given, convert_to_folder
+    from vdsm_pin.io.problem_file import read_problem
+
+    given = Given(trajectory, centres, cables)
+    rows = convert_to_folder(read_problem(problem), given, out)
+    typer.echo(f"wrote {rows.n_samples} waypoints to {out}")
 
 
 @app.command(epilog=_examples("vdsm diff out/monday out/tuesday"))

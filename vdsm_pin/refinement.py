@@ -147,7 +147,13 @@ def plan_and_verify(
         if adjustments:
             rounds.append(_measured(margins, adjustments))
         else:
-            verification = verify(promised, plan.trajectory, robot, deadline=deadline)
+            verification = verify(
+                promised,
+                plan.trajectory,
+                robot,
+                deadline=deadline,
+                centres=plan.centres,
+            )
             if deadline.passed and verification.verdict not in HANDED_OUT:
                 raise OutOfTime(deadline.limit, "a motion was found, but not proved")
             adjustments = _by_proof(verification, margins)

@@ -24,7 +24,12 @@ from vdsm_pin.report.folder import (
 )
 from vdsm_pin.report.pdf import find_browser, print_page
 from vdsm_pin.report.run_record import RunRecord
-from vdsm_pin.report.tables import ClearanceCsv, write_cables, write_link_angles
+from vdsm_pin.report.tables import (
+    ClearanceCsv,
+    write_cables,
+    write_centres,
+    write_link_angles,
+)
 from vdsm_pin.robot_model import RobotModel, load_robot
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.units import MM_PER_M
@@ -40,11 +45,12 @@ REPORT: Final = "report.html"
 CLEARANCE: Final = "clearance.csv"
 LINK_ANGLES: Final = "link_angles.csv"
 CABLES: Final = "cables.csv"
+CENTRES: Final = "centres.csv"
 
-PLANNED: Final = TRAJECTORY, PLAN
+PLANNED: Final = TRAJECTORY, PLAN, CENTRES, CABLES
 """What planning writes to its folder."""
 
-JUDGED: Final = VERIFICATION, REPORT, CLEARANCE, LINK_ANGLES, CABLES
+JUDGED: Final = VERIFICATION, REPORT, CLEARANCE, LINK_ANGLES, CENTRES, CABLES
 """What verifying writes to its folder."""
 
 
@@ -107,7 +113,7 @@ def plan_to_folder(
     command: str,
     deadline: Deadline = NO_LIMIT,
 ) -> PlanFile:
-    """Plan, and write trajectory.csv and plan.json.
+    """Plan, and write trajectory.csv, centres.csv, cables.csv and plan.json.
 
     A plan is certified, or incomplete: it is clear, but draws less than required.
 
@@ -125,8 +131,11 @@ def plan_to_folder(
     check_kept([folder / name for name in PLANNED], source.source.files)
     robot = load_robot(source.problem.manipulator)
     refinement = plan_and_verify(source.problem, strategy, robot, deadline=deadline)
+    plan, problem = refinement.plan, source.problem
     with staged(folder) as aside:
-        write_trajectory(aside / TRAJECTORY, refinement.plan.trajectory)
+        write_trajectory(aside / TRAJECTORY, plan.trajectory)
+        write_centres(aside / CENTRES, problem, plan.trajectory, plan.centres)
+        write_cables(aside / CABLES, problem, plan.trajectory)
         record = RunRecord(
             command=command,
             problem_file=str(source.path),
@@ -183,10 +192,10 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
                 deadline=order.deadline,
                 reach=reach,
             )
-            if verification.least is not None:
-                clearance.write_least(verification.least)
+            clearance.write(verification)
         write_link_angles(aside / LINK_ANGLES, verification)
-        write_cables(aside / CABLES, verification)
+        write_centres(aside / CENTRES, problem, trajectory)
+        write_cables(aside / CABLES, problem, trajectory)
         file = verification_file(verification, record)
         (aside / VERIFICATION).write_text(file.text(), encoding="utf-8")
         write_report(aside / REPORT, verification, file, planned_by(order.trajectory))

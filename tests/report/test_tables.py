@@ -17,6 +17,7 @@ from vdsm_pin.report.tables import (
     write_summary,
 )
 from vdsm_pin.report.thinning import nearest_obstacles
+from vdsm_pin.verification.coal_rows import CoalRows
 from vdsm_pin.verification.records import LeastClearances, Pair
 
 
@@ -31,6 +32,7 @@ def test_clearance_rows_are_complete_and_in_order(tmp_path: Path) -> None:
     with ClearanceCsv(tmp_path / "c.csv", judged.problem, pairs) as sink:
         sink(made_up.chunk(0, 3, len(pairs)))
         sink(made_up.chunk(3, 2, len(pairs), 0.5))
+        sink.write(judged)
     rows = read(tmp_path / "c.csv")
     assert len(rows) == 5 * len(pairs)
     assert [int(row["interval"]) for row in rows[:: len(pairs)]] == [0, 1, 2, 3, 4]
@@ -51,6 +53,7 @@ def test_a_pair_of_links_is_told_by_its_numbers(tmp_path: Path) -> None:
     judged = made_up.verification()
     with ClearanceCsv(tmp_path / "c.csv", judged.problem, [Pair(2, other_link=5)]) as c:
         c(made_up.chunk(0, 1, 1))
+        c.write(judged)
     (row,) = read(tmp_path / "c.csv")
     assert (row["link"], row["obstacle"], row["other_link"]) == ("2", "", "5")
 
@@ -60,18 +63,20 @@ def test_obstacle_names_with_commas_stay_one_field(tmp_path: Path) -> None:
     pair = Pair(1, 'a, "b"')
     with ClearanceCsv(tmp_path / "c.csv", judged.problem, [pair]) as sink:
         sink(made_up.chunk(0, 1, 1))
+        sink.write(judged)
     assert read(tmp_path / "c.csv")[0]["obstacle"] == 'a, "b"'
 
 
 def test_angles_and_cables_have_a_row_per_waypoint(tmp_path: Path) -> None:
     judged = made_up.verification(n=7)
     write_link_angles(tmp_path / "a.csv", judged)
-    write_cables(tmp_path / "l.csv", judged)
+    write_cables(tmp_path / "l.csv", judged.problem, judged.trajectory)
     angles, lengths = read(tmp_path / "a.csv"), read(tmp_path / "l.csv")
     assert len(angles) == len(lengths) == 7
-    assert list(lengths[0])[:4] == ["waypoint", "l1a_m", "l1b_m", "l1c_m"]
+    head = ["waypoint", "on_path", "path_m", "x0_m", "l1a_m", "l1b_m", "l1c_m"]
+    assert list(lengths[0])[:7] == head
     expected = cables(judged.problem, judged.trajectory)
-    got = [[float(v) for v in list(row.values())[1:]] for row in lengths]
+    got = [[float(v) for v in list(row.values())[4:]] for row in lengths]
     np.testing.assert_allclose(got, expected.reshape(7, -1), rtol=1e-11)
     assert float(angles[3]["x0_m"]) == pytest.approx(judged.trajectory.x0[3])
 
@@ -102,7 +107,7 @@ def test_far_pairs_have_one_row_and_near_ones_a_row_an_interval(tmp_path: Path) 
     )
     with ClearanceCsv(tmp_path / "c.csv", judged.problem, pairs, reach) as sink:
         sink(chunk)
-        sink.write_least(least)
+        sink.write(replace(judged, least=least))
     rows = read(tmp_path / "c.csv")
     found = [
         (int(r["interval"]), r["link"], r["obstacle"], r["other_link"]) for r in rows
@@ -116,6 +121,37 @@ def test_far_pairs_have_one_row_and_near_ones_a_row_an_interval(tmp_path: Path) 
     assert found[: len(expected)] == expected
     assert [float(row["lower_m"]) for row in rows[len(expected) :]] == [7.0] * far.size
     assert len({one[1:] for one in found}) == len(pairs)
+
+
+def test_coal_stands_in_the_row_of_its_interval_and_pair(tmp_path: Path) -> None:
+    """Two waypoints end the last interval; a far pair has the least of all rows."""
+    judged = made_up.verification(n=5)
+    pairs, chunk = judged.pairs[:3], made_up.chunk(0, 4, 3)
+    lower = chunk.lower.copy()
+    lower[:, 2] = 1.0  # far away
+    least = LeastClearances(
+        *(np.zeros(3, np.int64), np.zeros(3), np.ones(3), np.ones(3)),
+        *(np.zeros(3, np.int64), np.zeros((3, 3)), np.zeros((3, 3))),
+    )
+    coal = CoalRows(
+        waypoint=np.array([1, 3, 4, 0, 2, 4, 2]),
+        pair=np.array([0, 0, 0, 2, 2, 2, 1]),
+        distance=np.array([0.5, 0.25, 0.125, 0.75, 0.5, 0.625, np.nan]),
+    )
+    with ClearanceCsv(tmp_path / "c.csv", judged.problem, pairs, 0.9) as sink:
+        sink(replace(chunk, lower=np.minimum(lower, 1.0)))
+        sink.write(replace(judged, least=least, coal=coal))
+    rows = read(tmp_path / "c.csv")
+    near = {
+        (int(row["interval"]), row["link"]): (row["coal_waypoint"], row["coal_m"])
+        for row in rows[:-1]
+    }
+    first, second = (str(pair.link) for pair in pairs[:2])
+    expected = {(i, link): ("", "") for i in range(4) for link in (first, second)}
+    expected |= {(1, first): ("1", "0.5"), (3, first): ("4", "0.125")}
+    expected |= {(2, second): ("2", "")}  # Coal was asked and gave nothing usable
+    assert near == expected
+    assert (rows[-1]["coal_waypoint"], rows[-1]["coal_m"]) == ("2", "0.5")
 
 
 @pytest.mark.parametrize("most", [1, 3, 100])

@@ -10,7 +10,12 @@ import pytest
 
 from vdsm_pin.report.facts import verification_file
 from vdsm_pin.report.files import SCHEMA_NAMES, BatchRow, schema
-from vdsm_pin.report.tables import ClearanceCsv, write_cables, write_link_angles
+from vdsm_pin.report.tables import (
+    ClearanceCsv,
+    write_cables,
+    write_centres,
+    write_link_angles,
+)
 from vdsm_pin.report.words import TERMS
 from vdsm_pin.tolerances import TOLERANCES, UNITS
 
@@ -64,12 +69,14 @@ def test_every_length_and_angle_says_its_unit(name: str) -> None:
 
 def test_the_words_in_the_docs_are_the_keys_of_the_files(tmp_path: Path) -> None:
     judged = made_up.verification(n=3)
-    with ClearanceCsv(tmp_path / "clearance.csv", judged.problem, judged.pairs):
-        pass
+    path = tmp_path / "clearance.csv"
+    with ClearanceCsv(path, judged.problem, judged.pairs) as clearance:
+        clearance.write(judged)
     write_link_angles(tmp_path / "link_angles.csv", judged)
-    write_cables(tmp_path / "cables.csv", judged)
+    write_cables(tmp_path / "cables.csv", judged.problem, judged.trajectory)
+    write_centres(tmp_path / "centres.csv", judged.problem, judged.trajectory)
     columns = {
-        re.sub(r"_[yz]_m$", "_x_m", re.sub(r"^(psi|gamma|l)\d", r"\g<1>1", column))
+        re.sub(r"_[yz]_m$", "_x_m", re.sub(r"^(psi|gamma|l|o)\d", r"\g<1>1", column))
         for path in tmp_path.iterdir()
         for column in path.read_text(encoding="utf-8").splitlines()[0].split(",")
     }

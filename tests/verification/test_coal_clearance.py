@@ -8,21 +8,24 @@ import trimesh
 
 from vdsm_pin import scene
 from vdsm_pin.geometry.arrays import rotation_from_rpy
+from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
 from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification import coal_clearance
 from vdsm_pin.verification.coal_bodies import Measured
 from vdsm_pin.verification.coal_clearance import (
+    CoalDistances,
     check_coal,
     coal_distances,
     reach_of,
 )
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.verification.verify import verify
+from vdsm_pin.verification.verify import CLOSEST, verify
 
 HRM8 = built_in("hrm8")
 ROBOT = load_robot(HRM8)
@@ -287,3 +290,55 @@ def _nearest(start: np.ndarray, end: np.ndarray, point: np.ndarray) -> np.ndarra
         "ij,ij->i", along, along
     )
     return np.minimum(np.maximum(t, 0.0), 1.0)
+
+
+def test_coal_stands_beside_every_closest_approach_and_measured_row() -> None:
+    """At an approach Coal lies in its bracket, at a waypoint above the lower end."""
+    problem = read_problem("paper/obs1").problem
+    plan = plan_and_verify(problem, "paper", ROBOT).plan
+    judged = verify(problem, plan.trajectory, ROBOT)
+    assert len(judged.approaches) == CLOSEST
+    gap = TOLERANCES.coal_agreement
+    for near in judged.approaches:
+        assert near.lower - gap <= near.coal <= near.upper + gap
+        assert near.coal == pytest.approx(near.upper, abs=1e-5)
+    assert judged.coal is not None
+    assert judged.least is not None
+    assert set(judged.coal.pair.tolist()) == set(range(len(judged.pairs)))
+    least = judged.least.lower[judged.coal.pair]
+    assert (judged.coal.distance >= least - gap).all()
+    counts = [check.count for check in judged.checks if "by Coal" in check.name]
+    assert sum(counts) == judged.coal.pair.size + CLOSEST
+
+
+def test_a_lie_of_coal_at_a_closest_approach_is_seen(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Only the moments of the approaches are lied about: between two waypoints."""
+    problem = read_problem("paper/obs1").problem
+    plan = plan_and_verify(problem, "paper", ROBOT).plan
+
+    def lying(*arguments: object) -> CoalDistances:
+        found = measured(*arguments)
+        asked = arguments[1]
+        assert isinstance(asked, Trajectory)
+        if asked.n_samples <= CLOSEST:
+            found = replace(found, distance=found.distance + 2e-5)
+        return found
+
+    measured = coal_clearance._measured
+    monkeypatch.setattr(coal_clearance, "_measured", lying)
+    judged = verify(problem, plan.trajectory, ROBOT)
+    row = next(check for check in judged.checks if check.name == coal_clearance.NAME)
+    assert row.verdict is Verdict.UNDECIDED
+    assert row.moment in [near.moment for near in judged.approaches]
+
+
+def test_of_a_mesh_around_the_arm_coal_knows_no_clearance() -> None:
+    shell = trimesh.creation.box((20.0, 20.0, 20.0))
+    problem = problem_with(scene.Mesh("shell", shell.vertices, shell.faces))
+    still = Trajectory([0], [0], [0], np.zeros((1, 8)), np.zeros((1, 8)))
+    judged = verify(problem, still, ROBOT)
+    assert judged.coal is not None
+    assert judged.coal.pair.size > 0
+    assert not any(judged.pairs[k].obstacle for k in judged.coal.pair)

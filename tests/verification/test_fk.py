@@ -11,8 +11,9 @@ from vdsm_pin.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification import fk
-from vdsm_pin.verification.fk import CHUNK, check_fk
+from vdsm_pin.verification.fk import CHUNK, check_fk, check_planned
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.verify import verify
 
 HRM8 = built_in("hrm8")
 
@@ -73,3 +74,20 @@ def test_missing_evidence_is_no_pass(monkeypatch: pytest.MonkeyPatch) -> None:
     assert check.verdict is Verdict.REFUTED
     assert check.worst == np.inf
     assert (check.moment, check.where) == (2.0, "joint centre O5")
+
+
+def test_planned_centres_are_held_against_pinocchio() -> None:
+    rows = trajectory_of(CHUNK + 40)
+    centres = joint_centres(HRM8, rows.x0, rows.alpha, rows.theta).copy()
+    robot = load_robot(HRM8)
+    check = check_planned(robot, rows, centres)
+    assert (check.verdict, check.count) == (Verdict.CERTIFIED, 9 * rows.n_samples)
+    assert 0.0 <= check.worst < 1e-12
+    centres[CHUNK + 3, 6, 2] += 1.1e-9
+    check = check_planned(robot, rows, centres)
+    assert check.verdict is Verdict.REFUTED
+    assert (check.moment, check.where) == (CHUNK + 3, "joint centre O7")
+    judged = verify(problem_for(HRM8), rows.part(CHUNK, CHUNK + 9), robot,
+                    centres=centres[CHUNK : CHUNK + 9])  # fmt: skip
+    row = next(check for check in judged.checks if check.name == fk.PLANNED)
+    assert row.verdict is Verdict.REFUTED

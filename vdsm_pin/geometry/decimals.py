@@ -14,7 +14,6 @@ LONGEST: Final = 32
 
 _EXACT: Final = 2.0**53  # beyond so many units a double no longer tells one from next
 _ZERO, _COMMA, _NEWLINE, _MINUS, _POINT, _E = 48, 44, 10, 45, 46, 101
-_NAN: Final = (110, 97, 110)
 _INF: Final = (105, 110, 102)
 
 
@@ -58,12 +57,9 @@ def _put_units(scaled: float, unit: int, rounding: int, out: ByteArray, at: int)
 def _put_number(
     value: float, decimals: int, rounding: int, out: ByteArray, at: int
 ) -> int:
-    """Any number, very large ones with an exponent; the place behind it."""
+    """Any number, large ones with an exponent, NaN as nothing; the place behind it."""
     apart()
     if isnan(value):
-        for sign in _NAN:
-            out[at] = sign
-            at += 1
         return at
     if abs(value) == float("inf"):
         if value < 0.0:

@@ -34,6 +34,7 @@ from vdsm_pin.report.run_record import RunRecord, machine, versions
 from vdsm_pin.report.words import check_title, depth, percent, place, quantity
 from vdsm_pin.tolerances import TOLERANCES, UNITS
 from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.fk import PLANNED
 from vdsm_pin.verification.inside import NAME as INSIDE
 from vdsm_pin.verification.inside import surfaces
 from vdsm_pin.verification.records import (
@@ -128,6 +129,7 @@ def closest_row(verification: Verification, approach: ClosestApproach) -> Closes
         link_point_m=in_file_frame(verification, approach.link_point),
         other_point_m=in_file_frame(verification, approach.other_point),
         deeper=approach.deeper,
+        coal_m=finite(approach.coal),
     )
 
 
@@ -216,6 +218,7 @@ def min_clearance(verification: Verification) -> MinClearance | None:
         body=row.pair.body or None,
         obstacle=row.pair.obstacle,
         deeper=row.deeper,
+        coal_m=finite(row.coal),
     )
 
 
@@ -379,6 +382,9 @@ def plan_file(refinement: "Refinement", record: RunRecord) -> PlanFile:
             )
             for number, ended in enumerate(refinement.rounds, start=1)
             for one in ended.adjustments
+        ),
+        centres_error_m=next(
+            (finite(c.worst) for c in verification.checks if c.name == PLANNED), None
         ),
         coverage=finite(verification.coverage),
         motion=motion_facts(plan.problem, plan.trajectory),

@@ -33,6 +33,10 @@ _DEEPER: Final = (
     "whether the link's axis meets the body: no depth beyond the link's radius is "
     "measured, so it may be deeper than this"
 )
+_COAL: Final = (
+    "distance by Coal at `moment`, of the nominal motion; null where it was not asked "
+    "or gave no usable answer"
+)
 _COVERAGE: Final = (
     "proved share of the desired path that is drawn, 0 to 1; null where there is none"
 )
@@ -95,6 +99,7 @@ class ClosestRow(FileModel):
     link_point_m: Point | None = Field(description=f"on the link; {_FRAME}")
     other_point_m: Point | None = Field(description=f"on its partner; {_FRAME}")
     deeper: bool = Field(description=f"of both bounds: {_DEEPER}")
+    coal_m: FiniteFloat | None = Field(default=None, description=_COAL)
 
 
 class MinClearance(FileModel):
@@ -107,6 +112,7 @@ class MinClearance(FileModel):
     body: str | None = Field(description="`tool` where it is that; null for the link")
     obstacle: str = Field(description="name of the obstacle")
     deeper: bool = Field(description=f"of both bounds: {_DEEPER}")
+    coal_m: FiniteFloat | None = Field(default=None, description=_COAL)
 
 
 class LeftOutRow(FileModel):
@@ -276,6 +282,10 @@ class PlanFile(FileModel):
     rounds: int = Field(description="rounds of plan, measure, verify, larger margins")
     adjustments: tuple[AdjustmentRow, ...] = Field(
         default=(), description="margins raised between rounds, and what asked for it"
+    )
+    centres_error_m: FiniteFloat | None = Field(
+        default=None,
+        description="largest distance of a planned joint centre from Pinocchio's",
     )
     coverage: FiniteFloat | None = Field(description=_COVERAGE)
     motion: MotionFacts

@@ -2,7 +2,8 @@
 
 import csv
 import math
-from collections.abc import Callable, Iterable, Sequence
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields
 from pathlib import Path
 from types import TracebackType
@@ -13,10 +14,18 @@ import numpy as np
 from vdsm_pin.cables import cable_lengths
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.decimals import WORD
-from vdsm_pin.kinematics import link_angles, position_angles
+from vdsm_pin.io.waypoint_tables import (
+    NUMBER,
+    PLACE,
+    cable_columns,
+    centre_columns,
+)
+from vdsm_pin.kinematics import joint_centres, link_angles, position_angles
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.row_text import Form
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.coal_rows import NOTHING_MEASURED, CoalIndex
 from vdsm_pin.verification.records import (
     ClearanceChunk,
     LeastClearances,
@@ -27,13 +36,14 @@ from vdsm_pin.verification.records import (
 _VERDICTS: Final = ("certified", "refuted", "undecided")
 _CLEARANCE_HEADER: Final = (
     "interval,moment,link,obstacle,other_link,lower_m,upper_m,verdict,"
-    "link_x_m,link_y_m,link_z_m,other_x_m,other_y_m,other_z_m\n"
+    "link_x_m,link_y_m,link_z_m,other_x_m,other_y_m,other_z_m,coal_waypoint,coal_m\n"
 )
-_CLEARANCE_DECIMALS: Final = (0, 9, WORD, 9, 9, WORD, *6 * (6,))
-_CLEARANCE_ROUNDING: Final = (0, 0, 0, -1, 1, 0, *6 * (0,))
+_CLEARANCE_DECIMALS: Final = (0, 9, WORD, 9, 9, WORD, *6 * (6,), 0, 9)
+_CLEARANCE_ROUNDING: Final = (0, 0, 0, -1, 1, 0, *6 * (0,), 0, 0)
+_FIELDS: Final = fields(LeastClearances)
+_SPOOLED: Final = 12  # numbers of a row before Coal's two
 _DECIMALS: Final = 12  # of metres and radians at the rows
 _CHUNK: Final = 8192  # rows held at one time
-_HOLES: Final = ("a", "b", "c")
 
 
 class _OwnFile:
@@ -56,7 +66,10 @@ class _OwnFile:
 
 
 class ClearanceCsv(_OwnFile):
-    """clearance.csv, one row per interval and pair, written while it is proved.
+    """clearance.csv, one row per interval and pair.
+
+    Rows come while the motion is proved and wait aside as numbers: Coal measures after
+    that, and its distances stand in the same rows.
 
     Args:
         path: The file.
@@ -83,11 +96,11 @@ class ClearanceCsv(_OwnFile):
         self._form = Form(_CLEARANCE_DECIMALS, _CLEARANCE_ROUNDING,
                           (*_VERDICTS, *partners))  # fmt: skip
         self._reach, self._written = reach, np.zeros(len(pairs), dtype=np.bool_)
-        self._file = path.open("wb")
-        self._file.write(_CLEARANCE_HEADER.encode())
+        self._path = path
+        self._file = tempfile.TemporaryFile(dir=path.parent)
 
     def __call__(self, chunk: ClearanceChunk) -> None:
-        """Write the rows of one chunk that are within reach."""
+        """Take the rows of one chunk that are within reach."""
         row, column = np.nonzero(chunk.lower <= self._reach)
         pairs = column if chunk.pairs is None else chunk.pairs[column]
         part = LeastClearances(
@@ -100,18 +113,52 @@ class ClearanceCsv(_OwnFile):
             other_point=chunk.other_point[row, column],
         )
         self._written[pairs] = True
-        self._write(pairs, part)
+        self._table(pairs, part).tofile(self._file)
 
-    def write_least(self, least: LeastClearances) -> None:
-        """Write the least of every pair that has no row so far."""
-        rest = np.flatnonzero(~self._written)
+    def write(self, verification: Verification) -> None:
+        """Write the file: all rows so far, then one of every pair that has none.
+
+        A waypoint belongs to the interval that it begins, the last one to the last.
+
+        Args:
+            verification: Its least clearances, and what Coal measured.
+        """
+        n_pairs, coal = self._written.size, verification.coal or NOTHING_MEASURED
+        last = max(verification.trajectory.n_samples - 2, 0)
+        keys = np.minimum(coal.waypoint, last) * n_pairs + coal.pair
+        near, far = CoalIndex(coal, keys), CoalIndex(coal, coal.pair)
+        with self._path.open("wb") as file:
+            file.write(_CLEARANCE_HEADER.encode())
+            for rows in self._waiting():
+                numbers = rows[:, [0, 2]].astype(np.int64)
+                keys = numbers[:, 0] * n_pairs + numbers[:, 1] - len(_VERDICTS)
+                file.write(self._form.rows(np.hstack([rows, near.at(keys)])))
+            for pairs, rows in self._rest(verification.least):
+                file.write(self._form.rows(np.hstack([rows, far.at(pairs)])))
+
+    def _waiting(self) -> Iterator[FloatArray]:
+        """The rows that wait aside, in parts."""
+        self._file.seek(0)
+        while True:
+            table = np.fromfile(self._file, count=_CHUNK * _SPOOLED)
+            if not table.size:
+                return
+            yield table.reshape(-1, _SPOOLED)
+
+    def _rest(
+        self, least: LeastClearances | None
+    ) -> Iterator[tuple[IntArray, FloatArray]]:
+        """The pairs without a row, with the least clearance of each, in parts."""
+        rest = np.flatnonzero(~self._written) if least else np.zeros(0, np.int64)
         for first in range(0, rest.size, _CHUNK):
             pairs = rest[first : first + _CHUNK]
-            values = (getattr(least, one.name)[pairs] for one in fields(least))
-            self._write(pairs, LeastClearances(*values))
+            values = (
+                getattr(least, one.name)[pairs] for one in fields(LeastClearances)
+            )
+            yield pairs, self._table(pairs, LeastClearances(*values))
 
-    def _write(self, pairs: IntArray, rows: LeastClearances) -> None:
-        """Write rows, of which each has a pair."""
+    def _table(self, pairs: IntArray, rows: LeastClearances) -> FloatArray:
+        """Rows as numbers, of which each has a pair, shape (k, 12)."""
         columns = [
             rows.interval,
             rows.interval + rows.time,
@@ -124,8 +171,7 @@ class ClearanceCsv(_OwnFile):
             point @ self._rotation + self._shift
             for point in (rows.link_point, rows.other_point)
         ]
-        table = np.column_stack([*columns, *points]).astype(np.float64)
-        self._file.write(self._form.rows(table))
+        return np.column_stack([*columns, *points]).astype(np.float64)
 
 
 def write_link_angles(path: Path, verification: Verification) -> None:
@@ -144,17 +190,45 @@ def write_link_angles(path: Path, verification: Verification) -> None:
     _write_rows(path, header, 2, values, rows.n_samples)
 
 
-def write_cables(path: Path, verification: Verification) -> None:
-    """cables.csv: the 3N cable lengths at every row."""
-    rows, arm = verification.trajectory, verification.problem.manipulator
-    joints = range(1, rows.n_links + 1)
-    header = ["waypoint", *(f"l{j}{hole}_m" for j in joints for hole in _HOLES)]
+def write_centres(
+    path: Path,
+    problem: PlanningProblem,
+    rows: Trajectory,
+    centres: FloatArray | None = None,
+) -> None:
+    """centres.csv: the joint centres at every row, in the frame of the problem file.
+
+    Args:
+        path: The file.
+        problem: The arm, and the frame of the file.
+        rows: The motion.
+        centres: Its joint centres where they are planned, shape (n_samples, N + 1, 3);
+            from its angles otherwise; [m].
+    """
+    arm, pose = problem.manipulator, problem.T_world_base
+    header = [*NUMBER, *PLACE, *centre_columns(rows.n_links)]
 
     def values(part: slice) -> FloatArray:
-        lengths = cable_lengths(arm, rows.alpha[part], rows.theta[part])
-        return lengths.reshape(len(lengths), -1)
+        joints = rows.x0[part], rows.alpha[part], rows.theta[part]
+        own = joint_centres(arm, *joints) if centres is None else centres[part]
+        points = own @ pose[:3, :3].T + pose[:3, 3]
+        first = [rows.on_path[part], rows.path_m[part]]
+        return np.column_stack([*first, points.reshape(len(points), -1)])
 
-    _write_rows(path, header, 1, values, rows.n_samples)
+    _write_rows(path, header, 2, values, rows.n_samples)
+
+
+def write_cables(path: Path, problem: PlanningProblem, rows: Trajectory) -> None:
+    """cables.csv: the base position and the 3N cable lengths at every row."""
+    header = [*NUMBER, *PLACE, *cable_columns(rows.n_links)]
+
+    def values(part: slice) -> FloatArray:
+        angles = rows.alpha[part], rows.theta[part]
+        lengths = cable_lengths(problem.manipulator, *angles)
+        first = [rows.on_path[part], rows.path_m[part], rows.x0[part]]
+        return np.column_stack([*first, lengths.reshape(len(lengths), -1)])
+
+    _write_rows(path, header, 2, values, rows.n_samples)
 
 
 class SummaryCsv(_OwnFile):

@@ -34,6 +34,7 @@ from vdsm_pin.verification.coal_bodies import (
     distance_request,
     measure,
 )
+from vdsm_pin.verification.coal_log import CoalLog, rows_at
 from vdsm_pin.verification.records import Check, Verdict
 
 CHUNK_BOUNDS: Final = 1 << 17
@@ -85,6 +86,30 @@ class CoalDistances:
 
 
 @dataclass(frozen=True)
+class CoalScene:
+    """The obstacles, as the proof and as Coal see them.
+
+    Args:
+        pieces: Convex pieces for the proof's kernels.
+        bodies: Coal's, obstacle by obstacle.
+    """
+
+    pieces: PackedPieces
+    bodies: tuple[tuple[CoalBody, ...], ...]
+
+    @classmethod
+    def of(cls, problem: PlanningProblem, deadline: Deadline) -> "CoalScene":
+        """The obstacles of a problem.
+
+        Raises:
+            OutOfTime: If the time is over.
+        """
+        obstacles = problem.scene.obstacles
+        pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
+        return cls(pieces, tuple(_bodies_of(one, deadline) for one in obstacles))
+
+
+@dataclass(frozen=True)
 class ProvedLowers:
     """Proved lower bounds of the pairs over intervals, or else over the whole motion.
 
@@ -117,6 +142,7 @@ def check_coal(
     trajectory: Trajectory,
     proved: ProvedLowers | None = None,
     deadline: Deadline = NO_LIMIT,
+    log: CoalLog | None = None,
 ) -> tuple[Check, ...]:
     """Hold Coal's distances to the obstacles against the proved brackets.
 
@@ -127,6 +153,7 @@ def check_coal(
         proved: Proved lower bounds; Coal must not fall below them at either end of an
             interval.
         deadline: When to give up.
+        log: Asks for the closest approaches too, and keeps every answer.
 
     Returns:
         One row of evidence with the largest disagreement; none for an empty scene.
@@ -138,16 +165,12 @@ def check_coal(
     if not scene.obstacles:
         return ()
     count, worst, where, moment = 0, -np.inf, "", float("nan")
-    reach, travel = reach_of(problem), TOLERANCES.coal_travel
-    for found in coal_distances(robot, problem, trajectory, reach, travel, deadline):
-        excess = found.disagreement
-        if proved is not None:
-            excess = np.maximum(excess, _below_proof(found, proved, len(names)))
-        excess = np.where(np.isnan(excess), np.inf, excess)
+    answers = _answers(robot, problem, trajectory, proved, deadline, log)
+    for found, moments, excess in answers:
         count += excess.size
         k = int(np.argmax(excess))
         if excess[k] > worst:
-            worst, moment = float(excess[k]), float(found.waypoint[k])
+            worst, moment = float(excess[k]), float(moments[k])
             where = (
                 f"{names[found.link[k]]} and {scene.names[found.obstacle[k]]}: "
                 f"Coal {found.distance[k] * MM_PER_M:.6f} mm, "
@@ -170,6 +193,61 @@ def check_coal(
     return (check,)
 
 
+def _answers(
+    robot: RobotModel,
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    proved: ProvedLowers | None,
+    deadline: Deadline,
+    log: CoalLog | None,
+) -> Iterator[tuple[CoalDistances, FloatArray, FloatArray]]:
+    """What Coal measures, when (in waypoints), and how far it is off, (m,) each."""
+    scene, n_axes = CoalScene.of(problem, deadline), robot.manipulator.axis_radii.size
+    if log is not None:
+        near = log.asked(of_obstacles=True)
+        if near.size:
+            found, moments = _at_approaches(robot, problem, trajectory, scene, log)
+            log.keep_approaches(near, found.distance)
+            yield found, moments, _no_pass(found.disagreement)
+    reach, travel = reach_of(problem), TOLERANCES.coal_travel
+    for found in coal_distances(
+        robot, problem, trajectory, reach, travel, deadline, scene
+    ):
+        excess, pair = found.disagreement, found.obstacle * n_axes + found.link
+        if log is not None:
+            log.keep(found.waypoint, pair, found.distance)
+        if proved is not None:
+            excess = np.maximum(excess, _below_proof(found, proved, pair))
+        yield found, found.waypoint.astype(np.float64), _no_pass(excess)
+
+
+def _no_pass(excess: FloatArray) -> FloatArray:
+    """The same with infinity where there is no number."""
+    return np.where(np.isnan(excess), np.inf, excess)
+
+
+def _at_approaches(
+    robot: RobotModel,
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    scene: CoalScene,
+    log: CoalLog,
+) -> tuple[CoalDistances, FloatArray]:
+    """Distances at the closest approaches to obstacles, and their moments, (m,).
+
+    Their brackets are those of the configurations at these moments.
+    """
+    near = [log.approaches[k] for k in log.asked(of_obstacles=True)]
+    moments = np.array([one.moment for one in near])
+    bodies, names = problem.manipulator.axis_names, problem.scene.names
+    pairs = [
+        (k, bodies.index(one.pair.own), names.index(one.pair.obstacle))
+        for k, one in enumerate(near)
+    ]
+    rows = rows_at(trajectory, moments)
+    return _measured(robot, rows, scene, np.array(pairs)), moments
+
+
 def reach_of(problem: PlanningProblem) -> float:
     """Distance up to which pairs are measured at every row; [m].
 
@@ -185,6 +263,7 @@ def coal_distances(
     reach: float,
     travel: float = 0.0,
     deadline: Deadline = NO_LIMIT,
+    scene: CoalScene | None = None,
 ) -> Iterator[CoalDistances]:
     """Measure the pairs within reach, chunk by chunk, then every pair not yet seen.
 
@@ -196,6 +275,7 @@ def coal_distances(
         travel: Look at one row of each stretch in which the joint centres move by this
             much; 0 for every row; [m].
         deadline: When to give up.
+        scene: The obstacles, where they are there already.
 
     Yields:
         Distances in the order of the rows; last the pairs that were not measured, each
@@ -206,8 +286,7 @@ def coal_distances(
         OutOfTime: If the time is over.
     """
     arm, obstacles = problem.manipulator, problem.scene.obstacles
-    pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
-    bodies = [_bodies_of(obstacle, deadline) for obstacle in obstacles]
+    scene = scene or CoalScene.of(problem, deadline)
     least = np.full((arm.axis_radii.size, len(obstacles)), np.inf)
     nearest = np.zeros(least.shape, dtype=np.int64)
     seen = np.zeros(least.shape, dtype=np.bool_)
@@ -219,7 +298,7 @@ def coal_distances(
         joints = trajectory.x0[part], trajectory.alpha[part], trajectory.theta[part]
         centres = joint_centres(arm, *joints)
         axes = np.ascontiguousarray(arm.axes(centres))
-        bounds = coarse_bounds(pieces, axes, arm.axis_radii)
+        bounds = coarse_bounds(scene.pieces, axes, arm.axis_radii)
         here = np.argmin(bounds, axis=0)
         value = np.take_along_axis(bounds, here[None], axis=0)[0]
         nearer = value < least
@@ -230,7 +309,7 @@ def coal_distances(
         if close.size:
             close[:, 0] += first
             for some in in_turns(close, deadline):
-                yield _measured(robot, trajectory, pieces, bodies, some)
+                yield _measured(robot, trajectory, scene, some)
     if len(obstacles) > MANY:  # of the far ones the nearest link alone
         seen |= np.arange(len(least))[:, None] != np.argmin(least, axis=0)
     unseen = np.argwhere(~seen)
@@ -238,7 +317,7 @@ def coal_distances(
         rows = nearest[unseen[:, 0], unseen[:, 1]]
         far = np.column_stack([rows, unseen])
         for some in in_turns(far, deadline):
-            yield _measured(robot, trajectory, pieces, bodies, some)
+            yield _measured(robot, trajectory, scene, some)
 
 
 def _bodies_of(obstacle: Obstacle, deadline: Deadline) -> tuple[CoalBody, ...]:
@@ -285,8 +364,7 @@ class _Moved:
 def _measured(
     robot: RobotModel,
     trajectory: Trajectory,
-    pieces: PackedPieces,
-    bodies: list[tuple[CoalBody, ...]],
+    scene: CoalScene,
     pairs: IntArray,
 ) -> CoalDistances:
     """Ask both about (waypoint, link, obstacle) triples, shape (m, 3)."""
@@ -299,7 +377,7 @@ def _measured(
     ends = np.stack(
         [centres[row_of_pair, link], centres[row_of_pair, link + 1]], axis=1
     )
-    bounds = row_brackets(pieces, ends, obstacle, TOLERANCES.bracket_gap)
+    bounds = row_brackets(scene.pieces, ends, obstacle, TOLERANCES.bracket_gap)
     bounds -= arm.axis_radii[link, None]
     transforms = capsule_transforms(robot, poses, row_of_pair, link)
     request = distance_request()
@@ -307,7 +385,7 @@ def _measured(
     near, far = np.zeros((2, len(pairs), 3))
     for k, transform in enumerate(transforms):
         capsule = robot.capsules[link[k]]
-        found = measure(request, capsule, transform, bodies[obstacle[k]])
+        found = measure(request, capsule, transform, scene.bodies[obstacle[k]])
         distance[k], near[k], far[k] = found.distance, found.near, found.far
     return CoalDistances(
         pairs[:, 0], link, obstacle, distance, bounds[:, 0], bounds[:, 1], near, far
@@ -330,8 +408,10 @@ def capsule_transforms(
     return (coal.Transform3s(R, p) for R, p in zip(turned, shifted, strict=True))
 
 
-def _below_proof(found: CoalDistances, proved: ProvedLowers, n_axes: int) -> FloatArray:
+def _below_proof(
+    found: CoalDistances, proved: ProvedLowers, pair: IntArray
+) -> FloatArray:
     """By how much Coal falls below what was proved over the intervals at a row; [m]."""
-    bound = proved.at(found.waypoint, found.obstacle * n_axes + found.link)
+    bound = proved.at(found.waypoint, pair)
     # Where bodies meet only the sign counts.
     return np.asarray(bound - np.maximum(found.distance, 0.0))

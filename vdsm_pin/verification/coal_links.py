@@ -21,7 +21,9 @@ from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.coal_bodies import CoalBody, distance_request, measure
 from vdsm_pin.verification.coal_clearance import capsule_transforms, in_turns
+from vdsm_pin.verification.coal_log import CoalLog, rows_at
 from vdsm_pin.verification.records import Check, Verdict
+from vdsm_pin.verification.task import PairTable
 
 CHUNK_GAPS: Final = 1 << 20
 """Gaps held in memory at a time: rows times links times links."""
@@ -63,6 +65,7 @@ def check_coal_links(
     problem: PlanningProblem,
     trajectory: Trajectory,
     deadline: Deadline = NO_LIMIT,
+    log: CoalLog | None = None,
 ) -> tuple[Check, ...]:
     """Hold Coal's distances between links two or more apart against the closed form.
 
@@ -71,6 +74,7 @@ def check_coal_links(
         problem: Names the arm and the required self-clearance.
         trajectory: What is judged.
         deadline: When to give up.
+        log: Asks for the closest approaches too, and keeps every answer.
 
     Returns:
         One row of evidence with the largest disagreement; none for an arm of two links.
@@ -80,19 +84,17 @@ def check_coal_links(
     Raises:
         OutOfTime: If the time is over.
     """
-    arm = problem.manipulator
-    n_axes, names = arm.axis_radii.size, arm.axis_names
-    n_pairs = (n_axes - 1) * (n_axes - 2) // 2
+    names = problem.manipulator.axis_names
+    n_pairs = (len(names) - 1) * (len(names) - 2) // 2
     if n_pairs == 0:
         return ()
-    reach = problem.required_self_clearance + arm.most_radius
     count, worst, where, moment = 0, -np.inf, "", float("nan")
-    for found in link_distances(robot, trajectory, reach, deadline):
+    for found, moments in _answers(robot, problem, trajectory, deadline, log):
         excess = np.where(np.isnan(found.disagreement), np.inf, found.disagreement)
         count += excess.size
         k = int(np.argmax(excess))
         if excess[k] > worst:
-            worst, moment = float(excess[k]), float(found.waypoint[k])
+            worst, moment = float(excess[k]), float(moments[k])
             where = (
                 f"{names[found.link[k]]} and {names[found.other[k]]}: "
                 f"Coal {found.distance[k] * MM_PER_M:.6f} mm, "
@@ -111,6 +113,59 @@ def check_coal_links(
         moment=moment,
     )
     return (check,)
+
+
+def _answers(
+    robot: RobotModel,
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    deadline: Deadline,
+    log: CoalLog | None,
+) -> Iterator[tuple[LinkDistances, FloatArray]]:
+    """What Coal measures, and when, in waypoints, shape (m,)."""
+    if log is not None:
+        near = log.asked(of_obstacles=False)
+        if near.size:
+            found, moments = _at_approaches(robot, trajectory, log)
+            log.keep_approaches(near, found.distance)
+            yield found, moments
+    reach = problem.required_self_clearance + robot.manipulator.most_radius
+    numbers = _pair_numbers(problem)
+    for found in link_distances(robot, trajectory, reach, deadline):
+        pair = numbers[found.link, found.other]
+        if log is not None:
+            held = pair >= 0
+            log.keep(found.waypoint[held], pair[held], found.distance[held])
+        yield found, found.waypoint.astype(np.float64)
+
+
+def _pair_numbers(problem: PlanningProblem) -> IntArray:
+    """Numbers of the pairs of axes, as they are judged; below 0 where they are not."""
+    table, n_axes = PairTable(problem), problem.manipulator.axis_radii.size
+    numbers = np.full((n_axes, n_axes), -1)
+    for number, (one, other) in enumerate(table.between.held, start=len(table.outer)):
+        if max(one, other) < n_axes:
+            numbers[[one, other], [other, one]] = number
+    return numbers
+
+
+def _at_approaches(
+    robot: RobotModel, trajectory: Trajectory, log: CoalLog
+) -> tuple[LinkDistances, FloatArray]:
+    """Distances at the closest approaches of links, and their moments, (m,)."""
+    arm = robot.manipulator
+    near = [log.approaches[k] for k in log.asked(of_obstacles=False)]
+    moments, names = np.array([one.moment for one in near]), arm.axis_names
+    pairs = np.array(
+        [
+            (k, *sorted((names.index(one.pair.own), names.index(one.pair.label))))
+            for k, one in enumerate(near)
+        ]
+    )
+    rows = rows_at(trajectory, moments)
+    centres = joint_centres(arm, rows.x0, rows.alpha, rows.theta)
+    gaps = link_gaps(np.ascontiguousarray(arm.axes(centres)), arm.axis_radii)
+    return _measured(robot, rows, pairs, gaps[tuple(pairs.T)]), moments
 
 
 def link_distances(

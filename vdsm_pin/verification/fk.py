@@ -1,9 +1,11 @@
 """Forward kinematics by two roads: Pinocchio on the URDF against the closed form."""
 
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
 
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import RobotModel
@@ -19,6 +21,9 @@ CHUNK: Final = 4096
 NAME: Final = "joint centres by Pinocchio against the closed form"
 """Name of the row."""
 
+PLANNED: Final = "joint centres by Pinocchio against the planned ones"
+"""Name of the row about the centres that the angles were solved from."""
+
 
 def check_fk(
     robot: RobotModel,
@@ -26,7 +31,7 @@ def check_fk(
     trajectory: Trajectory,
     deadline: Deadline = NO_LIMIT,
 ) -> Check:
-    """Compare every joint centre of every row.
+    """Compare every joint centre of every row with the closed form.
 
     Args:
         robot: The arm in Pinocchio.
@@ -42,13 +47,53 @@ def check_fk(
     Raises:
         OutOfTime: If the time is over.
     """
+    arm = problem.manipulator
+
+    def closed_form(rows: slice) -> FloatArray:
+        values = trajectory.x0[rows], trajectory.alpha[rows], trajectory.theta[rows]
+        return joint_centres(arm, *values)
+
+    return _compared(NAME, robot, trajectory, closed_form, deadline)
+
+
+def check_planned(
+    robot: RobotModel,
+    trajectory: Trajectory,
+    centres: FloatArray,
+    deadline: Deadline = NO_LIMIT,
+) -> Check:
+    """Compare every joint centre of every row with the one that was planned.
+
+    Args:
+        robot: The arm in Pinocchio.
+        trajectory: The angles that were solved from the centres.
+        centres: Joint centres of Step 6, shape (n_samples, N + 1, 3); [m].
+        deadline: When to give up.
+
+    Returns:
+        The largest distance between the two, in metres.
+
+    Raises:
+        OutOfTime: If the time is over.
+    """
+    return _compared(PLANNED, robot, trajectory, lambda rows: centres[rows], deadline)
+
+
+def _compared(
+    name: str,
+    robot: RobotModel,
+    trajectory: Trajectory,
+    expected: Callable[[slice], FloatArray],
+    deadline: Deadline,
+) -> Check:
+    """Hold Pinocchio's joint centres against others, some rows at a time."""
     worst, row, joint = -np.inf, 0, 0
     for first in range(0, trajectory.n_samples, CHUNK):
         deadline.check()
         part = slice(first, first + CHUNK)
         joints = trajectory.x0[part], trajectory.alpha[part], trajectory.theta[part]
-        planned = joint_centres(problem.manipulator, *joints)
-        residual = np.linalg.norm(robot.joint_centres(*joints) - planned, axis=2)
+        found = robot.joint_centres(*joints)
+        residual = np.linalg.norm(found - expected(part), axis=2)
         residual[np.isnan(residual)] = np.inf
         here, centre = np.unravel_index(int(np.argmax(residual)), residual.shape)
         if residual[here, centre] > worst:
@@ -56,9 +101,9 @@ def check_fk(
             row, joint = first + int(here), int(centre)
     passed = worst <= TOLERANCES.joint_centre
     return Check(
-        name=NAME,
+        name=name,
         verdict=Verdict.CERTIFIED if passed else Verdict.REFUTED,
-        count=trajectory.n_samples * (problem.manipulator.n_links + 1),
+        count=trajectory.n_samples * (trajectory.n_links + 1),
         worst=worst,
         limit=TOLERANCES.joint_centre,
         unit="m",

@@ -12,6 +12,7 @@ from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import in_mm
+from vdsm_pin.verification.coal_rows import CoalRows
 
 
 class Verdict(StrEnum):
@@ -141,6 +142,8 @@ class ClosestApproach:
         other_point: Witness on the partner's surface, base frame, shape (3,); [m].
         deeper: Whether the link's axis meets the partner: what is measured of such a
             depth is the link's radius, and it may be deeper.
+        coal: Coal's distance at that time; NaN where it was not asked, -inf where its
+            answer is unusable; [m].
     """
 
     interval: int
@@ -152,6 +155,7 @@ class ClosestApproach:
     link_point: FloatArray
     other_point: FloatArray
     deeper: bool = False
+    coal: float = nan
 
     @property
     def moment(self) -> float:
@@ -295,6 +299,7 @@ class Verification(Summarised):
             in words, one thing each.
         time_limit: How long all of it was allowed to take; [s].
         least: The least clearance of every pair; None where nobody worked it out.
+        coal: What Coal measured; None where it was not asked.
     """
 
     problem: PlanningProblem
@@ -313,6 +318,7 @@ class Verification(Summarised):
     not_done: tuple[str, ...] = ()
     time_limit: float = float("inf")
     least: LeastClearances | None = None
+    coal: CoalRows | None = None
 
     @property
     def verdict(self) -> Verdict:

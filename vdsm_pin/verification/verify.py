@@ -25,6 +25,7 @@ from vdsm_pin.verification.clearance import (
     prove_clearance,
 )
 from vdsm_pin.verification.clearance_check import check_clearance
+from vdsm_pin.verification.coal_log import CoalLog
 from vdsm_pin.verification.counterexample import find_counterexamples
 from vdsm_pin.verification.enclosed import (
     EnclosedSink,
@@ -75,6 +76,7 @@ def verify(
     joint_error: bool = False,
     deadline: Deadline = NO_LIMIT,
     reach: float | None = None,
+    centres: FloatArray | None = None,
 ) -> Verification:
     """Judge a trajectory against a problem.
 
@@ -88,6 +90,8 @@ def verify(
         deadline: When to give up what is left.
         reach: The sinks hear of obstacles within it, see `prove_clearance`; as far as
             Coal looks where not given; [m].
+        centres: The joint centres that were planned, to be held against Pinocchio's,
+            shape (n_samples, N + 1, 3); [m].
 
     Returns:
         All rows of evidence. A check that could not be carried out, or not in time, is
@@ -124,16 +128,17 @@ def verify(
     if sinks and proof.sent < proof.n_intervals:
         besides.note(f"clearance.csv from interval {proof.sent} on", deadline)
     tip = check_tip(problem, trajectory)
-    proved = kept.proved(proof)
+    near_misses = closest_approaches(problem, trajectory, proof, around)
+    proved, log = kept.proved(proof), CoalLog(proof.pairs, near_misses, around)
     checks = [
-        *_guarded(fk.NAME, lambda: fk.check_fk(robot, problem, trajectory, deadline)),
+        *_by_pinocchio(robot, problem, trajectory, centres, deadline),
         *check_limits(problem, trajectory),
         *tip.checks,
         *check_inside(located),
         *enclosed_checks(
             check_clearance(problem, proof, found, contacts, deadline), problem, around
         ),
-        *_by_coal(robot, problem, trajectory, proved, deadline),
+        *_by_coal(robot, problem, trajectory, proved, deadline, log),
         *_guarded(
             cable_check.NAME,
             lambda: cable_check.check_cables(problem, trajectory, deadline),
@@ -155,7 +160,7 @@ def verify(
         errors=box,
         pairs=proof.pairs,
         checks=tuple(checks),
-        approaches=closest_approaches(problem, trajectory, proof, around),
+        approaches=log.approaches,
         profile=enclosed_profile(proof.profile, problem, around),
         tip_deviation=tip.deviation,
         coverage=tip.coverage,
@@ -166,6 +171,7 @@ def verify(
         not_done=tuple(besides.not_done),
         time_limit=deadline.limit,
         least=enclosed_least(least_clearances(proof), proof.pairs, problem, around),
+        coal=log.rows(),
     )
 
 
@@ -220,24 +226,44 @@ class _Besides:
         self.not_done.append(f"{name}: {OutOfTime(deadline.limit)}")
 
 
+def _by_pinocchio(
+    robot: RobotModel,
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    centres: FloatArray | None,
+    deadline: Deadline,
+) -> tuple[Check, ...]:
+    """Joint centres against the closed form, and against those planned."""
+    rows = _guarded(fk.NAME, lambda: fk.check_fk(robot, problem, trajectory, deadline))
+    if centres is None:
+        return rows
+    planned = _guarded(
+        fk.PLANNED, lambda: fk.check_planned(robot, trajectory, centres, deadline)
+    )
+    return (*rows, *planned)
+
+
 def _by_coal(
     robot: RobotModel,
     problem: PlanningProblem,
     trajectory: Trajectory,
     proved: coal_clearance.ProvedLowers,
     deadline: Deadline,
+    log: CoalLog,
 ) -> tuple[Check, ...]:
     """The second opinions on distances."""
     return (
         *_guarded(
             coal_clearance.NAME,
             lambda: coal_clearance.check_coal(
-                robot, problem, trajectory, proved, deadline
+                robot, problem, trajectory, proved, deadline, log
             ),
         ),
         *_guarded(
             coal_links.NAME,
-            lambda: coal_links.check_coal_links(robot, problem, trajectory, deadline),
+            lambda: coal_links.check_coal_links(
+                robot, problem, trajectory, deadline, log
+            ),
         ),
     )
 

@@ -1,0 +1,159 @@
+"""centres.csv and cables.csv: waypoints in other coordinates than joint angles.
+
+    waypoint,on_path,path_m,o1_x_m,o1_y_m,o1_z_m,..,o{N+1}_z_m
+    waypoint,on_path,path_m,x0_m,l1a_m,l1b_m,l1c_m,..,lNc_m
+
+Points are in the frame of the problem file. A file of another program may leave
+`on_path` and `path_m` out: its waypoints then claim to draw nothing.
+"""
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.cables import angles_from_cables
+from vdsm_pin.errors import InconsistentCables, InvalidFile, LinkTooShort
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.io.source import check_is_file
+from vdsm_pin.io.tables import Table, open_text
+from vdsm_pin.kinematics import joint_angles
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import MAX_ROWS, Trajectory
+from vdsm_pin.units import MM_PER_M
+
+NUMBER: Final = ("waypoint",)
+PLACE: Final = ("on_path", "path_m")
+HOLES: Final = "abc"
+
+
+def centre_columns(n_links: int) -> tuple[str, ...]:
+    """Names of the columns of the joint centres of an arm of N links."""
+    return tuple(f"o{i}_{x}_m" for i in range(1, n_links + 2) for x in "xyz")
+
+
+def cable_columns(n_links: int) -> tuple[str, ...]:
+    """Names of the columns of the base position and of the cables of N links."""
+    cables = (f"l{j}{hole}_m" for j in range(1, n_links + 1) for hole in HOLES)
+    return ("x0_m", *cables)
+
+
+def read_centres(path: Path, problem: PlanningProblem) -> Trajectory:
+    """The motion whose joint centres stand in a file (Eq. 11-15).
+
+    Args:
+        path: The CSV file.
+        problem: The arm, and the frame of the file.
+
+    Raises:
+        InvalidFile: If the file breaks its contract, two centres are not one link
+            apart, or the first one is not on the rail. Names the line.
+    """
+    arm, pose = problem.manipulator, problem.T_world_base
+    table = _read(path, centre_columns(arm.n_links))
+    points = table[:, 3:].reshape(len(table), arm.n_links + 1, 3)
+    centres = np.ascontiguousarray((points - pose[:3, 3]) @ pose[:3, :3])
+    off = np.hypot(centres[:, 0, 1], centres[:, 0, 2])
+    row = int(np.argmax(off))
+    if not off[row] <= TOLERANCES.joint_centre:
+        away = f"{off[row] * MM_PER_M:.3g} mm"
+        raise _bad_row(path, row, f"o1 is {away} off the rail, expected on it")
+    try:
+        alpha, theta = joint_angles(arm, centres)
+    except LinkTooShort as error:
+        gap, length = error.gap * MM_PER_M, error.length * MM_PER_M
+        problem_said = (
+            f"o{error.link} and o{error.link + 1} are {gap:.6f} mm apart, expected the "
+            f"length of link {error.link}, {length:.6f} mm"
+        )
+        raise _bad_row(path, error.waypoint, problem_said) from None
+    return _motion(table, centres[:, 0, 0], alpha, theta)
+
+
+def read_cables(path: Path, problem: PlanningProblem) -> Trajectory:
+    """The motion whose cable lengths stand in a file (Eq. 16-21 inverted).
+
+    Args:
+        path: The CSV file.
+        problem: The arm with its cable holes.
+
+    Raises:
+        InvalidFile: If the file breaks its contract or lengths fit no angles. Names
+            the line.
+    """
+    arm = problem.manipulator
+    table = _read(path, cable_columns(arm.n_links))
+    lengths = table[:, 4:].reshape(len(table), arm.n_links, 3)
+    try:
+        alpha, theta = angles_from_cables(arm, np.ascontiguousarray(lengths))
+    except InconsistentCables as error:
+        problem_said = (
+            f"the cable lengths of link {error.link} fit no joint angles; the nearest "
+            f"leave {error.residual * MM_PER_M:.3g} mm, expected "
+            f"{error.tolerance * MM_PER_M:.1e} mm at most"
+        )
+        raise _bad_row(path, error.waypoint, problem_said) from None
+    return _motion(table, table[:, 3], alpha, theta)
+
+
+def _read(path: Path, columns: tuple[str, ...]) -> FloatArray:
+    """All rows: waypoint, on_path, path_m, then the columns, shape (n, 3 + m).
+
+    Raises:
+        InvalidFile: If the file breaks its contract.
+    """
+    check_is_file(path)
+    try:
+        with open_text(path) as text:
+            missing = set(PLACE) - set(Table(path, text, (*NUMBER, *columns)).ignored)
+        places = () if len(missing) == len(PLACE) else PLACE
+        with open_text(path) as text:
+            table = Table(path, text, (*NUMBER, *places, *columns))
+            parts = list(_bounded(path, table))
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InvalidFile(file=path, problem=f"cannot be read: {reason}") from None
+    if not parts:
+        raise InvalidFile(file=path, problem="has no row")
+    rows = np.concatenate(parts)
+    if not places:
+        rows = np.insert(rows, [1, 1], 0.0, axis=1)
+    _check(path, np.diff(rows[:, 0], prepend=-1.0) > 0.0, "waypoint does not rise")
+    on_path = (rows[:, 1] == 0.0) | (rows[:, 1] == 1.0)
+    _check(path, on_path, "on_path is neither 0 nor 1")
+    most = TOLERANCES.path_extent
+    along = (rows[:, 2] >= 0.0) & (rows[:, 2] <= most)
+    _check(path, along, f"path_m is not 0 to {most:g} m")
+    extent = TOLERANCES.scene_extent
+    near = np.abs(rows[:, 3:]).max(axis=1) <= extent
+    _check(path, near, f"a length is beyond {extent:g} m; is it in millimetres?")
+    return rows
+
+
+def _bounded(path: Path, table: Table) -> list[FloatArray]:
+    parts, count = [], 0
+    for rows in table.rows():
+        count += len(rows)
+        if count > MAX_ROWS:
+            raise InvalidFile(file=path, problem=f"has more than {MAX_ROWS} rows")
+        parts.append(rows)
+    return parts
+
+
+def _check(path: Path, good: BoolArray, problem: str) -> None:
+    if not good.all():
+        raise _bad_row(path, int(np.argmin(good)), problem)
+
+
+def _bad_row(path: Path, row: int, problem: str) -> InvalidFile:
+    return InvalidFile(file=path, where=f"line {row + 2}", problem=problem)
+
+
+def _motion(
+    table: FloatArray,
+    x0: FloatArray,
+    alpha: FloatArray,
+    theta: FloatArray,
+) -> Trajectory:
+    return Trajectory(table[:, 1] != 0.0, table[:, 2], x0, alpha, theta)

@@ -1,0 +1,91 @@
+"""What Coal is asked besides its rows, and all that it answers."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.manipulator import TOOL
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.coal_rows import CoalRows
+from vdsm_pin.verification.records import ClosestApproach, Pair
+
+
+class CoalLog:
+    """What Coal is asked besides, and all that it answers.
+
+    Args:
+        pairs: Every pair that is judged.
+        approaches: The closest approaches, measured at their moments.
+        around: Names of the meshes around the arm: Coal knows their surface alone, so
+            its distance is no clearance and is not kept.
+    """
+
+    def __init__(
+        self,
+        pairs: Sequence[Pair],
+        approaches: Sequence[ClosestApproach],
+        around: Sequence[str],
+    ) -> None:
+        self.approaches = tuple(approaches)
+        self._around = tuple(around)
+        names = np.array([pair.obstacle for pair in pairs])
+        self._surfaces = np.flatnonzero(np.isin(names, around))
+        self._parts: list[tuple[IntArray, IntArray, FloatArray]] = []
+
+    def keep(self, waypoint: IntArray, pair: IntArray, distance: FloatArray) -> None:
+        """Receive distances of pairs, by their numbers, at waypoints."""
+        usable = np.where(np.isfinite(distance), distance, np.nan)
+        wanted = ~np.isin(pair, self._surfaces)
+        self._parts.append((waypoint[wanted], pair[wanted], usable[wanted]))
+
+    def asked(self, of_obstacles: bool) -> IntArray:
+        """Numbers of the approaches to obstacles, or else between links."""
+        return np.array(
+            [
+                k
+                for k, near in enumerate(self.approaches)
+                if bool(near.pair.obstacle) == of_obstacles
+                and near.pair.obstacle not in self._around
+                and {near.pair.body, near.pair.other_body} <= {"", TOOL}
+            ],
+            dtype=np.int64,
+        )
+
+    def keep_approaches(self, numbers: IntArray, distance: FloatArray) -> None:
+        """Receive the distances at some approaches."""
+        changed = list(self.approaches)
+        for k, value in zip(numbers.tolist(), distance.tolist(), strict=True):
+            changed[k] = replace(changed[k], coal=value)
+        self.approaches = tuple(changed)
+
+    def rows(self) -> CoalRows:
+        """All distances at waypoints, in the order in which they came."""
+        none = np.zeros(0, np.int64)
+        parts = [*self._parts, (none, none, np.zeros(0))]
+        waypoint, pair, distance = (
+            np.concatenate(one) for one in zip(*parts, strict=True)
+        )
+        return CoalRows(
+            frozen(waypoint, np.int64), frozen(pair, np.int64), frozen(distance)
+        )
+
+
+def rows_at(trajectory: Trajectory, moments: FloatArray) -> Trajectory:
+    """The motion at some moments, in waypoints, shape (m,)."""
+    before = np.minimum(moments.astype(np.int64), trajectory.n_samples - 1)
+    after = np.minimum(before + 1, trajectory.n_samples - 1)
+    share = moments - before
+
+    def between(rows: FloatArray) -> FloatArray:
+        part = share.reshape(-1, *[1] * (rows.ndim - 1))
+        return np.asarray(rows[before] + part * (rows[after] - rows[before]))
+
+    return Trajectory(
+        trajectory.on_path[before],
+        trajectory.path_m[before],
+        between(trajectory.x0),
+        between(trajectory.alpha),
+        between(trajectory.theta),
+    )
