@@ -311,7 +311,7 @@ def test_a_start_and_a_goal_are_judged(tmp_path: Path) -> None:
     for asked in (tip, whole):
         assert refused_or_not(tmp_path, asked, [0.0, 0.2], [0.0, 0.0]) == ""
         found = refused_or_not(tmp_path, asked, [2e-6, 0.2], [0.0, 0.0])
-        assert "2e-06 m off its start" in found
+        assert "0.002 mm off its start" in found
         found = refused_or_not(tmp_path, asked, [0.0, 0.1, 0.2 + 2e-6], [0.0] * 3)
         assert found.startswith("interval 1: the tip is")
         assert "m off its goal" in found
@@ -325,7 +325,7 @@ def test_a_start_and_a_goal_are_judged(tmp_path: Path) -> None:
 def test_what_is_drawn_backwards_is_rejected(tmp_path: Path) -> None:
     x0, station = [0.0, 0.1, 0.05, 0.3], [0.0, 0.1, 0.05, 0.3]
     found = refused_or_not(tmp_path, STRAIGHT, x0, station)
-    assert found == "interval 1: the path is drawn 0.05 m backwards"
+    assert found == "interval 1: the path is drawn 50 mm backwards"
     free = STRAIGHT | {"tip_path": STRAIGHT["tip_path"] | {"order": "free"}}
     assert refused_or_not(tmp_path, free, x0, station) == ""
     # Left in between and drawn on behind what is drawn.
@@ -335,7 +335,7 @@ def test_what_is_drawn_backwards_is_rejected(tmp_path: Path) -> None:
         [1, 1, 0, 1, 1],
     )
     found = refused_or_not(tmp_path, STRAIGHT, x0, station, on)
-    assert found == "interval 2: the path is drawn 0.2 m backwards"
+    assert found == "interval 2: the path is drawn 200 mm backwards"
 
 
 def test_a_limit_of_the_change_per_row_is_judged(tmp_path: Path) -> None:
@@ -348,7 +348,7 @@ def test_a_limit_of_the_change_per_row_is_judged(tmp_path: Path) -> None:
         if good:
             assert judge(case).accepted
         else:
-            assert "a joint turns by 0.0523" in refused(case)
+            assert "a joint turns by 3 deg" in refused(case)
 
 
 @pytest.mark.parametrize("closed", [False, True])

@@ -6,7 +6,18 @@ import shapely
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.convex import Hull
-from vdsm_pin.scene import Box, Capsule, Mesh, Prism, Scene, Sphere
+from vdsm_pin.scene import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Obstacle,
+    Prism,
+    Scene,
+    Sphere,
+    with_hulls,
+)
 
 EYE = np.eye(3)
 L_SHAPE = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 3], [0, 3]]
@@ -20,6 +31,55 @@ def test_duplicate_names_are_refused() -> None:
     ball = Sphere("a", np.zeros(3), 1.0)
     with pytest.raises(InvalidInput, match="'a'"):
         Scene((ball, ball))
+
+
+UP = np.array([0.0, 0.0, 1.0])
+FAR = np.array([60.0, 79.0, 0.0])  # 99.2 m away
+
+
+@pytest.mark.parametrize(
+    ("inside", "outside"),
+    [
+        (Sphere("a", FAR, 0.79), Sphere("a", FAR, 0.81)),
+        (
+            Capsule("a", 0.0 * FAR, UP, 99.0, 0.9),
+            Capsule("a", 0.0 * FAR, UP, 99.0, 1.1),
+        ),
+        (Cylinder("a", FAR, UP, 9.0, 0.3), Cylinder("a", FAR, UP, 15.0, 0.3)),
+        (Box("a", FAR, EYE, np.full(3, 0.45)), Box("a", FAR, EYE, np.full(3, 0.47))),
+        (
+            Prism("a", FAR, EYE, np.array([[0, 0], [0.1, 0], [0, 0.1]]), (0.0, 11.0)),
+            Prism("a", FAR, EYE, np.array([[0, 0], [0.1, 0], [0, 0.1]]), (-14.0, 0.0)),
+        ),
+        (HalfSpace("a", 100 * UP, UP), HalfSpace("a", 100.1 * UP, UP)),
+        (
+            Mesh("a", np.array([FAR, -UP, UP]), np.array([[0, 1, 2]])),
+            Mesh("a", np.array([FAR, -101 * UP, UP]), np.array([[0, 1, 2]])),
+        ),
+    ],
+    ids=["sphere", "capsule", "cylinder", "box", "prism", "half-space", "mesh"],
+)
+def test_a_scene_reaches_as_far_as_distances_are_proved(
+    inside: Obstacle, outside: Obstacle
+) -> None:
+    assert Scene((inside,)).names == ("a",)
+    with pytest.raises(InvalidInput, match=r"'a' reaches 1\d\d.* m from the base"):
+        Scene((outside,))
+
+
+def test_the_hull_of_a_mesh_is_that_of_its_triangles() -> None:
+    rng = np.random.default_rng(0)
+    vertices = np.vstack([rng.normal(size=(30, 3)), np.full((1, 3), 50.0)])
+    mesh = Mesh("a", vertices, rng.integers(0, 30, (60, 3)))
+    scene = Scene((mesh, Sphere("b", np.zeros(3), 1.0)))
+    cover, ball = with_hulls(scene, ["a", "b"]).obstacles
+    assert (cover.name, ball) == ("a", scene.obstacles[1])
+    (hull,) = cover.pieces
+    used = vertices[np.unique(mesh.triangles)]
+    for n in rng.normal(size=(50, 3)):
+        assert (hull.points @ n).max() == (used @ n).max()
+    assert len(hull.points) == len(used)
+    assert with_hulls(scene, ["b"]).obstacles == scene.obstacles
 
 
 @pytest.mark.parametrize("radius", [0.0, -1.0, np.nan, np.inf])

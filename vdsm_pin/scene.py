@@ -4,6 +4,7 @@ Everything that measures a distance works on pieces (`geometry/convex.py`). A me
 one hull per triangle plus, where they close (`geometry/closed_meshes.py`), an inside.
 """
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,6 +22,7 @@ from vdsm_pin.geometry.convex import (
     Piece,
     Triangles,
 )
+from vdsm_pin.tolerances import TOLERANCES
 
 if TYPE_CHECKING:  # it brings compiled code, for which readers need not wait
     from vdsm_pin.geometry.pieces import PackedPieces
@@ -336,21 +338,61 @@ class ConvexCover:
 Obstacle: TypeAlias = Sphere | Capsule | Cylinder | Box | Prism | HalfSpace | Mesh
 
 
+def reach_of(obstacle: Obstacle | ConvexCover) -> float:
+    """Largest distance of a solid's stated points from the base's origin; [m].
+
+    Not below that of its own points; of a half-space that of the stated point alone.
+    """
+    match obstacle:
+        case HalfSpace():
+            return math.hypot(*obstacle.point.tolist())
+        case Sphere():
+            return math.hypot(*obstacle.centre.tolist()) + obstacle.radius
+        case Box():
+            half = math.hypot(*obstacle.half_size.tolist())
+            return math.hypot(*obstacle.centre.tolist()) + half
+        case Cylinder() | Capsule():
+            arm, grown = obstacle.half_length * obstacle.axis, obstacle.radius
+            points = np.array([obstacle.centre + arm, obstacle.centre - arm])
+        case Prism():
+            corners = np.repeat(obstacle.polygon, 2, axis=0)
+            ends = np.tile(np.array(obstacle.span), len(obstacle.polygon))
+            section = np.column_stack([corners, ends])
+            points, grown = obstacle.origin + section @ obstacle.rotation.T, 0.0
+        case Mesh():
+            points, grown = obstacle.vertices, 0.0
+        case _:
+            hulls = [piece for piece in obstacle.pieces if isinstance(piece, Hull)]
+            return max((_reach_of_hull(hull) for hull in hulls), default=0.0)
+    return float(np.linalg.norm(points, axis=1).max()) + grown
+
+
+def _reach_of_hull(hull: Hull) -> float:
+    return float(np.linalg.norm(hull.points, axis=1).max()) + hull.radius
+
+
 @dataclass(frozen=True)
 class Scene:
     """All obstacles of one problem, in the base frame.
 
     Args:
-        obstacles: Any number, names unique.
+        obstacles: Any number, names unique, within `TOLERANCES.scene_extent`.
 
     Raises:
-        InvalidInput: If two share a name.
+        InvalidInput: If two share a name, or one is too far from the base.
     """
 
     obstacles: tuple[Obstacle, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse duplicate names."""
+        """Refuse duplicate names, and what distances are not proved for."""
+        for obstacle in self.obstacles:
+            if not (reach := reach_of(obstacle)) <= TOLERANCES.scene_extent:
+                message = (
+                    f"obstacle {obstacle.name!r} reaches {reach:.6g} m from the base, "
+                    f"expected at most {TOLERANCES.scene_extent:g} m"
+                )
+                raise InvalidInput(message)
         seen: set[str] = set()
         for name in self.names:
             if name in seen:

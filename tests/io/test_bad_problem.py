@@ -90,7 +90,7 @@ ONE_VALUE: list[tuple[tuple[Any, ...], Any, str]] = [
         "radius (line 13): is [200], expected a number",
     ),
     (("obstacles", 0, "radius"), 1e13, "is 10000000000000.0, expected 1e+12 or less"),
-    (("obstacles", 0, "radius"), 1e-321, "obstacles[0] (line 6): obstacle 'pillar': r"),
+    (("obstacles", 0, "radius"), 1e-321, "is 1e-321, expected 1e-12 or more"),
     (("obstacles", 0, "length"), 9e6, "'pillar' reaches 4.50176e+06 mm from the base"),
     (
         ("obstacles", 0, "center", 1),
@@ -134,7 +134,8 @@ ONE_VALUE: list[tuple[tuple[Any, ...], Any, str]] = [
         0.001,
         "cuts 6200 mm of path into more than 5000000 rows",
     ),
-    (("tip_path", "spacing"), 1e-300, "more than 5000000 rows"),
+    (("tip_path", "spacing"), 1e-300, "is 1e-300, expected 1e-12 or more"),
+    (("tip_path", "spacing"), 1e-9, "more than 5000000 rows"),
     (("tip_path", "retreat"), -1, "retreat (line 39): is -1, expected 0 or more"),
     (("tip_path", "approach"), "no", "expected 'shortest', 'equidistant' or 'nearest_"),
     (("tip_path", "blocked"), True, "blocked (line 40): is true, expected 'detour' or"),

@@ -14,7 +14,7 @@ from vdsm_pin.scene import Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Scene, 
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.hasty import is_certified
-from vdsm_pin.verification.inside import check_inside, locate_arm
+from vdsm_pin.verification.inside import check_inside, locate_start
 from vdsm_pin.verification.records import ClearanceChunk, ErrorBox, Verdict
 from vdsm_pin.verification.verify import verify
 
@@ -229,7 +229,7 @@ def test_an_arm_inside_a_closed_mesh_is_refuted() -> None:
         problem = problem_with(cube(half, centre))
         proof, _ = prove(problem, still)
         assert proof.counts[:, 0].sum() == proof.counts.sum()
-        (check,) = check_inside(locate_arm(problem, still))
+        (check,) = check_inside(locate_start(problem, still))
         assert check.verdict is verdict
 
 
@@ -237,7 +237,7 @@ def test_a_mesh_said_to_be_a_surface_is_judged_as_one_and_the_row_says_so() -> N
     still = trajectory(np.zeros(1), np.zeros((1, 8)), np.zeros((1, 8)))
     mesh = replace(cube(5.0, np.zeros(3)), solid=False)
     problem = problem_with(mesh)
-    assert check_inside(locate_arm(problem, still)) == ()
+    assert check_inside(locate_start(problem, still)) == ()
     rows = {row.name: row for row in verify(problem, still, load_robot(ARM)).checks}
     clearance = rows["clearance from obstacles"]
     assert clearance.verdict is Verdict.CERTIFIED

@@ -8,6 +8,7 @@ is said of the whole motion (`_close`). Links count from 0 in here.
 from collections.abc import Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
+import numpy as np
 from flint import arb
 
 from vdsm_pin.certificate_checker.balls import Matrix, claim, column, norm, number, unit
@@ -18,6 +19,7 @@ from vdsm_pin.problem import Order, PlanningProblem, Posture
 from vdsm_pin.trajectory import Trajectory
 
 VERSION: Final = 3
+MM: Final = 1000  # messages tell lengths in millimetres
 SLACK: Final = 1e-9  # claims may understate by this, limits be passed; [m], [rad], [-]
 KEYS: Final = set(
     "vdsm_certificate problem_sha256 trajectory_sha256 urdf_sha256 versions n_rows "
@@ -116,7 +118,6 @@ class Check:
             self.place = f"after interval {k}"
         claim(self.n_intervals == expected, f"interval {self.n_intervals} is missing")
         self.place = "header"
-        self._outside()
         self._close()
 
     def _header(self, header: dict[str, Any]) -> None:
@@ -187,8 +188,8 @@ class Check:
         reach = self.motion.reach(pair.body, pair.first, times, n)
         proved = pair.solid.support(n, *pieces) - reach - lost
         holds = required <= lower <= proved <= lower + SLACK
-        values = lower, proved, required
-        claim(holds, "claims {} m, proves {} m, required are {} m", *values)
+        values = [MM * length for length in (lower, proved, required)]
+        claim(holds, "claims {} mm, proves {} mm, required are {} mm", *values)
         self.n_claims += 1
 
     def _rows(self, rows: tuple[int, int]) -> None:
@@ -201,9 +202,9 @@ class Check:
         if rows[1] == self.rows.n_samples - 1:
             self._end("goal", problem.goal, rows[1], tips[1])
         if problem.max_row_change is not None:
-            turns = abs(self.joints[rows[1]] - self.joints[rows[0]])[1:]
+            turn = abs(self.joints[rows[1]] - self.joints[rows[0]])[1:].max()
             limit = problem.max_row_change + SLACK
-            claim(turns.max() <= limit, "a joint turns by {} rad", turns.max())
+            claim(turn <= limit, "a joint turns by {} deg", np.rad2deg(turn))
         if self.drawing is not None:
             self._draw(self.drawing, rows, tips)
 
@@ -212,13 +213,13 @@ class Check:
         if end is None:
             return
         away, most = norm(tip - column(*end.tip.tolist())), self.problem.tip_tolerance
-        claim(away <= most, f"the tip is {{}} m off its {name}", away)
+        claim(away <= most, f"the tip is {{}} mm off its {name}", MM * away)
         if end.joints is not None:
             pairs = zip(self.joints[row].tolist(), end.joints.tolist(), strict=True)
             off = [abs(arb(found) - stated) for found, stated in pairs]
             lever = sum(self.lengths, arb(0))  # how far an angle moves the tip at most
             for way in (off[0], *(lever * angle for angle in off[1:])):
-                claim(way <= most, f"the joints are {{}} m off their {name}", way)
+                claim(way <= most, f"the joints are {{}} mm off their {name}", MM * way)
 
     def _draw(
         self, drawing: Drawing, rows: tuple[int, int], tips: list[Matrix]
@@ -230,27 +231,24 @@ class Check:
             if not on[i]:
                 continue
             away = norm(tips[i] - drawing.point(stations[i]))
-            claim(away <= same, "the tip is {} m off the path", away)
+            claim(away <= same, "the tip is {} mm off the path", MM * away)
             if i == 1 or rows[0] == 0:  # else it was taken in with the interval before
                 ahead = drawing.visit(stations[i], bool(on[0]), same)
                 forwards = ahead >= -same - SLACK or not self.ordered
-                claim(forwards, "the path is drawn {} m backwards", -ahead)
+                claim(forwards, "the path is drawn {} mm backwards", -MM * ahead)
         if on.all():
             end = len(self.lengths) - 1, 0, float(self.arm.link_lengths[-1])
             drawing.draw(stations, tips, self.motion.bounds(*end)[0] / 8)
         else:
             drawing.last = None
 
-    def _outside(self) -> None:
-        """Check that the arm is clear of a mesh's hull, or begins outside."""
+    def _close(self) -> None:
+        """Check what is said of the whole motion, and its limits; -x bounds x below."""
         base = [float(self.joints[0, 0]), 0.0, 0.0]
-        for mesh in self.meshes.values():
+        for mesh in self.meshes.values():  # clear of its hull, or begun outside
             if not (mesh.surface_only or mesh.whole):
                 why = mesh.surface.not_outside(base, self.thinnest)
                 claim(not why, f"the arm is not proved outside {mesh.name}: {why}")
-
-    def _close(self) -> None:
-        """Check what is said of the whole motion, and its limits; -x bounds x below."""
         arm, header, q = self.arm, self.header, self.joints
         claim(set(header["limits"]) == set(LIMITS), f"limits: expected {LIMITS}")
         alpha, theta, psi, low, high = (header["limits"][key] for key in LIMITS)
@@ -270,7 +268,7 @@ class Check:
             past = drawing.advanced - drawing.length - self.problem.tip_tolerance
             again = self.ordered and drawing.left and drawing.closed
             once = past <= SLACK or not again
-            claim(once, "the path is begun again, {} m past its end", past)
+            claim(once, "the path is begun again, {} mm past its end", MM * past)
             claims += [
                 ("tip_deviation_m", tip, drawing.deviation, path.spacing),
                 ("-coverage", -share, -drawn, -path.required_coverage),

@@ -86,7 +86,7 @@ class ObstacleBuilder:
     def _check_extent(self, obstacle: scene.Obstacle, at: Location) -> None:
         """Distances are exact to a stated bound only within a stated extent."""
         limit = TOLERANCES.scene_extent
-        reach = _extent(obstacle)
+        reach = scene.reach_of(obstacle)
         if not reach <= limit:
             problem = (
                 f"{obstacle.name!r} reaches {self.frame.shown(reach)} from the base; "
@@ -147,6 +147,9 @@ class ObstacleBuilder:
         order = np.roll(np.arange(3), -1 - AXES[model.axis])
         base = self.frame.origin[order]
         low, high = self.frame.metres(np.array([model.from_, model.to]) - base[2])
+        if not low < high:
+            problem = f"is {model.to!r}, too near to from = {model.from_!r}"
+            raise self.document.invalid((*at, "to"), problem)
         return scene.Prism(
             model.name,
             np.zeros(3),
@@ -216,32 +219,3 @@ def without_repeats(points: FloatArray, *, closed: bool) -> FloatArray:
     if closed and len(kept) > 1 and (kept[-1] == kept[0]).all():
         kept = kept[:-1]
     return kept
-
-
-def _extent(obstacle: scene.Obstacle) -> float:
-    """Largest distance of a solid's stated points from the base's origin; [m]."""
-    match obstacle:
-        case scene.HalfSpace():
-            return float(np.linalg.norm(obstacle.point))
-        case scene.Mesh():
-            points, grown = obstacle.vertices, 0.0
-        case scene.Prism():
-            ends = np.array(obstacle.span)
-            section = np.column_stack(
-                [
-                    np.repeat(obstacle.polygon, 2, axis=0),
-                    np.tile(ends, len(obstacle.polygon)),
-                ]
-            )
-            points, grown = obstacle.origin + section @ obstacle.rotation.T, 0.0
-        case scene.Sphere():
-            points, grown = obstacle.centre[None], obstacle.radius
-        case scene.Box():
-            points, grown = obstacle.centre[None], float(np.sum(obstacle.half_size))
-        case scene.Cylinder() | scene.Capsule():
-            arm = obstacle.half_length * obstacle.axis
-            points, grown = (
-                np.array([obstacle.centre + arm, obstacle.centre - arm]),
-                obstacle.radius,
-            )
-    return float(np.linalg.norm(points, axis=1).max()) + grown

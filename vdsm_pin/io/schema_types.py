@@ -2,13 +2,28 @@
 
 from typing import Annotated, Any, Final, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic_core import PydanticCustomError
 
 LARGEST: Final = 1e12
 """Numbers beyond this are slips, and their squares would overflow further on."""
 
+SMALLEST: Final = 1e-12
+"""Sizes below this are slips, and might be nothing in another unit."""
+
+
+def _no_slip(value: float) -> float:
+    """A size that is left of zero by more than rounding."""
+    if not value >= SMALLEST:
+        kind, message = "greater_than_equal", "Input should be {ge} or more"
+        raise PydanticCustomError(kind, message, {"ge": SMALLEST})
+    return value
+
+
 Number: TypeAlias = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
-Positive: TypeAlias = Annotated[float, Field(gt=0.0, le=LARGEST)]
+Positive: TypeAlias = Annotated[
+    float, Field(gt=0.0, le=LARGEST), AfterValidator(_no_slip)
+]
 NotNegative: TypeAlias = Annotated[float, Field(ge=0.0, le=LARGEST)]
 Vector: TypeAlias = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Range: TypeAlias = Annotated[list[Number], Field(min_length=2, max_length=2)]
