@@ -138,3 +138,146 @@ def test_link_and_obstacle_are_marked_and_red_only_where_it_is_too_near(
         "vdsm.view.obstacles.map((one) => one.material.color.getHex())"
     )
     page.close()
+
+
+def choose(page: Any, what: str, value: str) -> None:
+    page.locator(what).select_option(value)
+    page.evaluate("vdsm.view.viewer.render()")
+
+
+def test_a_section_cuts_the_obstacles_where_it_says(report: Watched) -> None:
+    page = report.page
+    choose(page, "[data-section=axis]", "2")
+    page.locator("[data-section=place]").fill("0.2")  # of the file's frame
+    points = page.evaluate(
+        "Array.from(vdsm.view.section.outline.geometry.getAttribute('position').array)"
+    )
+    ends = np.array(points).reshape(-1, 2, 3)
+    height = ends[..., 2] + TURNED[2, 3]
+    np.testing.assert_allclose(height, 0.2, atol=1e-6)
+    crate = ends[(np.abs(ends[..., :2] - [0.6, 0.9]) < 0.2001).all(axis=(1, 2))]
+    length = np.linalg.norm(crate[:, 0] - crate[:, 1], axis=1).sum()
+    assert length == pytest.approx(4 * 0.4, abs=1e-5), "the crate's outline"
+    assert page.locator("[data-section=read]").text_content() == "z = 200 mm"
+    clipped = "vdsm.view.obstacles[0].material.clippingPlanes"
+    keeps = f"{clipped}[0].distanceToPoint(vdsm.view.cameras.camera.position)"
+    assert page.evaluate(keeps) < 0, "the camera looks into what is left"
+    page.locator("[data-section=flip]").click()
+    assert page.evaluate(keeps) > 0
+    choose(page, "[data-section=axis]", "")
+    assert page.evaluate(f"{clipped}.length") == 0
+    assert page.evaluate("vdsm.view.section.outline.visible") is False
+
+
+def test_obstacles_are_shown_hidden_and_seen_through_one_by_one(
+    report: Watched,
+) -> None:
+    page = report.page
+    page.locator("[data-obstacles] summary").click()
+    rows = page.locator("[data-rows] label")
+    rows.first.wait_for()
+    assert rows.count() == 7
+    assert rows.nth(5).locator(".name").text_content() == "part <1>"
+    rows.nth(1).locator("select").select_option("hidden")
+    rows.nth(2).locator("select").select_option("solid")
+    visible = page.evaluate("vdsm.view.obstacles.map((one) => one.visible)")
+    assert visible == [True, False, *[True] * 5]
+    opacity = page.evaluate("vdsm.view.obstacles.map((one) => one.material.opacity)")
+    assert opacity[2] == 1.0
+    assert opacity[3] < 1.0
+    page.locator("[data-obstacles] > label select").select_option("translucent")
+    assert all(page.evaluate("vdsm.view.obstacles.map((one) => one.visible)"))
+
+
+def test_the_swept_volume_has_the_arm_at_moments_of_the_motion(report: Watched) -> None:
+    page = report.page
+    page.locator("[data-toggle=swept]").check()
+    found = page.evaluate(
+        "() => { const body = vdsm.view.swept.children[0];"
+        "return Array.from(body.instanceMatrix.array); }"
+    )
+    bases = np.array(found).reshape(-1, 16)[:, 12:15]
+    rows = made_up.trajectory()
+    moments = np.linspace(0, rows.n_samples - 1, len(bases))
+    expected = np.interp(moments, np.arange(rows.n_samples), rows.x0)
+    assert len(bases) > 100
+    np.testing.assert_allclose(bases[:, 0], expected, atol=1e-5)
+    page.locator("[data-toggle=swept]").uncheck()
+    assert page.evaluate("vdsm.view.swept.visible") is False
+
+
+def test_the_read_out_says_what_is_proved_at_the_slider(report: Watched) -> None:
+    page, judged = report.page, made_up.verification()
+    for k in (0, 60, 150, 199):
+        page.evaluate("time => vdsm.motion.go(time)", k)
+        lower = judged.profile.link_lower[min(k, 198)]
+        least = f"link {lower.argmin() + 1}"
+        text = page.locator("[data-clearance]").text_content()
+        assert text.startswith(least)
+        shown = float(text.split("at least ")[1].split(" ")[0])
+        assert shown == pytest.approx(max(lower.min(), 0.0041) * 1000, abs=2e-3)
+        told = page.locator("[data-slider]").get_attribute("aria-valuetext")
+        assert text in told
+
+
+def test_plots_run_over_waypoints_or_the_way_of_the_tip(report: Watched) -> None:
+    page = report.page
+    choose(page, "[data-along]", "travel")
+    tips = joint_centres(
+        made_up.problem().manipulator, *(
+            getattr(made_up.trajectory(), name) for name in ("x0", "alpha", "theta")
+        )
+    )[:, -1]  # fmt: skip
+    way = np.concatenate(
+        [[0.0], np.linalg.norm(np.diff(tips, axis=0), axis=1).cumsum()]
+    )
+    for k in (20, 77, 140):
+        share = page.evaluate("time => vdsm.motion.shareAt(time)", k)
+        assert share == pytest.approx(way[k] / way[-1], abs=1e-4)
+        back = page.evaluate("share => vdsm.motion.momentAt(share)", share)
+        assert back == pytest.approx(k, abs=1e-2)
+    plot = page.locator("[data-chart=psi] svg")
+    assert "way of the tip" in plot.get_attribute("aria-label")
+    box = plot.bounding_box()
+    plot.click(position={"x": 0.5 * box["width"], "y": 0.4 * box["height"]})
+    share = page.evaluate("vdsm.motion.shareAt(vdsm.motion.time)")
+    assert share == pytest.approx((320 - 58) / (640 - 58 - 14), abs=0.01)
+    choose(page, "[data-along]", "waypoint")
+
+
+def test_curved_axes_have_three_ticks_whatever_they_span(report: Watched) -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(200):
+        ends = np.sort(np.sinh(rng.uniform(-9, 9, 2)))
+        if np.arcsinh(ends[1]) - np.arcsinh(ends[0]) < 0.05:
+            continue
+        found = report.page.evaluate(
+            """([low, high]) => {
+                const height = (v) => (186 * (Math.asinh(v) - Math.asinh(low))) /
+                  (Math.asinh(high) - Math.asinh(low));
+                const apart = (values) => values.reduce((kept, v) =>
+                  kept.every((o) => Math.abs(height(o) - height(v)) >= 13)
+                    ? [...kept, v] : kept, []);
+                return curvedTicks(low, high, apart);
+            }""",
+            ends.tolist(),
+        )
+        assert len(found) >= 3, ends
+        assert all(ends[0] - 1e-9 <= value <= ends[1] + 1e-9 for value in found)
+
+
+def test_the_picture_can_be_saved(report: Watched, tmp_path: Path) -> None:
+    report.page.evaluate("vdsm.motion.go(12.5)")
+    with report.page.expect_download() as download:
+        report.page.locator("[data-save]").click()
+    assert download.value.suggested_filename == "made-up-certified-12.5.png"
+    download.value.save_as(tmp_path / "saved.png")
+    assert (tmp_path / "saved.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_motion_plays_at_the_speed_chosen(report: Watched) -> None:
+    page = report.page
+    page.locator("[data-speed]").select_option("4")
+    assert page.evaluate("vdsm.motion.speed") == 4
+    page.locator("[data-speed]").select_option("1")
+    assert report.errors == []

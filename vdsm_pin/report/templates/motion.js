@@ -7,6 +7,20 @@ function unpack(text, Type) {
   return new Type(bytes.buffer);
 }
 
+// Index of the last of some rising values that is not above one, and the share of the
+// way to the next.
+function between(values, value) {
+  let low = 0;
+  let high = values.length - 1;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (values[middle] <= value) low = middle;
+    else high = middle;
+  }
+  const step = values[high] - values[low];
+  return [low, step > 0 ? (value - values[low]) / step : 0];
+}
+
 class Motion {
   constructor(data, lengths) {
     this.rows = unpack(data.rows, Int32Array);
@@ -20,7 +34,38 @@ class Motion {
     this.time = 0;
     this.playing = false;
     this.seconds = Math.min(40, Math.max(8, data.nSamples / 40));
+    this.speed = 1;
     this.listeners = [];
+    this.scales = { waypoint: this.rows, travel: this.travel() };
+    this.scale = this.scales.waypoint;
+  }
+
+  // How far the tip has come at each row, detours included; [mm].
+  travel() {
+    const found = new Float32Array(this.rows.length);
+    let before = null;
+    this.rows.forEach((row, k) => {
+      const tip = this.centres(row)[this.lengths.length];
+      if (before)
+        found[k] = found[k - 1] + 1000 * Math.hypot(...tip.map((v, i) => v - before[i]));
+      before = tip;
+    });
+    return found;
+  }
+
+  // Where a moment stands on the axis of the plots, and back; 0 to 1.
+  shareAt(time) {
+    const [k, share] = this.place(time);
+    const next = Math.min(k + 1, this.scale.length - 1);
+    const value = this.scale[k] * (1 - share) + this.scale[next] * share;
+    return value / (this.scale[this.scale.length - 1] || 1);
+  }
+
+  momentAt(share) {
+    const value = share * this.scale[this.scale.length - 1];
+    const [k, rest] = between(this.scale, value);
+    const next = Math.min(k + 1, this.rows.length - 1);
+    return this.rows[k] * (1 - rest) + this.rows[next] * rest;
   }
 
   // Call `listener(time)` now and whenever the moment changes.
@@ -42,7 +87,7 @@ class Motion {
       let before = performance.now();
       const tick = (now) => {
         if (!this.playing) return;
-        const next = this.time + ((now - before) / 1000) * (this.end / this.seconds);
+        const next = this.time + ((now - before) / 1000) * this.speed * (this.end / this.seconds);
         before = now;
         this.go(next);
         if (next >= this.end) this.play(false);
@@ -55,15 +100,7 @@ class Motion {
 
   // Index of the row shown at or before a time, and how far it is to the next.
   place(time) {
-    let low = 0;
-    let high = this.rows.length - 1;
-    while (high - low > 1) {
-      const middle = (low + high) >> 1;
-      if (this.rows[middle] <= time) low = middle;
-      else high = middle;
-    }
-    if (high === low) return [low, 0];
-    return [low, (time - this.rows[low]) / (this.rows[high] - this.rows[low])];
+    return between(this.rows, time);
   }
 
   // Joint centres O_1..O_{N+1} at a time: rows are joined by straight lines in joint
@@ -102,38 +139,4 @@ class Motion {
     }
     return found;
   }
-}
-
-// Play button, slider and readout of one page.
-function bindControls(motion, root) {
-  const slider = root.querySelector("[data-slider]");
-  const button = root.querySelector("[data-play]");
-  const readout = root.querySelector("[data-readout]");
-  slider.max = motion.end;
-  slider.addEventListener("input", () => {
-    motion.play(false);
-    motion.go(Number(slider.value));
-  });
-  button.addEventListener("click", () => motion.play(!motion.playing));
-  document.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.altKey || event.metaKey) return;
-    const pressed = event.target.closest("button, a, [type=checkbox]"); // space is theirs
-    if (event.key === " " && !pressed) motion.play(!motion.playing);
-    else if (event.key === "ArrowRight") motion.go(Math.floor(motion.time) + 1);
-    else if (event.key === "ArrowLeft") motion.go(Math.ceil(motion.time) - 1);
-    else return;
-    event.preventDefault();
-  });
-  motion.listen((time) => {
-    slider.value = time;
-    const [k] = motion.place(time);
-    const where = motion.onPath[k]
-      ? `, at ${(motion.pathM[k] * 1000).toFixed(0)} mm of the path`
-      : ", off the path";
-    const text = `waypoint ${time.toFixed(1)} of ${motion.end}${motion.onPath.length ? where : ""}`;
-    readout.textContent = text;
-    slider.setAttribute("aria-valuetext", text);
-    button.textContent = motion.playing ? "❚❚ Pause" : "▶ Play";
-    button.setAttribute("aria-pressed", String(motion.playing));
-  });
 }

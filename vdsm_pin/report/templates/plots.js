@@ -31,10 +31,20 @@ function ticks(low, high, count) {
   return found;
 }
 
-function decades(low, high) {
-  const found = [0];
-  for (let value = 1; value <= 1e5; value *= 10) found.push(value, -value);
-  return found.filter((value) => value >= low && value <= high);
+// Ticks of a curved scale: powers of ten, with 2 and 5 where those are too few, else
+// equal steps. `apart` keeps those that do not crowd.
+function curvedTicks(low, high, apart) {
+  const of = (steps) => {
+    const found = [0];
+    for (let power = 0.01; power <= 1e5; power *= 10)
+      for (const step of steps) found.push(step * power, -step * power);
+    return found.map((value) => Number(value.toPrecision(3)));
+  };
+  const inside = (value) => value >= low && value <= high;
+  const tens = of([1]).filter((value) => !value || Math.abs(value) >= 1);
+  const even = [5, 8, 12].map((count) => ticks(low, high, count));
+  const found = [tens, of([1, 2, 5]), ...even].map((some) => apart(some.filter(inside)));
+  return found.find((some) => some.length >= 3) || found[found.length - 1];
 }
 
 function shortNumber(value) {
@@ -57,8 +67,15 @@ class Plot {
     this.range();
     this.draw(figure);
     this.legend(figure);
-    this.bind();
     motion.listen((time) => this.cursor(time));
+  }
+
+  redraw() {
+    const place = this.svg.parentNode;
+    this.svg.remove();
+    this.draw(place.parentNode);
+    this.isolate(this.isolated);
+    this.cursor(this.motion.time);
   }
 
   // Lowest and highest value shown; far limits are left out, near ones are kept in.
@@ -90,7 +107,7 @@ class Plot {
 
   x(time) {
     const inner = FRAME.width - FRAME.left - FRAME.right;
-    return FRAME.left + (inner * time) / (this.motion.end || 1);
+    return FRAME.left + inner * this.motion.shareAt(time);
   }
 
   y(value) {
@@ -101,7 +118,7 @@ class Plot {
 
   draw(figure) {
     const { width, height, left, right, top, bottom } = FRAME;
-    const label = `${this.chart.title} against the waypoint; ${this.chart.note}`;
+    const label = `${this.chart.title} against ${this.along}; ${this.chart.note}`;
     this.svg = element("svg", {
       viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": label, class: "plot",
     });
@@ -122,31 +139,44 @@ class Plot {
     element("text", { y: 4, x: 6 }, this.tip);
     this.dot = element("circle", { r: 3.5, visibility: "hidden", class: "dot" }, this.svg);
     this.right = width - right;
+    this.bind();
+  }
+
+  get along() {
+    return this.motion.scale === this.motion.rows ? "waypoint" : "way of the tip [mm]";
   }
 
   axes() {
     const { width, height, left, right, top, bottom } = FRAME;
     const values = this.chart.scale === "asinh"
-      ? decades(this.lowest, this.highest)
+      ? curvedTicks(this.lowest, this.highest, (some) => this.apart(some))
       : ticks(this.lowest, this.highest, 5).filter((v) => !this.chart.whole || v % 1 === 0);
-    const drawn = []; // heights of the ticks; on a curved scale they may crowd near zero
-    for (const value of values.sort((a, b) => Math.abs(a) - Math.abs(b))) {
+    for (const value of values) {
       const y = this.y(value);
-      if (drawn.some((other) => Math.abs(other - y) < TICK_GAP)) continue;
-      drawn.push(y);
       element("line", { x1: left, x2: width - right, y1: y, y2: y, class: "grid" }, this.svg);
       element("text", { x: left - 6, y: y + 4, class: "tick end" }, this.svg, shortNumber(value));
     }
-    for (const time of ticks(0, this.motion.end || 1, NARROW ? 4 : 8).filter((t) => t % 1 === 0)) {
-      const x = this.x(time);
+    const { scale } = this.motion;
+    const end = scale[scale.length - 1] || 1;
+    for (const value of ticks(0, end, NARROW ? 4 : 8).filter((t) => t % 1 === 0)) {
+      const x = left + ((width - left - right) * value) / end;
       element("line", { x1: x, x2: x, y1: height - bottom, y2: height - bottom + 4, class: "axis" }, this.svg);
-      element("text", { x, y: height - bottom + 16, class: "tick middle" }, this.svg, time);
+      element("text", { x, y: height - bottom + 16, class: "tick middle" }, this.svg, value);
     }
     element("line", { x1: left, x2: left, y1: top, y2: height - bottom, class: "axis" }, this.svg);
     element("line", { x1: left, x2: width - right, y1: height - bottom, y2: height - bottom, class: "axis" }, this.svg);
-    element("text", { x: (left + width - right) / 2, y: height - 3, class: "label middle" }, this.svg, "waypoint");
+    element("text", { x: (left + width - right) / 2, y: height - 3, class: "label middle" }, this.svg, this.along);
     const turn = `translate(13 ${(top + height - bottom) / 2}) rotate(-90)`;
     element("text", { transform: turn, class: "label middle" }, this.svg, this.chart.axis);
+  }
+
+  // Those of some values whose ticks do not crowd, the smallest first.
+  apart(values) {
+    const kept = [];
+    for (const value of values.sort((a, b) => Math.abs(a) - Math.abs(b)))
+      if (kept.every((other) => Math.abs(this.y(other) - this.y(value)) >= TICK_GAP))
+        kept.push(value);
+    return kept;
   }
 
   limit(value, text) {
@@ -261,8 +291,8 @@ class Plot {
       const scale = FRAME.width / box.width;
       const inner = FRAME.width - FRAME.left - FRAME.right;
       const x = (event.clientX - box.left) * scale;
-      const time = ((x - FRAME.left) / inner) * this.motion.end;
-      return [Math.min(this.motion.end, Math.max(0, time)), (event.clientY - box.top) * scale];
+      const share = Math.min(1, Math.max(0, (x - FRAME.left) / inner));
+      return [this.motion.momentAt(share), (event.clientY - box.top) * scale];
     };
     this.svg.addEventListener("pointerdown", (event) => {
       this.svg.setPointerCapture(event.pointerId);

@@ -6,7 +6,8 @@
   const motion = new Motion(data.motion, data.scene.lengths);
   const pane = document.getElementById("view");
   const view = makeView(pane, data.scene, motion);
-  bindControls(motion, document);
+  bindControls(motion, clearancesOf(data.charts, motion));
+  if (view) bindView(view, document.title);
 
   const figures = document.querySelectorAll("[data-chart]");
   const plots = [...figures].map((figure) => {
@@ -39,10 +40,12 @@
       const moment = Number(button.dataset.go);
       jump(button, moment, data.closest.find((one) => Math.abs(one.moment - moment) < 0.01));
     });
-  for (const button of document.querySelectorAll("[data-look]"))
-    button.addEventListener("click", () => view && view.look(button.dataset.look));
-  for (const box of document.querySelectorAll("[data-toggle]"))
-    box.addEventListener("change", () => view && view.toggle(box.dataset.toggle, box.checked));
+  const along = document.querySelector("[data-along]");
+  if (along)
+    along.addEventListener("change", () => {
+      motion.scale = motion.scales[along.value];
+      plots.forEach((plot) => plot.redraw());
+    });
 
   // Paper has no WebGL: a still picture takes the canvas's place.
   window.addEventListener("beforeprint", () => {

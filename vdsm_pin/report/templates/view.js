@@ -35,6 +35,7 @@ class ArmView {
     this.addLights();
     this.cameras = new Cameras(this);
     this.overlay = new Overlay(this);
+    this.section = new Section(this);
     const render = this.viewer.render.bind(this.viewer);
     this.viewer.render = () => {
       render();
@@ -201,6 +202,8 @@ class ArmView {
 
   toggle(what, on) {
     if (what === "tracks") this.tracks.visible = on;
+    if (what === "swept" && !this.swept) this.root.add((this.swept = sweptVolume(this)));
+    if (what === "swept") this.swept.visible = on;
     if (what === "numbers") this.overlay.numbers = on;
     this.viewer.set_dirty();
   }
