@@ -34,6 +34,7 @@ figures: $(VENV)/.installed
 	$(BIN)/python analysis/readme_animation.py --out reports
 	$(BIN)/python analysis/conventions.py
 	$(BIN)/python analysis/theory_pictures.py
+	$(BIN)/python analysis/architecture_picture.py
 
 report: figures
 	$(BIN)/python analysis/paper_table.py --out reports/paper
