@@ -1,0 +1,61 @@
+"""Versions, dependencies and recipes say what the package says."""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+import yaml
+
+import vdsm_pin
+from vdsm_pin.io.problem_file import problem_schema
+from vdsm_pin.report.files import schema
+
+ROOT = Path(__file__).parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))[
+    "project"
+]
+
+
+def names(requirements: list[str]) -> set[str]:
+    return {re.split(r"[^\w.-]", line)[0] for line in requirements}
+
+
+@pytest.mark.parametrize("kind", ["problem", "certificate", "plan", "verification"])
+def test_the_page_about_versions_tells_the_versions_there_are(kind: str) -> None:
+    contract = problem_schema() if kind == "problem" else schema(kind)
+    stated = re.search(rf'"vdsm_{kind}": {{"const": (\d+)', json.dumps(contract))
+    page = (ROOT / "docs" / "formats.md").read_text(encoding="utf-8")
+    (row,) = [line for line in page.splitlines() if f"`vdsm_{kind}`" in line]
+    assert stated is not None
+    assert row.split("|")[3].strip() == stated[1]
+
+
+def test_every_dependency_is_on_the_page_with_its_use() -> None:
+    page = (ROOT / "docs" / "dependencies.md").read_text(encoding="utf-8")
+    told = set(re.findall(r"^\| ([\w.-]+) \|", page, re.MULTILINE)) - {"distribution"}
+    extras = PROJECT["optional-dependencies"]
+    needed = set(PROJECT["dependencies"])
+    for extra in extras.keys() - {"dev", "docs"}:
+        needed |= set(extras[extra])
+    assert told == names(sorted(needed))
+
+
+def test_the_recipe_asks_for_what_the_package_asks_for() -> None:
+    recipe = yaml.safe_load((ROOT / "recipe" / "recipe.yaml").read_text())
+    elsewhere = {"pinocchio": "pin", "meshcat-python": "meshcat"}
+    asked = {elsewhere.get(x, x) for x in names(recipe["requirements"]["run"])}
+    assert asked - {"python"} == names(PROJECT["dependencies"])
+    assert recipe["context"]["version"] == vdsm_pin.__version__
+
+
+def test_the_citation_is_of_this_version() -> None:
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["version"] == vdsm_pin.__version__
+
+
+def test_the_changelog_begins_with_this_version_or_what_comes() -> None:
+    page = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    first = re.findall(r"^## \[(.*?)\]", page, re.MULTILINE)[0]
+    assert first in ("Unreleased", vdsm_pin.__version__)
