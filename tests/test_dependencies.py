@@ -60,7 +60,7 @@ def ours() -> set[str]:
     ("folder", "extras"),
     [
         ("vdsm_pin", ("cluster", "parquet", "simulation")),
-        ("tests", ("dev",)),
+        ("tests", ("dev", "docs")),
         ("analysis", ("dev",)),
         ("benchmarks", ("dev", "references")),
     ],
