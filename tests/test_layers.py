@@ -45,6 +45,7 @@ LAYERS = {
     "new_project": 13,
     "workflow": 13,
     "conversion": 13,
+    "explanation": 13,
     "batch": 13,
     "certificate_checker": 13,
     "api": 14,

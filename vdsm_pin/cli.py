@@ -432,6 +432,34 @@ def simulate(
 
 @app.command(
     epilog=_examples(
+        "vdsm explain paper/obs1 --out out/explain",
+        "vdsm explain paper/obs3 --waypoint 300 --out out/explain",
+    )
+)
+def explain(
+    problem: Problem,
+    out: OutFolder,
+    waypoint: Annotated[
+        int | None,
+        typer.Option(
+            min=0, help="Waypoint, from 0; the one with the largest link angle if none."
+        ),
+    ] = None,
+) -> None:
+    """Follow the paper's seven steps at one waypoint.
+
+    Plans by the strategy `paper` and writes explain.html: numbers and a picture of
+    every step.
+    """
+    from vdsm_pin.explanation.folder import explain_to_folder
+    from vdsm_pin.io.problem_file import read_problem
+
+    page, row = explain_to_folder(read_problem(problem), waypoint, out)
+    typer.echo(f"waypoint {row}: wrote {page}")
+
+
+@app.command(
+    epilog=_examples(
         "vdsm convert paper/obs1 --trajectory out/obs1/trajectory.csv --out out/all",
         "vdsm convert mine.yaml --cables measured.csv --out out/mine",
     )

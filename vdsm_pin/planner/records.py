@@ -2,12 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from vdsm_pin.planner.paper.steps import PaperSteps
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,7 @@ class Plan(Summarised):
         rivals: Further plans of the same, none where the strategy has decided: the
             largest joint error that is proved to be survived decides between them and
             this one, which loses a draw.
+        steps: What each of the paper's steps found, by the strategy `paper`.
     """
 
     problem: PlanningProblem
@@ -59,6 +63,7 @@ class Plan(Summarised):
     undrawn: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     rivals: tuple["Plan", ...] = ()
+    steps: "PaperSteps | None" = None
 
     def summary(self) -> tuple[tuple[str, str], ...]:
         """How it was planned, its size, and the notes."""

@@ -179,6 +179,19 @@ def view_page(problem: PlanningProblem, trajectory: Trajectory, live: str = "") 
     )
 
 
+def explain_page(
+    problem: PlanningProblem, waypoint: int, n_waypoints: int, parts: Sequence[Any]
+) -> str:
+    """The steps of a plan at one waypoint as one page; pictures are trusted SVG."""
+    return _rendered(
+        "explain.html.j2",
+        problem=problem,
+        waypoint=waypoint,
+        n_waypoints=n_waypoints,
+        parts=parts,
+    )
+
+
 def message_page(message: str, live: str) -> str:
     """A page that says what is wrong, until the files are right again."""
     return _rendered("message.html.j2", message=message, live=live)

@@ -286,6 +286,8 @@ def coal_distances(
         OutOfTime: If the time is over.
     """
     arm, obstacles = problem.manipulator, problem.scene.obstacles
+    if not obstacles:
+        return
     scene = scene or CoalScene.of(problem, deadline)
     least = np.full((arm.axis_radii.size, len(obstacles)), np.inf)
     nearest = np.zeros(least.shape, dtype=np.int64)

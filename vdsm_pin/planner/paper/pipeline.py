@@ -1,6 +1,5 @@
 """The paper's method from problem to plan: seven steps, one call each."""
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -14,13 +13,13 @@ from vdsm_pin.planner.paper.lift import lift
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.scale import scale
 from vdsm_pin.planner.paper.solve import solve
+from vdsm_pin.planner.paper.steps import PaperSteps
 from vdsm_pin.planner.paper.tip_path import Route, subdivided
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.planner.spacing import row_steps
 from vdsm_pin.planner.start import check_start
 from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import in_mm
 
 SUBDIVISIONS: Final = 6
@@ -29,21 +28,6 @@ SUBDIVISIONS: Final = 6
 GRAZE: Final = 1e-3
 """A motion that misses the clearance by less is planned once more with this much on
 top; [m]."""
-
-
-@dataclass(frozen=True)
-class Motion:
-    """What Steps 4 to 7 give for one way of avoiding the obstacle.
-
-    Args:
-        route: Step 4.
-        centres: Step 6, shape (n_samples, N + 1, 3); [m].
-        trajectory: Step 7.
-    """
-
-    route: Route
-    centres: FloatArray
-    trajectory: Trajectory
 
 
 def plan_paper(
@@ -81,6 +65,7 @@ def plan_paper(
             for a, b in motion.route.undrawn
         ),
         motion.route.notes,
+        steps=motion,
     )
 
 
@@ -113,7 +98,7 @@ def _best_motion(
     clearance: LinkClearance,
     margins: FloatArray,
     reserve: float = 0.0,
-) -> Motion:
+) -> PaperSteps:
     """The first motion that draws the whole path, else the one that draws most.
 
     Args:
@@ -126,7 +111,7 @@ def _best_motion(
     motion = _motion(problem, straight, straight.route(np.inf))
     if straight.clearance(motion.centres) >= problem.required_clearance:
         return motion
-    best: Motion | None = None
+    best: PaperSteps | None = None
     missing, reason, grazing = np.inf, None, np.inf
     for avoidance in avoidances(problem, margins):
         try:
@@ -149,7 +134,7 @@ def _best_motion(
     return best
 
 
-def _motion(problem: PlanningProblem, avoidance: Avoidance, route: Route) -> Motion:
+def _motion(problem: PlanningProblem, avoidance: Avoidance, route: Route) -> PaperSteps:
     """Steps 2 to 7 for one route; rows are inserted where joints move fast.
 
     They are also where the tip would stray from its path between two rows.
@@ -169,7 +154,7 @@ def _motion(problem: PlanningProblem, avoidance: Avoidance, route: Route) -> Mot
         # jump is not filled with rows for the tip's sake.
         bows = np.sqrt(np.where(drawn, strays, 0.0) / TOLERANCES.planned_stray)
         needed = bows if (turns <= 1.0).all() else turns
-        motion = Motion(route, centres, trajectory)
+        motion = PaperSteps(avoidance, route, reference, planar, centres, trajectory)
         if (needed <= 1.0).all():
             return motion
         pieces = np.ceil(needed).astype(np.int64)
@@ -192,7 +177,7 @@ def _refuse_touch(problem: PlanningProblem, clearance: float) -> None:
         raise NoPlanFound(message)
 
 
-def _refuse_gaps(problem: PlanningProblem, motion: Motion) -> None:
+def _refuse_gaps(problem: PlanningProblem, motion: PaperSteps) -> None:
     if problem.path.blocked is Blocked.FAIL and len(motion.route.undrawn):
         first, last = motion.route.undrawn[0]
         reason = (

@@ -1,0 +1,104 @@
+"""The page of the seven steps: its numbers against the equations, its refusals."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lxml import etree
+
+from vdsm_pin.errors import InvalidInput, NoPlanFound
+from vdsm_pin.explanation.canvas import Canvas
+from vdsm_pin.explanation.cross import DIRECTIONS, crosses
+from vdsm_pin.explanation.folder import explain_to_folder
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.planner.paper.along_rail import AlongRail
+from vdsm_pin.planner.paper.steps import PaperSteps
+from vdsm_pin.refinement import plan_and_verify
+from vdsm_pin.robot_model import load_robot
+
+
+def steps_of(name: str) -> PaperSteps:
+    problem = read_problem(name).problem
+    robot = load_robot(problem.manipulator)
+    found = plan_and_verify(problem, "paper", robot).plan.steps
+    assert found is not None
+    return found
+
+
+def test_the_steps_kept_are_those_of_the_plan() -> None:
+    made = steps_of("paper/obs1")
+    arm = read_problem("paper/obs1").problem.manipulator
+    rows = made.trajectory
+    centres = joint_centres(arm, rows.x0, rows.alpha, rows.theta)
+    np.testing.assert_allclose(made.centres, centres, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(made.planar, made.centres[..., 1:], rtol=0, atol=1e-15)
+    tips = made.route.tip_path.points
+    np.testing.assert_allclose(made.centres[:, -1], tips, rtol=0, atol=1e-15)
+    reference = arm.ratios[:, None] * tips[:, None, 1:]
+    np.testing.assert_allclose(made.reference, reference, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["paper/obs1", "paper/obs2-small"])
+def test_the_four_points_lie_on_the_boundary_and_the_cross(name: str) -> None:
+    """A moved joint stands on the boundary too, another one in proportion."""
+    made, arm = steps_of(name), read_problem(name).problem.manipulator
+    assert isinstance(made.avoidance, AlongRail)
+    moved = 0
+    for row in range(0, made.trajectory.n_samples, 37):
+        side = int(made.route.side[row])
+        if not side:
+            continue
+        rule = made.avoidance.rules[side]
+        for one in crosses(arm, rule, made.planar[max(row - 1, 0)], made.planar[row]):
+            if not one.moved:
+                np.testing.assert_allclose(one.place, one.proportional, atol=1e-12)
+                continue
+            moved += 1
+            points = np.vstack([one.points, one.place])
+            on = one.region.core_distance(np.repeat(points[:, None], 2, axis=1))
+            np.testing.assert_allclose(on, one.region.radius, rtol=0, atol=1e-9)
+            offset = one.points - one.proportional
+            along = (offset * DIRECTIONS).sum(axis=1)
+            assert (along > 0.0).all()
+            np.testing.assert_allclose(offset, along[:, None] * DIRECTIONS, atol=1e-12)
+    assert moved > 10
+
+
+@pytest.mark.parametrize("name", ["paper/free", "paper/obs1", "paper/obs3"])
+def test_a_page_has_every_step_and_asks_nobody(name: str, tmp_path: Path) -> None:
+    page, row = explain_to_folder(read_problem(name), None, tmp_path)
+    text = page.read_text(encoding="utf-8")
+    for k in range(1, 8):
+        assert f"Step {k}: " in text
+    assert f"waypoint {row} of" in text
+    assert not re.search(r"(src|href)=\"(?!data:)", text)
+    assert "nan" not in re.sub(r"<style>.*?</style>", "", text, flags=re.S)
+    pictures = etree.HTML(text).xpath("//section//svg[@role='img']")
+    assert len(pictures) >= 6
+    assert all(picture.xpath("title/text()") for picture in pictures)
+
+
+def test_what_cannot_be_explained_is_refused(tmp_path: Path) -> None:
+    source = read_problem("paper/obs1")
+    with pytest.raises(InvalidInput, match="waypoint is 99999, expected 0 to "):
+        explain_to_folder(source, 99999, tmp_path)
+    bent = replace(source.problem.path, start_joints=np.array([0.0, *[0.1] * 16]))
+    asked = replace(source, problem=replace(source.problem, tip_path=bent))
+    with pytest.raises(NoPlanFound, match="starts bent"):
+        explain_to_folder(asked, 3, tmp_path)
+    assert not (tmp_path / "explain.html").exists()
+
+
+def test_a_drawing_keeps_its_scale_and_escapes_its_words() -> None:
+    made = Canvas(np.array([[0.0, 0.0], [2.0, 1.0]]), "y", "z")
+    made.dot(np.zeros(2), "joint", "a<b")
+    made.dot(np.array([2.0, 0.0]), "joint")
+    made.dot(np.array([0.0, 1.0]), "joint")
+    root = etree.fromstring(made.svg("a & b").encode())
+    assert root.xpath("string(title)") == "a & b"
+    assert "a<b" in root.xpath("//text()")
+    at = [(float(c.get("cx")), float(c.get("cy"))) for c in root.iter("circle")]
+    assert at[1][0] - at[0][0] == pytest.approx(2.0 * (at[0][1] - at[2][1]), abs=0.2)

@@ -1,0 +1,1 @@
+"""The paper's seven steps at one waypoint: numbers, pictures, one page."""

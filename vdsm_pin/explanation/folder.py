@@ -1,0 +1,107 @@
+"""explain.html: a plan of the paper's rule followed step by step at one waypoint."""
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.explanation import steps
+from vdsm_pin.explanation.parts import Moment, Part, mm, table
+from vdsm_pin.io.problem_file import ProblemFile
+from vdsm_pin.kinematics import link_angles
+from vdsm_pin.planner.paper.steps import PaperSteps
+from vdsm_pin.refinement import Refinement, plan_and_verify
+from vdsm_pin.report.folder import check_kept, check_output_folder, staged
+from vdsm_pin.report.html import explain_page
+from vdsm_pin.robot_model import RobotModel, load_robot
+from vdsm_pin.verification.coal_clearance import coal_distances
+
+PAGE: Final = "explain.html"
+
+
+def explain_to_folder(
+    source: ProblemFile, waypoint: int | None, folder: Path
+) -> tuple[Path, int]:
+    """Plan by the paper's seven steps and write down what each did at a waypoint.
+
+    Args:
+        source: The problem.
+        waypoint: From 0; None for the one with the largest link angle past joint 1.
+        folder: Where the page goes.
+
+    Returns:
+        The page and its waypoint.
+
+    Raises:
+        InvalidInput: If there is no such waypoint or the folder cannot be written.
+        Infeasible: If the paper's rule has no plan.
+    """
+    check_output_folder(folder)
+    check_kept([folder / PAGE], source.source.files)
+    robot = load_robot(source.problem.manipulator)
+    found = plan_and_verify(source.problem, "paper", robot)
+    made = found.plan.steps
+    assert made is not None  # the strategy `paper` tells them
+    row = _row(made, waypoint)
+    moment = Moment(found.plan, made, row)
+    parts = (
+        steps.reach_step(moment),
+        steps.projection_step(moment),
+        steps.scaling_step(moment),
+        steps.route_step(moment),
+        steps.joints_step(moment),
+        steps.lift_step(moment),
+        steps.angles_step(moment),
+        _checks(robot, found, row),
+    )
+    with staged(folder) as aside:
+        text = explain_page(source.problem, row, made.trajectory.n_samples, parts)
+        (aside / PAGE).write_text(text, encoding="utf-8")
+    return folder / PAGE, row
+
+
+def _row(made: PaperSteps, waypoint: int | None) -> int:
+    rows = made.trajectory
+    if waypoint is None:
+        psi = link_angles(rows.alpha, rows.theta)[:, 1:]
+        return int(np.argmax(psi.max(axis=1)))
+    if not 0 <= waypoint < rows.n_samples:
+        message = f"waypoint is {waypoint}, expected 0 to {rows.n_samples - 1}"
+        raise InvalidInput(message)
+    return waypoint
+
+
+def _checks(robot: RobotModel, found: Refinement, row: int) -> Part:
+    """What others say of the same configuration."""
+    plan, problem = found.plan, found.plan.problem
+    one = plan.trajectory.part(row, row + 1)
+    centres = robot.joint_centres(one.x0, one.alpha, one.theta)[0]
+    error = float(np.linalg.norm(centres - plan.centres[row], axis=1).max())
+    rows, names = [], problem.manipulator.axis_names
+    for seen in coal_distances(robot, problem, one, np.inf):
+        rows += [
+            (
+                names[seen.link[k]],
+                problem.scene.names[seen.obstacle[k]],
+                mm(seen.distance[k]),
+                mm(seen.lower[k]),
+                mm(seen.upper[k]),
+            )
+            for k in range(len(seen.link))
+        ]
+    head = ("link", "obstacle", "by Coal [mm]", "proved at least", "proved at most")
+    return Part(
+        "Checked",
+        "section 6.3, Eq. 22–24",
+        (
+            f"Pinocchio's joint centres for these angles are within {error:.1e} m of "
+            "those of Step 6.",
+            f"The whole motion is {found.verification.verdict.value}: "
+            f"{mm(found.verification.min_clearance)} mm proved between the surfaces at "
+            "every instant."
+            if problem.scene.obstacles
+            else f"The whole motion is {found.verification.verdict.value}.",
+        ),
+        (table(head, rows),) if rows else (),
+    )

@@ -1,0 +1,144 @@
+"""Drawings of one waypoint: the shadow, the cross, the lift, angles and cables."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+
+from vdsm_pin.explanation.canvas import Canvas
+from vdsm_pin.explanation.cross import Cross
+from vdsm_pin.explanation.parts import Moment, name
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.planner.paper.danger_region import DangerRegion
+from vdsm_pin.report.palette import link_colours
+from vdsm_pin.report.solids import surface
+from vdsm_pin.scene import HalfSpace
+
+VIEWS = {"y": (1, 2), "side": (0, 2), "top": (0, 1)}
+
+
+def outline(region: DangerRegion) -> FloatArray:
+    """The boundary of a danger region, shape (n, 2); [m]."""
+    core = shapely.MultiPoint(region.corners).convex_hull
+    return np.asarray(core.buffer(region.radius, quad_segs=32).exterior.coords)
+
+
+def shadows(moment: Moment, view: Sequence[int]) -> list[FloatArray]:
+    """Outlines of the obstacles in a view, half-spaces left out; [m]."""
+    found = []
+    for obstacle in moment.plan.problem.scene.obstacles:
+        if isinstance(obstacle, HalfSpace):
+            continue
+        corners = surface(obstacle, 1.0).vertices[:, list(view)]
+        hull = shapely.MultiPoint(corners).convex_hull
+        if isinstance(hull, shapely.Polygon):
+            found.append(np.asarray(hull.exterior.coords))
+    return found
+
+
+def canvas(
+    moment: Moment,
+    view: tuple[int, int],
+    regions: Sequence[DangerRegion] = (),
+) -> Canvas:
+    """Obstacles, danger regions and the desired path, seen in a view."""
+    path, centres = moment.plan.problem.path, moment.steps.centres
+    corners = path.corners[:, list(view)]
+    shown = [corners, centres[moment.row][:, list(view)], path.start[None, list(view)]]
+    made = Canvas(np.concatenate(shown), *("xyz"[k] for k in view))
+    for body in shadows(moment, view):
+        made.area(body, "obstacle")
+    for region in regions:
+        made.area(outline(region), "region")
+    made.line(corners, "path")
+    return made
+
+
+def chain(made: Canvas, arm: Manipulator, points: FloatArray, letter: str) -> None:
+    """The links in their colours and the joints with their names."""
+    for i, colour in enumerate(link_colours(arm.n_links)):
+        made.line(points[i : i + 2], "link", colour, 3.0)
+    rises = (points[-1] - points[0]).prod() > 0.0
+    beside = (7.0, 15.0) if rises else (7.0, -7.0)
+    for i, point in enumerate(points):
+        made.dot(point, "joint", name(letter, i + 1), beside)
+
+
+def cross_picture(moment: Moment, one: Cross, regions: Sequence[DangerRegion]) -> str:
+    """P'_i on the ray to P_{i+1}, the cross, its four points, P_i."""
+    arm, planar = moment.plan.problem.manipulator, moment.planar
+    made = canvas(moment, VIEWS["y"], [*regions, one.region])
+    i = one.joint
+    made.line(np.stack([planar[0], planar[i]]), "ray")
+    colours = link_colours(arm.n_links)
+    for j in range(i - 1, arm.n_links):
+        made.line(planar[j : j + 2], "link", colours[j], 3.0)
+    if one.moved:
+        for k in (0, 2):
+            made.line(one.points[k : k + 2], "cross")
+        for k, point in enumerate(one.points):
+            made.dot(point, "nearest" if k == one.nearest else "crossing")
+        made.dot(one.proportional, "wanted", name("P′", i), (-7.0, -7.0))
+    made.dot(one.former, "former", "before", (-9.0, 4.0))
+    made.dot(planar[i], "joint", name("P", i + 1), (8.0, 5.0))
+    made.dot(one.place, "taken", name("P", i), (4.0, -9.0))
+    return made.svg(f"Step 5 for joint {i}")
+
+
+def bars(values: FloatArray, limit: float, letter: str, unit: str) -> str:
+    """Values of the joints as bars beside their limit, in the unit said."""
+    top = 1.1 * max(limit, float(np.abs(values).max()))
+    step, high = 46.0, 150.0
+    width = step * len(values) + 60.0
+    colours = link_colours(len(values))
+    rows = [
+        f'<rect x="{50 + step * k:.0f}" y="{20 + high * (1 - v / top):.1f}" width="30" '
+        f'height="{high * v / top:.1f}" style="fill:{colour}"/>'
+        f'<text x="{65 + step * k:.0f}" y="{high + 38:.0f}" text-anchor="middle">'
+        f"{name(letter, k + 1)}</text>"
+        f'<text class="tick" x="{65 + step * k:.0f}" '
+        f'y="{15 + high * (1 - v / top):.1f}" text-anchor="middle">{v:.1f}</text>'
+        for k, (v, colour) in enumerate(zip(values.tolist(), colours, strict=True))
+    ]
+    line = 20 + high * (1 - limit / top)
+    rows.append(
+        f'<line class="limit" x1="40" x2="{width - 10:.0f}" y1="{line:.1f}" '
+        f'y2="{line:.1f}"/><text class="tick" x="36" y="{line + 4:.1f}" '
+        f'text-anchor="end">{limit:.1f}</text>'
+    )
+    said = f"{letter} of every joint in {unit}"
+    return (
+        f'<svg viewBox="0 0 {width:.0f} {high + 50:.0f}" width="{width:.0f}" '
+        f'height="{high + 50:.0f}" role="img" aria-label="{said}">'
+        f"<title>{said}</title>{''.join(rows)}</svg>"
+    )
+
+
+def hole_circle(arm: Manipulator, change: FloatArray) -> str:
+    """The cable holes on their circle; dark ones paid out, bright ones drawn in.
+
+    Args:
+        arm: The arm.
+        change: Cable lengths less those of the straight arm, shape (N, 3); [m].
+    """
+    colours = link_colours(arm.n_links)
+    most = float(np.abs(change).max()) or 1.0
+    rows = ['<circle class="rim" cx="170" cy="170" r="105"/>']
+    for (j, k), angle in np.ndenumerate(arm.cables.hole_angles):
+        label = f"{j + 1}{'abc'[k]}"
+        sine, cosine = np.sin(angle), np.cos(angle)
+        x, y = 170.0 + 105.0 * sine, 170.0 - 105.0 * cosine
+        size = 3.0 + 7.0 * abs(change[j, k]) / most
+        style = "paid" if change[j, k] > 0.0 else "drawn"
+        rows.append(
+            f'<circle class="hole {style}" cx="{x:.1f}" cy="{y:.1f}" r="{size:.1f}" '
+            f'style="--own:{colours[j]}"/>'
+            f'<text class="tick" x="{170 + 132 * sine:.1f}" '
+            f'y="{174 - 132 * cosine:.1f}" text-anchor="middle">{label}</text>'
+        )
+    said = "cable holes, seen along the arm; filled: paid out, open: drawn in"
+    return (
+        '<svg viewBox="0 0 340 340" width="340" height="340" role="img" '
+        f'aria-label="{said}"><title>{said}</title>{"".join(rows)}</svg>'
+    )
