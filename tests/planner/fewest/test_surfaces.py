@@ -46,7 +46,7 @@ def test_a_bound_lies_within_two_steps_below_the_distance(part: Mesh) -> None:
     segments = np.stack([begin, begin + rng.normal(0.0, 0.2, (3000, 3))], axis=1)
     segments[::3] = beside_an_edge(part, segments[::3], rng)
     truth = link_clearance(task)(segments)[:, 0] + task.manipulator.link_radius
-    bound = surfaces.least(segments, REACH)
+    bound = surfaces.least(segments, 0.0, REACH)
     inside = np.isneginf(bound)
     # A link that touches no triangle of a closed mesh may be wholly within it.
     assert inside.any() == (part is not SHEET)
@@ -58,8 +58,25 @@ def test_a_bound_lies_within_two_steps_below_the_distance(part: Mesh) -> None:
     assert (bound[apart] > low).all()
 
 
+@pytest.mark.parametrize("part", [RING, BRICK, SHEET])
+def test_below_the_floor_nothing_is_known_and_above_it_nothing_is_lost(
+    part: Mesh,
+) -> None:
+    surfaces, rng = surfaces_of((part,)), np.random.default_rng(4)
+    begin = rng.uniform([0.0, -0.7, -0.8], [3.0, 0.7, 0.8], (3000, 3))
+    segments = np.stack([begin, begin + rng.normal(0.0, 0.2, (3000, 3))], axis=1)
+    every = surfaces.least(segments, 0.0, REACH)
+    for floor in (0.02, 0.1, np.inf):
+        some = surfaces.least(segments, floor, REACH)
+        known = every >= floor - STEP
+        np.testing.assert_array_equal(some[known], every[known])
+        assert np.isneginf(some[~known]).all()
+    assert np.array_equal(surfaces.least(segments[::-1], 0.0, REACH), every[::-1])
+
+
 def test_a_scene_without_meshes_has_no_surfaces() -> None:
-    assert surfaces_of(()).least(np.zeros((2, 2, 3)), REACH).tolist() == [np.inf] * 2
+    distances = surfaces_of(()).least(np.zeros((2, 2, 3)), 0.0, REACH)
+    assert distances.tolist() == [np.inf] * 2
 
 
 def test_the_clearance_function_is_asked_where_a_step_decides() -> None:

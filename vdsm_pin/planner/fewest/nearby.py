@@ -69,7 +69,8 @@ class Nearby:
         enough = self.far + self.radius
         room = _box_bounds(ends, self.boxes, self.planes, STRETCHES, enough)
         room -= self.radius
-        mesh = self.surfaces.least(ends, enough, self.deadline) - self.radius
+        low = self.floor + self.radius
+        mesh = self.surfaces.least(ends, low, enough, self.deadline) - self.radius
         # A step below the distance will do, but not where it decides.
         near = room < self.far
         near |= mesh < min(self.far, self.floor + STEP)

@@ -23,6 +23,8 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 
 STEP: Final = 1e-6
 """More than rounding takes from a distance, also beside nearly parallel edges; [m]."""
+FLAT: Final = 1e-9
+"""Height of a triangle, over its coordinates, below which rounding turns it; [-]."""
 CROWD: Final = 4
 """At most so many triangles are looked at one by one."""
 
@@ -36,6 +38,7 @@ class Surfaces:
 
     Args:
         corners: Shape (t, 3, 3); [m].
+        planes: Their unit normals and offsets, 0 where rounding decides, shape (t, 4).
         first: Where the triangles of each ball begin, and where they end, shape (b, 2).
         balls: Centres and radii, shape (b, 4); [m].
         solids: The meshes that have an inside.
@@ -43,20 +46,27 @@ class Surfaces:
     """
 
     corners: FloatArray
+    planes: FloatArray
     first: IntArray
     balls: FloatArray
     solids: PackedPieces
     covers: IntArray
 
     def least(
-        self, ends: FloatArray, enough: float, deadline: Deadline = NO_LIMIT
+        self,
+        ends: FloatArray,
+        floor: float,
+        enough: float,
+        deadline: Deadline = NO_LIMIT,
     ) -> FloatArray:
         """Lower bounds of the distance of segments to the meshes, shape (n,); [m].
 
-        Each is less than two steps below the distance; -inf within a solid.
+        Each is less than two steps below the distance; -inf within a solid, and where
+        the distance is below `floor`.
 
         Args:
             ends: Shape (n, 2, 3); [m].
+            floor: A distance below which nothing need be known; [m].
             enough: A bound from which on more need not be known; [m].
             deadline: When to give up.
 
@@ -67,10 +77,17 @@ class Surfaces:
             return np.full(len(ends), np.inf)
         reach = enough + STEP
         bound = nearest_triangles(
-            self.corners, self.first, self.balls, ends, reach, deadline.end
+            (self.corners, self.planes),
+            self.first,
+            self.balls,
+            ends,
+            floor,
+            reach,
+            deadline.end,
         )
         deadline.check()
         bound -= STEP
+        bound[bound < floor - STEP] = -np.inf
         bound[buried(self.solids, self.covers, ends, bound > 0.0)] = -np.inf
         return bound
 
@@ -82,7 +99,22 @@ def surfaces_of(obstacles: tuple[Obstacle, ...]) -> Surfaces:
     corners = corners[coherent_order(corners.mean(axis=1))]
     solid = [mesh for mesh in meshes if mesh.has_inside]
     pieces = pack_pieces([mesh.pieces for mesh in solid])
-    return Surfaces(corners, *_balls(corners), pieces, covers_of(solid, pieces))
+    balls = _balls(corners)
+    return Surfaces(corners, _planes(corners), *balls, pieces, covers_of(solid, pieces))
+
+
+def _planes(corners: FloatArray) -> FloatArray:
+    """Planes of triangles as `Surfaces` has them, shape (t, 4)."""
+    sides = np.roll(corners, -1, axis=1) - corners
+    normal = np.cross(sides[:, 0], sides[:, 1])
+    size = np.linalg.norm(normal, axis=1)
+    longest = np.linalg.norm(sides, axis=2).max(axis=1, initial=0.0)
+    wide = size > FLAT * longest * np.maximum(longest, np.abs(corners).max((1, 2)))
+    normal = normal[wide] / size[wide, None]
+    planes = np.zeros((len(corners), 4))
+    planes[wide, :3] = normal
+    planes[wide, 3] = (normal * corners[wide, 0]).sum(axis=1)
+    return planes
 
 
 def _balls(corners: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -174,44 +206,77 @@ def _over(
 
 
 @compiled
+def _from_plane(plane: FloatArray, a: FloatArray, b: FloatArray) -> float:
+    """Distance of a segment from a plane; [m]."""
+    above = plane[0] * a[0] + plane[1] * a[1] + plane[2] * a[2] - plane[3]
+    other = plane[0] * b[0] + plane[1] * b[1] + plane[2] * b[2] - plane[3]
+    return float(max(min(above, other), min(-above, -other)))
+
+
+@compiled
+def _of_leaf(
+    triangles: tuple[FloatArray, FloatArray],
+    between: IntArray,
+    a: FloatArray,
+    b: FloatArray,
+    best: float,
+) -> float:
+    """Distance of a segment to the triangles of a ball, at most `best`; [m]."""
+    corners, planes = triangles
+    for k in range(between[0], between[1]):
+        if _from_plane(planes[k], a, b) < best:
+            best = min(best, sqrt(_from_triangle(corners[k], a, b)))
+    return best
+
+
+@compiled
 def nearest_triangles(
-    corners: FloatArray,
+    triangles: tuple[FloatArray, FloatArray],
     first: IntArray,
     balls: FloatArray,
     ends: FloatArray,
+    floor: float,
     enough: float,
     until: float,
 ) -> FloatArray:
     """Distance of segments to the nearest of some triangles, or `enough` if it is less.
 
+    The search begins with the triangles where the segment before found its nearest, and
+    ends at the first that is nearer than `floor`.
+
     Args:
-        corners: See `Surfaces`.
+        triangles: Their corners and planes, see `Surfaces`.
         first: See `Surfaces`.
         balls: See `Surfaces`.
         ends: Shape (n, 2, 3); [m].
+        floor: The least distance that matters; [m].
         enough: The largest distance that matters; [m].
         until: When to stop, by the monotonic clock; [s].
 
     Returns:
         Shape (n,), 0 where the time was over; [m].
     """
-    corners, balls, ends = borrowed(corners), borrowed(balls), borrowed(ends)
+    triangles, balls, ends = borrowed(triangles), borrowed(balls), borrowed(ends)
     result = np.zeros(ends.shape[0])
     stack, gaps = np.zeros(STACK, np.int64), np.zeros(STACK)
+    nearest = balls.shape[0] - 1
     for n in range(ends.shape[0]):
         if clock() > until:
             break
         a, b = ends[n]
         best = enough
-        stack[0], gaps[0], waiting = 1, -np.inf, int(balls.shape[0] > 1)
-        while waiting > 0:
+        if nearest > 0:
+            best = _of_leaf(triangles, first[nearest], a, b, best)
+        stack[0], gaps[0], waiting = 1, -np.inf, int(nearest > 0)
+        while waiting > 0 and best >= floor:
             waiting -= 1
             ball = stack[waiting]
             if gaps[waiting] >= best:
                 continue
             if 2 * ball >= balls.shape[0]:
-                for k in range(first[ball, 0], first[ball, 1]):
-                    best = min(best, sqrt(_from_triangle(corners[k], a, b)))
+                closer = _of_leaf(triangles, first[ball], a, b, best)
+                if closer < best:
+                    best, nearest = closer, ball
                 continue
             near, far = 2 * ball, 2 * ball + 1
             gap, other = _from_ball(balls[near], a, b), _from_ball(balls[far], a, b)
