@@ -339,7 +339,7 @@ def bad_inputs(folder: Path, planned: Path) -> dict[str, list[object]]:
     text = folder / "text.yaml"
     text.write_text("just words")
     short = folder / "short.csv"
-    short.write_text("\n".join(rows.read_text().splitlines()[:3])[:-9])
+    short.write_text("\n".join(rows.read_text().splitlines()[:3]).rpartition(",")[0])
     out = folder / "out"
     verify = ["verify", good, "--out", out, "--trajectory"]
     return {

@@ -19,6 +19,7 @@ LAYERS = {
     "tolerances": 0,
     "units": 0,
     "kept": 0,
+    "progress": 0,
     "startup": 0,
     "text": 0,
     "notebook": 1,

@@ -47,6 +47,9 @@ Problem = Annotated[
 OutFolder = Annotated[Path, typer.Option("--out", help="Folder for the results.")]
 Strategy = Annotated[str, typer.Option(help=f"How to plan: {', '.join(STRATEGIES)}.")]
 Trajectory = Annotated[Path, typer.Option(help="A trajectory.csv.")]
+PlanningTime = Annotated[
+    float, typer.Option(min=0.001, help="Time limit in seconds; inf for none.")
+]
 TimeLimit = Annotated[
     float | None,
     typer.Option(min=0.001, help="Time limit in seconds, for each problem."),
@@ -84,7 +87,7 @@ def plan(
     problem: Problem,
     out: OutFolder,
     strategy: Strategy = DEFAULT_STRATEGY,
-    time_limit: TimeLimit = None,
+    time_limit: PlanningTime = 60.0,
 ) -> None:
     """Plan a motion.
 
@@ -93,15 +96,16 @@ def plan(
     incomplete, and ends with status 1.
     """
     from vdsm_pin.io.problem_file import read_problem
+    from vdsm_pin.progress import shown
     from vdsm_pin.report.terminal import show_plan
     from vdsm_pin.report.words import outcome
     from vdsm_pin.workflow import plan_to_folder
 
     deadline, begin = Deadline.after(time_limit), time.monotonic()
     try:
-        file = plan_to_folder(
-            read_problem(problem), strategy, out, context.obj, deadline
-        )
+        source = read_problem(problem)
+        with shown():
+            file = plan_to_folder(source, strategy, out, context.obj, deadline)
     except OutOfTime as error:  # which tells its time itself
         error.args = (f"no plan found: {error}",)
         raise

@@ -8,7 +8,6 @@ same way. Coal proposes, the bracket proves: a motion with a failed check is nev
 handed out as a plan.
 """
 
-import logging
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
@@ -21,6 +20,7 @@ from vdsm_pin.planner.start import with_known_insides
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.planner.time_limit import within_time
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.progress import say
 from vdsm_pin.robot_model import RobotModel
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
@@ -44,8 +44,6 @@ swings a little farther; [-]."""
 
 HANDED_OUT: Final = (Verdict.CERTIFIED, Verdict.INCOMPLETE)
 """Verdicts of motions that are clear and within their limits at every instant."""
-
-LOG: Final = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -158,7 +156,7 @@ def plan_and_verify(
                 raise OutOfTime(deadline.limit, "a motion was found, but not proved")
             adjustments = _by_proof(verification, margins)
             rounds.append(_proved(margins, verification, adjustments))
-        LOG.info("margin %.6f m: %s", rounds[-1].margin, rounds[-1].reason)
+        say("margin %s: %s", in_mm(rounds[-1].margin), rounds[-1].reason)
         if rounds[-1].verdict in HANDED_OUT:
             story = (_story(rounds),) if len(rounds) > 1 else ()
             plan = replace(plan, notes=(*plan.notes, *known.notes, *story))

@@ -10,6 +10,7 @@ paper's test and breaks the limit of psi_1 in its method. Both are tested.
 import numpy as np
 
 from vdsm_pin.errors import OutOfReach
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.problem import DesiredPath
 from vdsm_pin.units import in_mm
@@ -25,6 +26,13 @@ def curled_reach(manipulator: Manipulator) -> float:
 def straight_reach(manipulator: Manipulator) -> float:
     """The reach of the straight arm, whose only changed link angle is psi_1; [m]."""
     return manipulator.total_length * float(np.sin(manipulator.max_link_angle))
+
+
+def rail_distance(manipulator: Manipulator, tips: FloatArray) -> FloatArray:
+    """Distance of tips (n, 3) from where the base can be, shape (n,); [m]."""
+    low, high = manipulator.base_range
+    along = tips[:, 0] - np.clip(tips[:, 0], low, high)
+    return np.asarray(np.hypot(along, np.hypot(tips[:, 1], tips[:, 2])))
 
 
 def check_feasibility(manipulator: Manipulator, path: DesiredPath) -> None:

@@ -20,6 +20,7 @@ from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.unbend import leans_ahead, unbend
+from vdsm_pin.planner.fewest.ways_in import Inserted
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import load_robot
@@ -166,7 +167,7 @@ def test_a_start_that_is_left_by_a_finer_search_alone_is_left(
     assert plan.trajectory.on_path.any()
     assert len(tried) == 2
     needed = 1000
-    monkeypatch.setattr(explore, "ways_in", lambda *_: None)
+    monkeypatch.setattr(explore, "ways_in", lambda *_: Inserted(None, None))
     with pytest.raises(NoWayOut, match="out of the start"):
         plan_fewest(task, link_clearance(task), 0.0)
 

@@ -218,11 +218,11 @@ def test_a_path_behind_a_pipe_is_drawn_in_visits_that_come_home() -> None:
     judge, rows = judge_of(task), path_rows(task.path)
     closed = np.zeros(len(rows.tips), dtype=np.bool_)
     effort = Insert(step=0.02, population=24, ways=2, returns=3, seed=0)
-    found = ways_in(judge, space_of(task), rows, closed, effort)
+    found = ways_in(judge, space_of(task), rows, closed, effort).found
     assert found is not None
     # Late, one visit is enough, but not none.
     late = Deadline(1.0, 0.0)
-    soon = ways_in(judge, space_of(task), rows, closed, effort, late)
+    soon = ways_in(judge, space_of(task), rows, closed, effort, late).found
     assert soon is not None
     assert found.missing <= soon.missing < task.path.length
     assert judge.clear(found.knots.pick(np.arange(len(found.knots.drawn)))).all()
@@ -238,7 +238,7 @@ def test_knees_are_taken_away_and_the_motion_stays_clear() -> None:
     judge, rows = judge_of(task), path_rows(task.path)
     effort = Insert(step=0.02, population=10, ways=1, returns=2, seed=0, directed=True)
     closed = np.zeros(len(rows.tips), dtype=np.bool_)
-    found = ways_in(judge, space_of(task), rows, closed, effort)
+    found = ways_in(judge, space_of(task), rows, closed, effort).found
     assert found is not None
     assert not found.missing > 0.0
     fewer = sparser(judge, found.knots)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.feasibility import curled_reach
+from vdsm_pin.planner.feasibility import curled_reach, rail_distance
 from vdsm_pin.planner.fewest.kernels import pose_shapes
 from vdsm_pin.planner.fewest.sway import sway
 from vdsm_pin.planner.records import LinkClearance
@@ -27,7 +27,8 @@ class TipProof:
     """Which tips nobody can reach.
 
     Args:
-        far: Beyond the reach of the curled arm, shape (n,).
+        far: Beyond the reach of the curled arm, or of the straight one from the ends
+            of its rail, shape (n,).
         buried: Within the margin of an obstacle, shape (n,).
         cut_off: No way leads there from the start, shape (n,).
         hemmed_in: The last link has no room there, shape (n,).
@@ -56,6 +57,8 @@ def prove_tips(
     """
     reach = curled_reach(problem.manipulator)
     far = np.hypot(tips[:, 1], tips[:, 2]) > reach + problem.tip_tolerance
+    length = problem.manipulator.total_length + TOLERANCES.joint_centre
+    far |= rail_distance(problem.manipulator, tips) > length + problem.tip_tolerance
     points = np.stack([tips, tips], axis=1)
     buried = clearance(points)[:, 0] < problem.required_clearance
     near = np.flatnonzero(buried)

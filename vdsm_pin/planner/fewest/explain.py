@@ -14,7 +14,7 @@ from vdsm_pin.errors import (
     PathBlocked,
 )
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.planner.feasibility import curled_reach
+from vdsm_pin.planner.feasibility import curled_reach, rail_distance
 from vdsm_pin.planner.fewest.bounds import (
     TipProof,
     least_changed,
@@ -24,10 +24,12 @@ from vdsm_pin.planner.fewest.motion import Intervals, Knots
 from vdsm_pin.planner.fewest.passage import narrowest
 from vdsm_pin.planner.fewest.poses import bends_of
 from vdsm_pin.planner.fewest.route import PathRows
+from vdsm_pin.planner.fewest.stuck import told
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.time_limit import deadline_of
 from vdsm_pin.planner.upper_clearance import culprit, upper_clearance
 from vdsm_pin.problem import Blocked, PlanningProblem
+from vdsm_pin.progress import say
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
@@ -90,14 +92,7 @@ def _proved(
     problem: PlanningProblem, rows: PathRows, proof: TipProof, deadline: Deadline
 ) -> Infeasible:
     if proof.far.any():
-        distance = np.hypot(rows.tips[:, 1], rows.tips[:, 2])
-        worst = int(np.argmax(distance))
-        return OutOfReach(
-            place=f"the tip at {in_mm(rows.stations[worst])} along the path",
-            distance=float(distance[worst]),
-            reach=curled_reach(problem.manipulator),
-            reason="every joint at its limit, Eq. 4",
-        )
+        return _out_of_reach(problem, rows)
     if not proof.buried.any() and proof.hemmed_in.any():
         first = int(np.flatnonzero(proof.hemmed_in)[0])
         return HemmedIn(station=float(rows.stations[first]))
@@ -113,6 +108,23 @@ def _proved(
             f"have at most {in_mm(room)} to it, required are "
             f"{in_mm(problem.required_clearance)}"
         ),
+    )
+
+
+def _out_of_reach(problem: PlanningProblem, rows: PathRows) -> OutOfReach:
+    """The tip that lies farthest off, whatever the base does or from where it ends."""
+    arm, tips = problem.manipulator, rows.tips
+    distance, reach = np.hypot(tips[:, 1], tips[:, 2]), curled_reach(arm)
+    reason = "every joint at its limit, Eq. 4"
+    if not distance.max() > reach:
+        distance, reach = rail_distance(arm, tips), arm.total_length
+        reason = "the straight arm, the base at the end of its rail"
+    worst = int(np.argmax(distance))
+    return OutOfReach(
+        place=f"the tip at {in_mm(rows.stations[worst])} along the path",
+        distance=float(distance[worst]),
+        reach=reach,
+        reason=reason,
     )
 
 
@@ -138,6 +150,21 @@ def _cut_off(
     return CutOff(station=float(rows.stations[first]), narrowest=words)
 
 
+def say_drawn(problem: PlanningProblem, outcome: Outcome) -> None:
+    """Say how much of the path can be drawn by now, and how far the tip comes on it."""
+    if outcome.found is None:
+        return
+    drawn, length = _drawn(problem, outcome), problem.path.length
+    knots = outcome.found.knots
+    on = np.flatnonzero(knots.drawn)
+    _, changed, _ = outcome.judge.look(knots.tips[on], knots.offsets[on])
+    say(
+        "draws %s of %s of the path, up to %s along it, bending at most %d joints",
+        in_mm(drawn), in_mm(length), in_mm(float(knots.stations[1:][on].max())),
+        int(changed.max()),
+    )  # fmt: skip
+
+
 def how_far(problem: PlanningProblem, outcome: Outcome) -> str:
     """Where the search came to an end, in words; not a proof."""
     drawn = _drawn(problem, outcome)
@@ -155,6 +182,8 @@ def how_far(problem: PlanningProblem, outcome: Outcome) -> str:
         f"drawn begins at {in_mm(station)} along the path, tip "
         f"{problem.in_file(tip)}"
     )
+    if outcome.stuck is not None:
+        return f"{words}; {told(problem, outcome.stuck)}"
     zero = np.zeros((1, problem.manipulator.n_links + 1, 2))
     straight = Intervals(tip[None], tip[None], zero, zero)
     place = np.zeros(1, dtype=np.int64)
@@ -293,7 +322,7 @@ def _closed_by(
     here = (rows.stations >= start) & (rows.stations <= stop)
     reasons = []
     if (proof.far & here).any():
-        reasons.append("beyond the reach of the curled arm")
+        reasons.append("beyond the reach of the arm")
     tips = rows.tips[proof.buried & here]
     if len(tips):
         room = upper_clearance(problem, np.stack([tips, tips], axis=1)).min(axis=0)

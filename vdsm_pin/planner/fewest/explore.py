@@ -34,6 +34,7 @@ from vdsm_pin.planner.fewest.search import (
     search,
 )
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes
+from vdsm_pin.planner.fewest.stuck import Stuck
 from vdsm_pin.planner.fewest.taper import kept_by_links
 from vdsm_pin.planner.fewest.tip_ways import TipSpace
 from vdsm_pin.planner.fewest.ways_in import tip_space, ways_in
@@ -53,12 +54,14 @@ class Outcome:
         found: The best sequence, None if nothing can be drawn.
         rows: The desired path row by row.
         proof: Which of its rows nobody can reach.
+        stuck: Where the insertion that came farthest ended, None without one.
     """
 
     judge: Judge
     found: Found | None
     rows: PathRows
     proof: TipProof
+    stuck: Stuck | None = None
 
     @property
     def missing(self) -> float:
@@ -98,8 +101,8 @@ def explore(
         soon: From when on what has been found will do.
 
     Yields:
-        Outcomes, of which each draws more or has more proved than the one before; the
-        first is what is known before any search.
+        What is known after each search: the best so far; first what is known before
+        any search.
 
     Raises:
         NoWayOut: If the start is left at no level.
@@ -119,6 +122,7 @@ def explore(
     least_ease = min(1.0, bent / link_limit(problem))
     unreached, kept = False, kept_by_links(problem.manipulator, taste.taper)
     stuck: NoWayOut | None = None
+    inserted: Stuck | None = None
     spaces: dict[tuple[float, float, int], TipSpace] = {}
     for level in effort.levels:
         if unreached and isinstance(level, Level) and level.back == 0.0:
@@ -129,7 +133,7 @@ def explore(
         worth += 0.0 if kept is None else float(kept[-1])
         judge = Judge(
             problem, clearance, margin, level.slack * length, level.finest * length,
-            ease,            clearance.up_to(worth), kept,
+            ease, clearance.up_to(worth), kept,
         )  # fmt: skip
         found: Found | None = None
         try:
@@ -137,20 +141,22 @@ def explore(
                 key = judge.required, level.step, level.cells
                 if key not in spaces:
                     spaces[key] = tip_space(judge, clearance, level)
-                found = ways_in(
+                now_in = ways_in(
                     judge, spaces[key], rows, best.proof.closed, level, soon
                 )
+                found, inserted = now_in.found, now_in.stuck or inserted
             else:
                 found = _look(judge, level, rows, best.proof, taste)
                 unreached |= level.ease == 1.0 and _unreached(found)
         except NoWayOut as error:
             stuck = error
             unreached |= level.ease == 1.0
-        now = Outcome(judge, found, rows, best.proof)
+        now = Outcome(judge, found, rows, best.proof, inserted)
         LOG.debug("%s: %.4f m missing", level, now.missing)
         if now.missing < best.missing:
             best = now
-            yield best
+        best = replace(best, stuck=inserted)
+        yield best
         if not best.missing > 0.0 or (best.found is not None and soon.passed):
             return
         if level is first and effort.proves:
@@ -160,7 +166,7 @@ def explore(
                 yield best
             if best.proof.closed.all():
                 return
-    if best.found is None and stuck is not None:
+    if best.found is None and inserted is None and stuck is not None:
         raise stuck
 
 

@@ -16,6 +16,7 @@ from vdsm_pin.planner.fewest.explain import (
     notes_of,
     refuse,
     refuse_proved,
+    say_drawn,
     undrawn,
 )
 from vdsm_pin.planner.fewest.explore import Outcome, explore
@@ -208,6 +209,7 @@ def _plan(
         soon = _soon(problem, clearance)
         for outcome in explore(problem, quick, margin, taste, effort, soon):
             best = outcome
+            say_drawn(problem, best)
             refuse_proved(problem, best)
         assert best is not None
         refuse(problem, best)

@@ -18,12 +18,15 @@ from vdsm_pin.planner.fewest.home import checked_start
 from vdsm_pin.planner.fewest.insertion import Chain, Insertion, Layers
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
-from vdsm_pin.planner.fewest.motion import Knots
+from vdsm_pin.planner.fewest.motion import Intervals, Knots
 from vdsm_pin.planner.fewest.nearby import Nearby
 from vdsm_pin.planner.fewest.route import PathRows, TipRoute, tip_route
 from vdsm_pin.planner.fewest.search import Found
+from vdsm_pin.planner.fewest.stuck import Stuck
 from vdsm_pin.planner.fewest.tip_ways import TipSpace
+from vdsm_pin.progress import say
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.units import in_mm
 
 PLAY: Final = 0.3
 """How far the tip may be from its way off the path, over the body's radius; [-]."""
@@ -41,17 +44,38 @@ class _Visit:
         first: Layer of the path at which it begins to draw.
         before: Layers of the chain that come before that one.
         chain: The motion.
+        way: Of the tip to the path, shape (k, 3); [m].
     """
 
     first: int
     before: int
     chain: Chain
+    way: FloatArray
+
+    @property
+    def come(self) -> tuple[int, float]:
+        """How far it came: layer of the path, part of the way to the path."""
+        reached = float(self.chain.layer[-1])
+        return self.last, min(1.0, reached / max(self.before, 1))
 
     @property
     def last(self) -> int:
         """Layer of the path up to which it draws, -1 if it does not come there."""
         drawn = int(self.chain.layer[-1]) - self.before
         return self.first + drawn if drawn >= 0 else -1
+
+
+@dataclass(frozen=True)
+class Inserted:
+    """What an insertion came to.
+
+    Args:
+        found: The motion, None if nothing is drawn.
+        stuck: The visit that came farthest, None if there is no way for the tip.
+    """
+
+    found: Found | None
+    stuck: Stuck | None
 
 
 def ways_in(
@@ -61,7 +85,7 @@ def ways_in(
     closed: BoolArray,
     effort: Insert,
     soon: Deadline = NO_LIMIT,
-) -> Found | None:
+) -> Inserted:
     """A motion that draws what it can, going in as often as it takes.
 
     Args:
@@ -72,15 +96,13 @@ def ways_in(
         effort: How thoroughly to look.
         soon: From when on what is not drawn yet is skipped, if something is drawn.
 
-    Returns:
-        None if nothing is drawn.
-
     Raises:
         LimitExceeded: If the start breaks a limit.
     """
     step = effort.step * judge.problem.manipulator.total_length
     route = tip_route(judge.problem, rows, closed, step, 0.0)
-    return _Search(judge, space, route, effort).found(soon)
+    search = _Search(judge, space, route, effort)
+    return Inserted(search.found(soon), search.stuck())
 
 
 def tip_space(judge: Judge, clearance: Nearby, effort: Insert) -> TipSpace:
@@ -104,6 +126,7 @@ class _Search:
         self.chart: Chart = Directions() if effort.directed else Projections()
         self.root = checked_start(judge, route.tips[:1], self.chart)
         self.rng = np.random.default_rng(effort.seed)
+        self.farthest: _Visit | None = None
 
     def found(self, soon: Deadline) -> Found | None:
         """Visits until the path's end is reached or too many are in vain."""
@@ -131,6 +154,18 @@ class _Search:
             return None
         return Found(self.route, self._knots(visits), tuple(skipped))
 
+    def stuck(self) -> Stuck | None:
+        """Where the visit that came farthest ended."""
+        visit = self.farthest
+        if visit is None:
+            return None
+        tip, shape = visit.chain.tips[-1:], visit.chain.offsets[-1:]
+        still = Intervals(tip, tip, shape, shape)
+        arm, place = self.judge.problem.manipulator, np.zeros(1, np.int64)
+        centres = still.centres(arm, place, np.zeros(1))[0]
+        come = 1 + min(int(visit.chain.layer[-1]), visit.before)
+        return Stuck(visit.way, come, centres)
+
     def _visit(self, k: int) -> _Visit | None:
         """The visit that draws most from layer k on."""
         shut = np.flatnonzero(self.route.closed[k + 1 :])
@@ -145,9 +180,17 @@ class _Search:
             grown = Insertion(
                 self.judge, layers, self.rng, self.effort.population, self.chart
             )
-            visit = _Visit(k, before, grown.grow(self.root, self.effort.returns))
+            chain = grown.grow(self.root, self.effort.returns)
+            visit = _Visit(k, before, chain, way)
+            if self.farthest is None or visit.come > self.farthest.come:
+                self.farthest = visit
             if best is None or visit.last > best.last:
                 best = visit
+            reached, part = visit.come
+            say(
+                "an arm came %.0f %% of a way in, to %s along the path", 100.0 * part,
+                in_mm(float(self.route.stations[reached]) if reached >= 0 else 0.0),
+            )  # fmt: skip
             if best.last == end - 1:
                 break
         return best

@@ -1,0 +1,111 @@
+"""What is said of an arm that does not come in: the passage, the stop, the advice."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scenes_for_fewest import problem
+
+from vdsm_pin.errors import NoPlanFound, OutOfReach
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.feasibility import rail_distance
+from vdsm_pin.planner.fewest.explain import refuse
+from vdsm_pin.planner.fewest.explore import explore
+from vdsm_pin.planner.fewest.levels import Effort, Insert
+from vdsm_pin.planner.fewest.nearby import nearby
+from vdsm_pin.planner.fewest.roadmap import Taste
+from vdsm_pin.planner.fewest.strategy import plan_fewest
+from vdsm_pin.planner.fewest.stuck import Stuck, told
+from vdsm_pin.problem import Blocked, PlanningProblem
+from vdsm_pin.progress import shown
+from vdsm_pin.scene import Box, Obstacle
+from vdsm_pin.verification.link_clearance import link_clearance
+
+HALF = 0.08
+
+
+def wall(x: float, half: float) -> list[Obstacle]:
+    """A wall across the rail with a square window on it."""
+    spans = [
+        ((-3, -half), (-3, 3)), ((half, 3), (-3, 3)),
+        ((-half, half), (-3, -half)), ((-half, half), (half, 3)),
+    ]  # fmt: skip
+    return [
+        Box(
+            f"wall{n}", np.array([x, sum(y) / 2, sum(z) / 2]), np.eye(3),
+            np.array([0.04, y[1] - y[0], z[1] - z[0]]) / 2,
+        )
+        for n, (y, z) in enumerate(spans)
+    ]  # fmt: skip
+
+
+def behind(half: float) -> PlanningProblem:
+    """A path behind the window."""
+    points = np.array([[1.4, 0.0, 0.0], [1.4, 0.0, 0.1]])
+    return problem(
+        *wall(0.6, half), points=points, closed=False, start=(0.0, 0.0, 0.0),
+        blocked=Blocked.FAIL,
+    )  # fmt: skip
+
+
+def straight(task: PlanningProblem, x: float) -> FloatArray:
+    """Joint centres of the straight arm with its tip at x on the rail."""
+    arm = task.manipulator
+    return np.column_stack([x - arm.total_length + arm.stations, *np.zeros((2, 9))])
+
+
+def test_the_passage_the_stop_and_the_advice_are_named() -> None:
+    task = behind(HALF)
+    way = np.column_stack([np.linspace(0.0, 1.4, 141), *np.zeros((2, 141))])
+    words = told(task, Stuck(way, 51, straight(task, 0.5)))
+    # The tip's point is 80 mm from the frame at any place within the wall.
+    assert "160.000 mm wide, for a body of 123.000 mm with 3.500 mm" in words
+    assert "narrowest at (580.0, 0.0, 0.0) mm" in words
+    assert "the arm came 500.000 mm of 1400.000 mm along it" in words
+    # The tip is 80 mm from the wall's face, and 80 mm aside.
+    room = np.hypot(0.08, 0.08) - task.manipulator.most_radius
+    assert f"where link 8 has {room * 1e3:.3f} mm to 'wall" in words
+    assert "wider opening" not in words
+
+
+def test_limits_that_are_met_are_named_first() -> None:
+    task = behind(0.067)
+    arm = task.manipulator
+    way, centres = np.zeros((2, 3)), straight(task, 0.5)
+    way[1, 0] = 1.4
+    turn = np.array([np.cos(arm.max_link_angle), np.sin(arm.max_link_angle), 0.0])
+    centres[8] = centres[7] + arm.link_lengths[7] * turn
+    words = told(task, Stuck(way, 2, centres))
+    assert "joint 8 is at its own" in words
+    assert "all the way in" in words
+    short = replace(arm, base_range=(float(centres[0, 0]), 1.0))
+    words = told(replace(task, manipulator=short), Stuck(way, 2, centres))
+    assert "try a longer rail" in words
+
+
+def test_a_search_in_vain_tells_where_it_ended(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Where the rail ends the straight arm is there, and too high for the window."""
+    task = behind(HALF)
+    arm = replace(task.manipulator, base_range=(-5.0, -1.724))
+    task = replace(task, manipulator=arm)
+    tip = task.path.points[-1]
+    assert float(rail_distance(arm, tip[None])[0]) < arm.total_length
+    clearance = nearby(task, link_clearance(task))
+    effort = Insert(step=0.02, population=10, ways=1, returns=1, seed=0)
+    with shown(quiet=0.0):
+        *_, outcome = explore(task, clearance, 0.0, Taste(), Effort((effort,), False))
+    with pytest.raises(NoPlanFound) as ended:
+        refuse(task, outcome)
+    words = str(ended.value)
+    assert "the best way in is narrowest at" in words
+    assert "try a longer rail" in words
+    assert "% of a way in" in capsys.readouterr().err
+
+
+def test_what_the_rail_keeps_from_the_path_is_proved() -> None:
+    task = behind(HALF)
+    arm = replace(task.manipulator, base_range=(-5.0, 1.39 - 3.126))
+    with pytest.raises(OutOfReach, match=r"the base at the end of its rail"):
+        plan_fewest(replace(task, manipulator=arm), link_clearance(task), 0.0)
