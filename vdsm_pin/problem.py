@@ -11,6 +11,7 @@ from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, frozen, running_sums
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.notebook import Summarised
+from vdsm_pin.pointing import Pointing
 from vdsm_pin.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M, in_mm
@@ -58,9 +59,10 @@ class DesiredPath:
             (1 + 2N,), with `start` their tip; None where the arm starts straight;
             [m] in the first entry, [rad] in the others.
         order: Whether pieces of the path may be drawn in another order or direction.
+        pointing: Where the last link shall look meanwhile; None for anywhere.
 
     Raises:
-        InvalidInput: If a value breaks its range.
+        InvalidInput: If a value breaks its range, or directions do not fit the corners.
     """
 
     start: FloatArray
@@ -73,6 +75,7 @@ class DesiredPath:
     required_coverage: float = 1.0
     start_joints: FloatArray | None = None
     order: Order = Order.AS_GIVEN
+    pointing: Pointing | None = None
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check the values."""
@@ -105,6 +108,35 @@ class DesiredPath:
             value = self.required_coverage
             message = f"tip_path.required_coverage is {value}, expected 0 to 1"
             raise InvalidInput(message)
+        self._check_pointing()
+
+    def _check_pointing(self) -> None:
+        directions = None if self.pointing is None else self.pointing.directions
+        if directions is None or len(directions) in (1, len(self.corners)):
+            return
+        message = (
+            f"pointing has {len(directions)} directions for a path of "
+            f"{len(self.corners)} corners, expected one, or one for each"
+        )
+        raise InvalidInput(message)
+
+    def aims(self, tips: FloatArray, stations: FloatArray) -> FloatArray:
+        """Where the last link shall look on the path; see `Pointing.aims`.
+
+        Args:
+            tips: Shape (n, 3); [m].
+            stations: Arc length along the path, past its length on laps, (n,); [m].
+
+        Returns:
+            Shape (n, 3), NaN where it may look anywhere.
+        """
+        if self.pointing is None:
+            return np.full(tips.shape, np.nan)
+        if self.closed and self.length > 0.0:
+            stations = np.where(
+                stations > self.length, stations - self.length, stations
+            )
+        return self.pointing.aims(self.corner_stations, tips, stations)
 
     @cached_property
     def corners(self) -> FloatArray:

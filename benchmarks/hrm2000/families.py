@@ -14,6 +14,7 @@ from benchmarks.hrm2000.drafts import (
     swung_and_drawn,
 )
 from benchmarks.hrm2000.litter import Litter, ball, crate, pipe, rod, scattered
+from benchmarks.hrm2000.looks import looking
 from benchmarks.hrm2000.passages import Hook, duct, pocket
 from benchmarks.hrm2000.sweeps import Rng, sweep
 from benchmarks.hrm2000.twins import twin
@@ -79,6 +80,12 @@ def any_size(rng: Rng, arm: Manipulator) -> Draft:
     return makers[int(rng.integers(len(makers)))](rng, arm)
 
 
+def pointing(rng: Rng, arm: Manipulator) -> Draft:
+    """What other families ask, and where the last link looks besides."""
+    makers = (port, one_window, windows, duct, dense_clutter)
+    return looking(rng, makers[int(rng.integers(len(makers)))](rng, arm))
+
+
 @dataclass(frozen=True)
 class Family:
     """How problems of a family are made.
@@ -106,6 +113,7 @@ FAMILIES: Final[Mapping[str, Family]] = {
     "dense_clutter": Family(dense_clutter),
     "short_rail": Family(short_rail, (*USUAL, *NINE)),
     "nine_arms": Family(nine_arms, NINE),
+    "pointing": Family(pointing),
     "small_arms": Family(any_size, SMALL),
     "large_arms": Family(any_size, LARGE),
     "twins": Family(twin),

@@ -85,6 +85,7 @@ def tip_path(witness: Witness) -> dict[str, Any]:
             "theta_deg": np.rad2deg(first.theta[0]),
         }
         start = {"joints": joints}
+    asked = {} if witness.pointing is None else pointing(witness)
     return {
         "start": start,
         "points": MM * witness.points,
@@ -92,7 +93,22 @@ def tip_path(witness: Witness) -> dict[str, Any]:
         "spacing": 10.0 * scale(witness.arm),
         "retreat": 100.0 * scale(witness.arm),
         "required_coverage": 1.0,
+        **asked,
     }
+
+
+def pointing(witness: Witness) -> dict[str, Any]:
+    """Where the last link shall look."""
+    wish = witness.pointing
+    assert wish is not None
+    fields: dict[str, Any] = {"cone_deg": float(np.rad2deg(wish.cone))}
+    if wish.target is not None:
+        fields["target"] = MM * wish.target
+    elif wish.directions is not None and len(wish.directions) == 1:
+        fields["direction"] = wish.directions[0]
+    elif wish.directions is not None:
+        fields["directions"] = wish.directions[: len(witness.points)]
+    return {"pointing": fields}
 
 
 @singledispatch

@@ -13,6 +13,7 @@ from benchmarks.hrm2000.curves import TipCurve, follow_the_leader
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_angles, joint_centres, link_angles
 from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.pointing import Pointing
 from vdsm_pin.problem import DesiredPath
 from vdsm_pin.trajectory import Trajectory
 
@@ -41,6 +42,7 @@ class Witness:
         points: Corners of the path, shape (k, 3); [m].
         closed: Whether the last corner joins the first.
         straight: Whether the arm is straight in the first row.
+        pointing: Where its last link looks on the path; None where nobody asks.
     """
 
     arm: Manipulator
@@ -48,6 +50,7 @@ class Witness:
     points: FloatArray
     closed: bool
     straight: bool = True
+    pointing: Pointing | None = None
 
     @property
     def centres(self) -> FloatArray:

@@ -63,6 +63,7 @@ def sample(problem: PlanningProblem, motion: Trajectory) -> Sampled:
     for obstacle in problem.scene.obstacles:
         least = min(least, float(clearance(obstacle, arm, centres)))
     faults = [*_limits(arm, motion), *_tip(problem, motion, centres, moments)]
+    faults += _looks(problem, motion, centres, moments)
     # What Coal's distances and those of points are good for.
     if not least >= problem.required_clearance - TOLERANCES.coal_agreement:
         faults.append(f"clearance {1e3 * least:.4f} mm")
@@ -256,6 +257,36 @@ def _tip(
     if not missed.max() <= 1.5 * path.spacing:
         faults.append(f"a place of the path is missed by {1e3 * missed.max():.2f} mm")
     return faults
+
+
+def _looks(
+    problem: PlanningProblem,
+    motion: Trajectory,
+    centres: FloatArray,
+    moments: FloatArray,
+) -> list[str]:
+    """Whether the last link looks where it shall wherever the tip draws."""
+    wish, on = problem.path.pointing, motion.on_path
+    if wish is None:
+        return []
+    before = np.minimum(moments.astype(int), on.size - 1)
+    after = np.minimum(np.ceil(moments).astype(int), on.size - 1)
+    drawn = on[before] & on[after]
+    station = np.interp(moments, np.arange(on.size), motion.path_m)[drawn]
+    tips, last = centres[drawn, -1], centres[drawn, -1] - centres[drawn, -2]
+    if wish.target is not None:
+        aims = wish.target - tips
+    elif wish.directions is not None and len(wish.directions) == 1:
+        aims = np.repeat(wish.directions, len(tips), axis=0)
+    else:
+        aims = problem.path.aims(tips, station)
+    cosine = (last * aims).sum(axis=1)
+    cosine /= np.linalg.norm(last, axis=1) * np.linalg.norm(aims, axis=1)
+    off = float(np.arccos(np.clip(cosine, -1.0, 1.0)).max(initial=0.0))
+    # An arc cosine near 1 is good to 1e-8.
+    if off <= wish.cone + 1e-6:
+        return []
+    return [f"the last link looks {np.rad2deg(off):.4f} deg past its aim"]
 
 
 def _along(corners: FloatArray, step: float) -> FloatArray:

@@ -13,6 +13,7 @@ from benchmarks.hrm2000.drafts import Draft
 from benchmarks.hrm2000.families import FAMILIES
 from benchmarks.hrm2000.generate import generate, verified, witness_of
 from benchmarks.hrm2000.motions import DraftRejected, drawn_by_feeding
+from benchmarks.hrm2000.sampling import sample
 from benchmarks.hrm2000.solids import (
     Opening,
     Ring,
@@ -194,3 +195,18 @@ def test_the_witness_of_the_feasible_twin_is_refused(tmp_path: Path) -> None:
     for number in range(3):
         path = generate(tmp_path, "twins", number).path
         assert verified(path).verdict is Verdict.REFUTED
+
+
+def test_a_last_link_that_looks_elsewhere_is_a_fault(tmp_path: Path) -> None:
+    path = generate(tmp_path, "pointing", 1).path
+    problem = read_problem(path).problem
+    motion = read_trajectory(witness_of(path), problem.manipulator)
+    assert sample(problem, motion).faults == ()
+    wish = problem.path.pointing
+    assert wish is not None
+    narrow = replace(wish, cone=wish.cone - np.deg2rad(1.5))
+    tighter = replace(problem, tip_path=replace(problem.path, pointing=narrow))
+    (fault,) = sample(tighter, motion).faults
+    assert "past its aim" in fault
+    robot = load_robot(problem.manipulator)
+    assert verify(tighter, motion, robot).verdict is Verdict.REFUTED

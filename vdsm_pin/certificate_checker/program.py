@@ -111,6 +111,8 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
     with ctx.workprec(PRECISION):
         check = Check(source.problem, rows, hashes)
         try:
+            looks = getattr(source.problem.tip_path, "pointing", None)
+            claim(not looks, "pointing is not rechecked yet")
             check.run(_lines(certificate))
         except Rejected as error:
             reason = printable(f"{check.place}: {error}")

@@ -24,6 +24,7 @@ from vdsm_pin.io.posture_builder import PostureBuilder
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.pointing import Pointing
 from vdsm_pin.problem import Approach, Blocked, DesiredPath, Order
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import MAX_ROWS
@@ -76,9 +77,55 @@ class PathBuilder:
             model.required_coverage,
             start.joints,
             Order(model.order),
+            self._pointing(model, points),
         )
         self._check_rows(path)
         return path
+
+    def _pointing(
+        self, model: schema.TipPathModel, points: FloatArray
+    ) -> Pointing | None:
+        """Where the last link looks, in the base frame.
+
+        Args:
+            model: What the file says.
+            points: The corners as read, repeats included, shape (n, 3); [m].
+        """
+        asked, at = model.pointing, ("tip_path", "pointing")
+        if asked is None:
+            return None
+        given = [asked.target, asked.direction, asked.directions]
+        if sum(one is not None for one in given) != 1:
+            problem = "expected one of target, direction and directions"
+            raise self.document.invalid(at, problem)
+        cone = float(np.deg2rad(asked.cone_deg))
+        try:
+            if asked.target is not None:
+                return Pointing(cone, target=self.frame.point(asked.target))
+            if asked.direction is not None:
+                one = self.frame.direction(np.array([asked.direction]))
+                return Pointing(cone, directions=one)
+            return Pointing(cone, directions=self._directions(model, points))
+        except InvalidInput as error:
+            raise self.document.invalid(at, str(error)) from None
+
+    def _directions(self, model: schema.TipPathModel, points: FloatArray) -> FloatArray:
+        """A direction for each corner, the closing one included, shape (m, 3)."""
+        assert model.pointing is not None
+        given = model.pointing.directions or []
+        if len(given) != len(points) or len(model.points) != len(points):
+            message = (
+                f"{len(given)} directions for {len(model.points)} points, expected as "
+                "many, and no curves and files among the points"
+            )
+            raise InvalidInput(message)
+        if len(without_repeats(points, closed=model.closed)) != len(points):
+            message = "directions need points without repeats"
+            raise InvalidInput(message)
+        turned = self.frame.direction(np.array(given))
+        if model.closed and len(points) > 1:
+            turned = np.concatenate([turned, turned[:1]])
+        return turned
 
     def _corners(self, model: schema.TipPathModel) -> tuple[FloatArray, IntArray]:
         """All corners, shape (n, 3) in the file's frame, and whose part each is."""

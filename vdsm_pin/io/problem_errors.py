@@ -25,6 +25,7 @@ _MODELS: Final[Mapping[str | int, type[FileModel]]] = {
     "tool": schema.ToolModel,
     "base": schema.BasePoseModel,
     "tip_path": schema.TipPathModel,
+    "pointing": schema.PointingModel,
     "arc": paths.ArcModel,
     "circle": paths.CircleModel,
     "spline": paths.SplinePart,

@@ -178,6 +178,26 @@ Start: TypeAlias = Annotated[
 ]
 
 
+class PointingModel(FileModel):
+    """Where the last link looks while the tip draws, one of the three."""
+
+    target: Vector | None = Field(
+        default=None, description="A point to look at [length_unit]."
+    )
+    direction: Vector | None = Field(
+        default=None, description="A direction to look in, of any length."
+    )
+    directions: Annotated[list[Vector], Field(min_length=1)] | None = Field(
+        default=None,
+        description="A direction for each of the points, of any length; in between it "
+        "turns from one to the next.",
+    )
+    cone_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = Field(
+        description="Largest angle between the last link's axis and that direction "
+        "[deg]."
+    )
+
+
 class TipPathModel(FileModel):
     """What the tip shall draw, and how it comes there."""
 
@@ -226,6 +246,11 @@ class TipPathModel(FileModel):
         default="as_given",
         description="Whether pieces of the path may be drawn in another order or "
         "direction.",
+    )
+    pointing: PointingModel | None = Field(
+        default=None,
+        description="Where the last link's axis looks wherever the tip draws. Default: "
+        "anywhere.",
     )
 
 

@@ -90,6 +90,9 @@ def write_certificate(
         message = "no certificate is written: it cannot state a turn of the base yet"
         raise VerificationFailed(message)
     problem, trajectory = verification.problem, verification.trajectory
+    if problem.tip_path is not None and problem.tip_path.pointing is not None:
+        message = "no certificate is written: it cannot state `pointing` yet"
+        raise VerificationFailed(message)
     # Of a mesh without known inside the hull is proved clear, by planes for all of it.
     hulls = unlocated(locate_start(problem, trajectory))
     scene = with_hulls(problem.scene, hulls)

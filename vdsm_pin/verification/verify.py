@@ -18,7 +18,13 @@ from vdsm_pin.robot_model import RobotModel
 from vdsm_pin.scene import with_hulls
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification import cable_check, coal_clearance, coal_links, fk
+from vdsm_pin.verification import (
+    cable_check,
+    coal_clearance,
+    coal_links,
+    fk,
+    pointing,
+)
 from vdsm_pin.verification.clearance import (
     ClearanceProof,
     least_clearances,
@@ -134,6 +140,10 @@ def verify(
         *_by_pinocchio(robot, problem, trajectory, centres, deadline),
         *check_limits(problem, trajectory),
         *tip.checks,
+        *_guarded(
+            pointing.NAME,
+            lambda: pointing.check_pointing(problem, trajectory, deadline),
+        ),
         *check_inside(located),
         *enclosed_checks(
             check_clearance(problem, proof, found, contacts, deadline), problem, around

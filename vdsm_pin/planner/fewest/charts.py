@@ -44,6 +44,29 @@ class Chart(Protocol):
         """The shape coordinates with the base brought onto its rail, if it can be."""
 
 
+def turned_towards(
+    shapes: FloatArray, aims: FloatArray, turned: BoolArray, rng: np.random.Generator
+) -> FloatArray:
+    """Directions of links with the last ones turned so that the last looks somewhere.
+
+    Each of them turns a part of the way, the more the nearer it is to the tip.
+
+    Args:
+        shapes: Directions, shape (n, N, 3); [-].
+        aims: Where to, of any length, shape (n, 3).
+        turned: Which arms, shape (n,).
+        rng: Source of chance.
+    """
+    n, count = shapes.shape[:2]
+    sharing = rng.integers(1, count + 1, n)
+    spread = rng.normal(size=(n, 3)) * rng.choice(np.array(TURNS), n)[:, None]
+    goal = aims / np.linalg.norm(aims, axis=1, keepdims=True) + spread
+    back = np.arange(count)[::-1]
+    part = np.maximum(0.0, 1.0 - back / sharing[:, None]) * turned[:, None]
+    mixed = (1.0 - part[..., None]) * shapes + part[..., None] * goal[:, None]
+    return np.asarray(mixed / np.linalg.norm(mixed, axis=2, keepdims=True))
+
+
 class Projections:
     """Offsets of the joints' projections; links lean ahead."""
 

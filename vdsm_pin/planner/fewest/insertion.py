@@ -13,16 +13,21 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.charts import Chart
+from vdsm_pin.planner.fewest.charts import Chart, turned_towards
 from vdsm_pin.planner.fewest.follow import followed
 from vdsm_pin.planner.fewest.growth import FAMILY, lacking
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.pointing import angles_between
 
 LED: Final = 0.4
 """Part of the children that follow the leader; [-]."""
 UNCHANGED: Final = 0.3
 """Part of these that are not varied besides; [-]."""
+AIMED: Final = 0.5
+"""Part of the children that are turned to where the last link shall look; [-]."""
+PULL: Final = 4.0
+"""What an arm is worse for if it looks a radian past where it shall soon; [-]."""
 RESTS: Final = 4
 """Rounds of change at rest before a population that dwindles goes back."""
 
@@ -34,10 +39,18 @@ class Layers:
     Args:
         tips: Shape (l, 3); [m].
         play: How far the tip may be from there, 0 on the desired path, shape (l,); [m].
+        aims: Where the last link shall look, shape (l, 3); None for anywhere.
+        pull: How much that counts, 0 to 1: from 1 on it must, shape (l,); [-].
     """
 
     tips: FloatArray
     play: FloatArray
+    aims: FloatArray | None = None
+    pull: FloatArray | None = None
+
+    def must(self, layer: int) -> bool:
+        """Whether the last link must look somewhere at a layer."""
+        return self.pull is not None and bool(self.pull[layer] >= 1.0)
 
 
 @dataclass(frozen=True)
@@ -180,16 +193,47 @@ class Insertion:
     def _children(self, layer: int, to: int, crowd: _Crowd) -> _Crowd:
         """Living children at a layer, the best first."""
         rows, tips, offsets = self._born(to, crowd)
-        room, changed, bend = self.judge.look(tips, offsets)
+        aims = self._aims(to, tips)
+        must = aims if self.layers.must(to) else None
+        room, changed, bend = self.judge.look(tips, offsets, must)
         alive = np.flatnonzero(room >= self.judge.required)
-        picked = alive[self._choice(room[alive], changed[alive], bend[alive])]
+        score = self._score(room[alive], changed[alive], bend[alive])
+        if aims is not None and must is None:
+            score += self._pull(to, offsets[alive], aims[alive])
+        picked = alive[self._choice(score)]
         parents = crowd.take(rows[picked])
-        lines = Intervals(parents.tips, tips[picked], parents.offsets, offsets[picked])
+        lines = Intervals(
+            parents.tips, tips[picked], parents.offsets, offsets[picked],
+            self._looking(layer, parents.tips, must, picked),
+        )  # fmt: skip
         # The start may be closer than the margin asks for.
         need = np.minimum(self.judge.required, self.room[parents.number])
         good = self.judge.clear(lines, need) if len(picked) else np.zeros(0, bool)
         picked, number = picked[good], parents.number[good]
         return self._recorded(to, tips[picked], offsets[picked], room[picked], number)
+
+    def _aims(self, layer: int, tips: FloatArray) -> FloatArray | None:
+        """Where last links shall look with tips at a layer, shape (n, 3)."""
+        aims, pull = self.layers.aims, self.layers.pull
+        if aims is None or pull is None or not pull[layer] > 0.0:
+            return None
+        return np.broadcast_to(aims[layer], tips.shape)
+
+    def _looking(
+        self, layer: int, tips: FloatArray, must: FloatArray | None, picked: IntArray
+    ) -> FloatArray | None:
+        """Aims at both ends of ways from a layer to one where there are such."""
+        before = self._aims(layer, tips)
+        if must is None or before is None or not self.layers.must(layer):
+            return None
+        return np.stack([before, must[picked]], axis=1)
+
+    def _pull(self, layer: int, offsets: FloatArray, aims: FloatArray) -> FloatArray:
+        """What arms are worse for that do not look to where they shall soon."""
+        pull = self.layers.pull
+        assert pull is not None
+        off = angles_between(offsets[:, -1], aims)
+        return np.asarray(PULL * pull[layer] * off**2)
 
     def _born(self, to: int, crowd: _Crowd) -> tuple[IntArray, FloatArray, FloatArray]:
         """Children at a layer: row of the parent, tip, offsets."""
@@ -206,6 +250,9 @@ class Insertion:
         kept = np.zeros(n, dtype=np.bool_)
         kept[led[rng.random(len(led)) < UNCHANGED]] = True
         born = self.chart.varied(arm, offsets, moved, kept, rng)
+        aims = self._aims(to, tips)
+        if aims is not None:
+            born = turned_towards(born, aims, rng.random(n) < AIMED, rng)
         return rows, tips, self.chart.settled(arm, tips, born)
 
     def _family(self, crowd: _Crowd) -> int:
@@ -225,13 +272,17 @@ class Insertion:
         fits = np.asarray(np.isfinite(after).all(axis=(1, 2)))
         return np.where(fits[:, None, None], offsets, crowd.offsets[rows]), fits
 
-    def _choice(
+    def _score(
         self, room: FloatArray, changed: IntArray, bend: FloatArray
-    ) -> IntArray:
-        """Half the best, half by chance, the best first."""
+    ) -> FloatArray:
+        """How bad arms are."""
         lack = lacking(self.judge, room)
-        score = 0.5 * changed + 2.0 * lack**2 + 2.0 * (bend / self.judge.limit) ** 4
-        order = np.argsort(score + self.rng.random(len(room)), kind="stable")
+        steep = (bend / self.judge.limit) ** 4
+        return np.asarray(0.5 * changed + 2.0 * lack**2 + 2.0 * steep)
+
+    def _choice(self, score: FloatArray) -> IntArray:
+        """Half the best, half by chance, the best first."""
+        order = np.argsort(score + self.rng.random(len(score)), kind="stable")
         if len(order) <= self.population:
             return order
         best, rest = order[: self.population // 2], order[self.population // 2 :]

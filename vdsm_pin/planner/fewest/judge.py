@@ -6,16 +6,18 @@ look. For the other pieces the interval is cut into as many parts as that seems 
 This is a planner's check; the proof over continuous time is the verifier's.
 """
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.planner.fewest.motion import Intervals, Knots
 from vdsm_pin.planner.fewest.parts import Parts
 from vdsm_pin.planner.fewest.poses import bends_of, pieces_of, room_along
 from vdsm_pin.planner.fewest.roadmap import Pricing, Taste, link_limit
 from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.pointing import angles_between
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -23,8 +25,25 @@ CUTS: Final = 16
 """Times an interval is cut; the body moves 65,536 times less in what is left then."""
 NEAR_LIMIT: Final = 0.9
 """An interval is looked at for its link angles if an end has so much of the largest."""
+LOOKS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
+"""Places of an interval at which it is seen where the last link looks; [-]."""
+STEADY: Final = 2e-4
+"""More of its cone that is kept in reserve; [rad]."""
 THIRDS: Final = 40
 """Times the place where the base is farthest back is looked for in two thirds."""
+
+
+def _cone(problem: PlanningProblem, slack: float) -> float:
+    """What a plan uses of the cone in which the last link looks; [rad].
+
+    The rest is for what happens between two rows, where joint centres stray by up to
+    `slack` [m].
+    """
+    pointing = problem.path.pointing
+    if pointing is None:
+        return np.inf
+    reserve = 2.0 * slack / problem.manipulator.link_lengths[-1] + STEADY
+    return max(pointing.cone - float(reserve), pointing.cone / 2.0)
 
 
 class Judge:
@@ -58,20 +77,37 @@ class Judge:
         self.required = problem.required_clearance + margin + slack
         self.slack, self.finest = slack, finest
         self.limit = ease * link_limit(problem)
+        self.cone = _cone(problem, slack)
 
     def pricing(self, taste: Taste) -> Pricing:
         """What configurations keep and cost to a taste."""
         length = self.problem.manipulator.total_length
-        return Pricing(self.required, self.limit, length, taste)
+        return Pricing(self.required, self.limit, length, taste, self.cone)
+
+    def lines(self, knots: Knots, intervals: IntArray) -> Intervals:
+        """Some intervals of a motion, with where the last link shall look on the path.
+
+        Args:
+            knots: The motion.
+            intervals: Numbers, shape (n,).
+        """
+        lines, path = knots.pick(intervals), self.problem.path
+        if path.pointing is None:
+            return lines
+        aims = path.aims(knots.tips, knots.stations)
+        both = np.stack([aims[intervals], aims[intervals + 1]], axis=1)
+        both[~knots.drawn[intervals]] = np.nan
+        return replace(lines, aims=both)
 
     def look(
-        self, tips: FloatArray, offsets: FloatArray
+        self, tips: FloatArray, offsets: FloatArray, aims: FloatArray | None = None
     ) -> tuple[FloatArray, IntArray, FloatArray]:
         """Clearance, changed angles and largest angle of configurations.
 
         Args:
             tips: Shape (n, 3); [m].
             offsets: Shape (n, N + 1, 2); [m].
+            aims: Where the last link shall look, shape (n, 3); None for anywhere.
 
         Returns:
             Least clearance beyond what links keep, -inf where a limit is broken, shape
@@ -85,9 +121,16 @@ class Judge:
         centres, room = self._states(
             still, number, share, most, self.rough, knees, knees[:, 1:]
         )
+        if aims is not None:
+            room[~self._aimed(centres, aims)] = -np.inf
         angles = bends_of(centres)
         changed = (angles > TOLERANCES.changed_angle).sum(axis=1)
         return room.min(axis=1), changed, angles.max(axis=1)
+
+    def _aimed(self, centres: FloatArray, aims: FloatArray) -> BoolArray:
+        """Whether last links look where they shall, shape (n,)."""
+        off = angles_between(centres[:, -1] - centres[:, -2], aims)
+        return np.asarray((off <= self.cone) | np.isnan(aims).any(axis=1))
 
     def bends(self, tips: FloatArray, offsets: FloatArray) -> FloatArray:
         """Link angles of configurations, shape (n, N); [rad]."""
@@ -234,10 +277,24 @@ class Judge:
         for share in (0.25, 0.5, 0.75) if near.size else ():
             inner = intervals.centres(arm, near, np.full(len(near), share))
             kept[near] &= bends_of(inner).max(axis=1) <= most[near]
+        kept &= self._looking(intervals)
         ahead = np.minimum(begin[:, -1, 0], end[:, -1, 0])
         near = np.flatnonzero(kept & (ahead - arm.total_length < arm.base_range[0]))
         if near.size:
             kept[near] = self._farthest_back(intervals, near) >= arm.base_range[0]
+        return kept
+
+    def _looking(self, intervals: Intervals) -> BoolArray:
+        """Whether last links look where they shall at some places, shape (n,)."""
+        kept = np.ones(len(intervals.tips), dtype=np.bool_)
+        if intervals.aims is None:
+            return kept
+        asked = np.flatnonzero(np.isfinite(intervals.aims).all(axis=(1, 2)))
+        begin, end = intervals.aims[asked, 0], intervals.aims[asked, 1]
+        arm = self.problem.manipulator
+        for share in LOOKS if asked.size else ():
+            inner = intervals.centres(arm, asked, np.full(len(asked), share))
+            kept[asked] &= self._aimed(inner, (1.0 - share) * begin + share * end)
         return kept
 
     def _farthest_back(self, intervals: Intervals, number: IntArray) -> FloatArray:

@@ -1,6 +1,6 @@
 """How finely to look: what each search of the exploration may use up."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 
@@ -135,6 +135,17 @@ class Effort:
 FULL: Final = Effort(THOROUGH, proves=True)
 QUICK: Final = Effort(THOROUGH[:2], proves=False)
 """For plans that are only better than one there is already."""
+
+
+def pointed(effort: Effort) -> Effort:
+    """An effort for a last link that shall look somewhere.
+
+    Directions say where it looks. Roadmaps are tried first; shapes are not grown.
+    """
+    roadmaps = [replace(one, grow=0) for one in THOROUGH[:2] if isinstance(one, Level)]
+    inserts = [one for one in THOROUGH if isinstance(one, Insert) and one.directed]
+    return replace(effort, levels=(*roadmaps, *inserts))
+
 
 LEANING: Final = Effort(
     tuple(one for one in THOROUGH if isinstance(one, Insert) and one.directed),

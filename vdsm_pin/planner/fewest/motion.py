@@ -90,16 +90,19 @@ class Intervals:
         offsets: D_1..D_{N+1} where they begin, shape (n, N + 1, 2) [m], or the
             directions of the links, shape (n, N, 3) [-].
         next_offsets: The same where they end.
+        aims: Where the last link shall look at both ends, NaN for anywhere, shape
+            (n, 2, 3), see `Pointing.aims`; None for anywhere in all of them.
     """
 
     tips: FloatArray
     next_tips: FloatArray
     offsets: FloatArray
     next_offsets: FloatArray
+    aims: FloatArray | None = None
 
     def __post_init__(self) -> None:
         """Lay the arrays out in one way, so that kernels are compiled for one."""
-        for field in fields(self):
+        for field in fields(self)[:4]:
             value = np.require(getattr(self, field.name), float, ["C", "W"])
             object.__setattr__(self, field.name, value)
 

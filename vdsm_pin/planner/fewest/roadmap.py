@@ -12,6 +12,7 @@ from vdsm_pin.planner.fewest.route import TipRoute
 from vdsm_pin.planner.fewest.shapes import Shapes
 from vdsm_pin.planner.fewest.taper import kept_by_links, link_by_link
 from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.pointing import angles_between
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -53,12 +54,14 @@ class Pricing:
         limit: Largest link angle; [rad].
         length: Of the arm; [m].
         taste: What the strategy prefers.
+        cone: Largest angle between the last link and where it shall look; [rad].
     """
 
     required: float
     limit: float
     length: float
     taste: Taste
+    cone: float = np.inf
 
     def prices(
         self, bends: FloatArray, room: FloatArray
@@ -165,13 +168,18 @@ def build_roadmap(
             where the straight arm does not do; None: every shape at every tip.
     """
     arm, taste, required = problem.manipulator, pricing.taste, pricing.required
-    kept = kept_by_links(arm, taste.taper)
+    kept, aims = kept_by_links(arm, taste.taper), _aims(problem, route)
 
     def tried(whole: BoolArray) -> Roadmap:
         node, ends, bends = pose_shapes(
             route.tips, whole, shapes.knees, shapes.slopes, arm.stations, pricing.limit,
             *arm.base_range,
         )  # fmt: skip
+        if aims is not None:
+            there = aims[node // shapes.size]
+            looks = np.isnan(there).any(axis=1)
+            looks |= angles_between(ends[:, 2] - ends[:, 1], there) <= pricing.cone
+            node, ends, bends = node[looks], ends[looks], bends[looks]
         if kept is not None:
             ends = link_by_link(ends, arm.stations)
         room = _least(clearance, ends, required, kept)
@@ -185,6 +193,15 @@ def build_roadmap(
     poor = np.ones(count, dtype=np.bool_)
     poor[straight.tips_of(np.flatnonzero(straight.cost <= 2.0 * taste.angle))] = False
     return tried(_spread(route, poor, around)) if poor.any() else straight
+
+
+def _aims(problem: PlanningProblem, route: TipRoute) -> FloatArray | None:
+    """Where the last link shall look at each tip, NaN off the path, shape (k, 3)."""
+    if problem.path.pointing is None:
+        return None
+    aims = np.full(route.tips.shape, np.nan)
+    aims[route.layers] = problem.path.aims(route.tips[route.layers], route.stations)
+    return aims
 
 
 def _least(

@@ -79,7 +79,9 @@ def search(
             sequence = reordered(planner, sequence)
         knots = knots_of(judge.problem.manipulator, roadmap, sequence)
         fresh = _fresh(knots.edges, known)
-        good = judge.clear(knots.pick(fresh)) if fresh.size else np.ones(0, bool)
+        good = (
+            judge.clear(judge.lines(knots, fresh)) if fresh.size else np.ones(0, bool)
+        )
         bad = fresh[~good]
         if not bad.size:
             return Searched(

@@ -103,7 +103,7 @@ def _round(
     new.changed[picked] = (bends > TOLERANCES.changed_angle).sum(axis=1)
     new.bend[picked] = bends.max(axis=1)
     need, bend = _guards(judge, knots, state, taste, spans)
-    good, new.room[picked] = judge.measured(trial.pick(picked), need, bend)
+    good, new.room[picked] = judge.measured(judge.lines(trial, picked), need, bend)
     kept = []
     place = 0
     taken = np.zeros(len(knots.tips), dtype=np.bool_)
@@ -171,7 +171,7 @@ def lifted(judge: Judge, knots: Knots) -> Knots:
         for part in (1.0, 0.5, 0.25):
             trial = _stepped_back(knots, begin, end, part * retreat)
             count = end - begin + len(trial.tips) - len(knots.tips)
-            if judge.clear(trial.pick(np.arange(begin, begin + count))).all():
+            if judge.clear(judge.lines(trial, np.arange(begin, begin + count))).all():
                 knots = trial
                 break
     return knots

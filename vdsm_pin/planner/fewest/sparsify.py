@@ -95,7 +95,7 @@ def projected(judge: Judge, knots: Knots) -> Knots:
         return knots
     offsets = Projections().of_centres(arm, centres)
     trial = replace(knots, offsets=offsets)
-    clear = judge.clear(trial.pick(np.arange(len(knots.drawn))))
+    clear = judge.clear(judge.lines(trial, np.arange(len(knots.drawn))))
     return trial if clear.all() else knots
 
 
@@ -117,7 +117,7 @@ def _without(judge: Judge, knots: Knots, joint: int, on: BoolArray) -> Knots:
         offsets = np.where(better[:, None, None], trial, knots.offsets)
         changed = replace(knots, offsets=offsets)
         touched = np.flatnonzero(better[:-1] | better[1:])
-        bad = touched[~judge.clear(changed.pick(touched))]
+        bad = touched[~judge.clear(judge.lines(changed, touched))]
         if not len(bad):
             return changed
         better = _narrowed(better, bad)

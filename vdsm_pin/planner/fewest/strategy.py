@@ -20,7 +20,7 @@ from vdsm_pin.planner.fewest.explain import (
     undrawn,
 )
 from vdsm_pin.planner.fewest.explore import Outcome, explore
-from vdsm_pin.planner.fewest.levels import FULL, LEANING, QUICK, Effort
+from vdsm_pin.planner.fewest.levels import FULL, LEANING, QUICK, Effort, pointed
 from vdsm_pin.planner.fewest.motion import Knots, Rows, dense_rows
 from vdsm_pin.planner.fewest.nearby import Nearby, nearby
 from vdsm_pin.planner.fewest.roadmap import Taste
@@ -200,6 +200,8 @@ def _plan(
             return with_unbending(problem, rows, rest)
         except NoPlanFound:
             effort = LEANING
+    if problem.path.pointing is not None and effort is not LEANING:
+        effort = pointed(effort)
     # What is kept is judged exactly, however much it is.
     most = margin + taste.taper * float(levers(problem.manipulator)[-1])
     quick = nearby(problem, clearance)

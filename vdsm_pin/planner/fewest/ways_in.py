@@ -32,6 +32,8 @@ PLAY: Final = 0.3
 """How far the tip may be from its way off the path, over the body's radius; [-]."""
 AHEAD: Final = (3, 8, 20)
 """Layers ahead of a place of the path by way of which it is come to."""
+TURNING: Final = 12
+"""Layers before the path from which on the arm turns to where it shall look there."""
 FAILURES: Final = 3
 """Places of the path at which the arm is not got in before the search gives up."""
 
@@ -176,7 +178,8 @@ class _Search:
             before = len(way) - 1
             play = np.zeros(before + len(path))
             play[1:before] = PLAY * self.judge.problem.manipulator.most_radius
-            layers = Layers(np.vstack([way, path[1:]]), play)
+            tips = np.vstack([way, path[1:]])
+            layers = Layers(tips, play, *self._pull(k, before, tips))
             grown = Insertion(
                 self.judge, layers, self.rng, self.effort.population, self.chart
             )
@@ -194,6 +197,24 @@ class _Search:
             if best.last == end - 1:
                 break
         return best
+
+    def _pull(
+        self, k: int, before: int, tips: FloatArray
+    ) -> tuple[FloatArray | None, FloatArray | None]:
+        """Where the last link shall look at layers, and how much that counts.
+
+        Args:
+            k: Layer of the path that comes after those of the way in.
+            before: Number of these.
+            tips: Of all layers, shape (l, 3); [m].
+        """
+        path = self.judge.problem.path
+        if path.pointing is None:
+            return None, None
+        number = np.arange(len(tips))
+        stations = self.route.stations[k + np.maximum(number - before, 0)]
+        pull = np.clip(1.0 + (number - before) / TURNING, 0.0, 1.0)
+        return path.aims(tips, stations), pull
 
     def _ways(self, path: FloatArray) -> Iterator[FloatArray]:
         """Ways of the tip to a path's first point, also by way of points after it.

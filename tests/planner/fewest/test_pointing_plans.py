@@ -1,0 +1,116 @@
+"""Plans whose last link looks somewhere: certified, and by plain sampling too."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenes_for_fewest import problem
+
+from vdsm_pin.errors import VerificationFailed
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.manipulator import built_in
+from vdsm_pin.planner.fewest.charts import turned_towards
+from vdsm_pin.pointing import Pointing, angles_between
+from vdsm_pin.problem import Blocked, PlanningProblem
+from vdsm_pin.refinement import Refinement, plan_and_verify
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.scene import Cylinder, Obstacle, Sphere
+from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
+from vdsm_pin.verification.pointing import NAME
+from vdsm_pin.verification.records import Verdict
+
+ARM = built_in("hrm8")
+WELD = np.array([[2.8, 0.2, 0.1], [2.8, 0.5, 0.1], [2.8, 0.5, 0.4]])
+PILLAR = Cylinder("pillar", np.array([1.6, 0.5, 0.0]), np.array([0.0, 0, 1]), 2.0, 0.1)
+BALL = Sphere("ball", np.array([2.2, -0.1, -0.2]), 0.15)
+
+
+def looking(pointing: Pointing, *obstacles: Obstacle) -> PlanningProblem:
+    """The weld, seen as asked."""
+    task = problem(
+        *obstacles, points=WELD, closed=False, start=(2.4, 0.0, 0.0),
+        blocked=Blocked.FAIL,
+    )  # fmt: skip
+    return replace(task, tip_path=replace(task.path, pointing=pointing))
+
+
+def planned(task: PlanningProblem) -> Refinement:
+    return plan_and_verify(task, "fewest", load_robot(task.manipulator))
+
+
+def largest_angle(task: PlanningProblem, found: Refinement) -> float:
+    """Off the aim at many instants on the path, in plain arithmetic; [rad]."""
+    told = found.plan.trajectory
+    both = told.on_path[:-1] & told.on_path[1:]
+    worst = 0.0
+    for t in np.linspace(0.0, 1.0, 21):
+        rows = ((1.0 - t) * told.joints[:-1] + t * told.joints[1:])[both]
+        station = ((1.0 - t) * told.path_m[:-1] + t * told.path_m[1:])[both]
+        centres = joint_centres(ARM, rows[:, 0], rows[:, 1::2], rows[:, 2::2])
+        aims = task.path.aims(centres[:, -1], station)
+        off = angles_between(centres[:, -1] - centres[:, -2], aims)
+        worst = max(worst, float(off.max()))
+    return worst
+
+
+AHEAD = np.array([[1.0, 0.0, 0.0]])
+ASIDE = np.array([[0.8, 0.5, 0.3]])
+EACH = np.array([[1.0, 0.0, 0.0], [0.9, 0.4, 0.0], [0.8, 0.4, 0.4]])
+
+
+@pytest.mark.parametrize("obstacles", [(), (PILLAR, BALL)])
+@pytest.mark.parametrize(
+    ("target", "directions", "cone_deg"),
+    [
+        (np.array([3.3, 0.4, 0.2]), None, 5.0),
+        (None, AHEAD, 2.0),
+        (None, ASIDE, 5.0),
+        (None, EACH, 5.0),
+    ],
+)
+def test_the_last_link_looks_there_all_along_the_path(
+    target: FloatArray | None,
+    directions: FloatArray | None,
+    cone_deg: float,
+    obstacles: tuple[Obstacle, ...],
+) -> None:
+    pointing = Pointing(float(np.deg2rad(cone_deg)), target, directions)
+    task = looking(pointing, *obstacles)
+    found = planned(task)
+    assert found.verification.verdict is Verdict.CERTIFIED
+    (row,) = [check for check in found.verification.checks if check.name == NAME]
+    assert row.verdict is Verdict.CERTIFIED
+    assert largest_angle(task, found) <= row.worst <= pointing.cone
+    assert found.verification.coverage == pytest.approx(1.0)
+
+
+def test_the_wish_makes_a_difference_and_the_same_plan_comes_again() -> None:
+    """Without it the arm looks past the target by far more than the cone."""
+    wide = Pointing(float(np.deg2rad(5.0)), directions=ASIDE)
+    task = looking(wide)
+    free = replace(task, tip_path=replace(task.path, pointing=None))
+    assert largest_angle(task, planned(free)) > 2.0 * wide.cone
+    one, two = planned(task).plan, planned(task).plan
+    np.testing.assert_array_equal(one.trajectory.joints, two.trajectory.joints)
+
+
+def test_links_share_a_turn_towards_an_aim() -> None:
+    rng = np.random.default_rng(3)
+    shapes = rng.normal(size=(500, 8, 3)) * 0.1 + np.array([1.0, 0.0, 0.0])
+    shapes /= np.linalg.norm(shapes, axis=2, keepdims=True)
+    aims = np.array([1.0, 0.3, 0.0]) + rng.normal(size=(500, 3)) * 0.1
+    some = np.arange(500) % 2 == 0
+    turned = turned_towards(shapes, aims, some, rng)
+    np.testing.assert_allclose(np.linalg.norm(turned, axis=2), 1.0, atol=1e-12)
+    np.testing.assert_allclose(turned[~some], shapes[~some], atol=1e-12)
+    assert np.median(angles_between(turned[some, -1], aims[some])) < 0.15
+
+
+def test_no_certificate_is_written_that_cannot_state_it(tmp_path: Path) -> None:
+    found = planned(looking(Pointing(0.1, directions=AHEAD)))
+    hashes = Hashes("", "", "")
+    with pytest.raises(VerificationFailed, match="cannot state `pointing`"):
+        write_certificate(tmp_path / "c", found.verification, hashes)
+    assert not (tmp_path / "c").exists()

@@ -1,0 +1,160 @@
+"""Where the last link looks: proved against dense sampling and closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.manipulator import built_in
+from vdsm_pin.pointing import Pointing, angles_between
+from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.scene import Scene
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.pointing import check_pointing
+from vdsm_pin.verification.records import Check, Verdict
+
+ARM = built_in("hrm8")
+
+
+def motion(
+    rng: np.random.Generator, rows: int, size: float, step: float
+) -> tuple[Trajectory, FloatArray]:
+    """A motion all of which draws, and its tips at the rows."""
+    turns = rng.uniform(-1.0, 1.0, (2, rows, ARM.n_links))
+    angles = rng.uniform(-size, size, (2, 1, ARM.n_links)) + step * turns.cumsum(axis=1)
+    x0 = 0.01 * rng.uniform(-1.0, 1.0, rows).cumsum()
+    tips = joint_centres(ARM, x0, *angles)[:, -1]
+    gaps = np.linalg.norm(np.diff(tips, axis=0), axis=1)
+    stations = np.append(0.0, gaps.cumsum())
+    on = np.ones(rows, dtype=np.bool_)
+    return Trajectory(on, stations, x0, *angles), tips
+
+
+def asked(tips: FloatArray, pointing: Pointing) -> PlanningProblem:
+    """The problem to draw the polyline through some tips."""
+    path = DesiredPath(tips[0], tips, pointing=pointing)
+    return PlanningProblem("test", ARM, Scene(()), path, 0.0, np.eye(4))
+
+
+def sampled(task: PlanningProblem, told: Trajectory, count: int) -> FloatArray:
+    """Angles at many instants, in plain arithmetic, shape (k,); [rad]."""
+    last = told.n_samples - 1
+    at = np.linspace(0.0, last, count * last + 1)
+    k = np.minimum(at.astype(np.int64), last - 1)
+    t = (at - k)[:, None]
+    rows = (1.0 - t) * told.joints[k] + t * told.joints[k + 1]
+    station = (1.0 - t[:, 0]) * told.path_m[k] + t[:, 0] * told.path_m[k + 1]
+    centres = joint_centres(ARM, rows[:, 0], rows[:, 1::2], rows[:, 2::2])
+    axes = centres[:, -1] - centres[:, -2]
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    aims = task.path.aims(centres[:, -1], station)
+    aims /= np.linalg.norm(aims, axis=1, keepdims=True)
+    return np.asarray(np.arccos(np.clip((axes * aims).sum(axis=1), -1.0, 1.0)))
+
+
+def the_row(task: PlanningProblem, told: Trajectory) -> Check:
+    (row,) = check_pointing(task, told)
+    return row
+
+
+def pointings(rng: np.random.Generator, tips: FloatArray) -> list[Pointing]:
+    """A target, a direction, and a direction for each corner."""
+    ahead = np.array([1.0, 0.0, 0.0])
+    each = ahead + rng.normal(0.0, 0.3, tips.shape)
+    return [
+        Pointing(0.1, target=tips[0] + rng.uniform(0.3, 1.0, 3)),
+        Pointing(0.1, directions=np.array([ahead])),
+        Pointing(0.1, directions=each),
+    ]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_largest_angle_is_bounded_closely_and_decides(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    told, tips = motion(rng, 30, 0.1, 0.02)
+    for pointing in pointings(rng, tips):
+        task = asked(tips, pointing)
+        truth = float(sampled(task, told, 200).max())
+        for cone, verdict in (
+            (truth + 2e-3, Verdict.CERTIFIED),
+            (truth + 1e-5, Verdict.CERTIFIED),
+            (truth - 1e-5, Verdict.REFUTED),
+            (truth / 2.0, Verdict.REFUTED),
+        ):
+            if not 0.0 < cone < np.pi / 2.0:
+                continue
+            row = the_row(asked(tips, replace(pointing, cone=cone)), told)
+            assert row.verdict is verdict, (cone - truth, row)
+            assert row.count == 29
+            if verdict is Verdict.CERTIFIED:
+                assert truth - 1e-9 <= row.worst <= min(cone, truth + 1.01e-3) + 1e-9
+            else:
+                assert cone < row.worst <= truth + 1e-6
+
+
+def test_a_swing_between_two_rows_is_seen() -> None:
+    """Both rows look ahead; in between, the two last joints turn out and back."""
+    alpha = np.zeros((3, ARM.n_links))
+    alpha[1, -1] = 0.3
+    still = np.zeros(3), alpha, np.zeros_like(alpha)
+    tips = joint_centres(ARM, *still)[:, -1]
+    on, stations = np.ones(3, dtype=np.bool_), np.array([0.0, 0.05, 0.1])
+    told = Trajectory(on, stations, *still)
+    path = DesiredPath(
+        tips[0], np.array([[0.0, 0, 0], [0.1, 0, 0]]),
+        pointing=Pointing(0.2, directions=np.eye(3)[:1]),
+    )  # fmt: skip
+    task = PlanningProblem("test", ARM, Scene(()), path, 0.0, np.eye(4))
+    row = the_row(task, told)
+    assert (row.verdict, row.moment) == (Verdict.REFUTED, 1.0)
+    assert row.worst == pytest.approx(0.3, abs=1e-12)
+    # Off the path it may look anywhere; a row alone on the path is looked at too.
+    off = replace(told, on_path=np.array([True, False, True]))
+    row = the_row(task, off)
+    assert (row.verdict, row.count) == (Verdict.CERTIFIED, 2)
+    alone = replace(told, on_path=np.array([False, True, False]))
+    assert the_row(task, alone).verdict is Verdict.REFUTED
+
+
+def test_a_target_that_the_tip_runs_through_is_never_green() -> None:
+    x0 = np.linspace(0.0, 1.0, 11)
+    flat = np.zeros((11, ARM.n_links))
+    tips = joint_centres(ARM, x0, flat, flat)[:, -1]
+    told = Trajectory(np.ones(11, dtype=np.bool_), x0, x0, flat, flat)
+    for target, verdict in (
+        (tips[5], {Verdict.REFUTED, Verdict.UNDECIDED}),
+        ((tips[5] + tips[6]) / 2.0, {Verdict.REFUTED, Verdict.UNDECIDED}),
+        (tips[-1] + np.array([0.1, 0.0, 0.0]), {Verdict.CERTIFIED}),
+    ):
+        task = asked(tips[[0, -1]], Pointing(0.5, target=target))
+        assert the_row(task, told).verdict in verdict
+
+
+def test_directions_that_turn_back_on_themselves_are_never_green() -> None:
+    """Half-way between a direction and its opposite there is none."""
+    x0 = np.linspace(0.0, 1.0, 11)
+    flat = np.zeros((11, ARM.n_links))
+    tips = joint_centres(ARM, x0, flat, flat)[:, -1]
+    told = Trajectory(np.ones(11, dtype=np.bool_), x0, x0, flat, flat)
+    ends = np.array([[1.0, 0, 0], [-1.0, 0, 0]])
+    task = asked(tips[[0, -1]], Pointing(1.5, directions=ends))
+    assert the_row(task, told).verdict is not Verdict.CERTIFIED
+
+
+def test_without_rows_on_the_path_nothing_is_proved() -> None:
+    rng = np.random.default_rng(0)
+    told, tips = motion(rng, 5, 0.1, 0.02)
+    task = asked(tips, Pointing(1.0, directions=np.eye(3)[:1]))
+    off = replace(told, on_path=np.zeros(5, dtype=np.bool_))
+    assert the_row(task, off).verdict is Verdict.UNDECIDED
+
+
+def test_angles_are_those_of_arccos() -> None:
+    rng = np.random.default_rng(1)
+    one, other = rng.normal(size=(2, 1000, 3))
+    sizes = np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1)
+    expected = np.arccos((one * other).sum(axis=1) / sizes)
+    np.testing.assert_allclose(angles_between(one, other), expected, atol=1e-7)
+    assert np.isnan(angles_between(np.zeros((1, 3)), one[:1])[0])
