@@ -24,12 +24,12 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from importlib.metadata import version
 from multiprocessing import get_context
-from pathlib import Path
+from pathlib import Path as FilePath
 from typing import Any, Final
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+sys.path.insert(0, str(FilePath(__file__).resolve().parents[1] / "tests"))
 
 from oracles.adversarial import (
     BASE,
@@ -43,20 +43,24 @@ from oracles.adversarial_boxes import Boxed, attacked, make_boxed
 from oracles.adversarial_truth import exact_bracket
 
 from vdsm_pin.arm_bodies import arm_bodies
+from vdsm_pin.arm_tree import arm_tree, link_frame
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.problem import DesiredPath, PlanningProblem
 from vdsm_pin.proof.blocks import sweep
-from vdsm_pin.proof.culling import new_culling
-from vdsm_pin.proof.desk import new_desk
-from vdsm_pin.proof.terms import Motion, Pairs, Rules, Task
+from vdsm_pin.proof.bodies import Body, PairTable
+from vdsm_pin.proof.broad_phase import new_broad_phase
+from vdsm_pin.proof.packing import pack_task
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.terms import WORLD, Rules
+from vdsm_pin.proof.workspace import new_workspace
 from vdsm_pin.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.proving import BUDGET, new_results
 from vdsm_pin.verification.records import ClearanceChunk, ErrorBox
-from vdsm_pin.verification.task import SLACK, pack_bodies, with_errors
+from vdsm_pin.verification.task import SLACK, with_errors
 
 FAR: Final = 1e-6
 """From here on a query must be decided; [m]."""
@@ -120,10 +124,6 @@ def verdicts(batch: Batch, errors: ErrorBox = NOMINAL) -> Any:
     extent = max(float(np.abs(x).max(initial=0.0)) for x in values)
     extent = max(extent, arm.total_length, *np.abs(arm.base_range))
     rules = Rules(
-        lengths=np.array(arm.link_lengths),
-        joint_errors=np.zeros((arm.n_links, 2)),
-        base_turn=0.0,
-        joints_err=False,
         steady=True,
         nominal=True,
         pad=TOLERANCES.arithmetic * max(1.0, extent / TOLERANCES.scene_extent),
@@ -132,25 +132,23 @@ def verdicts(batch: Batch, errors: ErrorBox = NOMINAL) -> Any:
         slack=SLACK,
         until=np.inf,
     )
-    own, link = batch.frame == BASE, batch.link.astype(np.int64)
-    pairs = Pairs(
-        body=link,
-        link=link,
-        obstacle=np.where(own, np.arange(n), batch.frame).astype(np.int64),
-        frame=batch.frame.astype(np.int64),
+    tree, path = arm_tree(arm), Path(np.ascontiguousarray(batch.rows))
+    moving = [Body(link_frame(b.link), (b.piece,)) for b in arm_bodies(arm)]
+    # Obstacles are packed already; links that rest are the links that move.
+    obstacles = [Body(WORLD, ())] * n if batch.groups else []
+    own = batch.frame == BASE
+    table = PairTable(
+        one=len(obstacles) + batch.link.astype(np.int64),
+        other=np.where(own, np.arange(n), batch.frame).astype(np.int64),
         required=batch.required,
-        lost=np.zeros(n),
-        rise=np.zeros(n),
     )
-    rows = np.ascontiguousarray(batch.rows)
-    x0, alpha, theta = rows[:, 0].copy(), rows[:, 1::2].copy(), rows[:, 2::2].copy()
-    results = new_results(n, arm.n_links + n, 1)
-    desk = new_desk(arm.n_links, n, 2, BUDGET)
-    # No obstacle is named as such, so that none is culled.
-    culling = new_culling(pieces, pairs, arm.n_links, 0)
-    task = Task(pieces, pack_bodies(arm_bodies(arm)), pairs, rules)
-    task, motion = with_errors(task, errors), Motion(x0, alpha, theta)
-    sweep(task, motion, desk, results, culling, 0, 1, False)
+    bodies = [*obstacles, *moving]
+    task = pack_task(tree, bodies, table, rules, path.reach, pieces=pieces)
+    task = with_errors(task, errors)
+    results, desk = new_results(n, 1, 1), new_workspace(task, tree.n_columns, BUDGET)
+    # No obstacle is named as such, so that none is settled by its box.
+    broad = new_broad_phase(task, 0)
+    sweep(task, path.packed(), desk, results, broad, (0, 1), False)
     return results.counts.argmax(axis=1)
 
 
@@ -402,7 +400,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--batch", type=int, default=1000, help="queries of a scene")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--save", type=Path, help="write the page here as well")
+    parser.add_argument("--save", type=FilePath, help="write the page here as well")
     arguments = parser.parse_args()
     wanted = arguments.queries, arguments.seed
     command = "python analysis/soundness.py --queries {} --seed {}".format(*wanted)

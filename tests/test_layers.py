@@ -29,6 +29,7 @@ LAYERS = {
     "manipulator": 2,
     "kinematics": 3,
     "arm_bodies": 3,
+    "arm_tree": 3,
     "cables": 4,
     "urdf_writer": 4,
     "urdf_validator": 4,

@@ -3,6 +3,8 @@
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.proof.error_box import ErrorBox
+from vdsm_pin.proof.paths import Path, cubic_path, quintic_path
 from vdsm_pin.proof.tree import Joint, Kind, Tree
 
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
@@ -46,3 +48,26 @@ def random_tree(rng: np.random.Generator, n_joints: int) -> Tree:
             )
         )
     return Tree(tuple(joints))
+
+
+def random_path(rng: np.random.Generator, tree: Tree, n_rows: int, degree: int) -> Path:
+    """Knots some of whose columns rest, and pieces of a degree between them."""
+    shape = (n_rows, tree.n_columns)
+    size = rng.choice([1e-3, 0.1, 0.5], tree.n_columns)
+    q = rng.uniform(-1.5, 1.5, tree.n_columns) + size * rng.uniform(-1.0, 1.0, shape)
+    times = np.cumsum(rng.uniform(0.2, 1.5, n_rows))
+    rates, changes = size * rng.normal(size=(2, *shape))
+    if degree == 1:
+        return Path(q)
+    if degree == 3:
+        return cubic_path(q, rates, times)
+    return quintic_path(q, rates, changes, times)
+
+
+def random_box(rng: np.random.Generator, tree: Tree) -> ErrorBox:
+    """Errors of joints and of placements, or none; [rad], [m]."""
+    n = len(tree.joints)
+    joints = rng.choice([0.0, 1e-3, 0.02], n) * rng.choice([0.0, 1.0])
+    tilts = rng.choice([0.0, 0.0, 0.01], n) * rng.choice([0.0, 1.0])
+    shifts = rng.choice([0.0, 1e-3], n) * rng.choice([0.0, 1.0])
+    return ErrorBox(joints, shifts, tilts)

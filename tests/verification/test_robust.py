@@ -5,16 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vdsm_pin.geometry.arm import place
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
-from vdsm_pin.geometry.bodies import body_reach, new_body
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
 from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.proof.coasting import crude_growth
 from vdsm_pin.proof.layouts import SLICES
-from vdsm_pin.proof.swept_bodies import load_errors, new_ends, room_of
-from vdsm_pin.proof.terms import CERTIFIED, mover_of
+from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.scene import Box, Cylinder, Obstacle, Scene, Sphere
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
@@ -22,7 +18,6 @@ from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.hasty import HastyProof, is_certified
 from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.robust import LARGEST, STRETCH, largest_joint_error
-from vdsm_pin.verification.task import make_task
 
 ARM = built_in("hrm8")
 CENTRE, BALL = np.array([2.0, 0.45, 0.1]), 0.2
@@ -143,39 +138,6 @@ def test_many_obstacles_are_culled_and_change_nothing() -> None:
     proof = HastyProof(crowded, rows)
     results = proof._proving.results
     assert (proof.n_intervals - 1) // results.stride < results.profile.shape[2]
-
-
-def test_the_crude_growth_is_above_every_exact_one() -> None:
-    rng = np.random.default_rng(2)
-    lengths, n_links = np.array(ARM.link_lengths), ARM.n_links
-    centres, frames = np.zeros((n_links + 1, 3)), np.zeros((n_links, 3, 3))
-    task, nearest = make_task(asked(BALL), ErrorBox()), np.inf
-    for _ in range(500):
-        size = rng.choice([0.0, 1e-7, 0.7])
-        angles = rng.uniform(-size, size, (2, n_links))
-        place(0.1, angles[0], angles[1], lengths, centres, frames)
-        first, link = sorted(rng.choice(n_links, 2, replace=False))
-        n, lever = rng.normal(size=3), rng.uniform(0.0, 0.6)
-        n /= np.linalg.norm(n)
-        errors = rng.uniform(0.0, 0.1, (n_links, 2))
-        rules = task.rules._replace(joint_errors=errors, joints_err=True)
-        across = rng.normal(size=3)
-        corner = lever * across / np.linalg.norm(across)
-        mover = mover_of(task, 0)._replace(
-            link=int(link),
-            first=int(first),
-            corners=corner[None],
-            levers=np.array([lever]),
-        )
-        ends, body = new_ends(n_links), new_body(2, 1, room_of(n_links))
-        ends.centres[0], ends.frames[0] = centres, frames
-        # The point is in the origin of the partner's frame.
-        load_errors(rules, mover, ends, body, 0.0)
-        exact = body_reach(body, *n)
-        crude = crude_growth(rules, int(first), int(link), lever)
-        assert crude >= exact
-        nearest = min(nearest, crude / exact)
-    assert nearest < 1.2
 
 
 def test_what_is_asked_before_makes_no_question_harder() -> None:

@@ -179,13 +179,14 @@ class _Clock:
 
 
 class _Borrowed:
-    """The same value, its arrays without reference counts.
+    """The same value, handed on by address, its arrays without reference counts.
 
     Compiled code counts the references of every array that it hands on, twice a call,
-    with atomic operations: for a tuple of fifty arrays that costs more than the
-    arithmetic of a short function. Whoever calls from Python holds the arrays until the
-    call returns, so that nothing inside needs to count them. Only for arguments that
-    came from Python, and never to be returned.
+    with atomic operations, and copies every field of a tuple of fifty arrays: that
+    costs more than the arithmetic of a short function. A borrowed named tuple is one
+    address. Whoever calls from Python holds the arrays until the call returns, so that
+    nothing inside needs to count them. Only for arguments that came from Python, and
+    never to be returned.
     """
 
     def __call__(self, value: T) -> T:

@@ -18,7 +18,13 @@ from numba._dynfunc import make_function
 from numba.core import cgutils, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
-from numba.core.typing.templates import make_intrinsic_template
+from numba.core.imputils import lower_getattr_generic
+from numba.core.typing.templates import (
+    AttributeTemplate,
+    infer_getattr,
+    make_intrinsic_template,
+)
+from numba.extending import models, register_model
 
 from vdsm_pin.geometry.machine_code import MachineCode
 
@@ -196,14 +202,68 @@ def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return value
 
 
+class _Borrowed(types.Type):
+    """A named tuple somewhere in memory: functions hand on its address alone."""
+
+    def __init__(self, inner: Any) -> None:
+        self.inner = inner
+        super().__init__(name=f"borrowed({inner})")
+
+    def field(self, name: str) -> tuple[int, Any]:
+        """Number and type of a field; named tuples within are handed on as well."""
+        number = self.inner.fields.index(name)
+        kind: Any = list(self.inner)[number]
+        return number, _lent(kind)
+
+
+def _lent(kind: Any) -> Any:
+    """What a value is lent as."""
+    return _Borrowed(kind) if isinstance(kind, types.BaseNamedTuple) else kind
+
+
+@register_model(_Borrowed)
+class _BorrowedModel(models.PrimitiveModel):
+    """An address."""
+
+    def __init__(self, manager: Any, kind: Any) -> None:
+        inner = manager.lookup(kind.inner).get_value_type()
+        super().__init__(manager, kind, inner.as_pointer())  # type: ignore[no-untyped-call]
+
+
+@infer_getattr
+class _BorrowedFields(AttributeTemplate):
+    """Types of fields."""
+
+    key = _Borrowed
+
+    def generic_resolve(self, kind: Any, name: str) -> Any:  # type: ignore[override]
+        """The type of a field."""
+        return kind.field(name)[1]
+
+
+@lower_getattr_generic(_Borrowed)  # type: ignore[no-untyped-call,untyped-decorator]
+def _field(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
+    """A field: the address of a named tuple, the value of anything else."""
+    helpers: Any = cgutils
+    number, field = kind.field(name)
+    place = helpers.gep_inbounds(builder, value, 0, number)
+    if isinstance(field, _Borrowed):
+        return place
+    return _without_owner(context, builder, field, builder.load(place))
+
+
 def borrowed() -> Any:
     """The numba type of the function that takes the owners off its argument."""
 
     def define(typing_context: Any, value: Any) -> Any:
-        return value(value), generate
+        return _lent(value)(value), generate
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return _without_owner(context, builder, signature.args[0], arguments[0])
+        helpers: Any = cgutils
+        kind, value = signature.args[0], arguments[0]
+        if isinstance(kind, types.BaseNamedTuple):
+            return helpers.alloca_once_value(builder, value)
+        return _without_owner(context, builder, kind, value)
 
     template: Any = make_intrinsic_template
     return types.Function(

@@ -4,119 +4,71 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.geometry.compiled import apart, borrowed, clock, compiled
-from vdsm_pin.proof.coasting import bound_above, bound_below, served
-from vdsm_pin.proof.culling import Culling, cull
-from vdsm_pin.proof.desk import Desk
+from vdsm_pin.proof.broad_phase import BroadPhase, settle_far
+from vdsm_pin.proof.cached_planes import bound_above, bound_below, served
 from vdsm_pin.proof.layouts import OWN_POINT, UP, WIDTH
-from vdsm_pin.proof.pair_sweep import sweep_pair
-from vdsm_pin.proof.results import (
-    Results,
-    nominate,
-    note_block,
-    note_upper,
-)
+from vdsm_pin.proof.packed_tree import Motion
+from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
+from vdsm_pin.proof.results import Results, note_block, note_upper
 from vdsm_pin.proof.rows import BLOCK, fill_rows
-from vdsm_pin.proof.terms import (
-    BASE,
-    CERTIFIED,
-    Motion,
-    Task,
-    group_of,
-)
+from vdsm_pin.proof.terms import CERTIFIED, Task, mover_of
+from vdsm_pin.proof.workspace import Workspace
+
+
+@compiled
+def _serves(
+    task: Task, desk: Workspace, results: Results, pair: int, stretch: Stretch
+) -> bool:
+    """Whether a pair's cached plane serves a whole block; its bounds are written.
+
+    The quick way out, of segments under errors that cost the same everywhere: most
+    blocks of most pairs end here.
+    """
+    mover, plane, runs = mover_of(task, pair), desk.planes[pair], desk.runs
+    rules, count, group = task.rules, stretch.size, task.pairs.group[pair]
+    bound_below(mover, desk.rows.tracks, runs, plane, 0, count)
+    bound_above(mover, desk.rows.tracks, runs, plane, 0, count)
+    bar = task.pairs.required[pair]
+    if stretch.closely:
+        bar = max(bar, results.limit[group] - rules.gap)
+    lower, upper = runs.lower[:count], runs.upper[:count]
+    if served(lower, upper, bar, rules.slack, 2.0 * plane[WIDTH]) < count:
+        return False
+    best = results.best[pair]
+    results.counts[pair, CERTIFIED] += count
+    note_upper(best, runs, plane[OWN_POINT:WIDTH], stretch.start, 0, count)
+    if rules.nominal:
+        results.limit[group] = min(results.limit[group], best[UP])
+    return True
 
 
 @compiled
 def _sweep_block(
     task: Task,
     motion: Motion,
-    desk: Desk,
+    desk: Workspace,
     results: Results,
     near: IntArray,
-    start: int,
-    offset: int,
-    count: int,
-    steady: BoolArray,
-    hasty: bool,
+    stretch: Stretch,
+    settled: BoolArray,
 ) -> bool:
-    """All near pairs over a block whose rows are filled, as `sweep`.
-
-    The quick way is tried here, with bare arrays: handing on whole tuples takes longer
-    than to bound a block.
-    """
+    """All near pairs over a block whose rows are filled, as `sweep`."""
     apart()
-    rules, rows, runs, planes = task.rules, desk.rows, desk.runs, desk.planes
-    best, counts, profile = results.best, results.counts, results.profile
-    limit, lower, upper = results.limit, runs.lower[:count], runs.upper[:count]
-    n_links, pairs, axial = rules.lengths.size, task.pairs, task.bodies.axial
-    quick = rules.steady and results.dense.verdict.shape[0] == 0
+    runs, pairs, count = desk.runs, task.pairs, stretch.size
+    quick = task.rules.steady and results.dense.verdict.shape[0] == 0
     for pair in near:
-        link, frame = pairs.link[pair], pairs.frame[pair]
-        column = n_links + pairs.obstacle[pair] if frame == BASE else -1
-        group, plane, done = group_of(frame), planes[pair], 0
-        if quick and axial[pairs.body[pair]]:
-            length, f = rules.lengths[link], frame + 1
-            points = rows.centres[f, link : link + 2]
-            bound_below(
-                points,
-                rows.sags[f, link : link + 2],
-                runs.growth,
-                plane,
-                2,
-                pairs.lost[pair],
-                0,
-                count,
-                runs.lower,
-                runs.work,
-            )
-            bound_above(
-                points[0],
-                points[1],
-                plane,
-                1.0 / (length * length),
-                pairs.rise[pair],
-                0,
-                count,
-                runs.upper,
-                runs.at_rows,
-            )
-            bar = pairs.required[pair]
-            if steady[group]:
-                bar = max(bar, limit[group] - rules.gap)
-            done = served(lower, upper, bar, rules.slack, 2.0 * plane[WIDTH])
-        if done == count:
-            counts[pair, CERTIFIED] += count
-            points_of = plane[OWN_POINT:WIDTH]
-            note_upper(best[pair], upper, runs.at_rows, points_of, start, 0, count)
-            if rules.nominal:
-                limit[group] = min(limit[group], best[pair, UP])
-        elif not sweep_pair(
-            task,
-            motion,
-            desk,
-            results,
-            start,
-            offset,
-            count,
-            pair,
-            bool(steady[group]),
-            hasty,
-        ):
-            return False
-        if hasty:  # all that is asked is whether everything is proved
+        closely = settled[pairs.group[pair]]
+        asked = Stretch(
+            stretch.start, stretch.offset, count, closely, stretch.yes_or_no
+        )
+        segment = task.bodies.inverse[pairs.body[pair]] >= 0.0
+        if not (quick and segment and _serves(task, desk, results, pair, asked)):
+            if not sweep_pair(task, motion, desk, results, pair, asked):
+                return False
+        if stretch.yes_or_no:  # all that is asked is whether everything is proved
             continue
-        bar = limit[group] - rules.gap
-        if note_block(
-            best[pair],
-            profile,
-            results.stride,
-            link,
-            column,
-            lower,
-            upper,
-            start,
-            bar,
-        ):
-            nominate(task, results, pair, start, lower)
+        lower, upper = runs.lower[:count], runs.upper[:count]
+        note_block(task, results, pair, stretch.start, lower, upper)
     return True
 
 
@@ -124,53 +76,50 @@ def _sweep_block(
 def sweep(
     task: Task,
     motion: Motion,
-    desk: Desk,
+    desk: Workspace,
     results: Results,
-    culling: Culling,
-    first: int,
-    last: int,
-    hasty: bool,
+    broad: BroadPhase,
+    span: tuple[int, int],
+    yes_or_no: bool,
 ) -> bool:
-    """Judge the intervals [first, last).
+    """Judge some intervals.
 
     Returns:
-        False where `hasty` and one is not proved, or where the time is over: what is
-        left is then not counted.
+        False where only a yes or no is asked and an interval is not proved, or where
+        the time is over: what is left is then not counted.
 
     Args:
         task: The scene, pairs and rules.
         motion: Rows of joint values.
         desk: Working space; what the pairs remember is carried on.
         results: Where to write.
-        culling: For the pairs that are far.
-        first: First interval; row 0 of the dense results.
-        last: One past the last interval.
-        hasty: As for `sweep_pair`.
+        broad: For the pairs that are far.
+        span: First interval, row 0 of the dense results, and one past the last.
+        yes_or_no: As for `sweep_pair`.
     """
     task = borrowed(task)
     motion = borrowed(motion)
     desk = borrowed(desk)
     results = borrowed(results)
-    culling = borrowed(culling)
+    broad = borrowed(broad)
     if task.rules.steady:
         # Whoever asks about several error boxes leaves here what the last one added.
         desk.runs.growth[:] = 0.0
-    limit, steady = results.limit, np.zeros(2, np.bool_)
-    before = limit.copy()
+    limit, settled = results.limit, np.zeros(2, np.bool_)
+    before, (first, last) = limit.copy(), span
     for start in range(first, last, BLOCK):
         if clock() > task.rules.until:
             return False
         # A limit that falls is soon out of date: what is below it is looked at later.
         for group in range(2):
-            steady[group] = limit[group] >= before[group] - task.rules.gap
-            steady[group] &= limit[group] < np.inf and not hasty
+            settled[group] = limit[group] >= before[group] - task.rules.gap
+            settled[group] &= limit[group] < np.inf and not yes_or_no
             before[group] = limit[group]
-        count, offset = min(BLOCK, last - start), start - first
-        fill_rows(motion, task.rules, desk.rows, start, count)
-        n_near = cull(task, desk, results, culling, start, offset, count)
-        near = culling.near[:n_near]
-        if not _sweep_block(
-            task, motion, desk, results, near, start, offset, count, steady, hasty
-        ):
+        count = min(BLOCK, last - start)
+        stretch = Stretch(start, start - first, count, False, yes_or_no)
+        fill_rows(task, motion, desk.rows, start, count)
+        n_near = settle_far(task, desk, results, broad, stretch)
+        near = broad.near[:n_near]
+        if not _sweep_block(task, motion, desk, results, near, stretch, settled):
             return False
     return True

@@ -8,31 +8,12 @@ from math import sqrt
 
 import numpy as np
 
-from vdsm_pin.geometry.arm import turned_by
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.geometry.compiled import apart, compiled
-from vdsm_pin.proof.coasting import crude_growth
-from vdsm_pin.proof.rows import BLOCK, Rows, place_corner
+from vdsm_pin.proof.error_growth import crude_growth
+from vdsm_pin.proof.rows import Rows
 from vdsm_pin.proof.terms import Task
-
-
-@compiled
-def _growth(task: Task, rows: Rows, count: int, body: int, corner: int) -> float:
-    """How far a corner may leave the box of its rows: sag and error box; [m]."""
-    rules, bodies = task.rules, task.bodies
-    link, lever = bodies.link[body], bodies.levers[bodies.first[body] + corner]
-    sag = drift = 0.0
-    error = lever * turned_by(rules.joint_errors, 0, link)
-    for r in range(count):
-        turning = 0.0
-        for k in range(link + 1):
-            turning += rows.turns[k, r]
-        sag = max(sag, rows.sags[0, link, r] + 0.125 * lever * turning * turning)
-        if rules.joints_err:
-            drift = max(drift, rows.drifts[0, link, r] + error * turning)
-    grown = sag + 0.5 * drift + bodies.discs[body, RADIUS]
-    return float(grown + crude_growth(rules, 0, link, lever))
 
 
 @compiled
@@ -40,37 +21,51 @@ def body_box(
     task: Task,
     rows: Rows,
     count: int,
-    body: int,
+    pair: int,
     low: FloatArray,
     high: FloatArray,
 ) -> None:
     """Box of a body's core over a block and the error box, shape (3,) each; [m].
 
     Its ball and shifts are left to what every plane of a pair loses.
+
+    Args:
+        task: The bodies and the error box.
+        rows: The block.
+        count: Intervals in it.
+        pair: A pair of the body with a partner in the world.
+        low: Written.
+        high: Written.
     """
     apart()
     low[:], high[:] = np.inf, -np.inf
-    bodies, at = task.bodies, np.zeros((3, BLOCK + 1))
-    first, link = bodies.first[body], bodies.link[body]
-    for corner in range(bodies.first[body + 1] - first):
-        grown = _growth(task, rows, count, body, corner)
-        place_corner(rows, link, bodies.corners[first + corner], count + 1, at)
-        if task.rules.base_turn > 0.0:
-            far = 0.0
-            for r in range(count + 1):
-                far = max(far, at[0, r] ** 2 + at[1, r] ** 2 + at[2, r] ** 2)
-            grown += task.rules.base_turn * (sqrt(far) + grown)
+    bodies, places, tracks = task.bodies, task.places, rows.tracks
+    body, slot = task.pairs.body[pair], task.pairs.slot[pair]
+    for corner in range(bodies.first[body + 1] - bodies.first[body]):
+        place = task.pairs.slots[slot + corner]
+        grown, sag = bodies.discs[body, RADIUS], tracks.sags[place]
+        drift = 0.0
+        for r in range(count):
+            drift = max(drift, sag[r])
+        grown += drift
+        if not task.rules.steady:
+            drift = 0.0
+            for r in range(count):
+                drift = max(drift, tracks.drifts[place, r])
+            way, lever = places.way[place], places.lever[place]
+            grown += 0.5 * drift + crude_growth(task.errors, way, lever)
         for c in range(3):
+            at = tracks.places[place, c]
             for r in range(count + 1):
-                low[c] = min(low[c], at[c, r] - grown)
-                high[c] = max(high[c], at[c, r] + grown)
+                low[c] = min(low[c], at[r] - grown)
+                high[c] = max(high[c], at[r] + grown)
 
 
 @compiled
 def box_gaps(
     box: FloatArray, low: FloatArray, high: FloatArray, gap: FloatArray
 ) -> None:
-    """Distance of a body's box from every obstacle's."""
+    """Distance of a body's box from every obstacle's; [m]."""
     apart()
     lx, ly, lz, hx, hy, hz = (
         box[0, 0],

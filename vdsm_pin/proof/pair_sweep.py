@@ -5,7 +5,7 @@ proved by that plane alone; a pair whose bracket grows too wide gets a new one; 
 the bound misses the required clearance the interval is subdivided.
 """
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -13,9 +13,8 @@ from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.geometry.compiled import apart, clock, compiled
 from vdsm_pin.geometry.kernels import BRACKET, FAR, LOWER, NEAR, NORMAL
 from vdsm_pin.geometry.obstacles import node_support
-from vdsm_pin.proof.coasting import coast, place_body, place_own
-from vdsm_pin.proof.desk import Desk, load_rows, take_rows
-from vdsm_pin.proof.holding import hold
+from vdsm_pin.proof.cached_clearances import hold
+from vdsm_pin.proof.cached_planes import Demand, place_disc, place_own, try_plane
 from vdsm_pin.proof.layouts import (
     AT_UPPER,
     END,
@@ -38,34 +37,47 @@ from vdsm_pin.proof.layouts import (
     WHEN,
     WIDTH,
 )
+from vdsm_pin.proof.packed_tree import Motion
 from vdsm_pin.proof.results import Results, note_upper
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.search import bound_between, new_witness, resolve
 from vdsm_pin.proof.slices import leaf_bracket, loaded_bound
-from vdsm_pin.proof.swept_bodies import to_link
-from vdsm_pin.proof.terms import (
-    CERTIFIED,
-    Motion,
-    Mover,
-    Task,
-    group_of,
-    mover_of,
-)
+from vdsm_pin.proof.swept_bodies import to_body
+from vdsm_pin.proof.terms import CERTIFIED, Mover, Task, mover_of
 from vdsm_pin.proof.witnesses import witness_at
+from vdsm_pin.proof.workspace import Workspace, load_rows, take_frame, take_row
 
-STRETCH: Final = 8
+FIRST_TRIED: Final = 8
 """Intervals that a new plane is tried on at first; doubled as long as it serves."""
 
 ROUGH: Final = 0.1
 """Part of the slack that a new plane may miss, where it is not looked at closely."""
 
 
+class Stretch(NamedTuple):
+    """Which intervals are judged, and how.
+
+    Args:
+        start: First interval.
+        offset: Its row in the dense results.
+        size: Number of intervals, at most BLOCK.
+        closely: Whether bounds below the least clearance met are made as good as they
+            can be.
+        yes_or_no: Whether to stop at the first interval that is not proved.
+    """
+
+    start: int
+    offset: int
+    size: int
+    closely: bool
+    yes_or_no: bool
+
+
 @compiled
 def _renew(
     task: Task,
     mover: Mover,
-    desk: Desk,
-    results: Results,
+    desk: Workspace,
     local: int,
     pair: int,
     goal: float,
@@ -77,7 +89,6 @@ def _renew(
         task: The scene, pairs and rules.
         mover: The body of the pair.
         desk: Working space, its rows filled.
-        results: For the tally.
         local: The interval.
         pair: The pair.
         goal: Width of a distance bracket at which to stop; [m].
@@ -91,7 +102,7 @@ def _renew(
     pieces, space, plane = task.pieces, desk.space, desk.planes[pair]
     root, proved = pieces.root[task.pairs.obstacle[pair]], -np.inf
     p, last = pieces.node_range[root]
-    load_rows(task.rules, mover, desk, local, local + 1)
+    load_rows(task, mover, desk, local, local + 1)
     space.out[NORMAL:NEAR] = plane[:3]
     if last - p == 1:
         leaf_bracket(pieces, space, p, goal, True, space.out)
@@ -103,38 +114,39 @@ def _renew(
     plane[:3], plane[POINT:WIDTH] = space.out[NORMAL:NEAR], space.out[FAR:BRACKET]
     n, stack, point = plane[:3], space.stack, space.scratch[0]
     plane[SUPPORT] = node_support(pieces, root, n, stack, point)
-    if not mover.axial:
+    if mover.inverse < 0.0:
         _renew_witness(task, mover, desk, local, pair)
-    results.tally[RENEWED] += 1
     return proved
 
 
 @compiled
-def _renew_witness(task: Task, mover: Mover, desk: Desk, local: int, pair: int) -> None:
-    """Witnesses on a body that is no axis and on its partner, both at one row."""
-    load_rows(task.rules, mover, desk, local, local)
+def _renew_witness(
+    task: Task, mover: Mover, desk: Workspace, local: int, pair: int
+) -> None:
+    """Witnesses on a body that is no segment and on its partner, both at one row."""
+    load_rows(task, mover, desk, local, local)
     plane, space, rows = desk.planes[pair], desk.space, desk.rows
     space.out[NORMAL:NEAR] = plane[:3]
     loaded_bound(task, space, pair, True, np.inf)
     plane[POINT:WIDTH] = space.out[FAR:BRACKET]
     own = plane[OWN_POINT:POINT]
     own[:] = space.out[NEAR:FAR]
-    take_rows(rows, local, local, desk.ends)
-    to_link(mover, desk.ends.centres[0], desk.ends.frames[0], own)
+    take_row(rows, local, desk.ends.start)
+    to_body(mover, desk.ends.start, own)
     place_own(mover, rows, desk.runs, plane, BLOCK)
 
 
 @compiled
 def _look_at_row(
-    task: Task, mover: Mover, desk: Desk, results: Results, local: int, pair: int
+    task: Task, mover: Mover, desk: Workspace, results: Results, local: int, pair: int
 ) -> None:
     """Lower the limit to what can be proved at a row at all, within the error box."""
     apart()
-    load_rows(task.rules, mover, desk, local, local)
+    load_rows(task, mover, desk, local, local)
     space = desk.space
     space.out[NORMAL:NEAR] = desk.planes[pair, :3]
     loaded_bound(task, space, pair, False, np.inf)
-    group = group_of(task.pairs.frame[pair])
+    group = task.pairs.group[pair]
     results.limit[group] = min(results.limit[group], space.out[LOWER])
 
 
@@ -142,23 +154,21 @@ def _look_at_row(
 def _subdivide(
     task: Task,
     motion: Motion,
-    desk: Desk,
+    desk: Workspace,
     results: Results,
-    k: int,
-    m: int,
-    local: int,
     pair: int,
+    stretch: Stretch,
+    local: int,
 ) -> int:
-    """Decide interval k by subdivision, row m of the dense results; its verdict."""
+    """Decide one interval of a block by subdivision; its verdict."""
     apart()
     row, witness = np.zeros(SLICE), new_witness()
+    k, ends, space = stretch.start + local, desk.ends, desk.space
     row[INTERVAL], row[PAIR], row[END] = k, pair, 1.0
-    verdict, count = resolve(
-        task, motion, desk.ends, desk.space, desk.heap, row, witness
-    )
+    verdict, count = resolve(task, motion, ends, space, desk.heap, row, witness)
     results.tally[SLICES] += count
     lower, upper, time = row[KEY], witness.value[MET], witness.value[WHEN]
-    group = group_of(task.pairs.frame[pair])
+    group = task.pairs.group[pair]
     results.limit[group] = min(results.limit[group], witness.value[INSTANT])
     desk.runs.lower[local], desk.runs.upper[local] = lower, upper
     results.counts[pair, verdict] += 1
@@ -168,14 +178,17 @@ def _subdivide(
         best[OWN:] = witness.points
     dense = results.dense
     if dense.verdict.shape[0] > 0:
+        m = stretch.offset + local
         row[START] = row[END] = time
-        bound_between(task, motion, desk.ends, desk.space, row)
+        bound_between(task, motion, ends, space, row)
         dense.lower[m, pair], dense.upper[m, pair] = lower, upper
         dense.time[m, pair], dense.verdict[m, pair] = time, verdict
-        centres, frames = desk.ends.centres[0], desk.ends.frames[0]
-        own, other = dense.own[m, pair], dense.other[m, pair]
-        mover = mover_of(task, pair)
-        witness_at(mover, centres, frames, witness.points, own, other)
+        own, other, mover = (
+            dense.own[m, pair],
+            dense.other[m, pair],
+            mover_of(task, pair),
+        )
+        witness_at(mover, ends.start, witness.points, own, other)
     desk.planes[pair, SUPPORT] = desk.planes[pair, HELD_CLEARANCE] = -np.inf
     return verdict
 
@@ -183,7 +196,7 @@ def _subdivide(
 @compiled
 def _dense_stretch(
     mover: Mover,
-    desk: Desk,
+    desk: Workspace,
     results: Results,
     pair: int,
     offset: int,
@@ -192,100 +205,100 @@ def _dense_stretch(
 ) -> None:
     """Write intervals that one plane and witness bound to the dense results."""
     apart()
-    runs, rows, dense = desk.runs, desk.rows, results.dense
+    runs, dense, pose = desk.runs, results.dense, desk.ends.start
     at_rows, points = runs.at_rows, desk.planes[pair, OWN_POINT:WIDTH]
-    centres, frames = rows.centres[0], rows.frames[1:]
     for r in range(first, last):
         m, later = offset + r, 1 if at_rows[r + 1] < at_rows[r] else 0
         dense.lower[m, pair], dense.upper[m, pair] = runs.lower[r], runs.upper[r]
         dense.time[m, pair], dense.verdict[m, pair] = float(later), CERTIFIED
-        witness_at(
-            mover,
-            centres[:, :, r + later],
-            frames[:, :, :, r + later],
-            points,
-            dense.own[m, pair],
-            dense.other[m, pair],
-        )
+        for frame in (mover.rest, mover.frame):
+            take_frame(desk.rows, r + later, frame, pose)
+        witness_at(mover, pose, points, dense.own[m, pair], dense.other[m, pair])
+
+
+@compiled
+def _note_stretch(
+    task: Task,
+    mover: Mover,
+    desk: Workspace,
+    results: Results,
+    pair: int,
+    stretch: Stretch,
+    local: int,
+    done: int,
+) -> None:
+    """Count and record the intervals [local, done) that one plane proves."""
+    runs, best, group = desk.runs, results.best[pair], task.pairs.group[pair]
+    results.counts[pair, CERTIFIED] += done - local
+    points = desk.planes[pair, OWN_POINT:WIDTH]
+    note_upper(best, runs, points, stretch.start, local, done)
+    if task.rules.nominal:
+        results.limit[group] = min(results.limit[group], best[UP])
+    if results.dense.verdict.shape[0] > 0:
+        _dense_stretch(mover, desk, results, pair, stretch.offset, local, done)
 
 
 @compiled
 def sweep_pair(
     task: Task,
     motion: Motion,
-    desk: Desk,
+    desk: Workspace,
     results: Results,
-    start: int,
-    offset: int,
-    count: int,
     pair: int,
-    closely: bool,
-    hasty: bool,
+    stretch: Stretch,
 ) -> bool:
     """All intervals of a block for one pair.
 
     Returns:
-        False where `hasty` and one is not proved, or where the time is over: the rest
-        is then neither judged nor counted.
+        False where only a yes or no is asked and an interval is not proved, or where
+        the time is over: the rest is then neither judged nor counted.
 
     Args:
         task: The scene, pairs and rules.
         motion: Rows of joint values.
         desk: Working space, its rows filled; its runs are written.
         results: Where to write.
-        start: First interval of the block.
-        offset: Its row in the dense results.
-        count: Intervals in the block.
         pair: The pair.
-        closely: Whether bounds below the least clearance met are made as good as they
-            can be.
-        hasty: Whether to stop at the first interval that is not proved.
+        stretch: The intervals.
     """
     apart()
     rules, rows, runs, plane = task.rules, desk.rows, desk.runs, desk.planes[pair]
-    required, group = task.pairs.required[pair], group_of(task.pairs.frame[pair])
-    counts, best, limit = results.counts[pair], results.best[pair], results.limit
-    nominal, dense = rules.nominal, results.dense.verdict.shape[0] > 0
-    goal = rules.goal if closely else max(rules.goal, ROUGH * rules.slack * required)
-    slack = np.inf if hasty else rules.slack
-    local, stretch, fresh, proved = 0, count, False, -np.inf
+    required, group = task.pairs.required[pair], task.pairs.group[pair]
+    goal, count, yes_or_no = rules.goal, stretch.size, stretch.yes_or_no
+    if not stretch.closely:
+        goal = max(rules.goal, ROUGH * rules.slack * required)
+    slack = np.inf if yes_or_no else rules.slack
+    local, tried, fresh, proved = 0, count, False, -np.inf
     mover = mover_of(task, pair)
-    place_body(mover, rows, runs, count, rules.steady)
+    place_disc(mover, rows, runs, count)
     place_own(mover, rows, runs, plane, count)
     while clock() <= rules.until:
-        last, bar = min(count, local + stretch), required
-        if closely:
-            bar = max(bar, limit[group] - rules.gap)
-        done = coast(
-            rules, mover, rows, runs, plane, local, last, bar, slack, fresh, proved
-        )
+        last, bar = min(count, local + tried), required
+        if stretch.closely:
+            bar = max(bar, results.limit[group] - rules.gap)
+        demand = Demand(local, last, bar, slack, fresh, proved)
+        done = try_plane(task, mover, rows, runs, plane, demand)
         if fresh and done == local:
             # This interval allows no more, and may be proved nevertheless.
             done += runs.lower[local] >= required
         if done > local:
-            counts[CERTIFIED] += done - local
-            points = plane[OWN_POINT:WIDTH]
-            note_upper(best, runs.upper, runs.at_rows, points, start, local, done)
-            if nominal:
-                limit[group] = min(limit[group], best[UP])
-            if dense:
-                _dense_stretch(mover, desk, results, pair, offset, local, done)
+            _note_stretch(task, mover, desk, results, pair, stretch, local, done)
         elif fresh:
-            if hasty and runs.upper[local] < required:
+            if yes_or_no and runs.upper[local] < required:
                 return False
-            k, m = start + local, offset + local
-            verdict = _subdivide(task, motion, desk, results, k, m, local, pair)
-            if hasty and verdict != CERTIFIED:
+            verdict = _subdivide(task, motion, desk, results, pair, stretch, local)
+            if yes_or_no and verdict != CERTIFIED:
                 return False
             done = local + 1
         fresh, local = False, done
         if local == count:
             return True
         if done == last:
-            stretch *= 2
+            tried *= 2
             continue
-        proved = _renew(task, mover, desk, results, local, pair, goal, bar)
-        if not (nominal or hasty):
+        proved = _renew(task, mover, desk, local, pair, goal, bar)
+        results.tally[RENEWED] += 1
+        if not (rules.nominal or yes_or_no):
             _look_at_row(task, mover, desk, results, local, pair)
-        fresh, stretch = True, STRETCH
+        fresh, tried = True, FIRST_TRIED
     return False

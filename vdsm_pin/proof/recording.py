@@ -5,7 +5,6 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import apart, borrowed, clock, compiled
 from vdsm_pin.geometry.kernels import NEAR, NORMAL
-from vdsm_pin.proof.desk import Desk
 from vdsm_pin.proof.layouts import (
     CLAIM,
     END,
@@ -18,13 +17,17 @@ from vdsm_pin.proof.layouts import (
     SLICE,
     START,
 )
+from vdsm_pin.proof.packed_tree import Motion
 from vdsm_pin.proof.search import bound_between, new_witness, resolve
 from vdsm_pin.proof.slices import leaf_bound, node_bound, plane_bound
-from vdsm_pin.proof.terms import CERTIFIED, Motion, Task
+from vdsm_pin.proof.terms import CERTIFIED, Task
+from vdsm_pin.proof.workspace import Workspace
 
 
 @compiled
-def _claim(task: Task, desk: Desk, row: FloatArray, node: int, n: FloatArray) -> float:
+def _claim(
+    task: Task, desk: Workspace, row: FloatArray, node: int, n: FloatArray
+) -> float:
     """Clearance that one plane proves of the pieces of a node over a slice; [m]."""
     lost = task.pairs.lost[int(row[PAIR])]
     return plane_bound(task.pieces, desk.space, node, lost, n)
@@ -56,7 +59,7 @@ def _write(
 
 @compiled
 def _write_ranges(
-    task: Task, desk: Desk, row: FloatArray, records: FloatArray, count: int
+    task: Task, desk: Workspace, row: FloatArray, records: FloatArray, count: int
 ) -> int:
     """Write planes for ranges of pieces, as few as the hierarchy allows."""
     apart()
@@ -88,7 +91,7 @@ def _write_ranges(
 def _write_slice(
     task: Task,
     motion: Motion,
-    desk: Desk,
+    desk: Workspace,
     row: FloatArray,
     records: FloatArray,
     count: int,
@@ -114,7 +117,7 @@ def _write_slice(
 def _record_pair(
     task: Task,
     motion: Motion,
-    desk: Desk,
+    desk: Workspace,
     row: FloatArray,
     records: FloatArray,
     count: int,
@@ -148,7 +151,7 @@ def _record_pair(
 def record(
     task: Task,
     motion: Motion,
-    desk: Desk,
+    desk: Workspace,
     first: int,
     last: int,
     records: FloatArray,
@@ -176,7 +179,7 @@ def record(
     row, count = np.zeros(SLICE), 0
     for k in range(first, last):
         before = count
-        for pair in range(task.pairs.link.size):
+        for pair in range(task.pairs.body.size):
             if clock() > task.rules.until:
                 return before, k, -1
             row[INTERVAL], row[PAIR] = k, pair

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import apart, compiled
+from vdsm_pin.proof.cached_planes import Runs
 from vdsm_pin.proof.layouts import (
     AT_LOWER,
     AT_UPPER,
@@ -14,7 +15,7 @@ from vdsm_pin.proof.layouts import (
     TIME,
     UP,
 )
-from vdsm_pin.proof.terms import Task, group_of
+from vdsm_pin.proof.terms import Task
 
 
 class Candidates(NamedTuple):
@@ -59,8 +60,8 @@ class Results(NamedTuple):
     Args:
         best: Least bounds of each pair, shape (n_pairs, BEST).
         counts: Intervals of each pair by verdict, shape (n_pairs, 3).
-        profile: Lower and upper bounds by link, then by obstacle, in each bin, shape
-            (2, N + n_obstacles, n_bins); [m].
+        profile: Lower and upper bounds by column, of bodies and partners, in each bin,
+            shape (2, n_columns, n_bins); [m].
         stride: Intervals per bin.
         limit: Least bound that some instant cannot pass, by group, shape (2,); [m].
         candidates: Blocks that may hold the least bound.
@@ -102,8 +103,7 @@ def _least(values: FloatArray) -> int:
 @compiled
 def note_upper(
     best: FloatArray,
-    upper: FloatArray,
-    at_rows: FloatArray,
+    runs: Runs,
     points: FloatArray,
     start: int,
     first: int,
@@ -113,17 +113,17 @@ def note_upper(
 
     Args:
         best: The pair's, shape (BEST,).
-        upper: Upper bounds of the block, shape (>= last,); [m].
-        at_rows: Core distances at its rows, shape (> last,); [m].
+        runs: The bounds of the block.
         points: The witnesses on the body and on the partner, shape (6,); [m].
         start: First interval of the block.
         first: First interval, counted in the block.
         last: One past the last.
     """
-    if any_below(upper[first:last], best[UP]):
-        at = first + _least(upper[first:last])
+    upper, at_rows = runs.upper[first:last], runs.at_rows
+    if any_below(upper, best[UP]):
+        at = first + _least(upper)
         later = 1.0 if at_rows[at + 1] < at_rows[at] else 0.0
-        best[UP], best[AT_UPPER], best[TIME] = upper[at], start + at, later
+        best[UP], best[AT_UPPER], best[TIME] = runs.upper[at], start + at, later
         best[OWN:] = points
 
 
@@ -133,7 +133,7 @@ def _drop_candidates(task: Task, results: Results) -> None:
     apart()
     held, kept = results.candidates, 0
     for k in range(results.tally[HELD]):
-        group = group_of(task.pairs.frame[held.pair[k]])
+        group = task.pairs.group[held.pair[k]]
         if held.lower[k] < results.limit[group] - task.rules.gap:
             held.lower[kept], held.first[kept] = held.lower[k], held.first[k]
             held.size[kept], held.pair[kept] = held.size[k], held.pair[k]
@@ -164,7 +164,7 @@ def nominate(
         results.tally[LOST] += 1
     at = results.tally[HELD]
     if at == room:
-        group = group_of(task.pairs.frame[pair])
+        group = task.pairs.group[pair]
         results.overflow[group] = min(results.overflow[group], least)
         return
     held.lower[at], held.first[at], held.size[at] = least, first, lower.size
@@ -189,41 +189,33 @@ def _lower_column(
 
 @compiled
 def note_block(
-    best: FloatArray,
-    profile: FloatArray,
-    stride: int,
-    link: int,
-    column: int,
+    task: Task,
+    results: Results,
+    pair: int,
+    first: int,
     lower: FloatArray,
     upper: FloatArray,
-    first: int,
-    bar: float,
-) -> bool:
+) -> None:
     """Record the bounds of a pair over a block, but for the least upper one.
 
-    It takes bare arrays, because it runs for every block of every pair.
-
     Args:
-        best: The pair's, shape (BEST,).
-        profile: As in the results.
-        stride: Intervals per bin of it.
-        link: Its column of the link.
-        column: Its column of the obstacle; below 0 for a pair of links.
+        task: The pairs.
+        results: Where to.
+        pair: The pair.
+        first: First interval of the block.
         lower: Lower bounds of the intervals, shape (count,); [m].
         upper: Upper bounds, shape (count,); [m].
-        first: First interval of the block.
-        bar: Below which a bound may be the least of all; [m].
-
-    Returns:
-        Whether one is below the bar.
     """
-    apart()
+    pairs, best = task.pairs, results.best[pair]
+    profile, stride = results.profile, results.stride
+    column, own = pairs.column[pair], task.bodies.column[pairs.body[pair]]
     if column >= 0:
-        _lower_column(profile[0, link], stride, lower, first)
-        _lower_column(profile[1, link], stride, upper, first)
+        _lower_column(profile[0, own], stride, lower, first)
+        _lower_column(profile[1, own], stride, upper, first)
         _lower_column(profile[0, column], stride, lower, first)
         _lower_column(profile[1, column], stride, upper, first)
     if any_below(lower, best[LOW]):
         at = _least(lower)
         best[LOW], best[AT_LOWER] = lower[at], first + at
-    return any_below(lower, bar)
+    if any_below(lower, results.limit[pairs.group[pair]] - task.rules.gap):
+        nominate(task, results, pair, first, lower)

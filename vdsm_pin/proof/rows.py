@@ -9,324 +9,437 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.geometry.arm import turned_by
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import apart, compiled
-from vdsm_pin.proof.terms import Motion, Rules
+from vdsm_pin.proof.packed_tree import (
+    PRISMATIC,
+    REVOLUTE,
+    Motion,
+    PackedTree,
+    bound_column,
+)
+from vdsm_pin.proof.terms import WORLD, Places, Task
+from vdsm_pin.proof.ways import WayErrors, Ways
 
 BLOCK: Final = 64
 """Intervals whose configurations are computed at once: they fit the cache."""
 
-WORK: Final = 7
-"""Rows of working space."""
+
+class Tracks(NamedTuple):
+    """Where the task's places go in a block of rows.
+
+    Args:
+        places: In their frames at rest, shape (n_places, 3, BLOCK + 1); [m].
+        sags: M/8, how far places may leave their chords, (n_places, BLOCK); [m].
+        drifts: D of places, only where errors turn, the same shape; [m].
+    """
+
+    places: FloatArray
+    sags: FloatArray
+    drifts: FloatArray
 
 
 class Rows(NamedTuple):
     """Configurations of a block of rows and what lies between them.
 
-    Frames count from the base: frame 0 is the base, frame f + 1 that of link f.
-
     Args:
-        frames: R_base_frame, shape (N + 1, 3, 3, BLOCK + 1); [-].
-        centres: O_j in a frame, shape (N + 1, N + 1, 3, BLOCK + 1); of frame f + 1
-            only the end of its link and the centres behind it; [m].
-        sags: M/8, how far O_j may leave its chord with joints before f at rest, at
-            [f, j], shape (N + 1, N + 1, BLOCK); [m].
-        drifts: D at [f, j], only where joints may err, the same shape; [m].
-        turns: |change of alpha_l| + |change of theta_l|, shape (N, BLOCK); [rad].
-        work: Working space, shape (WORK, BLOCK + 1).
+        frames: R_world_frame, shape (n_frames, 3, 3, BLOCK + 1); [-].
+        origins: Shape (n_frames, 3, BLOCK + 1); [m].
+        tracks: The task's places.
+        ways: M, W and D of the frames along each way, and how fast W changes where
+            pieces are not straight, shape (n_ways, 4, BLOCK); [m], [rad].
+        joints: Bounds of each joint's value, its rate and how fast that changes, shape
+            (n_joints, 3, BLOCK).
+        work: Working space, shape (8, BLOCK + 1).
     """
 
     frames: FloatArray
-    centres: FloatArray
-    sags: FloatArray
-    drifts: FloatArray
-    turns: FloatArray
+    origins: FloatArray
+    tracks: Tracks
+    ways: FloatArray
+    joints: FloatArray
     work: FloatArray
 
 
+BEND: Final = 0
+TURN: Final = 1
+DRIFT: Final = 2
+SWING: Final = 3
+"""Layout of what is bounded along a way."""
+
+
 @compiled
-def new_rows(n_links: int) -> Rows:
-    """Fresh working space; its base frame is set."""
-    n = n_links + 1
-    frames = np.zeros((n, 3, 3, BLOCK + 1))
+def new_rows(n_frames: int, n_ways: int, n_places: int) -> Rows:
+    """Fresh working space; the world's frame is set."""
+    frames = np.zeros((n_frames, 3, 3, BLOCK + 1))
     for c in range(3):
         frames[0, c, c] = 1.0
     return Rows(
         frames,
-        np.zeros((n, n, 3, BLOCK + 1)),
-        np.zeros((n, n, BLOCK)),
-        np.zeros((n, n, BLOCK)),
-        np.zeros((n_links, BLOCK)),
-        np.zeros((WORK, BLOCK + 1)),
+        np.zeros((n_frames, 3, BLOCK + 1)),
+        Tracks(
+            np.zeros((n_places, 3, BLOCK + 1)),
+            np.zeros((n_places, BLOCK)),
+            np.zeros((n_places, BLOCK)),
+        ),
+        np.zeros((n_ways, 4, BLOCK)),
+        np.zeros((n_frames - 1, 3, BLOCK)),
+        np.zeros((8, BLOCK + 1)),
     )
 
 
 @compiled
-def _blend(
+def blend(
     x: FloatArray,
     y: FloatArray,
     z: FloatArray,
-    a: FloatArray,
-    b: FloatArray,
-    c: FloatArray,
+    at: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Out = a x + b y + c z, row by row."""
+    """Out = at[0] x + at[1] y + at[2] z, row by row."""
+    a, b, c = at[0], at[1], at[2]
     for r in range(out.size):
-        out[r] = a[r] * x[r] + b[r] * y[r] + c[r] * z[r]
+        out[r] = a * x[r] + b * y[r] + c * z[r]
 
 
 @compiled
-def _turn_link(motion: Motion, rows: Rows, first: int, n: int, link: int) -> None:
-    """Frame of a link from the one before: Rz(alpha) Ry(theta)."""
-    apart()
-    cos_a, sin_a = rows.work[0, :n], rows.work[1, :n]
-    cos_t, sin_t = rows.work[2, :n], rows.work[3, :n]
-    across, last = rows.work[4, :n], motion.x0.size - 1
-    for r in range(n):
-        k = min(first + r, last)
-        alpha, theta = motion.alpha[k, link], motion.theta[k, link]
-        cos_a[r], sin_a[r] = cos(alpha), sin(alpha)
-        cos_t[r], sin_t[r] = cos(theta), sin(theta)
+def carry(
+    origins: FloatArray, frames: FloatArray, at: FloatArray, n: int, out: FloatArray
+) -> None:
+    """Points of one frame in the world's, of n rows.
+
+    Args:
+        origins: The frame's, shape (3, >= n); [m].
+        frames: Its rotations, shape (3, 3, >= n); [-].
+        at: The point in it, shape (3,); [m].
+        n: Number of rows.
+        out: Written, shape (3, >= n); [m].
+    """
+    x, y, z = at[0], at[1], at[2]
+    on_axis = y == 0.0 and z == 0.0
     for c in range(3):
-        x = rows.frames[link, c, 0, :n]
-        y, z = rows.frames[link, c, 1, :n], rows.frames[link, c, 2, :n]
-        new_x = rows.frames[link + 1, c, 0, :n]
-        new_y = rows.frames[link + 1, c, 1, :n]
-        new_z = rows.frames[link + 1, c, 2, :n]
-        for r in range(n):
-            across[r] = cos_a[r] * x[r] + sin_a[r] * y[r]
-        for r in range(n):
-            new_x[r] = cos_t[r] * across[r] - sin_t[r] * z[r]
-        for r in range(n):
-            new_y[r] = cos_a[r] * y[r] - sin_a[r] * x[r]
-        for r in range(n):
-            new_z[r] = sin_t[r] * across[r] + cos_t[r] * z[r]
-
-
-@compiled
-def _place(motion: Motion, rules: Rules, rows: Rows, first: int, n: int) -> None:
-    """Link frames, and joint centres in the base frame."""
-    apart()
-    last = motion.x0.size - 1
-    for r in range(n):
-        rows.centres[0, 0, 0, r] = motion.x0[min(first + r, last)]
-    for link in range(rules.lengths.size):
-        _turn_link(motion, rows, first, n, link)
-        length = rules.lengths[link]
-        for c in range(3):
-            start, axis = rows.centres[0, link, c, :n], rows.frames[link + 1, c, 0, :n]
-            end = rows.centres[0, link + 1, c, :n]
+        o, place = origins[c], out[c]
+        fx, fy, fz = frames[c, 0], frames[c, 1], frames[c, 2]
+        if on_axis and x == 0.0:
             for r in range(n):
-                end[r] = start[r] + length * axis[r]
+                place[r] = o[r]
+        elif on_axis:
+            for r in range(n):
+                place[r] = o[r] + x * fx[r]
+        else:
+            for r in range(n):
+                place[r] = o[r] + (x * fx[r] + y * fy[r] + z * fz[r])
 
 
 @compiled
-def _localise(rules: Rules, rows: Rows, n: int) -> None:
-    """Joint centres in the frames of the links before them."""
-    apart()
-    n_links = rows.frames.shape[0] - 1
-    for f in range(1, n_links):
-        rows.centres[f, f, 0, :n] = rules.lengths[f - 1]
-        for j in range(f + 1, n_links + 1):
-            for c in range(3):
-                o, p = rows.centres[0, f - 1, c, :n], rows.centres[0, j, c, :n]
-                arm = rows.work[c, :n]
-                for r in range(n):
-                    arm[r] = p[r] - o[r]
-            for c in range(3):
-                _blend(
-                    rows.work[0, :n],
-                    rows.work[1, :n],
-                    rows.work[2, :n],
-                    rows.frames[f, 0, c, :n],
-                    rows.frames[f, 1, c, :n],
-                    rows.frames[f, 2, c, :n],
-                    rows.centres[f, j, c, :n],
-                )
+def _turn_pair(
+    p: FloatArray, q: FloatArray, co: FloatArray, si: FloatArray, out: FloatArray
+) -> None:
+    """Out = co p + si q, row by row."""
+    for r in range(out.size):
+        out[r] = co[r] * p[r] + si[r] * q[r]
 
 
 @compiled
-def _bend(motion: Motion, rules: Rules, rows: Rows, first: int, count: int) -> None:
-    """How far from linear the intervals are: sags, and drifts where joints may err."""
+def _turn_back_pair(
+    p: FloatArray, q: FloatArray, co: FloatArray, si: FloatArray, out: FloatArray
+) -> None:
+    """Out = co q - si p, row by row."""
+    for r in range(out.size):
+        out[r] = co[r] * q[r] - si[r] * p[r]
+
+
+@compiled
+def _turn_askew(
+    old: FloatArray, axis: FloatArray, co: FloatArray, si: FloatArray, new: FloatArray
+) -> None:
+    """Turn one row of the frames, shape (3, n), about an axis of the frame."""
+    u, v, w = axis[0], axis[1], axis[2]
+    for r in range(co.size):
+        x, y, z = old[0, r], old[1, r], old[2, r]
+        rest = (1.0 - co[r]) * (x * u + y * v + z * w)
+        new[0, r] = co[r] * x + si[r] * (y * w - z * v) + rest * u
+        new[1, r] = co[r] * y + si[r] * (z * u - x * w) + rest * v
+        new[2, r] = co[r] * z + si[r] * (x * v - y * u) + rest * w
+
+
+@compiled
+def _place_rotation(
+    tree: PackedTree, rows: Rows, joint: int, n: int, before: FloatArray
+) -> None:
+    """One frame's rotations as the joint's placement leaves them, to its own array."""
+    placed, new = tree.rotation[joint], rows.frames[joint + 1]
+    old = rows.frames[tree.parent[joint]]
+    for c in range(3):
+        for d in range(3):
+            before[0], before[1], before[2] = placed[0, d], placed[1, d], placed[2, d]
+            blend(old[c, 0, :n], old[c, 1, :n], old[c, 2, :n], before, new[c, d, :n])
+
+
+@compiled
+def _turn_frame(tree: PackedTree, rows: Rows, joint: int, n: int) -> None:
+    """Turn a frame by the joint's angles, whose cosines and sines are in `work`."""
+    co, si = rows.work[0, :n], rows.work[1, :n]
+    along, new = tree.along[joint], rows.frames[joint + 1]
+    old, turned = rows.frames[tree.parent[joint]], tree.turned[joint]
+    for c in range(3):
+        given = rows.work[2:5]
+        if turned:
+            given[:, :n] = new[c, :, :n]
+        else:
+            given = old[c]
+        if along > 2:
+            _turn_askew(given, tree.axis[joint], co, si, new[c])
+            continue
+        # About z: x' = co x + si y, y' = co y - si x; the others by going round.
+        first, second = (along + 1) % 3, (along + 2) % 3
+        p, q = given[first, :n], given[second, :n]
+        _turn_pair(p, q, co, si, new[c, first, :n])
+        _turn_back_pair(p, q, co, si, new[c, second, :n])
+        if not turned:
+            new[c, along, :n] = old[c, along, :n]
+
+
+@compiled
+def _move_frame(
+    tree: PackedTree, motion: Motion, rows: Rows, first: int, n: int, joint: int
+) -> None:
+    """The frame of a joint in the rows of a block, from its parent's."""
     apart()
-    n_links, last = rules.lengths.size, motion.x0.size - 1
+    parent, column, kind = tree.parent[joint], tree.column[joint], tree.kind[joint]
+    values, last = rows.work[5, :n], motion.knots.shape[0] - 1
+    ratio, offset = tree.ratio[joint], tree.offset[joint]
+    values[:] = offset
+    if column >= 0:
+        for r in range(n):
+            values[r] = ratio * motion.knots[min(first + r, last), column] + offset
+    origin, new = rows.origins[joint + 1], rows.frames[joint + 1]
+    carry(rows.origins[parent], rows.frames[parent], tree.shift[joint], n, origin)
+    if tree.turned[joint]:
+        _place_rotation(tree, rows, joint, n, rows.work[6, :3])
+    elif kind != REVOLUTE:
+        new[:, :, :n] = rows.frames[parent, :, :, :n]
+    if kind == REVOLUTE:
+        co, si = rows.work[0, :n], rows.work[1, :n]
+        for r in range(n):
+            co[r], si[r] = cos(values[r]), sin(values[r])
+        _turn_frame(tree, rows, joint, n)
+    elif kind == PRISMATIC:
+        for c in range(3):
+            moved, f = rows.work[0, :n], new[c]
+            blend(f[0, :n], f[1, :n], f[2, :n], tree.axis[joint], moved)
+            for r in range(n):
+                origin[c, r] += values[r] * moved[r]
+
+
+@compiled
+def _bound_joints(
+    tree: PackedTree, motion: Motion, rows: Rows, first: int, count: int
+) -> None:
+    """How far and how fast each joint moves in the intervals of a block."""
+    last = motion.knots.shape[0] - 1
+    straight = motion.inner.shape[1] == 0
+    bound = np.zeros(3)
+    for joint in range(tree.parent.size):
+        column, ratio = tree.column[joint], abs(tree.ratio[joint])
+        offset, own = abs(tree.offset[joint]), rows.joints[joint]
+        if column < 0:
+            own[0, :count], own[1:, :count] = offset, 0.0
+            continue
+        for r in range(count):
+            k, after = min(first + r, last), min(first + r + 1, last)
+            if straight or after == k:
+                here, there = motion.knots[k, column], motion.knots[after, column]
+                own[0, r] = ratio * max(abs(here), abs(there)) + offset
+                own[1, r] = ratio * abs(there - here)
+                own[2, r] = 0.0
+                continue
+            bound_column(motion, k, column, 0.0, 1.0, bound)
+            own[0, r] = ratio * bound[0] + offset
+            own[1, r], own[2, r] = ratio * bound[1], ratio * bound[2]
+
+
+@compiled
+def _add_shift(
+    lever: float,
+    turn: FloatArray,
+    before: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Out = before + lever turn^2, row by row."""
+    for r in range(out.size):
+        out[r] = before[r] + lever * turn[r] * turn[r]
+
+
+@compiled
+def _bend_way(
+    tree: PackedTree,
+    ways: Ways,
+    rows: Rows,
+    way: int,
+    count: int,
+    straight: bool,
+) -> None:
+    """M and W of a way, from those of the way before it."""
+    apart()
+    before, joint = rows.ways[ways.before[way]], ways.joint[way]
+    own, kind = rows.ways[way], tree.kind[joint]
+    turn, turn_before = own[TURN, :count], before[TURN, :count]
+    swing, swing_before = own[SWING, :count], before[SWING, :count]
+    turn[:] = turn_before
+    rate = rows.joints[joint, 1, :count]
+    if kind == REVOLUTE:
+        for r in range(count):
+            turn[r] += rate[r]
+    if not straight:
+        swing[:] = swing_before
+        if kind == REVOLUTE:
+            for r in range(count):
+                swing[r] += rows.joints[joint, 2, r]
+    # The shift rides on the frame that the joint hangs on.
+    shifting, shift_swing = turn_before, swing_before
+    if ways.up[way]:
+        shifting, shift_swing = turn, swing
+    bend, lever = own[BEND, :count], tree.lever[joint]
+    _add_shift(lever, shifting, before[BEND, :count], bend)
+    if not straight:
+        for r in range(count):
+            bend[r] += lever * shift_swing[r]
+    if kind == PRISMATIC:
+        reach, change = rows.joints[joint, 0], rows.joints[joint, 2]
+        for r in range(count):
+            bend[r] += turn[r] * (reach[r] * turn[r] + 2.0 * rate[r]) + change[r]
+        if not straight:
+            for r in range(count):
+                bend[r] += reach[r] * swing[r]
+
+
+@compiled
+def _drift_way(
+    tree: PackedTree,
+    ways: Ways,
+    erring: FloatArray,
+    rows: Rows,
+    way: int,
+    count: int,
+) -> None:
+    """D of a way, from that of the way before it and from W."""
+    apart()
+    number, joint = ways.before[way], ways.joint[way]
+    before, own = rows.ways[number], rows.ways[way]
+    turn, share, stroke = before[TURN], erring[number], erring[way]
+    if ways.up[way]:
+        turn, share = own[TURN], stroke
+    share, drift = tree.lever[joint] * share, own[DRIFT]
     for r in range(count):
-        k, after_k = min(first + r, last), min(first + r + 1, last)
-        for link in range(n_links):
-            yaw = abs(motion.alpha[after_k, link] - motion.alpha[k, link])
-            pitch = abs(motion.theta[after_k, link] - motion.theta[k, link])
-            rows.turns[link, r] = yaw + pitch
-    turning = rows.work[0, :count]
-    for f in range(n_links):
-        turning[:] = 0.0
-        for link in range(f, n_links):
-            length = rules.lengths[link]
-            turn = rows.turns[link, :count]
-            for r in range(count):
-                turning[r] += turn[r]
-            before, after = rows.sags[f, link, :count], rows.sags[f, link + 1, :count]
-            for r in range(count):
-                after[r] = before[r] + 0.125 * length * turning[r] * turning[r]
-            if rules.joints_err:
-                error = turned_by(rules.joint_errors, f, link)
-                before = rows.drifts[f, link, :count]
-                after = rows.drifts[f, link + 1, :count]
-                for r in range(count):
-                    after[r] = before[r] + error * length * turning[r]
+        drift[r] = before[DRIFT, r] + share * turn[r]
+    if tree.kind[joint] == PRISMATIC:
+        reach, rate, turn = rows.joints[joint, 0], rows.joints[joint, 1], own[TURN]
+        for r in range(count):
+            drift[r] += stroke * (reach[r] * turn[r] + rate[r])
 
 
 @compiled
-def fill_rows(motion: Motion, rules: Rules, rows: Rows, first: int, count: int) -> None:
+def _bend_places(
+    places: Places, errors: WayErrors, rows: Rows, count: int, straight: bool
+) -> None:
+    """How far places leave their chords, and D where errors turn."""
+    apart()
+    turning = errors.any_turn
+    for place in range(places.way.size):
+        way, lever = places.way[place], places.lever[place]
+        own, sag = rows.ways[way], rows.tracks.sags[place, :count]
+        bend, turn = own[BEND, :count], own[TURN, :count]
+        for r in range(sag.size):
+            sag[r] = 0.125 * (bend[r] + lever * turn[r] * turn[r])
+        if not straight:
+            for r in range(sag.size):
+                sag[r] += 0.125 * lever * own[SWING, r]
+        if turning:
+            share, drift = lever * errors.erring[way], rows.tracks.drifts[place]
+            for r in range(count):
+                drift[r] = own[DRIFT, r] + share * turn[r]
+
+
+@compiled
+def _set_places(places: Places, ways: Ways, rows: Rows, n: int) -> None:
+    """Places in the frames from which they are seen."""
+    apart()
+    for place in range(places.way.size):
+        way, out = places.way[place], rows.tracks.places[place]
+        if place < places.n_points:
+            frame = ways.frame[way]
+            at = places.at[place]
+            carry(rows.origins[frame], rows.frames[frame], at, n, out)
+        elif ways.before[way] < 0:
+            for c in range(3):
+                out[c, :n] = places.at[place, c]
+        else:
+            based = rows.tracks.places[places.point[place]]
+            to_frame(rows, ways.rest[way], n, based, out)
+
+
+@compiled
+def fill_rows(task: Task, motion: Motion, rows: Rows, first: int, count: int) -> None:
     """Configurations of rows first .. first + count; the last row may repeat."""
     apart()
-    _place(motion, rules, rows, first, count + 1)
-    _localise(rules, rows, count + 1)
-    _bend(motion, rules, rows, first, count)
-
-
-@compiled
-def turning_of(rows: Rows, f: int, link: int, count: int, out: FloatArray) -> None:
-    """W of a link with joints below f at rest, shape (>= count,); [rad]."""
-    out[:count] = 0.0
-    for k in range(f, link + 1):
-        turn = rows.turns[k]
-        for r in range(count):
-            out[r] += turn[r]
-
-
-@compiled
-def place_corner(
-    rows: Rows, link: int, at: FloatArray, count: int, out: FloatArray
-) -> None:
-    """A point of a link's frame in the base frame, shape (3, >= count); [m]."""
-    x, y, z = at[0], at[1], at[2]
-    for c in range(3):
-        o, f = rows.centres[0, link, c], rows.frames[link + 1, c]
-        fx, fy, fz, place = f[0], f[1], f[2], out[c]
-        for r in range(count):
-            place[r] = o[r] + (x * fx[r] + y * fy[r] + z * fz[r])
+    tree, ways, places, errors = task.tree, task.ways, task.places, task.errors
+    straight = motion.inner.shape[1] == 0
+    for joint in range(tree.parent.size):
+        _move_frame(tree, motion, rows, first, count + 1, joint)
+    _set_places(places, ways, rows, count + 1)
+    _bound_joints(tree, motion, rows, first, count)
+    for way in range(ways.before.size):
+        if ways.before[way] >= 0:
+            _bend_way(tree, ways, rows, way, count, straight)
+            if errors.any_turn:
+                _drift_way(tree, ways, errors.erring, rows, way, count)
+    _bend_places(places, errors, rows, count, straight)
 
 
 @compiled
 def turn_axis(
-    rows: Rows, f: int, link: int, axis: FloatArray, count: int, out: FloatArray
+    rows: Rows, rest: int, frame: int, axis: FloatArray, count: int, out: FloatArray
 ) -> None:
-    """A direction of a link's frame in frame f, shape (3, >= count)."""
-    x, y, z = axis[0], axis[1], axis[2]
+    """A direction of one frame in another, shape (3, >= count)."""
     for c in range(3):
-        g = rows.frames[link + 1, c]
-        gx, gy, gz, turned = g[0], g[1], g[2], out[c]
-        for r in range(count):
-            turned[r] = x * gx[r] + y * gy[r] + z * gz[r]
-    if f > 0:
-        _turn_back(rows, f, count, out)
+        f = rows.frames[frame, c]
+        blend(f[0, :count], f[1, :count], f[2, :count], axis, out[c, :count])
+    if rest != WORLD:
+        _turn_back(rows, rest, count, out)
 
 
 @compiled
-def _turn_back(rows: Rows, f: int, count: int, out: FloatArray) -> None:
-    """Directions of the base frame in frame f, shape (3, >= count)."""
+def _turn_back(rows: Rows, rest: int, count: int, out: FloatArray) -> None:
+    """Directions of the world's frame in another, shape (3, >= count)."""
     work = rows.work
     for c in range(3):
         for r in range(count):
             work[c, r] = out[c, r]
+    _across(work, rows.frames[rest], count, out)
+
+
+@compiled
+def _across(given: FloatArray, frames: FloatArray, count: int, out: FloatArray) -> None:
+    """Out = frames^T given, row by row; shapes (3, 3, >= count), (3, >= count)."""
+    x, y, z = given[0], given[1], given[2]
     for c in range(3):
-        _blend(
-            work[0, :count],
-            work[1, :count],
-            work[2, :count],
-            rows.frames[f, 0, c, :count],
-            rows.frames[f, 1, c, :count],
-            rows.frames[f, 2, c, :count],
-            out[c, :count],
-        )
+        a, b, d, turned = frames[0, c], frames[1, c], frames[2, c], out[c]
+        for r in range(count):
+            turned[r] = a[r] * x[r] + b[r] * y[r] + d[r] * z[r]
 
 
 @compiled
 def to_frame(
-    rows: Rows, f: int, count: int, based: FloatArray, out: FloatArray
+    rows: Rows, rest: int, count: int, based: FloatArray, out: FloatArray
 ) -> None:
-    """Points of the base frame in frame f, shape (3, >= count); [m]."""
-    for c in range(3):
-        if f == 0:
-            out[c, :count] = based[c, :count]
-            continue
-        o = rows.centres[0, f - 1, c]
-        for r in range(count):
-            out[c, r] = based[c, r] - o[r]
-    if f > 0:
-        _turn_back(rows, f, count, out)
-
-
-@compiled
-def _swing(
-    rules: Rules, rows: Rows, f: int, link: int, based: FloatArray, first: int, end: int
-) -> None:
-    """G of a point along the directions in work[3:6], to work[6], rows [first, end).
-
-    The sum over the angles of joints f to `link` of error |n . (axis x arm)|: yaw turns
-    about z of the frame before, pitch about y of the joint's own; [m].
-    """
-    apart()
-    nx, ny = rows.work[3, first:end], rows.work[4, first:end]
-    nz = rows.work[5, first:end]
-    swing = rows.work[6, first:end]
-    swing[:] = 0.0
-    for joint in range(f, link + 1):
+    """Points of the world's frame in another, shape (3, >= count); [m]."""
+    if rest == WORLD:
         for c in range(3):
-            o = rows.centres[0, joint, c, first:end]
-            p, arm = based[c, first:end], rows.work[c, first:end]
-            for r in range(arm.size):
-                arm[r] = p[r] - o[r]
-        ax, ay = rows.work[0, first:end], rows.work[1, first:end]
-        az = rows.work[2, first:end]
-        for turn in range(2):
-            frame, axis = joint + turn, 2 - turn
-            error = rules.joint_errors[joint, turn]
-            ux = rows.frames[frame, 0, axis, first:end]
-            uy = rows.frames[frame, 1, axis, first:end]
-            uz = rows.frames[frame, 2, axis, first:end]
-            for r in range(swing.size):
-                x = uy[r] * az[r] - uz[r] * ay[r]
-                y = uz[r] * ax[r] - ux[r] * az[r]
-                z = ux[r] * ay[r] - uy[r] * ax[r]
-                swing[r] += error * abs(nx[r] * x + ny[r] * y + nz[r] * z)
-
-
-@compiled
-def add_errors(
-    rules: Rules,
-    rows: Rows,
-    f: int,
-    link: int,
-    based: FloatArray,
-    n: FloatArray,
-    first: int,
-    last: int,
-    out: FloatArray,
-) -> None:
-    """Add half of G of a point at both ends of intervals, along n given in frame f.
-
-    Args:
-        rules: The error box.
-        rows: The block.
-        f: Frame of the partner: joints from f on err.
-        link: The link that the point rides on.
-        based: The point in the base frame, shape (3, BLOCK + 1); [m].
-        n: Unit vector, shape (3,); [-].
-        first: First interval.
-        last: One past the last interval.
-        out: Added to at [first, last), shape (BLOCK,); [m].
-    """
-    apart()
-    end = last + 1
+            out[c, :count] = based[c, :count]
+        return
     for c in range(3):
-        x, y = rows.frames[f, c, 0, first:end], rows.frames[f, c, 1, first:end]
-        z, turned = rows.frames[f, c, 2, first:end], rows.work[3 + c, first:end]
-        for r in range(turned.size):
-            turned[r] = n[0] * x[r] + n[1] * y[r] + n[2] * z[r]
-    _swing(rules, rows, f, link, based, first, end)
-    swing = rows.work[6]
-    for r in range(first, last):
-        out[r] += 0.5 * (swing[r] + swing[r + 1])
+        o, arm, given = rows.origins[rest, c], rows.work[c], based[c]
+        for r in range(count):
+            arm[r] = given[r] - o[r]
+    _across(rows.work, rows.frames[rest], count, out)

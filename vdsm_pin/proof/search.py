@@ -4,10 +4,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.geometry.arm import bends_and_drifts, place_between
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import apart, clock, compiled
 from vdsm_pin.geometry.kernels import BRACKET, LOWER, NEAR, UPPER
+from vdsm_pin.proof.bends import bend_between
 from vdsm_pin.proof.heaps import pop, push
 from vdsm_pin.proof.layouts import (
     END,
@@ -20,13 +20,13 @@ from vdsm_pin.proof.layouts import (
     START,
     WHEN,
 )
+from vdsm_pin.proof.packed_tree import Motion, interpolate, place_tree
 from vdsm_pin.proof.slices import Space, slice_bound
-from vdsm_pin.proof.swept_bodies import Ends, to_link
+from vdsm_pin.proof.swept_bodies import Ends, to_body
 from vdsm_pin.proof.terms import (
     CERTIFIED,
     REFUTED,
     UNDECIDED,
-    Motion,
     Task,
     mover_of,
 )
@@ -57,6 +57,7 @@ class Witnesses(NamedTuple):
         time: When in that interval, shape (n_pairs,).
         points: Core points as in a `Witness`, shape (n_pairs, 6); [m].
         instant: Least bounds proved for one instant, shape (n_pairs,); [m].
+        limit: Least upper bound met before; [m].
     """
 
     upper: FloatArray
@@ -64,6 +65,7 @@ class Witnesses(NamedTuple):
     time: FloatArray
     points: FloatArray
     instant: FloatArray
+    limit: float
 
 
 @compiled
@@ -89,22 +91,14 @@ def bound_between(
         row: The slice.
     """
     apart()
-    k = int(row[INTERVAL])
-    last = min(k + 2, motion.x0.size)
-    x0, alpha = motion.x0[k:last], motion.alpha[k:last]
-    theta, lengths = motion.theta[k:last], task.rules.lengths
-    for end in range(2):
-        t = row[START + end] if last - k == 2 else 0.0
-        place_between(t, x0, alpha, theta, lengths, ends.centres[end], ends.frames[end])
-    if last - k == 2:
-        errors = task.rules.joint_errors
-        bends, drifts, rates = ends.bends, ends.drifts, ends.rates
-        bends_and_drifts(alpha, theta, lengths, errors, bends, drifts, rates)
-    else:
-        ends.bends[:] = 0.0
-        ends.drifts[:] = 0.0
-        ends.rates[:] = 0.0
-    slice_bound(task, ends, space, int(row[PAIR]), row[END] - row[START])
+    k, start, end, pair = int(row[INTERVAL]), row[START], row[END], int(row[PAIR])
+    interpolate(motion, k, start, ends.q)
+    place_tree(task.tree, ends.q, ends.start)
+    interpolate(motion, k, end, ends.q)
+    place_tree(task.tree, ends.q, ends.end)
+    way = task.pairs.way[pair]
+    bend_between(task, motion, ends.bends, way, k, start, end)
+    slice_bound(task, ends, space, pair, end - start)
     row[KEY] = space.out[LOWER]
 
 
@@ -134,7 +128,7 @@ def examine(
         for c in range(NEAR, BRACKET):
             witness.points[c - NEAR] = space.out[c]
         own, mover = witness.points[:3], mover_of(task, pair)
-        to_link(mover, ends.centres[0], ends.frames[0], own)
+        to_body(mover, ends.start, own)
     witness.value[INSTANT] = min(witness.value[INSTANT], instant[KEY])
     return float(instant[KEY])
 
@@ -232,7 +226,6 @@ def tighten(
     space: Space,
     heap: FloatArray,
     count: int,
-    limit: float,
     witnesses: Witnesses,
 ) -> int:
     """Split the slices of the least bounds until the bracket of the least is narrow.
@@ -244,7 +237,6 @@ def tighten(
         space: Working space.
         heap: A heap of slices with room for more: the budget.
         count: Slices in it.
-        limit: Least upper bound met before; [m].
         witnesses: Updated.
 
     Returns:
@@ -252,7 +244,7 @@ def tighten(
     """
     apart()
     row = np.zeros(SLICE)
-    least = limit
+    least = witnesses.limit
     while count > 0 and count + 2 <= heap.shape[0]:
         if heap[0, KEY] >= least - task.rules.gap or least < 0.0:
             break

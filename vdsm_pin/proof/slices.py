@@ -59,10 +59,10 @@ class Space(NamedTuple):
 
 
 @compiled
-def new_space(n_links: int, corners: int) -> Space:
+def new_space(n_joints: int, corners: int) -> Space:
     """Fresh working space for bodies of up to so many corners."""
     apart()
-    body = new_body(2 * corners, corners, room_of(n_links))
+    body = new_body(2 * corners, corners, room_of(n_joints))
     core = new_body(0, corners, 0)
     return Space(
         body,
@@ -232,5 +232,5 @@ def slice_bound(task: Task, ends: Ends, space: Space, pair: int, h: float) -> No
         h: Length of the slice; 0 for an instant, where `upper` is a true distance.
     """
     apart()
-    load_body(task.rules, mover_of(task, pair), ends, space.body, h)
+    load_body(task, mover_of(task, pair), ends, space.body, h)
     loaded_bound(task, space, pair, h == 0.0, np.inf)

@@ -11,229 +11,217 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vdsm_pin.geometry.arm import second_order, turned_by
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS, Body
 from vdsm_pin.geometry.compiled import apart, compiled
-from vdsm_pin.proof.terms import BASE, Mover, Rules
+from vdsm_pin.proof.bends import Bends, new_bends
+from vdsm_pin.proof.error_growth import second_order
+from vdsm_pin.proof.packed_tree import PRISMATIC, PackedTree, Pose, new_pose
+from vdsm_pin.proof.terms import WORLD, Mover, Task
 
 
 class Ends(NamedTuple):
     """Configurations at the two ends of a slice and what lies between.
 
     Args:
-        centres: Joint centres at both ends, shape (2, N + 1, 3); [m].
-        frames: Link frames at both ends, shape (2, N, 3, 3); [-].
-        bends: M of the interval, shape (N + 1, N + 1); [m].
-        drifts: D of the interval, shape (N + 1, N + 1); [m].
-        rates: W of the interval, shape (N, N); [rad].
+        start: At the start of the slice.
+        end: At its end.
+        bends: Of the frames along the way that is asked about.
+        q: Working space for a configuration, shape (n_columns,).
     """
 
-    centres: FloatArray
-    frames: FloatArray
-    bends: FloatArray
-    drifts: FloatArray
-    rates: FloatArray
+    start: Pose
+    end: Pose
+    bends: Bends
+    q: FloatArray
 
 
 @compiled
-def new_ends(n_links: int) -> Ends:
+def new_ends(n_frames: int, n_ways: int, n_columns: int) -> Ends:
     """Fresh working space for two configurations."""
-    n = n_links + 1
     return Ends(
-        np.zeros((2, n, 3)),
-        np.zeros((2, n_links, 3, 3)),
-        np.zeros((n, n)),
-        np.zeros((n, n)),
-        np.zeros((n_links, n_links)),
+        new_pose(n_frames),
+        new_pose(n_frames),
+        new_bends(n_ways, n_frames),
+        np.zeros(n_columns),
     )
 
 
 @compiled
-def room_of(n_links: int) -> int:
-    """Most generators of one corner: two angles a joint at two instants."""
-    return 4 * n_links
+def room_of(n_joints: int) -> int:
+    """Most generators of one corner: every joint at two instants."""
+    return 2 * n_joints
 
 
 @compiled
-def place_point(
-    centres: FloatArray, frames: FloatArray, link: int, at: FloatArray, out: FloatArray
-) -> None:
-    """A point of a link's frame in the base frame, shape (3,); [m]."""
+def place_point(pose: Pose, frame: int, at: FloatArray, out: FloatArray) -> None:
+    """A point of a frame in the world's, shape (3,); [m]."""
+    x, y, z = at[0], at[1], at[2]
     for c in range(3):
-        f = frames[link, c]
-        out[c] = centres[link, c] + (f[0] * at[0] + f[1] * at[1] + f[2] * at[2])
+        f = pose.frames[frame, c]
+        out[c] = pose.origins[frame, c] + (f[0] * x + f[1] * y + f[2] * z)
 
 
 @compiled
-def turn_back(frames: FloatArray, frame: int, out: FloatArray) -> None:
-    """A direction of the base frame in that of a link, or of BASE, shape (3,)."""
-    if frame == BASE:
+def turn_back(pose: Pose, frame: int, out: FloatArray) -> None:
+    """A direction of the world's frame in another, shape (3,)."""
+    if frame == WORLD:
         return
     x, y, z = out[0], out[1], out[2]
-    f = frames[frame]
+    f = pose.frames[frame]
     for c in range(3):
         out[c] = f[0, c] * x + f[1, c] * y + f[2, c] * z
 
 
 @compiled
-def local_point(
-    centres: FloatArray, frames: FloatArray, frame: int, out: FloatArray
-) -> None:
-    """A point of the base frame in that of a link, or of BASE, shape (3,); [m]."""
-    if frame != BASE:
+def local_point(pose: Pose, frame: int, out: FloatArray) -> None:
+    """A point of the world's frame in another, shape (3,); [m]."""
+    if frame != WORLD:
         for c in range(3):
-            out[c] -= centres[frame, c]
-        turn_back(frames, frame, out)
+            out[c] -= pose.origins[frame, c]
+        turn_back(pose, frame, out)
 
 
 @compiled
-def to_link(
-    mover: Mover, centres: FloatArray, frames: FloatArray, at: FloatArray
-) -> None:
-    """A point of the partner's frame in that of the body's link, shape (3,); [m]."""
-    frame = mover.first - 1
-    if frame != BASE:
-        x, y, z = at[0], at[1], at[2]
-        for c in range(3):
-            f = frames[frame, c]
-            at[c] = centres[frame, c] + (f[0] * x + f[1] * y + f[2] * z)
-    local_point(centres, frames, mover.link, at)
+def to_body(mover: Mover, pose: Pose, at: FloatArray) -> None:
+    """A point of the partner's frame in that of the body, shape (3,); [m]."""
+    if mover.rest != WORLD:
+        place_point(pose, mover.rest, at, at)
+    local_point(pose, mover.frame, at)
 
 
 @compiled
-def _add_joints(
-    rules: Rules, ends: Ends, instant: int, frame: int, share: float, swings: FloatArray
-) -> int:
-    """Add what errors of all angles before a point do, at one end of the slice.
+def _turn_generator(
+    tree: PackedTree, pose: Pose, joint: int, error: float, out: FloatArray
+) -> None:
+    """Replace the arm from a joint to a point by error (axis x arm), (3,); [m]."""
+    f, axis = pose.frames[joint + 1], tree.axis[joint]
+    ux = f[0, 0] * axis[0] + f[0, 1] * axis[1] + f[0, 2] * axis[2]
+    uy = f[1, 0] * axis[0] + f[1, 1] * axis[1] + f[1, 2] * axis[2]
+    uz = f[2, 0] * axis[0] + f[2, 1] * axis[1] + f[2, 2] * axis[2]
+    ax, ay, az = out[0], out[1], out[2]
+    out[0] = error * (uy * az - uz * ay)
+    out[1] = error * (uz * ax - ux * az)
+    out[2] = error * (ux * ay - uy * ax)
 
-    Each adds error (axis x arm): yaw turns about z of the frame before, pitch about y
-    of the joint's own; written in the partner's frame.
+
+@compiled
+def _placed_at(tree: PackedTree, pose: Pose, joint: int, out: FloatArray) -> None:
+    """Where a joint's placement stands in the world, shape (3,); [m]."""
+    if tree.kind[joint] == PRISMATIC:
+        place_point(pose, tree.parent[joint], tree.shift[joint], out)
+    else:
+        out[:] = pose.origins[joint + 1]
+
+
+@compiled
+def _add_turns(
+    task: Task, pose: Pose, place: int, share: float, swings: FloatArray
+) -> tuple[int, float]:
+    """Add what errors of all turns along a place's way do, in one configuration.
 
     Args:
-        rules: The error box.
-        ends: The slice.
-        instant: Which end of it.
-        frame: Frame of the partner.
-        share: Part of the errors to add; [-].
-        swings: The first row is the point in the base frame, overwritten by the first
-            generator; shape (2 joints, 3); [m].
+        task: The tree and the error box.
+        pose: The configuration.
+        place: The place.
+        share: Part of the errors of joints to add; [-].
+        swings: Generators in the partner's frame are written, shape (room, 3); [m].
 
     Returns:
-        Number of generators written.
+        Number of generators, and the radius of a ball for turns of placements; [m].
     """
     apart()
-    centres, frames = ends.centres[instant], ends.frames[instant]
-    px, py, pz = swings[0, 0], swings[0, 1], swings[0, 2]
-    size, ux, uy, uz = 0, 0.0, 0.0, 1.0
-    for k in range(frame + 1, frame + 1 + swings.shape[0] // 2):
-        ax, ay, az = px - centres[k, 0], py - centres[k, 1], pz - centres[k, 2]
-        for turn in range(2):
-            if turn == 1:
-                ux, uy, uz = frames[k, 0, 1], frames[k, 1, 1], frames[k, 2, 1]
-            elif k > 0:
-                j = k - 1
-                ux, uy, uz = frames[j, 0, 2], frames[j, 1, 2], frames[j, 2, 2]
-            error = share * rules.joint_errors[k, turn]
-            swings[size, 0] = error * (uy * az - uz * ay)
-            swings[size, 1] = error * (uz * ax - ux * az)
-            swings[size, 2] = error * (ux * ay - uy * ax)
-            turn_back(frames, frame, swings[size])
+    tree, ways, errors = task.tree, task.ways, task.errors
+    way = task.places.way[place]
+    frame, rest = ways.frame[way], ways.rest[way]
+    point, at = np.zeros(3), np.zeros(3)
+    place_point(pose, frame, task.places.at[place], point)
+    size, ball = 0, 0.0
+    while ways.before[way] >= 0:
+        joint = ways.joint[way]
+        error, tilt = share * errors.turn[joint], errors.tilt[joint]
+        way = ways.before[way]
+        if not (error > 0.0 or tilt > 0.0):
+            continue
+        _placed_at(tree, pose, joint, at)
+        arm = swings[size]
+        for c in range(3):
+            arm[c] = point[c] - at[c]
+        if tilt > 0.0:
+            ball += tilt * sqrt(arm[0] ** 2 + arm[1] ** 2 + arm[2] ** 2)
+        if error > 0.0:
+            _turn_generator(tree, pose, joint, error, arm)
+            turn_back(pose, rest, arm)
             size += 1
-    return size
+    return size, ball
 
 
 @compiled
-def _turn_base(
-    mover: Mover, turn: float, ends: Ends, loaded: Body, corner: int
-) -> float:
-    """How far a turn of the base moves a corner over the slice and the box; [m]."""
-    at, far = np.zeros(3), 0.0
-    for instant in range(2):
-        centres, frames = ends.centres[instant], ends.frames[instant]
-        place_point(centres, frames, mover.link, mover.corners[corner], at)
-        far = max(far, sqrt(at[0] * at[0] + at[1] * at[1] + at[2] * at[2]))
-    far += loaded.balls[corner] + mover.disc[RADIUS]
-    for k in range(loaded.sizes[corner]):
-        g = loaded.swings[corner, k]
-        far += sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
-    return float(turn * far)
-
-
-@compiled
-def _add_joint_errors(
-    rules: Rules, mover: Mover, ends: Ends, loaded: Body, corner: int, h: float
-) -> None:
-    """Grow one corner by what joint errors do to it."""
-    link, f, lever = mover.link, mover.first, mover.levers[corner]
-    turned = turned_by(rules.joint_errors, f, link)
-    ball = second_order(rules.lengths, rules.joint_errors, f, link, lever)
-    ball += mover.disc[RADIUS] * turned
-    n_instants, share, size = 1, 1.0, 0
-    if h > 0.0:
-        drift = ends.drifts[f, link] + lever * turned * ends.rates[f, link]
-        ball += 0.5 * h * drift
-        n_instants, share = 2, 0.5
-    # A corner at the joint's centre is not moved by this joint.
-    room = 2 * (link + (1 if lever > 0.0 else 0) - f)
-    for instant in range(n_instants if room > 0 else 0):
-        part = loaded.swings[corner, size : size + room]
-        centres, frames = ends.centres[instant], ends.frames[instant]
-        place_point(centres, frames, link, mover.corners[corner], part[0])
-        size += _add_joints(rules, ends, instant, f - 1, share, part)
-    loaded.sizes[corner] = size
-    loaded.balls[corner] += ball
-
-
-@compiled
-def load_errors(rules: Rules, mover: Mover, ends: Ends, loaded: Body, h: float) -> None:
-    """Grow a body over a slice by the error box.
+def load_errors(task: Task, mover: Mover, ends: Ends, loaded: Body, h: float) -> None:
+    """Grow a body over a slice by turns in the error box.
 
     Args:
-        rules: The error box.
+        task: The tree and the error box.
         mover: The body.
         ends: The slice; read only where the errors are not steady.
         loaded: Its points and the sags in its balls are set; zonotopes are written and
             the balls grown.
         h: Length of the slice; 0 for an instant.
     """
-    turn = mover.first == BASE + 1 and rules.base_turn > 0.0
-    for corner in range(mover.levers.size):
+    errors, places, bends = task.errors, task.places, ends.bends
+    for corner in range(mover.slots.size):
         loaded.sizes[corner] = 0
-        if rules.joints_err:
-            _add_joint_errors(rules, mover, ends, loaded, corner, h)
-        if turn:
-            far = _turn_base(mover, rules.base_turn, ends, loaded, corner)
-            loaded.balls[corner] += far
+        if task.rules.steady:
+            continue
+        place, size = mover.slots[corner], 0
+        way, lever = places.way[place], places.lever[place]
+        erring, far = errors.erring[way], 0.0
+        ball = second_order(errors, way, lever)
+        ball += mover.disc[RADIUS] * errors.turned[mover.way]
+        share = 1.0
+        if h > 0.0:
+            drift = bends.drifts[way] + lever * erring * bends.turns[way]
+            ball, share = ball + 0.5 * h * drift, 0.5
+        for instant in range(2 if h > 0.0 else 1):
+            pose = ends.end if instant else ends.start
+            part = loaded.swings[corner, size:]
+            more, tilted = _add_turns(task, pose, place, share, part)
+            size, far = size + more, max(far, tilted)
+        loaded.sizes[corner] = size
+        # The arm of a turn, a length, is convex but for the sag.
+        sag = loaded.balls[corner] * (errors.turned[way] - erring)
+        loaded.balls[corner] += ball + far + sag
 
 
 @compiled
-def load_body(rules: Rules, mover: Mover, ends: Ends, loaded: Body, h: float) -> None:
+def load_body(task: Task, mover: Mover, ends: Ends, loaded: Body, h: float) -> None:
     """A body over a slice and the error box; arguments as for `load_errors`."""
     apart()
-    corners, frame, link = mover.levers.size, mover.first - 1, mover.link
+    corners, places, bends = mover.slots.size, task.places, ends.bends
     loaded.used[0], loaded.used[1] = 2 * corners, corners
     for instant in range(2):
-        centres, frames = ends.centres[instant], ends.frames[instant]
+        pose = ends.end if instant else ends.start
         for k in range(corners):
             point = loaded.points[instant * corners + k]
-            place_point(centres, frames, link, mover.corners[k], point)
-            local_point(centres, frames, frame, point)
-        load_disc(mover, frames, loaded.discs[instant])
-    rate = ends.rates[mover.first, link]
+            place_point(pose, mover.frame, mover.corners[k], point)
+            local_point(pose, mover.rest, point)
+        load_disc(mover, pose, loaded.discs[instant])
     for k in range(corners):
-        bend = ends.bends[mover.first, link] + mover.levers[k] * rate * rate
+        place = mover.slots[k]
+        way, lever = places.way[place], places.lever[place]
+        rate = bends.turns[way]
+        bend = bends.bends[way] + lever * (rate * rate + bends.swings[way])
         loaded.balls[k] = 0.125 * bend * h * h
-    load_errors(rules, mover, ends, loaded, h)
+    load_errors(task, mover, ends, loaded, h)
 
 
 @compiled
-def load_disc(mover: Mover, frames: FloatArray, disc: FloatArray) -> None:
+def load_disc(mover: Mover, pose: Pose, disc: FloatArray) -> None:
     """The disc of a body in the frame of its partner, shape (4,)."""
     own = mover.disc
     disc[RADIUS] = own[RADIUS]
     if own[RADIUS] > 0.0:
         for c in range(3):
-            f = frames[mover.link, c]
+            f = pose.frames[mover.frame, c]
             disc[c] = f[0] * own[0] + f[1] * own[1] + f[2] * own[2]
-        turn_back(frames, mover.first - 1, disc)
+        turn_back(pose, mover.rest, disc)

@@ -1,19 +1,21 @@
-"""What a proof is about: the bodies, the pairs, the rules, the rows of joint values.
+"""What a proof is about: bodies, the places of their corners, pairs, rules.
 
-A body is a convex solid that rides on a link: the link itself, a tool, a camera. A pair
-is a body and an obstacle or, in the frame of another link, a body that rests on that
-link. Both are the same to the kernels: moving corners against an obstacle of the packed
-scene, in which the bodies stand behind the obstacles.
+A body is a convex solid that rides on a frame of the tree. A pair is a body and a
+partner that rests in a frame, the world or another one: an obstacle of the packed scene
+in the coordinates of that frame. Both are the same to the kernels: moving corners
+against pieces at rest.
 """
 
 from typing import Final, NamedTuple
 
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.geometry.pieces import PackedPieces
+from vdsm_pin.proof.packed_tree import PackedTree
+from vdsm_pin.proof.ways import WayErrors, Ways
 
-BASE: Final = -1
-"""Frame of a pair whose partner rests in the base frame."""
+WORLD: Final = 0
+"""The frame in which obstacles rest."""
 
 CERTIFIED: Final = 0
 REFUTED: Final = 1
@@ -26,46 +28,74 @@ LINKS: Final = 1
 
 
 class Bodies(NamedTuple):
-    """Convex solids that ride on the links: hulls of corners, grown by ball and disc.
+    """Convex solids that ride on frames: hulls of corners, grown by ball and disc.
 
     Args:
-        link: The link that each rides on, from 0, shape (n_bodies,).
+        frame: The frame that each rides on, shape (n_bodies,).
         first: Where a body's corners start, shape (n_bodies + 1,).
-        corners: In the frames of their links, shape (n_corners, 3); [m].
-        levers: Distance of each corner, with its disc, from the link's origin, shape
+        corners: In their frames, shape (n_corners, 3); [m].
+        levers: Distance of each corner, with its disc, from the frame's origin, shape
             (n_corners,); [m].
         radius: Of the ball that grows the body, shape (n_bodies,); [m].
         discs: Axis and radius of the disc that grows it, shape (n_bodies, 4).
-        axial: Whether a body is the whole axis of its link, grown by a ball, shape
-            (n_bodies,): its corners are the two joint centres.
+        inverse: 1 / length^2 of a body that is a segment grown by a ball, 0 of one that
+            is a ball, below 0 of any other, shape (n_bodies,); [1/m^2].
+        column: Where the profile has its bounds, shape (n_bodies,).
     """
 
-    link: IntArray
+    frame: IntArray
     first: IntArray
     corners: FloatArray
     levers: FloatArray
     radius: FloatArray
     discs: FloatArray
-    axial: BoolArray
+    inverse: FloatArray
+    column: IntArray
+
+
+class Places(NamedTuple):
+    """Points that ride on frames as seen from frames at rest, each once.
+
+    Those seen from the world stand first; all others are among them too.
+
+    Args:
+        n_points: How many are seen from the world.
+        point: Number of the same point as seen from the world, shape (n_places,).
+        way: The way to the point's frame, shape (n_places,).
+        at: In that frame, shape (n_places, 3); [m].
+        lever: Distance from the frame's origin, a disc included, (n_places,); [m].
+    """
+
+    n_points: int
+    point: IntArray
+    way: IntArray
+    at: FloatArray
+    lever: FloatArray
 
 
 class Pairs(NamedTuple):
-    """All pairs, those with obstacles first, in the order of the certificate.
+    """All pairs, in the order of the certificate.
 
     Args:
         body: The moving body, shape (n_pairs,).
-        link: The link that it rides on, from 0, shape (n_pairs,).
         obstacle: Its partner in the packed scene, shape (n_pairs,).
-        frame: Link in whose frame the partner rests, or BASE, shape (n_pairs,).
+        way: From the partner's frame to the body's, shape (n_pairs,).
+        slot: Where the numbers of its corners' places start, shape (n_pairs,).
+        slots: Numbers of places, for each pair one a corner of its body.
+        group: OBSTACLES or LINKS, shape (n_pairs,).
+        column: Where the profile has the partner's bounds, -1 for nowhere, (n_pairs,).
         required: Least clearance, shape (n_pairs,); [m].
         lost: What every plane loses: radius, shifts, rounding, shape (n_pairs,); [m].
         rise: What turns a distance of core points into an upper bound, (n_pairs,); [m].
     """
 
     body: IntArray
-    link: IntArray
     obstacle: IntArray
-    frame: IntArray
+    way: IntArray
+    slot: IntArray
+    slots: IntArray
+    group: IntArray
+    column: IntArray
     required: FloatArray
     lost: FloatArray
     rise: FloatArray
@@ -75,24 +105,26 @@ class Mover(NamedTuple):
     """The moving side of a pair.
 
     Args:
-        link: The link that the body rides on, from 0.
-        first: The first joint that moves it in the frame of its partner.
-        corners: In the frame of the link, shape (n, 3); [m].
-        levers: As in `Bodies`, shape (n,); [m].
+        rest: The frame in which the partner rests.
+        frame: The frame that the body rides on.
+        way: From one to the other.
+        slots: Places of the corners, shape (n,).
+        corners: In the body's frame, shape (n, 3); [m].
         disc: Axis and radius, shape (4,).
         radius: Of the ball that grows it; [m].
-        axial: As in `Bodies`.
+        inverse: As in `Bodies`.
         lost: As in `Pairs`; [m].
         rise: As in `Pairs`; [m].
     """
 
-    link: int
-    first: int
+    rest: int
+    frame: int
+    way: int
+    slots: IntArray
     corners: FloatArray
-    levers: FloatArray
     disc: FloatArray
     radius: float
-    axial: bool
+    inverse: float
     lost: float
     rise: float
 
@@ -101,10 +133,6 @@ class Rules(NamedTuple):
     """What a proof has to cover and what it may assume.
 
     Args:
-        lengths: Link lengths, shape (N,); [m].
-        joint_errors: Largest errors of alpha_l and theta_l, shape (N, 2); [rad].
-        base_turn: Largest rotation of the base about its origin; [rad].
-        joints_err: Whether any angle may be off.
         steady: Whether the errors cost the same in every configuration.
         nominal: Whether the error box is empty.
         pad: Bound of all rounding in one evaluation; [m].
@@ -116,10 +144,6 @@ class Rules(NamedTuple):
             counted, or undecided; [s].
     """
 
-    lengths: FloatArray
-    joint_errors: FloatArray
-    base_turn: float
-    joints_err: bool
     steady: bool
     nominal: bool
     pad: float
@@ -129,24 +153,14 @@ class Rules(NamedTuple):
     until: float
 
 
-class Motion(NamedTuple):
-    """Rows of joint values.
-
-    Args:
-        x0: Shape (n_rows,); [m].
-        alpha: Shape (n_rows, N); [rad].
-        theta: Shape (n_rows, N); [rad].
-    """
-
-    x0: FloatArray
-    alpha: FloatArray
-    theta: FloatArray
-
-
 class Task(NamedTuple):
     """Everything that stays the same while a motion is judged."""
 
     pieces: PackedPieces
+    tree: PackedTree
+    ways: Ways
+    errors: WayErrors
+    places: Places
     bodies: Bodies
     pairs: Pairs
     rules: Rules
@@ -156,22 +170,18 @@ class Task(NamedTuple):
 def mover_of(task: Task, pair: int) -> Mover:
     """The moving side of a pair."""
     pairs, bodies = task.pairs, task.bodies
-    body, frame = pairs.body[pair], pairs.frame[pair]
+    body, way = pairs.body[pair], pairs.way[pair]
     first, last = bodies.first[body], bodies.first[body + 1]
+    slot = pairs.slot[pair]
     return Mover(
-        pairs.link[pair],
-        frame + 1,
+        task.ways.rest[way],
+        bodies.frame[body],
+        way,
+        pairs.slots[slot : slot + last - first],
         bodies.corners[first:last],
-        bodies.levers[first:last],
         bodies.discs[body],
         bodies.radius[body],
-        bodies.axial[body],
+        bodies.inverse[body],
         pairs.lost[pair],
         pairs.rise[pair],
     )
-
-
-@compiled
-def group_of(frame: int) -> int:
-    """OBSTACLES or LINKS."""
-    return OBSTACLES if frame == BASE else LINKS

@@ -1,15 +1,22 @@
-"""Witness points of a clearance on both surfaces, in the base frame, compiled."""
+"""Witness points of a clearance on both surfaces, in the world's frame, compiled."""
 
 from math import sqrt
 
 import numpy as np
 
-from vdsm_pin.geometry.arm import place_between
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.proof.layouts import AT_UPPER, OWN, TIME, UP
+from vdsm_pin.proof.packed_tree import (
+    Motion,
+    PackedTree,
+    Pose,
+    interpolate,
+    new_pose,
+    place_tree,
+)
 from vdsm_pin.proof.swept_bodies import Ends, place_point
-from vdsm_pin.proof.terms import BASE, Motion, Mover, Task, mover_of
+from vdsm_pin.proof.terms import Mover, Task, mover_of
 
 
 @compiled
@@ -30,32 +37,30 @@ def _nearest_on_axis(
 @compiled
 def witness_at(
     mover: Mover,
-    centres: FloatArray,
-    frames: FloatArray,
+    pose: Pose,
     points: FloatArray,
     own: FloatArray,
     other: FloatArray,
 ) -> None:
-    """Surface points of a body and of its partner, in the base frame.
+    """Surface points of a body and of its partner, in the world's frame.
 
     Args:
         mover: The body of the pair.
-        centres: Joint centres of the configuration, shape (N + 1, 3); [m].
-        frames: R_base_link, shape (N, 3, 3); [-].
-        points: Core points of the body in its link's frame, not read where it is an
-            axis, and of the partner in its own, shape (6,); [m].
+        pose: The configuration.
+        points: Core points of the body in its frame, not read where it is a segment,
+            and of the partner in its own, shape (6,); [m].
         own: Result on the body, shape (3,); [m].
         other: Result on the partner, shape (3,); [m].
     """
-    link, frame = mover.link, mover.first - 1
-    if frame == BASE:
-        other[:] = points[3:]
+    place_point(pose, mover.rest, points[3:], other)
+    if mover.inverse < 0.0:
+        place_point(pose, mover.frame, points, own)
     else:
-        place_point(centres, frames, frame, points[3:], other)
-    if mover.axial:
-        _nearest_on_axis(centres[link], centres[link + 1], other, own)
-    else:
-        place_point(centres, frames, link, points, own)
+        start, end = np.zeros(3), np.zeros(3)
+        last = mover.corners.shape[0] - 1
+        place_point(pose, mover.frame, mover.corners[0], start)
+        place_point(pose, mover.frame, mover.corners[last], end)
+        _nearest_on_axis(start, end, other, own)
     squared = 0.0
     for c in range(3):
         squared += (other[c] - own[c]) ** 2
@@ -69,7 +74,7 @@ def witness_at(
 def place_best(
     task: Task, motion: Motion, ends: Ends, best: FloatArray, order: IntArray
 ) -> None:
-    """Put the witnesses of all pairs on the surfaces, in the base frame.
+    """Put the witnesses of all pairs on the surfaces, in the world's frame.
 
     Args:
         task: The scene, bodies and pairs.
@@ -85,18 +90,31 @@ def place_best(
             continue
         if at != int(row[AT_UPPER]) or when != row[TIME]:
             at, when = int(row[AT_UPPER]), row[TIME]
-            last = min(at + 2, motion.x0.size)
-            time = when if last - at == 2 else 0.0
-            place_between(
-                time,
-                motion.x0[at:last],
-                motion.alpha[at:last],
-                motion.theta[at:last],
-                task.rules.lengths,
-                ends.centres[0],
-                ends.frames[0],
-            )
-        centres, frames = ends.centres[0], ends.frames[0]
+            interpolate(motion, at, when, ends.q)
+            place_tree(task.tree, ends.q, ends.start)
         mover = mover_of(task, pair)
-        witness_at(mover, centres, frames, row[OWN:], places[0], places[1])
+        witness_at(mover, ends.start, row[OWN:], places[0], places[1])
         row[OWN:] = places.ravel()
+
+
+@compiled
+def place_points(
+    tree: PackedTree, motion: Motion, rows: IntArray, frames: IntArray, at: FloatArray
+) -> FloatArray:
+    """Points of frames at rows of a motion, in the world's frame.
+
+    Args:
+        tree: The joints.
+        motion: Rows of joint values.
+        rows: Shape (n,).
+        frames: Shape (n,).
+        at: In the frames, shape (n, 3); [m].
+
+    Returns:
+        Shape (n, 3); [m].
+    """
+    pose, out = new_pose(tree.parent.size + 1), np.zeros((rows.size, 3))
+    for k in range(rows.size):
+        place_tree(tree, motion.knots[rows[k]], pose)
+        place_point(pose, frames[k], at[k], out[k])
+    return out

@@ -21,10 +21,11 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.proof.desk import new_desk
 from vdsm_pin.proof.layouts import FIRST, LAST, PLANE_NORMAL, RECORD
+from vdsm_pin.proof.packed_tree import straight_motion
 from vdsm_pin.proof.recording import record
-from vdsm_pin.proof.terms import Motion, Task
+from vdsm_pin.proof.terms import Task
+from vdsm_pin.proof.workspace import new_workspace
 from vdsm_pin.scene import Mesh, Prism, with_hulls
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
@@ -37,7 +38,7 @@ from vdsm_pin.verification.certificate_file import (
 )
 from vdsm_pin.verification.inside import locate_start, unlocated
 from vdsm_pin.verification.limits import extremes
-from vdsm_pin.verification.proving import BUDGET, most_corners
+from vdsm_pin.verification.proving import BUDGET
 from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.task import all_pairs, make_task
 
@@ -218,14 +219,13 @@ def _lines(
 ) -> Iterator[str]:
     """One line per interval; planes clear of a mesh's hull serve all its triangles."""
     trajectory = verification.trajectory
-    motion = Motion(trajectory.x0, trajectory.alpha, trajectory.theta)
+    motion = straight_motion(trajectory.joints)
     n_intervals = max(1, trajectory.n_samples - 1)
-    n_links, n_pairs = trajectory.n_links, task.pairs.body.size
     whole = np.zeros(len(task.pieces.root), np.int64)
     for k, obstacle in enumerate(verification.problem.scene.obstacles):
         if obstacle.name in hulls:
             whole[k] = len(obstacle.pieces)
-    desk = new_desk(n_links, n_pairs, most_corners(task.bodies), BUDGET)
+    desk = new_workspace(task, motion.knots.shape[1], BUDGET)
     records, first = np.zeros((ROOM, RECORD)), 0
     while first < n_intervals:
         last = min(first + CHUNK, n_intervals)
@@ -257,7 +257,7 @@ def _interval_lines(
 
 def _proofs(task: Task, rows: list[list[float]]) -> list[list[list[Any]]]:
     """The proofs of one interval: per pair its slices, per slice its planes."""
-    proofs: list[list[list[Any]]] = [[] for _ in range(task.pairs.link.size)]
+    proofs: list[list[list[Any]]] = [[] for _ in range(task.pairs.body.size)]
     for row in rows:
         slices = proofs[int(row[1])]
         if not slices or slices[-1][0] != row[2]:

@@ -13,7 +13,6 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.geometry.pieces import PackedPieces
-from vdsm_pin.kinematics import joint_centres, link_frames
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.layouts import (
     AT_LOWER,
@@ -30,19 +29,18 @@ from vdsm_pin.proof.layouts import (
     TIME,
     UP,
 )
-from vdsm_pin.proof.narrowing import narrow
+from vdsm_pin.proof.least_bracket import narrow
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.search import Witnesses
 from vdsm_pin.proof.terms import (
-    BASE,
     CERTIFIED,
     LINKS,
     OBSTACLES,
     REFUTED,
     UNDECIDED,
 )
-from vdsm_pin.proof.witnesses import place_best
+from vdsm_pin.proof.witnesses import place_best, place_points
 from vdsm_pin.scene import Scene
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
@@ -103,7 +101,7 @@ def _chunk(
     dense = proving.results.dense
     own, other = dense.own[:count], dense.other[:count]
     # In a pair of links the sweep moves the second one against the first.
-    swapped = (proving.task.pairs.frame != BASE)[None, :, None]
+    swapped = (proving.task.pairs.group == LINKS)[None, :, None]
     return ClearanceChunk(
         first_interval=first,
         # No interval is worse than what narrowing proved of all of them.
@@ -158,7 +156,7 @@ def prove_clearance(
     results = proving.results
     proving.sweep(results, 0, proving.n_intervals)
     late = proving.deadline.passed
-    _merge_far(problem, trajectory, proving)
+    _merge_far(proving)
     _own_up(proving)
     for group in (OBSTACLES, LINKS):
         _narrow(proving, group)
@@ -189,11 +187,9 @@ def _own_up(proving: Proving) -> None:
         results.profile[0] = -np.inf
 
 
-def _merge_far(
-    problem: PlanningProblem, trajectory: Trajectory, proving: Proving
-) -> None:
+def _merge_far(proving: Proving) -> None:
     """Bring what culling settled to the results of the pairs."""
-    far, task = proving.culling, proving.task
+    far, task = proving.broad, proving.task
     body, obstacle = np.nonzero(far.number >= 0)
     pair, at = far.number[body, obstacle], (body, obstacle)
     best = proving.results.best
@@ -204,7 +200,7 @@ def _merge_far(
     found = np.flatnonzero(far.upper[at] < best[pair, UP])
     body, pair, rows = body[found], pair[found], far.at_upper[at][found]
     corner = task.bodies.corners[task.bodies.first[body]]
-    place = _places(problem, trajectory, rows, task.bodies.link[body], corner)
+    place = _places(proving, rows, task.bodies.frame[body], corner)
     point = far.point.T[obstacle[found]]
     gap = np.linalg.norm(point - place, axis=1)
     best[pair, UP] = gap - task.bodies.radius[body] + task.rules.pad
@@ -213,18 +209,11 @@ def _merge_far(
 
 
 def _places(
-    problem: PlanningProblem,
-    trajectory: Trajectory,
-    rows: IntArray,
-    link: IntArray,
-    corner: FloatArray,
+    proving: Proving, rows: IntArray, frames: IntArray, at: FloatArray
 ) -> FloatArray:
-    """Places of points of links at rows, in the base frame, shape (n, 3); [m]."""
-    arm, each = problem.manipulator, np.arange(len(rows))
-    joints = (trajectory.x0[rows], trajectory.alpha[rows], trajectory.theta[rows])
-    turned = link_frames(joints[1], joints[2])[each, link]
-    start = joint_centres(arm, *joints)[each, link]
-    return np.asarray(start + np.einsum("nij,nj->ni", turned, corner))
+    """Points of frames, shape (n, 3), at rows, in the base frame, (n, 3); [m]."""
+    task, motion = proving.task, proving.motion
+    return place_points(task.tree, motion, rows, frames, np.ascontiguousarray(at))
 
 
 def _narrow(proving: Proving, group: int) -> None:
@@ -232,7 +221,7 @@ def _narrow(proving: Proving, group: int) -> None:
     if proving.deadline.passed:
         return
     task, results = proving.task, proving.results
-    mine = (task.pairs.frame == BASE) == (group == OBSTACLES)
+    mine = task.pairs.group == group
     held, n = results.candidates, results.tally[HELD]
     near = np.flatnonzero(mine[held.pair[:n]])
     near = near[held.lower[near] < results.limit[group] - task.rules.gap]
@@ -249,10 +238,11 @@ def _narrow(proving: Proving, group: int) -> None:
         time=np.zeros(n_pairs),
         points=np.zeros((n_pairs, 6)),
         instant=np.full(n_pairs, np.inf),
+        limit=np.inf,
     )
     heap = np.zeros((CANDIDATES + BUDGET, SLICE))
     again = results._replace(counts=np.zeros_like(results.counts))
-    count = narrow(task, proving.motion, proving.desk, again, group, order, heap, found)
+    count = narrow(task, proving.motion, proving.desk, again, order, heap, found)
     if proving.deadline.passed:
         return  # not all was looked at again: what was proved before holds
     proved = np.full(n_pairs, results.limit[group] - task.rules.gap)
@@ -279,7 +269,7 @@ def _send(
         Number of intervals sent.
     """
     known, obstacles = proving.results, problem.scene.obstacles
-    outer, obstacle = proving.task.pairs.frame == BASE, proving.task.pairs.obstacle
+    outer, obstacle = proving.task.pairs.group == OBSTACLES, proving.task.pairs.obstacle
     # numpy.unique imports numpy.ma, for which every process would wait.
     near = np.flatnonzero(np.bincount(obstacle[outer & (known.best[:, LOW] <= reach)]))
     pairs = frozen(np.flatnonzero(~outer | np.isin(obstacle, near)), np.int64)

@@ -23,7 +23,7 @@ from vdsm_pin.verification.coal_bodies import CoalBody, distance_request, measur
 from vdsm_pin.verification.coal_clearance import capsule_transforms, in_turns
 from vdsm_pin.verification.coal_log import CoalLog, rows_at
 from vdsm_pin.verification.records import Check, Verdict
-from vdsm_pin.verification.task import PairTable
+from vdsm_pin.verification.task import ArmPairs
 
 CHUNK_GAPS: Final = 1 << 20
 """Gaps held in memory at a time: rows times links times links."""
@@ -141,7 +141,7 @@ def _answers(
 
 def _pair_numbers(problem: PlanningProblem) -> IntArray:
     """Numbers of the pairs of axes, as they are judged; below 0 where they are not."""
-    table, n_axes = PairTable(problem), problem.manipulator.axis_radii.size
+    table, n_axes = ArmPairs(problem), problem.manipulator.axis_radii.size
     numbers = np.full((n_axes, n_axes), -1)
     for number, (one, other) in enumerate(table.between.held, start=len(table.outer)):
         if max(one, other) < n_axes:

@@ -6,7 +6,7 @@ import numpy as np
 
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.blocks import sweep
-from vdsm_pin.proof.desk import forget
+from vdsm_pin.proof.workspace import forget
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
@@ -59,8 +59,8 @@ class HastyProof:
         forget(known.desk.planes)
         # No least clearance is asked for: whatever is proved may be culled.
         known.results.limit[:] = -np.inf
-        args = task, known.motion, known.desk, known.results, known.culling
-        proved = bool(sweep(*args, first, last, True))
+        args = task, known.motion, known.desk, known.results, known.broad
+        proved = bool(sweep(*args, (first, last), True))
         known.deadline.check()
         return proved
 

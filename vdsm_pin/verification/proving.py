@@ -8,11 +8,12 @@ import numpy as np
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.blocks import sweep
-from vdsm_pin.proof.culling import Culling, new_culling
-from vdsm_pin.proof.desk import Desk, new_desk
+from vdsm_pin.proof.broad_phase import BroadPhase, new_broad_phase
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, BEST, TALLY, TIME
+from vdsm_pin.proof.packed_tree import Motion, straight_motion
 from vdsm_pin.proof.results import Candidates, Dense, Results
-from vdsm_pin.proof.terms import Bodies, Motion, Task
+from vdsm_pin.proof.terms import Task
+from vdsm_pin.proof.workspace import Workspace, new_workspace
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import ErrorBox
@@ -81,9 +82,9 @@ class Proving:
 
     task: Task
     motion: Motion
-    desk: Desk
+    desk: Workspace
     results: Results
-    culling: Culling
+    broad: BroadPhase
     n_intervals: int
     deadline: Deadline
 
@@ -94,16 +95,10 @@ class Proving:
             self.motion,
             self.desk,
             results,
-            self.culling,
-            first,
-            last,
+            self.broad,
+            (first, last),
             False,
         )
-
-
-def most_corners(bodies: Bodies) -> int:
-    """Most corners of a body."""
-    return int(np.diff(bodies.first).max())
 
 
 def new_proving(
@@ -126,16 +121,20 @@ def new_proving(
         budget: Most slices of one interval and pair.
         deadline: When to stop; who sweeps asks it afterwards.
     """
-    task = make_task(problem, errors, pieces, deadline)
+    reach = float(np.abs(trajectory.x0).max())
+    task = make_task(problem, errors, pieces, deadline, reach)
     n_pairs, n_links = task.pairs.body.size, problem.manipulator.n_links
     n_intervals = max(1, trajectory.n_samples - 1)
-    n_obstacles, n_bodies = len(problem.scene.obstacles), task.bodies.link.size
+    n_obstacles, motion = (
+        len(problem.scene.obstacles),
+        straight_motion(trajectory.joints),
+    )
     return Proving(
         task=task,
-        motion=Motion(trajectory.x0, trajectory.alpha, trajectory.theta),
-        desk=new_desk(n_links, n_pairs, most_corners(task.bodies), budget),
+        motion=motion,
+        desk=new_workspace(task, motion.knots.shape[1], budget),
         results=new_results(n_pairs, n_links + n_obstacles, n_intervals, values),
-        culling=new_culling(task.pieces, task.pairs, n_bodies, n_obstacles),
+        broad=new_broad_phase(task, n_obstacles),
         n_intervals=n_intervals,
         deadline=deadline,
     )

@@ -1,15 +1,21 @@
 """What a clearance proof is asked: bodies and pairs, the packed scene, the rules."""
 
+import math
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.arm_bodies import ArmBody, SelfPairs, arm_bodies, self_pairs
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.arm_tree import RAIL, arm_tree, link_frame
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.proof.terms import BASE, Bodies, Pairs, Rules, Task
+from vdsm_pin.proof.bodies import Body, PairTable
+from vdsm_pin.proof.error_box import ErrorBox as ProofBox
+from vdsm_pin.proof.packed_tree import REVOLUTE
+from vdsm_pin.proof.packing import pack_task
+from vdsm_pin.proof.packing import with_errors as with_box
+from vdsm_pin.proof.terms import OBSTACLES, WORLD, Rules, Task
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import arithmetic_pad
@@ -19,7 +25,7 @@ SLACK: Final = 0.02
 """How wide a bracket may be, as a part of the clearance."""
 
 
-class PairTable:
+class ArmPairs:
     """Which pairs of a problem are judged, in the order of the certificate.
 
     With every obstacle every body, then the bodies among themselves.
@@ -67,29 +73,22 @@ class PairTable:
     def _named(self, body: int) -> str:
         return "" if body < self.problem.manipulator.n_links else self.bodies[body].name
 
-    def packed(self) -> Pairs:
-        """The same for the kernels: body b at rest is obstacle n_obstacles + b."""
+    def numbers(self) -> PairTable:
+        """The same by numbers of bodies: the obstacles, then those of the arm."""
         problem, between = self.problem, self.between.held
         outer = np.array(self.outer, dtype=np.int64).reshape(-1, 2)
-        link = np.array([body.link - 1 for body in self.bodies], dtype=np.int64)
-        body = np.concatenate([outer[:, 0], between[:, 1]])
-        n_obstacles = len(problem.scene.obstacles)
+        n = len(problem.scene.obstacles)
         needed = problem.required_clearance, problem.required_self_clearance
-        sizes = len(outer), len(between)
-        return Pairs(
-            body=body,
-            link=link[body],
-            obstacle=np.concatenate([outer[:, 1], n_obstacles + between[:, 0]]),
-            frame=np.concatenate([np.full(len(outer), BASE), link[between[:, 0]]]),
-            required=np.repeat(needed, sizes),
-            lost=np.zeros(sum(sizes)),
-            rise=np.zeros(sum(sizes)),
+        return PairTable(
+            one=n + np.concatenate([outer[:, 0], between[:, 1]]),
+            other=np.concatenate([outer[:, 1], n + between[:, 0]]),
+            required=np.repeat(np.array(needed), (len(outer), len(between))),
         )
 
 
 def all_pairs(problem: PlanningProblem) -> tuple[Pair, ...]:
     """Every pair that is judged, in the order of the certificate."""
-    return PairTable(problem).pairs
+    return ArmPairs(problem).pairs
 
 
 def pack_scene(problem: PlanningProblem) -> PackedPieces:
@@ -99,71 +98,52 @@ def pack_scene(problem: PlanningProblem) -> PackedPieces:
     return pack_pieces([*obstacles, *bodies])
 
 
-def pack_bodies(bodies: tuple[ArmBody, ...]) -> Bodies:
-    """The bodies as the kernels read them."""
-    corners = [body.corners for body in bodies]
-    discs = np.zeros((len(bodies), 4))
-    for row, body in zip(discs, bodies, strict=True):
-        if body.disc > 0.0:
-            row[:3], row[3] = body.piece.axis, body.disc  # type: ignore[union-attr]
-    levers = [_levers(body) for body in bodies]
-    return Bodies(
-        link=np.array([body.link - 1 for body in bodies], dtype=np.int64),
-        first=np.cumsum([0, *map(len, corners)], dtype=np.int64),
-        corners=np.concatenate(corners),
-        levers=np.concatenate(levers),
-        radius=np.array([body.ball for body in bodies]),
-        discs=discs,
-        axial=np.array([body.axial for body in bodies], dtype=np.bool_),
-    )
-
-
-def _levers(body: ArmBody) -> FloatArray:
-    """Distances of the corners, with their disc, from the link's origin; [m]."""
-    if body.axial:
-        return np.array([0.0, body.corners[1, 0]])
-    return np.asarray(np.linalg.norm(body.corners, axis=1) + body.disc)
-
-
 def make_task(
     problem: PlanningProblem,
     errors: ErrorBox,
     pieces: PackedPieces | None = None,
     deadline: Deadline = NO_LIMIT,
+    reach: float = math.inf,
 ) -> Task:
-    """What the kernels need to know of a problem."""
-    packed, table = pieces or pack_scene(problem), PairTable(problem)
-    n_links = problem.manipulator.n_links
+    """What the kernels need to know of a problem.
+
+    Args:
+        problem: Arm, scene, required clearances.
+        errors: What the proof covers.
+        pieces: `pack_scene(problem)`, where it is known already.
+        deadline: When to stop.
+        reach: How large x0 gets; where the base may turn, nothing is proved of a motion
+            of which that is not known; [m].
+    """
+    table, arm = ArmPairs(problem), problem.manipulator
+    obstacles = problem.scene.obstacles
+    pieces = pieces or pack_scene(problem)
+    bodies = [Body(WORLD, obstacle.pieces, obstacle.name) for obstacle in obstacles]
+    bodies += [Body(link_frame(b.link), (b.piece,), b.name) for b in table.bodies]
+    columns = arm.n_links + np.arange(len(bodies))
+    columns[len(obstacles) :] = [body.link - 1 for body in table.bodies]
     rules = Rules(
-        lengths=np.array(problem.manipulator.link_lengths),
-        joint_errors=np.zeros((n_links, 2)),
-        base_turn=0.0,
-        joints_err=False,
         steady=True,
         nominal=True,
-        pad=arithmetic_pad(problem, packed),
+        pad=arithmetic_pad(problem, pieces),
         goal=TOLERANCES.bracket_gap,
         gap=TOLERANCES.least_bracket,
         slack=SLACK,
         until=deadline.end,
     )
-    task = Task(packed, pack_bodies(table.bodies), table.packed(), rules)
+    reaches = np.full(2 * arm.n_links + 1, reach)
+    tree, numbers = arm_tree(arm), table.numbers()
+    task = pack_task(tree, bodies, numbers, rules, reaches, columns, pieces)
     return with_errors(task, errors)
 
 
 def with_errors(task: Task, errors: ErrorBox) -> Task:
     """The same asked about another error box."""
-    pairs, pad = task.pairs, task.rules.pad
-    joints = np.full_like(task.rules.joint_errors, errors.joint)
-    shift = np.where(pairs.frame == BASE, errors.obstacle + errors.base, 0.0)
-    radius = task.bodies.radius[pairs.body]
-    steady = not (joints.any() or errors.base_turn > 0.0)
-    rules = task.rules._replace(
-        joint_errors=joints,
-        base_turn=float(errors.base_turn),
-        joints_err=bool(joints.any()),
-        steady=steady,
-        nominal=steady and not shift.any(),
-    )
-    pairs = pairs._replace(lost=radius + pad + shift, rise=pad - radius)
-    return task._replace(pairs=pairs, rules=rules)
+    tree = task.tree
+    shifts, tilts = np.zeros((2, tree.parent.size))
+    shifts[RAIL], tilts[RAIL] = errors.base, errors.base_turn
+    joints = np.where(tree.kind == REVOLUTE, errors.joint, 0.0)
+    surfaces = np.zeros(task.pieces.root.size)
+    obstacles = task.pairs.obstacle[task.pairs.group == OBSTACLES]
+    surfaces[obstacles] = errors.obstacle
+    return with_box(task, ProofBox(joints, shifts, tilts, surfaces))

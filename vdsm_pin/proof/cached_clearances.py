@@ -1,7 +1,7 @@
-"""A clearance held from row to row: it falls no faster than the body moves, compiled.
+"""A clearance cached from row to row: it falls no faster than the body moves, compiled.
 
 A partner of many pieces needs a plane for each, found by a walk through its hierarchy.
-What one walk proved serves the rows around it.
+What one walk proved serves the rows around it (conservative advancement).
 """
 
 from math import sqrt
@@ -10,6 +10,8 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import Body
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE
+from vdsm_pin.proof.rows import Tracks
+from vdsm_pin.proof.terms import Mover
 
 
 @compiled
@@ -30,10 +32,9 @@ def hold(plane: FloatArray, clearance: float, body: Body) -> None:
 
 @compiled
 def raise_to_held(
-    points: FloatArray,
-    sags: FloatArray,
+    mover: Mover,
+    tracks: Tracks,
     plane: FloatArray,
-    corners: int,
     first: int,
     last: int,
     lower: FloatArray,
@@ -44,26 +45,25 @@ def raise_to_held(
     depend on the configuration.
 
     Args:
-        points: Corners in the partner's frame, shape (corners, 3, BLOCK + 1); [m].
-        sags: Shape (corners, BLOCK); [m].
+        mover: The body.
+        tracks: Its corners over the block.
         plane: What the pair remembers.
-        corners: How many the body has.
         first: First interval of the block to look at.
         last: One past the last.
         lower: Updated, shape (BLOCK,); [m].
     """
     apart()
-    before = 0.0
+    before, slots = 0.0, mover.slots
     for row in range(first, last + 1):
         moved = sag = 0.0
-        for k in range(corners):
-            squared = 0.0
+        for k in range(slots.size):
+            squared, place = 0.0, tracks.places[slots[k]]
             for c in range(3):
-                d = points[k, c, row] - plane[HELD_AT + 3 * k + c]
+                d = place[c, row] - plane[HELD_AT + 3 * k + c]
                 squared += d * d
             moved = max(moved, sqrt(squared))
             if row > first:
-                sag = max(sag, sags[k, row - 1])
+                sag = max(sag, tracks.sags[slots[k], row - 1])
         if row > first:
             held = plane[HELD_CLEARANCE] - max(before, moved) - sag
             lower[row - 1] = max(lower[row - 1], held)

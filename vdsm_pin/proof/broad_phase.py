@@ -1,4 +1,4 @@
-"""Boxes over a block of intervals settle the pairs that are far, in compiled code.
+"""The broad phase: boxes over a block of intervals settle the pairs that are far.
 
 A pair is far where the distance of the boxes exceeds the required clearance, the
 least clearance met so far, and the distance of the body's nearest obstacle: then no
@@ -14,32 +14,34 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import NORMAL, UPPER
 from vdsm_pin.geometry.obstacles import obstacle_bracket
-from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.proof.boxes import body_box, box_gaps, box_reaches
-from vdsm_pin.proof.coasting import place_body
-from vdsm_pin.proof.desk import Desk, load_rows
+from vdsm_pin.proof.cached_planes import place_disc
+from vdsm_pin.proof.pair_sweep import Stretch
 from vdsm_pin.proof.results import Dense, Results
-from vdsm_pin.proof.rows import BLOCK, Rows, place_corner
+from vdsm_pin.proof.rows import Rows
 from vdsm_pin.proof.terms import (
-    BASE,
     CERTIFIED,
     OBSTACLES,
-    Pairs,
+    WORLD,
     Task,
     mover_of,
 )
+from vdsm_pin.proof.workspace import Workspace, load_rows
 
 FEW: Final = 8
 """Up to so many obstacles nothing is culled and every bracket is narrow."""
 
 
-class Culling(NamedTuple):
-    """The obstacles as culling sees them, its working space, and what it settled.
+class BroadPhase(NamedTuple):
+    """The obstacles as broad sees them, its working space, and what it settled.
 
     Args:
         number: The pair of every body and obstacle, -1 for none, shape (n_bodies,
             n_obstacles).
-        others: The pairs without an obstacle.
+        some: A pair of each body with one of them, -1 for none, shape (n_bodies,).
+        others: All other pairs.
+        column: Where the profile has an obstacle's bounds, -1 for nowhere, shape
+            (n_obstacles,).
         box: Lower and upper corner of every obstacle's box, shape (2, 3, n_obstacles);
             [m].
         point: A point of every obstacle, shape (3, n_obstacles); [m].
@@ -57,7 +59,9 @@ class Culling(NamedTuple):
     """
 
     number: IntArray
+    some: IntArray
     others: IntArray
+    column: IntArray
     box: FloatArray
     point: FloatArray
     gap: FloatArray
@@ -73,11 +77,12 @@ class Culling(NamedTuple):
 
 
 @compiled
-def new_culling(
-    pieces: PackedPieces, pairs: Pairs, n_bodies: int, n_obstacles: int
-) -> Culling:
-    """Nothing settled yet; the obstacles are the first ones of the packed scene."""
-    n, shape, n_pairs = n_obstacles, (n_bodies, n_obstacles), pairs.body.size
+def new_broad_phase(task: Task, n_obstacles: int) -> BroadPhase:
+    """Nothing settled yet; the first obstacles of the packed scene are looked at."""
+    apart()
+    pieces, pairs, ways = task.pieces, task.pairs, task.ways
+    n_bodies, n_pairs = task.bodies.frame.size, pairs.body.size
+    n, shape = n_obstacles, (n_bodies, n_obstacles)
     box, point = np.zeros((2, 3, n)), np.zeros((3, n))
     for o in range(n):
         root, first = pieces.root[o], pieces.first_piece[o]
@@ -86,16 +91,22 @@ def new_culling(
             box[1, c, o] = pieces.node_high[root, c]
             point[c, o] = pieces.centre[first, c]
     number, others = np.full(shape, -1), np.zeros(n_pairs, np.int64)
+    some, column = np.full(n_bodies, -1), np.full(n, -1)
     n_others = 0
     for pair in range(n_pairs):
-        if pairs.frame[pair] == BASE and pairs.obstacle[pair] < n:
+        at_rest = ways.rest[pairs.way[pair]] == WORLD
+        if at_rest and pairs.obstacle[pair] < n:
             number[pairs.body[pair], pairs.obstacle[pair]] = pair
+            some[pairs.body[pair]] = pair
+            column[pairs.obstacle[pair]] = pairs.column[pair]
         else:
             others[n_others] = pair
             n_others += 1
-    return Culling(
+    return BroadPhase(
         number,
+        some,
         others[:n_others].copy(),
+        column,
         box,
         point,
         np.zeros(shape),
@@ -121,21 +132,21 @@ def _keep_least(values: FloatArray, least: FloatArray, at: IntArray, k: int) -> 
 
 
 @compiled
-def _nearest_upper(task: Task, desk: Desk, culling: Culling, body: int) -> float:
+def _nearest_upper(task: Task, desk: Workspace, broad: BroadPhase, body: int) -> float:
     """Upper bound of the clearance of a body and of the obstacle whose box is nearest.
 
     At the first row of a block; inf for a body without pairs.
     """
     apart()
     pair, least, space = -1, np.inf, desk.space
-    for o in range(culling.number.shape[1]):
-        if culling.number[body, o] >= 0 and culling.gap[body, o] < least:
-            pair, least = culling.number[body, o], culling.gap[body, o]
+    for o in range(broad.number.shape[1]):
+        if broad.number[body, o] >= 0 and broad.gap[body, o] < least:
+            pair, least = broad.number[body, o], broad.gap[body, o]
     if pair < 0:
         return np.inf
     mover = mover_of(task, pair)
-    place_body(mover, desk.rows, desk.runs, 1, task.rules.steady)
-    load_rows(task.rules, mover, desk, 0, 0)
+    place_disc(mover, desk.rows, desk.runs, 1)
+    load_rows(task, mover, desk, 0, 0)
     space.out[NORMAL : NORMAL + 3] = 1.0
     obstacle_bracket(
         task.pieces,
@@ -152,21 +163,26 @@ def _nearest_upper(task: Task, desk: Desk, culling: Culling, body: int) -> float
 
 @compiled
 def _settle_body(
-    task: Task, results: Results, culling: Culling, body: int, upper: float, n_near: int
+    task: Task,
+    results: Results,
+    broad: BroadPhase,
+    body: int,
+    upper: float,
+    n_near: int,
 ) -> int:
     """Tell which obstacles are far from a body; adds the near ones, their number.
 
     Args:
         task: The scene, pairs and rules.
         results: For the least clearance met.
-        culling: `gap` of the body is read, `far` written.
+        broad: `gap` of the body is read, `far` written.
         body: The body.
         upper: Upper bound of the distance of its nearest obstacle; [m].
         n_near: Near pairs so far.
     """
     apart()
     threshold = max(upper, results.limit[OBSTACLES])
-    gap, far, number = culling.gap[body], culling.far[body], culling.number[body]
+    gap, far, number = broad.gap[body], broad.far[body], broad.number[body]
     for o in range(gap.size):
         required = task.pairs.required[max(number[o], 0)]
         far[o] = gap[o] >= max(threshold, required) and number[o] >= 0
@@ -174,38 +190,39 @@ def _settle_body(
         if not far[o]:
             gap[o] = np.inf
             if number[o] >= 0:
-                culling.near[n_near] = number[o]
+                broad.near[n_near] = number[o]
                 n_near += 1
     return n_near
 
 
 @compiled
 def _dense_far(
-    task: Task, dense: Dense, rows: Rows, culling: Culling, offset: int, count: int
+    task: Task, dense: Dense, rows: Rows, broad: BroadPhase, offset: int, count: int
 ) -> None:
     """Dense rows of the far pairs; witnesses are the obstacle's point and a corner."""
     apart()
-    n_bodies, n_obstacles = culling.far.shape
-    bodies, at = task.bodies, np.zeros((3, BLOCK + 1))
+    n_bodies, n_obstacles = broad.far.shape
+    bodies, pairs = task.bodies, task.pairs
     for body in range(n_bodies):
-        corner = bodies.corners[bodies.first[body]]
-        place_corner(rows, bodies.link[body], corner, count + 1, at)
-        radius = bodies.radius[body]
+        if broad.some[body] < 0:
+            continue
+        place = pairs.slots[pairs.slot[broad.some[body]]]
+        at, radius = rows.tracks.places[place], bodies.radius[body]
         for o in range(n_obstacles):
-            if not culling.far[body, o]:
+            if not broad.far[body, o]:
                 continue
-            pair = culling.number[body, o]
+            pair = broad.number[body, o]
             for local in range(count):
                 m, squared = offset + local, 0.0
                 for c in range(3):
-                    squared += (culling.point[c, o] - at[c, local]) ** 2
+                    squared += (broad.point[c, o] - at[c, local]) ** 2
                 gap = sqrt(squared)
                 share = radius / gap if gap > 0.0 else 0.0
                 for c in range(3):
-                    away = culling.point[c, o] - at[c, local]
+                    away = broad.point[c, o] - at[c, local]
                     dense.own[m, pair, c] = at[c, local] + share * away
-                    dense.other[m, pair, c] = culling.point[c, o]
-                dense.lower[m, pair] = culling.gap[body, o]
+                    dense.other[m, pair, c] = broad.point[c, o]
+                dense.lower[m, pair] = broad.gap[body, o]
                 dense.upper[m, pair] = gap + task.pairs.rise[pair]
                 dense.time[m, pair], dense.verdict[m, pair] = 0.0, CERTIFIED
 
@@ -230,18 +247,19 @@ def _lower_profile(
 
 @compiled
 def _profile_far(
-    task: Task, results: Results, culling: Culling, start: int, count: int
+    task: Task, results: Results, broad: BroadPhase, start: int, count: int
 ) -> None:
     """Lower the profile's bins of a block to the least bounds of its far pairs."""
     apart()
-    n_bodies, n_obstacles = culling.far.shape
-    profile, stride, n_links = results.profile, results.stride, task.rules.lengths.size
-    culling.least[:] = np.inf
+    n_bodies, n_obstacles = broad.far.shape
+    profile, stride = results.profile, results.stride
+    bodies = task.bodies
+    broad.least[:] = np.inf
     for body in range(n_bodies):
         low = high = np.inf
         for side in range(2):
-            values = culling.gap[body] if side == 0 else culling.reach[body]
-            least = culling.least[side]
+            values = broad.gap[body] if side == 0 else broad.reach[body]
+            least = broad.least[side]
             for o in range(n_obstacles):
                 least[o] = values[o] if values[o] < least[o] else least[o]
             for o in range(n_obstacles):
@@ -249,23 +267,21 @@ def _profile_far(
                     low = min(low, values[o])
                 else:
                     high = min(high, values[o])
-        link = task.bodies.link[body]
-        _lower_profile(profile, stride, link, low, high, start, count)
+        _lower_profile(profile, stride, bodies.column[body], low, high, start, count)
     for o in range(n_obstacles):
-        low, high = culling.least[0, o], culling.least[1, o]
-        if low < np.inf:
-            _lower_profile(profile, stride, n_links + o, low, high, start, count)
+        low, high = broad.least[0, o], broad.least[1, o]
+        column = broad.column[o]
+        if low < np.inf and column >= 0:
+            _lower_profile(profile, stride, column, low, high, start, count)
 
 
 @compiled
-def cull(
+def settle_far(
     task: Task,
-    desk: Desk,
+    desk: Workspace,
     results: Results,
-    culling: Culling,
-    start: int,
-    offset: int,
-    count: int,
+    broad: BroadPhase,
+    stretch: Stretch,
 ) -> int:
     """Record the pairs that are far over a block and list the others.
 
@@ -273,43 +289,46 @@ def cull(
         task: The scene, pairs and rules.
         desk: Working space; its rows are filled.
         results: Where to write.
-        culling: Where to write; `near` lists the pairs that need a closer look.
-        start: First interval of the block.
-        offset: Its row in the dense results.
-        count: Intervals in the block.
+        broad: Where to write; `near` lists the pairs that need a closer look.
+        stretch: The block.
 
     Returns:
         The number of near pairs.
     """
     apart()
-    n_bodies, n_obstacles = culling.gap.shape
+    n_bodies, n_obstacles = broad.gap.shape
     if n_obstacles <= FEW:
-        return culling.near.size
+        return broad.near.size
     rules, rows, n_near = task.rules, desk.rows, 0
+    start, count = stretch.start, stretch.size
     low, high, lost = np.zeros(3), np.zeros(3), task.pairs.lost
     for body in range(n_bodies):
-        gap, reach = culling.gap[body], culling.reach[body]
-        body_box(task, rows, count, body, low, high)
-        box_gaps(culling.box, low, high, gap)
+        gap, reach = broad.gap[body], broad.reach[body]
+        if broad.some[body] < 0:
+            gap[:] = reach[:] = np.inf
+            broad.far[body, :] = False
+            continue
+        body_box(task, rows, count, broad.some[body], low, high)
+        box_gaps(broad.box, low, high, gap)
         radius = task.bodies.radius[body]
         for o in range(n_obstacles):
-            pair = culling.number[body, o]
+            pair = broad.number[body, o]
             gap[o] -= lost[pair] if pair >= 0 else 0.0
-        upper = _nearest_upper(task, desk, culling, body)
+        upper = _nearest_upper(task, desk, broad, body)
         if rules.nominal:
             results.limit[OBSTACLES] = min(results.limit[OBSTACLES], upper)
-        n_near = _settle_body(task, results, culling, body, upper, n_near)
-        far, settled = culling.far[body], culling.settled[body]
+        n_near = _settle_body(task, results, broad, body, upper, n_near)
+        far, settled = broad.far[body], broad.settled[body]
         rise_of = rules.pad - radius
-        box_reaches(culling.point, low, high, rise_of, far, reach)
+        box_reaches(broad.point, low, high, rise_of, far, reach)
         for o in range(n_obstacles):
             settled[o] += count if far[o] else 0
-        _keep_least(gap, culling.lower[body], culling.at_lower[body], start)
-        _keep_least(reach, culling.upper[body], culling.at_upper[body], start)
-    for pair in culling.others:
-        culling.near[n_near] = pair
+        _keep_least(gap, broad.lower[body], broad.at_lower[body], start)
+        _keep_least(reach, broad.upper[body], broad.at_upper[body], start)
+    for pair in broad.others:
+        broad.near[n_near] = pair
         n_near += 1
-    _profile_far(task, results, culling, start, count)
+    _profile_far(task, results, broad, start, count)
     if results.dense.verdict.shape[0] > 0:
-        _dense_far(task, results.dense, rows, culling, offset, count)
+        _dense_far(task, results.dense, rows, broad, stretch.offset, count)
     return n_near

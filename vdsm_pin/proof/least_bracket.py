@@ -4,7 +4,6 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import apart, borrowed, clock, compiled
-from vdsm_pin.proof.desk import Desk
 from vdsm_pin.proof.heaps import push
 from vdsm_pin.proof.layouts import (
     AT_UPPER,
@@ -17,18 +16,20 @@ from vdsm_pin.proof.layouts import (
     TIME,
     UP,
 )
-from vdsm_pin.proof.pair_sweep import sweep_pair
+from vdsm_pin.proof.packed_tree import Motion
+from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.rows import fill_rows
 from vdsm_pin.proof.search import Witnesses, tighten
-from vdsm_pin.proof.terms import Motion, Task
+from vdsm_pin.proof.terms import Task
+from vdsm_pin.proof.workspace import Workspace
 
 
 @compiled
 def _look_again(
     task: Task,
     motion: Motion,
-    desk: Desk,
+    desk: Workspace,
     results: Results,
     group: int,
     order: IntArray,
@@ -54,9 +55,10 @@ def _look_again(
             continue
         start, size, pair = held.first[c], held.size[c], held.pair[c]
         if start != filled:
-            fill_rows(motion, task.rules, desk.rows, start, size)
+            fill_rows(task, motion, desk.rows, start, size)
             filled = start
-        sweep_pair(task, motion, desk, results, start, 0, size, pair, True, False)
+        stretch = Stretch(start, 0, size, True, False)
+        sweep_pair(task, motion, desk, results, pair, stretch)
         for local in range(size):
             if not lower[local] < results.limit[group] - task.rules.gap:
                 continue
@@ -72,9 +74,8 @@ def _look_again(
 def narrow(
     task: Task,
     motion: Motion,
-    desk: Desk,
+    desk: Workspace,
     results: Results,
-    group: int,
     order: IntArray,
     heap: FloatArray,
     found: Witnesses,
@@ -87,8 +88,7 @@ def narrow(
         desk: Working space.
         results: Holds the candidates; best upper bounds and the limit are improved. Its
             counts are spoilt: every candidate is counted again.
-        group: OBSTACLES or LINKS.
-        order: The group's candidates, those of one block together.
+        order: Candidates of one group, those of one block together.
         heap: Room for intervals and their slices.
         found: Working space, nothing met yet.
 
@@ -103,9 +103,17 @@ def narrow(
     order = borrowed(order)
     heap = borrowed(heap)
     found = borrowed(found)
+    group = task.pairs.group[results.candidates.pair[order[0]]]
     count = _look_again(task, motion, desk, results, group, order, heap)
-    limit = results.limit[group]
-    count = tighten(task, motion, desk.ends, desk.space, heap, count, limit, found)
+    found = Witnesses(
+        found.upper,
+        found.interval,
+        found.time,
+        found.points,
+        found.instant,
+        results.limit[group],
+    )
+    count = tighten(task, motion, desk.ends, desk.space, heap, count, found)
     for pair in range(found.upper.size):
         if found.upper[pair] < results.best[pair, UP]:
             best = results.best[pair]

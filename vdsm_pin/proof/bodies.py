@@ -1,0 +1,77 @@
+"""Bodies that ride on frames, and which of them are held apart."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.geometry.convex import HalfSpacePiece, Piece, Triangles
+
+
+@dataclass(frozen=True)
+class Body:
+    """Convex pieces that ride on one frame of a tree.
+
+    Args:
+        frame: The frame; 0 is the world, where obstacles rest.
+        pieces: The solid is their union, in the frame's coordinates.
+        name: For messages and reports.
+    """
+
+    frame: int
+    pieces: Sequence[Piece] | Triangles
+    name: str = ""
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether none of its pieces is a half-space."""
+        if isinstance(self.pieces, Triangles):
+            return True
+        return not any(isinstance(piece, HalfSpacePiece) for piece in self.pieces)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two bodies, by their numbers, and the clearance that they must keep.
+
+    Args:
+        one: The first body.
+        other: The second one; it rides on another frame.
+        required: Least clearance of the two; [m].
+    """
+
+    one: int
+    other: int
+    required: float = 0.0
+
+
+@dataclass(frozen=True)
+class PairTable:
+    """Pairs as columns, one row each.
+
+    Args:
+        one: Numbers of the first bodies, shape (n_pairs,).
+        other: Of the second ones, shape (n_pairs,).
+        required: Least clearances, shape (n_pairs,); [m].
+    """
+
+    one: IntArray
+    other: IntArray
+    required: FloatArray
+
+    @classmethod
+    def of(cls, pairs: Iterable[Pair]) -> "PairTable":
+        """The same as columns."""
+        rows = [(pair.one, pair.other, pair.required) for pair in pairs]
+        columns = np.array(rows, dtype=np.float64).reshape(-1, 3).T
+        return cls(
+            frozen(columns[0], np.int64),
+            frozen(columns[1], np.int64),
+            frozen(columns[2]),
+        )
+
+    @property
+    def size(self) -> int:
+        """Number of pairs."""
+        return int(self.one.size)

@@ -1,0 +1,307 @@
+"""The loops that prove most intervals: one cached plane, one cached witness point.
+
+Most pairs keep apart along much the same direction for many rows: the plane that
+served last is tried first (temporal coherence). Arrays have the rows last: a few
+operations an interval, many at a time.
+"""
+
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.bodies import RADIUS
+from vdsm_pin.geometry.compiled import apart, compiled
+from vdsm_pin.proof.cached_clearances import raise_to_held
+from vdsm_pin.proof.error_growth import grow_corners, set_direction
+from vdsm_pin.proof.layouts import (
+    HELD_CLEARANCE,
+    OWN_POINT,
+    POINT,
+    SUPPORT,
+    WIDTH,
+)
+from vdsm_pin.proof.rows import (
+    BLOCK,
+    Rows,
+    Tracks,
+    carry,
+    to_frame,
+    turn_axis,
+)
+from vdsm_pin.proof.terms import Mover, Task
+
+
+class Runs(NamedTuple):
+    """A block's intervals for one pair: its bounds and what they are made of.
+
+    Args:
+        lower: Lower bounds, shape (BLOCK,); [m].
+        upper: Upper bounds, at the nearer of the two rows, shape (BLOCK,); [m].
+        at_rows: Core distances at the rows, shape (BLOCK + 1,); [m].
+        growth: What errors add to n.corner, shape (corners, BLOCK); [m].
+        axis: Axis of the disc in the partner's frame, shape (3, BLOCK + 1); [-].
+        own: The witness on a body that is no segment, shape (3, BLOCK + 1); [m].
+        toward: n in the world's frame, shape (3, BLOCK + 1); [-].
+        work: Working space, shape (4, BLOCK + 1).
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    at_rows: FloatArray
+    growth: FloatArray
+    axis: FloatArray
+    own: FloatArray
+    toward: FloatArray
+    work: FloatArray
+
+
+class Demand(NamedTuple):
+    """What a cached plane has to come up to.
+
+    Args:
+        first: First interval of the block to look at.
+        last: One past the last.
+        bar: A lower bound below it does not serve; [m].
+        slack: As for `served`; inf where narrow brackets are not wanted.
+        fresh: Whether the plane was made for the first interval: its bracket there is
+            what the following ones are measured by.
+        proved: Clearance proved for that interval otherwise, or -inf; [m].
+    """
+
+    first: int
+    last: int
+    bar: float
+    slack: float
+    fresh: bool
+    proved: float
+
+
+@compiled
+def new_runs(corners: int) -> Runs:
+    """Fresh working space; where errors add nothing `growth` is to be 0."""
+    return Runs(
+        np.zeros(BLOCK),
+        np.zeros(BLOCK),
+        np.zeros(BLOCK + 1),
+        np.zeros((corners, BLOCK)),
+        np.zeros((3, BLOCK + 1)),
+        np.zeros((3, BLOCK + 1)),
+        np.zeros((3, BLOCK + 1)),
+        np.zeros((4, BLOCK + 1)),
+    )
+
+
+@compiled
+def place_disc(mover: Mover, rows: Rows, runs: Runs, count: int) -> None:
+    """The axis of a body's disc over a block in its partner's frame."""
+    if mover.disc[RADIUS] > 0.0:
+        axis = mover.disc
+        turn_axis(rows, mover.rest, mover.frame, axis, count + 1, runs.axis)
+
+
+@compiled
+def place_own(
+    mover: Mover, rows: Rows, runs: Runs, plane: FloatArray, count: int
+) -> None:
+    """The witness on a body over a block, where the body is no segment."""
+    if mover.inverse < 0.0:
+        frame, at = mover.frame, plane[OWN_POINT : OWN_POINT + 3]
+        carry(rows.origins[frame], rows.frames[frame], at, count + 1, runs.own)
+        to_frame(rows, mover.rest, count + 1, runs.own, runs.own)
+
+
+@compiled
+def _reach(
+    points: FloatArray,
+    sags: FloatArray,
+    growth: FloatArray,
+    plane: FloatArray,
+    along: FloatArray,
+    reach: FloatArray,
+) -> None:
+    """Largest n.x of a corner over each interval, from the rows, (3, count + 1)."""
+    nx, ny, nz = plane[0], plane[1], plane[2]
+    x, y, z = points[0], points[1], points[2]
+    for r in range(along.size):
+        along[r] = nx * x[r] + ny * y[r] + nz * z[r]
+    after = along[1:]
+    for r in range(reach.size):
+        more = along[r] if along[r] > after[r] else after[r]
+        reach[r] = more + sags[r] + growth[r]
+
+
+@compiled
+def _distances(
+    a: FloatArray, b: FloatArray, plane: FloatArray, share: float, out: FloatArray
+) -> None:
+    """Distance from a plane's witness to a point of each segment from a to b.
+
+    Any point of the segment gives an upper bound, so the share 1 / length^2 need not
+    be exact.
+    """
+    ax, ay, az, bx, by, bz = a[0], a[1], a[2], b[0], b[1], b[2]
+    wx, wy, wz = plane[POINT], plane[POINT + 1], plane[POINT + 2]
+    for r in range(out.size):
+        dx, dy, dz = bx[r] - ax[r], by[r] - ay[r], bz[r] - az[r]
+        px, py, pz = wx - ax[r], wy - ay[r], wz - az[r]
+        t = share * (px * dx + py * dy + pz * dz)
+        t = 0.0 if t < 0.0 else t
+        t = 1.0 if t > 1.0 else t
+        px, py, pz = px - t * dx, py - t * dy, pz - t * dz
+        out[r] = sqrt(px * px + py * py + pz * pz)
+
+
+@compiled
+def bound_below(
+    mover: Mover, tracks: Tracks, runs: Runs, plane: FloatArray, first: int, last: int
+) -> None:
+    """Lower bounds of the intervals [first, last) of a block by one plane."""
+    gap, low = plane[SUPPORT] - mover.lost, runs.lower[first:last]
+    work, slots = runs.work, mover.slots
+    most, along = work[0, first:last], work[2, first : last + 1]
+    for k in range(slots.size):
+        reach = work[k if k < 2 else 3, first:last]
+        place = tracks.places[slots[k], :, first : last + 1]
+        sags, growth = tracks.sags[slots[k], first:last], runs.growth[k, first:last]
+        _reach(place, sags, growth, plane, along, reach)
+        if k > 1:
+            for r in range(most.size):
+                most[r] = most[r] if most[r] > reach[r] else reach[r]
+    if slots.size == 1:
+        work[1, first:last] = -np.inf
+    other = work[1, first:last]
+    for r in range(low.size):
+        low[r] = gap - (most[r] if most[r] > other[r] else other[r])
+
+
+@compiled
+def bound_above(
+    mover: Mover, tracks: Tracks, runs: Runs, plane: FloatArray, first: int, last: int
+) -> None:
+    """Upper bounds of the intervals [first, last) by one witness of the partner."""
+    a, b, share = runs.own, runs.own, 0.0
+    if mover.inverse >= 0.0:
+        slots, share = mover.slots, mover.inverse
+        a, b = tracks.places[slots[0]], tracks.places[slots[slots.size - 1]]
+    now, after = runs.at_rows[first : last + 1], runs.at_rows[first + 1 :]
+    _distances(a[:, first:], b[:, first:], plane, share, now)
+    high = runs.upper[first:last]
+    for r in range(high.size):
+        high[r] = mover.rise + (now[r] if now[r] < after[r] else after[r])
+
+
+@compiled
+def take_disc(
+    axis: FloatArray,
+    plane: FloatArray,
+    radius: float,
+    first: int,
+    last: int,
+    low: FloatArray,
+) -> None:
+    """Take what a disc adds to a body's reach off lower bounds, shape (BLOCK,)."""
+    nx, ny, nz = plane[0], plane[1], plane[2]
+    before = 0.0
+    for r in range(first, last + 1):
+        ux, uy, uz = axis[0, r], axis[1, r], axis[2, r]
+        along = nx * ux + ny * uy + nz * uz
+        x, y, z = nx - along * ux, ny - along * uy, nz - along * uz
+        here = radius * sqrt(x * x + y * y + z * z)
+        if r > first:
+            low[r - 1] -= max(before, here)
+        before = here
+
+
+@compiled
+def served(
+    lower: FloatArray, upper: FloatArray, bar: float, slack: float, width: float
+) -> int:
+    """How many of the first intervals a plane serves.
+
+    Args:
+        lower: Lower bounds, shape (count,); [m].
+        upper: Upper bounds, shape (count,); [m].
+        bar: A lower bound below it does not serve; [m].
+        slack: A bracket may be as wide as this part of the clearance, and wider
+        width: by so much; [m].
+    """
+    missed = 0
+    for r in range(lower.size):
+        low = not lower[r] >= bar
+        wide = not upper[r] - lower[r] <= width + slack * upper[r]
+        missed |= low | wide
+    if not missed:
+        return lower.size
+    for r in range(lower.size):
+        if not lower[r] >= bar:
+            return r
+        if not upper[r] - lower[r] <= width + slack * upper[r]:
+            return r
+    return lower.size
+
+
+@compiled
+def _grow(
+    task: Task,
+    mover: Mover,
+    rows: Rows,
+    runs: Runs,
+    plane: FloatArray,
+    demand: Demand,
+    crudely: bool,
+) -> None:
+    """What errors that turn add to n.x of a body's corners, to `runs.growth`; [m]."""
+    first, end = demand.first, demand.last + 1
+    if not crudely:
+        set_direction(rows, mover.rest, plane[:3], first, end, runs.toward)
+    toward = runs.toward[:, :end]
+    grow_corners(task, mover, rows, toward, first, crudely, runs.growth)
+
+
+@compiled
+def try_plane(
+    task: Task,
+    mover: Mover,
+    rows: Rows,
+    runs: Runs,
+    plane: FloatArray,
+    demand: Demand,
+) -> int:
+    """Bound intervals with a pair's cached plane and witness.
+
+    Args:
+        task: The tree, the rules and the error box.
+        mover: The body of the pair.
+        rows: The block.
+        runs: The disc and witness are placed; bounds of the intervals are written.
+        plane: What the pair remembers.
+        demand: Which intervals, and what serves.
+
+    Returns:
+        The first interval that the plane does not serve, or `demand.last`.
+    """
+    apart()
+    first, last, steady = demand.first, demand.last, task.rules.steady
+    done, disc = first, mover.disc[RADIUS]
+    crudely = not steady and np.isinf(demand.slack)
+    lower, upper = runs.lower[first:last], runs.upper[first:last]
+    bound_above(mover, rows.tracks, runs, plane, first, last)
+    for _ in range(2):
+        if not steady:
+            _grow(task, mover, rows, runs, plane, demand, crudely)
+        bound_below(mover, rows.tracks, runs, plane, first, last)
+        if disc > 0.0:
+            take_disc(runs.axis, plane, disc, first, last, runs.lower)
+        if steady and plane[HELD_CLEARANCE] > -np.inf:
+            raise_to_held(mover, rows.tracks, plane, first, last, runs.lower)
+        if demand.fresh:
+            lower[0] = max(lower[0], demand.proved)
+            plane[WIDTH] = upper[0] - lower[0]
+        width = 2.0 * plane[WIDTH]
+        done = first + served(lower, upper, demand.bar, demand.slack, width)
+        if not crudely or done == last:
+            break
+        crudely = False
+    return done

@@ -1,0 +1,32 @@
+"""How far the real motion may stray from the nominal one."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.proof.tree import Tree
+
+
+@dataclass(frozen=True)
+class ErrorBox:
+    """The largest errors, each from none to that, in whatever direction, at every time.
+
+    Args:
+        joints: Of each joint's value, shape (n_joints,); [rad] or [m].
+        shifts: Of the origin of each joint's placement, shape (n_joints,); [m].
+        tilts: Turn of each placement about its origin, shape (n_joints,); [rad].
+        surfaces: By how much the surface of each body may be off where it is the second
+            one of a pair, shape (n_bodies,); [m]. None for not at all.
+    """
+
+    joints: FloatArray
+    shifts: FloatArray
+    tilts: FloatArray
+    surfaces: FloatArray | None = None
+
+    @classmethod
+    def none(cls, tree: Tree) -> "ErrorBox":
+        """No errors."""
+        blank = np.zeros(len(tree.joints))
+        return cls(blank, blank, blank)

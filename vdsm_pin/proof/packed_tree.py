@@ -1,0 +1,300 @@
+"""A tree of joints and a motion of it as compiled code reads them."""
+
+from math import cos, sin
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.compiled import apart, compiled
+from vdsm_pin.proof.tree import Joint, Kind, Tree
+
+FIXED: Final = 0
+REVOLUTE: Final = 1
+PRISMATIC: Final = 2
+"""`Kind` as numbers."""
+
+ASKEW: Final = 3
+"""An axis that is none of the joint's own x (0), y (1) and z (2)."""
+
+DEGREE: Final = 5
+"""Highest degree of a piece of a path."""
+
+
+class PackedTree(NamedTuple):
+    """The joints of a tree; joint j carries frame j + 1.
+
+    Args:
+        parent: Frame that each hangs on, shape (n_joints,).
+        kind: FIXED, REVOLUTE or PRISMATIC, shape (n_joints,).
+        axis: Unit axes in the joints' own frames, shape (n_joints, 3); [-].
+        along: Which coordinate axis that is, or ASKEW, shape (n_joints,).
+        shift: Origin of a joint in its parent's frame, shape (n_joints, 3); [m].
+        lever: Length of the shift, shape (n_joints,); [m].
+        turned: Whether a placement rotates, shape (n_joints,).
+        rotation: R_parent_joint, shape (n_joints, 3, 3); [-].
+        column: Column of q, -1 for none, shape (n_joints,).
+        ratio: Value per unit of q, shape (n_joints,).
+        offset: Value at q = 0, shape (n_joints,); [rad] or [m].
+        stroke: How large the values of prismatic joints get, inf where that is not
+            known, shape (n_joints,); [m].
+    """
+
+    parent: IntArray
+    kind: IntArray
+    axis: FloatArray
+    along: IntArray
+    shift: FloatArray
+    lever: FloatArray
+    turned: BoolArray
+    rotation: FloatArray
+    column: IntArray
+    ratio: FloatArray
+    offset: FloatArray
+    stroke: FloatArray
+
+
+class Motion(NamedTuple):
+    """Rows of q joined by polynomials in Bernstein form.
+
+    Args:
+        knots: Shape (n_rows, n_columns); [rad], [m].
+        inner: Control points between two knots, shape (n_rows - 1, degree - 1,
+            n_columns); of straight lines, degree 1, no rows either.
+    """
+
+    knots: FloatArray
+    inner: FloatArray
+
+
+class Pose(NamedTuple):
+    """Where all frames stand in one configuration.
+
+    Args:
+        origins: Shape (n_frames, 3); [m].
+        frames: R_world_frame, shape (n_frames, 3, 3); [-].
+    """
+
+    origins: FloatArray
+    frames: FloatArray
+
+
+def _along(joint: Joint) -> tuple[int, float]:
+    """The coordinate axis that a joint moves along or about, and in which sense."""
+    axis = np.asarray(joint.axis)
+    k = int(np.argmax(np.abs(axis)))
+    whole = abs(axis[k]) == 1.0 and np.count_nonzero(axis) == 1
+    return (k, float(axis[k])) if whole else (ASKEW, 1.0)
+
+
+def _stroke(joint: Joint, reach: FloatArray | None) -> float:
+    """How large the value of a prismatic joint gets; 0 for the others; [m]."""
+    if joint.kind is not Kind.PRISMATIC:
+        return 0.0
+    if joint.column is None:
+        return abs(joint.offset)
+    most = np.inf if reach is None else float(reach[joint.column])
+    return abs(joint.ratio) * most + abs(joint.offset)
+
+
+def pack_tree(tree: Tree, reach: FloatArray | None = None) -> PackedTree:
+    """The joints as compiled code reads them; axes along -x are taken along x.
+
+    Args:
+        tree: The joints.
+        reach: How large each column of q gets, where that is known, (n_columns,).
+    """
+    joints = tree.joints
+    n, along = len(joints), [_along(joint) for joint in joints]
+    sense = np.array([sign for _, sign in along])
+    placements = np.array([joint.placement for joint in joints]).reshape(n, 4, 4)
+    rotation = np.ascontiguousarray(placements[:, :3, :3])
+    shift = np.ascontiguousarray(placements[:, :3, 3])
+    columns = [-1 if joint.column is None else joint.column for joint in joints]
+    ratio = [0.0 if joint.column is None else joint.ratio for joint in joints]
+    axis = np.array([joint.axis for joint in joints]).reshape(n, 3)
+    return PackedTree(
+        parent=np.array([joint.parent for joint in joints], dtype=np.int64),
+        kind=np.array([joint.kind for joint in joints], dtype=np.int64),
+        axis=axis * sense.reshape(n, 1),
+        along=np.array([k for k, _ in along], dtype=np.int64),
+        shift=shift,
+        lever=np.sqrt((shift * shift).sum(axis=1)),
+        turned=(rotation != np.eye(3)).any(axis=(1, 2)),
+        rotation=rotation,
+        column=np.array(columns, dtype=np.int64),
+        ratio=np.array(ratio) * sense,
+        offset=np.array([joint.offset for joint in joints]) * sense,
+        stroke=np.array([_stroke(joint, reach) for joint in joints]),
+    )
+
+
+def straight_motion(q: FloatArray) -> Motion:
+    """Rows (n_rows, n_columns) joined by straight lines."""
+    knots = np.ascontiguousarray(q, dtype=np.float64)
+    return Motion(knots, np.zeros((0, 0, knots.shape[1])))
+
+
+@compiled
+def new_pose(n_frames: int) -> Pose:
+    """The world's frame; the others are to be written."""
+    frames = np.zeros((n_frames, 3, 3))
+    for c in range(3):
+        frames[0, c, c] = 1.0
+    return Pose(np.zeros((n_frames, 3)), frames)
+
+
+@compiled
+def _move_frame(
+    tree: PackedTree, joint: int, value: float, origins: FloatArray, frames: FloatArray
+) -> None:
+    """The frame of a joint from that of its parent."""
+    parent, kind, along = tree.parent[joint], tree.kind[joint], tree.along[joint]
+    shift, axis, placed = tree.shift[joint], tree.axis[joint], tree.rotation[joint]
+    turned, old, new = tree.turned[joint], frames[parent], frames[joint + 1]
+    co, si = 1.0, 0.0
+    if kind == REVOLUTE:
+        co, si = cos(value), sin(value)
+    for c in range(3):
+        x, y, z = old[c, 0], old[c, 1], old[c, 2]
+        at = origins[parent, c] + (x * shift[0] + y * shift[1] + z * shift[2])
+        if turned:
+            x, y, z = (
+                x * placed[0, 0] + y * placed[1, 0] + z * placed[2, 0],
+                x * placed[0, 1] + y * placed[1, 1] + z * placed[2, 1],
+                x * placed[0, 2] + y * placed[1, 2] + z * placed[2, 2],
+            )
+        if kind == REVOLUTE:
+            if along == 2:
+                x, y = co * x + si * y, co * y - si * x
+            elif along == 1:
+                x, z = co * x - si * z, si * x + co * z
+            elif along == 0:
+                y, z = co * y + si * z, co * z - si * y
+            else:
+                u, v, w = axis[0], axis[1], axis[2]
+                rest = (1.0 - co) * (x * u + y * v + z * w)
+                x, y, z = (
+                    co * x + si * (y * w - z * v) + rest * u,
+                    co * y + si * (z * u - x * w) + rest * v,
+                    co * z + si * (x * v - y * u) + rest * w,
+                )
+        elif kind == PRISMATIC:
+            at += value * (x * axis[0] + y * axis[1] + z * axis[2])
+        new[c, 0], new[c, 1], new[c, 2] = x, y, z
+        origins[joint + 1, c] = at
+
+
+@compiled
+def place_tree(tree: PackedTree, q: FloatArray, pose: Pose) -> None:
+    """All frames of one configuration q, shape (n_columns,)."""
+    apart()
+    origins, frames = pose.origins, pose.frames
+    for joint in range(tree.parent.size):
+        column = tree.column[joint]
+        value = tree.offset[joint]
+        if column >= 0:
+            value += tree.ratio[joint] * q[column]
+        _move_frame(tree, joint, value, origins, frames)
+
+
+@compiled
+def interpolate(motion: Motion, k: int, t: float, q: FloatArray) -> None:
+    """The configuration at time t of interval k; one row alone is an interval.
+
+    Args:
+        motion: Rows and what joins them.
+        k: The interval.
+        t: 0 to 1; both ends are the rows themselves.
+        q: Written, shape (n_columns,).
+    """
+    knots, last = motion.knots, motion.knots.shape[0] - 1
+    if t == 0.0 or t == 1.0 or k >= last:
+        row = min(k + (1 if t == 1.0 else 0), last)
+        q[:] = knots[row]
+        return
+    degree = motion.inner.shape[1] + 1
+    if degree == 1:
+        for c in range(q.size):
+            q[c] = knots[k, c] + t * (knots[k + 1, c] - knots[k, c])
+        return
+    control = np.zeros(DEGREE + 1)
+    for c in range(q.size):
+        take_controls(motion, k, c, control)
+        for level in range(degree, 0, -1):
+            for i in range(level):
+                control[i] += t * (control[i + 1] - control[i])
+        q[c] = control[0]
+
+
+@compiled
+def take_controls(motion: Motion, k: int, column: int, control: FloatArray) -> None:
+    """Control points of one column over interval k, the first degree + 1 entries."""
+    inner = motion.inner.shape[1]
+    control[0] = motion.knots[k, column]
+    for i in range(inner):
+        control[i + 1] = motion.inner[k, i, column]
+    control[inner + 1] = motion.knots[k + 1, column]
+
+
+@compiled
+def largest_between(
+    control: FloatArray, degree: int, start: float, end: float
+) -> float:
+    """Bound of a polynomial's size over [start, end], part of [0, 1].
+
+    Args:
+        control: Its control points over [0, 1], the first degree + 1; overwritten by
+            those over [start, end], which hold it between them.
+        degree: Its degree.
+        start: 0 to 1.
+        end: From `start` to 1.
+    """
+    if end < 1.0:
+        for level in range(degree):
+            for i in range(degree, level, -1):
+                control[i] = control[i - 1] + end * (control[i] - control[i - 1])
+    if start > 0.0:
+        share = start / end
+        for level in range(degree, 0, -1):
+            for i in range(level):
+                control[i] += share * (control[i + 1] - control[i])
+    most = 0.0
+    for i in range(degree + 1):
+        most = max(most, abs(control[i]))
+    return most
+
+
+@compiled
+def _steepen(control: FloatArray, degree: int) -> None:
+    """Control points of the derivative, degree - 1, from those of a polynomial."""
+    for i in range(degree):
+        control[i] = degree * (control[i + 1] - control[i])
+
+
+@compiled
+def bound_column(
+    motion: Motion, k: int, column: int, start: float, end: float, out: FloatArray
+) -> None:
+    """How far and how fast one column of q moves over a slice of interval k.
+
+    Args:
+        motion: Rows and what joins them; it has the row k + 1.
+        k: The interval.
+        column: The column.
+        start: Start of the slice, 0 to 1.
+        end: End of the slice.
+        out: Bounds of |q|, |dq/dt| and |d2q/dt2|, t from 0 to 1 over the interval,
+            shape (3,); written.
+    """
+    degree = motion.inner.shape[1] + 1
+    if degree == 1:
+        one, other = motion.knots[k, column], motion.knots[k + 1, column]
+        out[0], out[1], out[2] = max(abs(one), abs(other)), abs(other - one), 0.0
+        return
+    control = np.zeros(DEGREE + 1)
+    for derivative in range(3):
+        take_controls(motion, k, column, control)
+        for order in range(derivative):
+            _steepen(control, degree - order)
+        out[derivative] = largest_between(control, degree - derivative, start, end)

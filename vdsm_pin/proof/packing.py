@@ -1,0 +1,255 @@
+"""What is asked as compiled code reads it: bodies, pairs, what lies between them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.convex import FlatCylinder, Hull
+from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
+from vdsm_pin.proof.bodies import Body, PairTable
+from vdsm_pin.proof.error_box import ErrorBox
+from vdsm_pin.proof.packed_tree import PRISMATIC, PackedTree, pack_tree
+from vdsm_pin.proof.terms import (
+    LINKS,
+    OBSTACLES,
+    WORLD,
+    Bodies,
+    Pairs,
+    Places,
+    Rules,
+    Task,
+)
+from vdsm_pin.proof.tree import Tree
+from vdsm_pin.proof.ways import WayErrors, Ways, WayTable, way_errors
+
+
+def corners_of(solid: Hull | FlatCylinder) -> FloatArray:
+    """Corners of a hull, or the centres of a cylinder's ends, shape (n, 3); [m]."""
+    if isinstance(solid, Hull):
+        return solid.points
+    offset = solid.half_length * solid.axis
+    return np.stack([solid.centre - offset, solid.centre + offset])
+
+
+def _only_piece(body: Body) -> Hull | FlatCylinder:
+    """The solid of a body that moves past another one."""
+    if len(body.pieces) == 1:
+        piece = body.pieces[0]
+        if isinstance(piece, (Hull, FlatCylinder)):
+            return piece
+    message = f"body {body.name!r} moves in a pair: it must be one bounded convex piece"
+    raise ValueError(message)
+
+
+def _pack_bodies(bodies: Sequence[Body], columns: IntArray) -> Bodies:
+    """Convex bodies, and where the profile has their bounds."""
+    solids = [_only_piece(body) for body in bodies]
+    corners = [corners_of(solid) for solid in solids]
+    discs, radius = np.zeros((len(solids), 4)), np.zeros(len(solids))
+    for k, solid in enumerate(solids):
+        if isinstance(solid, FlatCylinder):
+            discs[k, :3], discs[k, 3] = solid.axis, solid.radius
+        else:
+            radius[k] = solid.radius
+    levers = [
+        np.linalg.norm(points, axis=1) + disc
+        for points, disc in zip(corners, discs[:, 3], strict=True)
+    ]
+    return Bodies(
+        frame=np.array([body.frame for body in bodies], dtype=np.int64),
+        first=np.cumsum([0, *map(len, corners)], dtype=np.int64),
+        corners=np.concatenate([np.zeros((0, 3)), *corners]),
+        levers=np.concatenate([np.zeros(0), *levers]),
+        radius=radius,
+        discs=discs,
+        inverse=np.array([_inverse(solid) for solid in solids]),
+        column=columns.astype(np.int64),
+    )
+
+
+def _inverse(solid: Hull | FlatCylinder) -> float:
+    """As `Bodies` has it."""
+    if isinstance(solid, FlatCylinder) or len(solid.points) > 2:
+        return -1.0
+    way = solid.points[-1] - solid.points[0]
+    squared = float(way @ way)
+    return 1.0 / squared if squared > 0.0 else 0.0
+
+
+class _PlaceTable:
+    """Collects the places of corners, each once."""
+
+    def __init__(self, tree: PackedTree) -> None:
+        self.ways = WayTable(tree.parent)
+        self._tree = tree
+        self._points: dict[tuple[int, bytes, float], int] = {}
+        self._local: dict[tuple[int, int], int] = {}
+        self._rows: list[tuple[int, FloatArray, float]] = []
+
+    def corner(
+        self, rest: int, frame: int, at: FloatArray, lever: float
+    ) -> tuple[int, int]:
+        """The point of a corner and the way on which it is seen.
+
+        The origin of a joint that turns also rides on the frame that it hangs on, where
+        fewer joints move it.
+        """
+        tree = self._tree
+        while frame != rest and lever == 0.0 and self.ways.goes_down(rest, frame):
+            joint = frame - 1
+            if tree.kind[joint] == PRISMATIC:
+                break
+            frame, at = int(tree.parent[joint]), tree.shift[joint]
+            lever = float(tree.lever[joint])
+        key = (frame, at.tobytes(), lever)
+        if key not in self._points:
+            self._points[key] = len(self._rows)
+            self._rows.append((frame, at, lever))
+        return self._points[key], self.ways.number(rest, frame)
+
+    def place(self, rest: int, point: int, way: int) -> tuple[int, int]:
+        """Where a point is seen from: the world, or another frame by its number."""
+        if rest == WORLD:
+            return -1, point
+        return self._local.setdefault((point, way), len(self._local)), point
+
+    def packed(self) -> Places:
+        """All places, those in the world first."""
+        frames = [frame for frame, _, _ in self._rows]
+        ways = [self.ways.number(WORLD, frame) for frame in frames]
+        points = list(range(len(frames)))
+        points += [point for point, _ in self._local]
+        ways += [way for _, way in self._local]
+        at = np.array([at for _, at, _ in self._rows]).reshape(-1, 3)
+        lever = np.array([lever for _, _, lever in self._rows])
+        return Places(
+            n_points=len(frames),
+            point=np.array(points, dtype=np.int64),
+            way=np.array(ways, dtype=np.int64),
+            at=at[points],
+            lever=lever[points],
+        )
+
+
+def _pack_pairs(
+    tree: PackedTree, bodies: Bodies, rests: IntArray, pairs: Pairs
+) -> tuple[Ways, Places, Pairs]:
+    """Find what lies between the two sides of each pair, and where corners are seen.
+
+    Args:
+        tree: The joints.
+        bodies: The bodies.
+        rests: The frame in which each pair's partner rests, shape (n_pairs,).
+        pairs: The pairs; their ways and places are not read.
+
+    Returns:
+        Ways and places, and the pairs with theirs.
+    """
+    table, n = _PlaceTable(tree), max(1, bodies.frame.size)
+    each, first, number = np.unique(
+        rests * n + pairs.body, return_index=True, return_inverse=True
+    )
+    way_of, slot_of = np.zeros((2, each.size), np.int64)
+    found: list[tuple[int, int]] = []
+    for k, pair in enumerate(first.tolist()):
+        body, rest = int(pairs.body[pair]), int(rests[pair])
+        frame = int(bodies.frame[body])
+        way_of[k], slot_of[k] = table.ways.number(rest, frame), len(found)
+        for corner in range(bodies.first[body], bodies.first[body + 1]):
+            at, lever = bodies.corners[corner], float(bodies.levers[corner])
+            found.append(table.place(rest, *table.corner(rest, frame, at, lever)))
+    places = table.packed()
+    slots = [point if k < 0 else places.n_points + k for k, point in found]
+    packed = pairs._replace(
+        way=way_of[number],
+        slot=slot_of[number],
+        slots=np.array(slots, dtype=np.int64),
+    )
+    return table.ways.packed(), places, packed
+
+
+def _branches(tree: Tree) -> IntArray:
+    """The first frame on the way to each frame from the world, shape (n_frames,)."""
+    branch = np.arange(tree.n_frames)
+    for number, joint in enumerate(tree.joints):
+        if joint.parent != WORLD:
+            branch[number + 1] = branch[joint.parent]
+    return branch
+
+
+def pack_task(
+    tree: Tree,
+    bodies: Sequence[Body],
+    pairs: PairTable,
+    rules: Rules,
+    reach: FloatArray | None = None,
+    columns: IntArray | None = None,
+    pieces: PackedPieces | None = None,
+) -> Task:
+    """What is asked, without errors.
+
+    Args:
+        tree: The joints.
+        bodies: The bodies; they are the packed scene's obstacles, in their order.
+        pairs: The first body of each is one bounded convex piece and moves past the
+            second.
+        rules: What may be assumed.
+        reach: How large each column of q gets, where that is known, (n_columns,); where
+            placements may turn and it is not, nothing is proved.
+        columns: Where a profile has each body's bounds, -1 for nowhere, (n_bodies,).
+        pieces: `pack_bodies_pieces(bodies)`, where they are packed already.
+
+    Raises:
+        ValueError: If a first body is not of that kind, or both ride on one frame.
+    """
+    joints, frames = pack_tree(tree, reach), np.array([body.frame for body in bodies])
+    if columns is None:
+        columns = np.full(len(bodies), -1)
+    each, mover = np.unique(pairs.one, return_inverse=True)
+    same = np.flatnonzero(frames[pairs.one] == frames[pairs.other])
+    if same.size:
+        one, other = pairs.one[same[0]], pairs.other[same[0]]
+        message = f"bodies {one} and {other} ride on one frame: they cannot part"
+        raise ValueError(message)
+    branch, n = _branches(tree), pairs.size
+    apart = branch[frames[pairs.one]] != branch[frames[pairs.other]]
+    group = np.where(apart, OBSTACLES, LINKS)
+    column, none = np.where(apart, columns[pairs.other], -1), np.zeros(n, np.int64)
+    packed = Pairs(
+        body=mover.astype(np.int64),
+        obstacle=pairs.other.astype(np.int64),
+        way=none,
+        slot=none,
+        slots=none,
+        group=group,
+        column=column.astype(np.int64),
+        required=pairs.required.astype(np.float64),
+        lost=np.zeros(n),
+        rise=np.zeros(n),
+    )
+    moving = _pack_bodies([bodies[k] for k in each.tolist()], columns[each])
+    ways, places, packed = _pack_pairs(joints, moving, frames[pairs.other], packed)
+    if pieces is None:
+        pieces = pack_pieces([body.pieces for body in bodies])
+    blank = np.zeros(joints.parent.size)
+    exact = way_errors(joints, ways, blank, blank, blank)
+    task = Task(pieces, joints, ways, exact, places, moving, packed, rules)
+    return with_errors(task, ErrorBox.none(tree))
+
+
+def with_errors(task: Task, box: ErrorBox) -> Task:
+    """The same asked about another error box."""
+    pairs, pad = task.pairs, task.rules.pad
+    erring: WayErrors = way_errors(
+        task.tree, task.ways, box.joints, box.shifts, box.tilts
+    )
+    shift = erring.shifted[pairs.way]
+    surfaces = box.surfaces
+    if surfaces is not None:
+        shift = shift + surfaces[pairs.obstacle]
+    steady = not erring.any_turn
+    rules = task.rules._replace(steady=steady, nominal=steady and not shift.any())
+    radius = task.bodies.radius[pairs.body]
+    pairs = pairs._replace(lost=radius + pad + shift, rise=pad - radius)
+    return task._replace(pairs=pairs, rules=rules, errors=erring)

@@ -1,0 +1,117 @@
+"""What a sweep works with, in compiled code: its space, and what the pairs remember."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.bodies import RADIUS
+from vdsm_pin.geometry.compiled import apart, compiled
+from vdsm_pin.proof.cached_planes import Runs, new_runs
+from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE, SLICE, SUPPORT
+from vdsm_pin.proof.packed_tree import Pose
+from vdsm_pin.proof.rows import BLOCK, DRIFT, TURN, Rows, new_rows
+from vdsm_pin.proof.slices import Space, new_space
+from vdsm_pin.proof.swept_bodies import Ends, load_errors, new_ends
+from vdsm_pin.proof.terms import Mover, Task
+
+
+class Workspace(NamedTuple):
+    """Working space of a sweep.
+
+    Args:
+        rows: The block.
+        runs: Bounds of the block's intervals for one pair.
+        planes: What the pairs remember, one row each.
+        ends: For slices inside an interval.
+        space: For bounds.
+        heap: For subdivision; its length is the budget of one interval and pair.
+    """
+
+    rows: Rows
+    runs: Runs
+    planes: FloatArray
+    ends: Ends
+    space: Space
+    heap: FloatArray
+
+
+@compiled
+def forget(planes: FloatArray) -> None:
+    """No pair remembers a plane any more, one row each."""
+    planes[:] = 0.0
+    planes[:, 0] = 1.0
+    planes[:, SUPPORT] = planes[:, HELD_CLEARANCE] = -np.inf
+
+
+def new_workspace(task: Task, n_columns: int, budget: int) -> Workspace:
+    """Fresh working space; no pair remembers a plane yet.
+
+    Args:
+        task: What is asked.
+        n_columns: Length of a row of q.
+        budget: Most slices of one interval and pair.
+    """
+    n_joints, n_ways = task.tree.parent.size, task.ways.rest.size
+    corners = int(np.diff(task.bodies.first).max(initial=1))
+    planes = np.zeros((task.pairs.body.size, HELD_AT + 3 * corners))
+    forget(planes)
+    return Workspace(
+        new_rows(n_joints + 1, n_ways, task.places.way.size),
+        new_runs(corners),
+        planes,
+        new_ends(n_joints + 1, n_ways, n_columns),
+        new_space(n_joints, corners),
+        np.zeros((budget, SLICE)),
+    )
+
+
+@compiled
+def take_frame(rows: Rows, row: int, frame: int, pose: Pose) -> None:
+    """Write one frame of one row of a block to a pose."""
+    for c in range(3):
+        pose.origins[frame, c] = rows.origins[frame, c, row]
+        for d in range(3):
+            pose.frames[frame, c, d] = rows.frames[frame, c, d, row]
+
+
+@compiled
+def take_row(rows: Rows, row: int, pose: Pose) -> None:
+    """Write the configuration of one row of a block to a pose."""
+    apart()
+    for frame in range(1, pose.origins.shape[0]):
+        take_frame(rows, row, frame, pose)
+
+
+@compiled
+def load_rows(task: Task, mover: Mover, desk: Workspace, first: int, last: int) -> None:
+    """Load a body between two rows of a block; `last` is `first` or next.
+
+    Of the ends only what errors ask for is written.
+    """
+    apart()
+    rows, runs, loaded, ends = desk.rows, desk.runs, desk.space.body, desk.ends
+    corners, tracks = mover.slots.size, rows.tracks
+    loaded.used[0], loaded.used[1] = 2 * corners, corners
+    for k in range(corners):
+        place = tracks.places[mover.slots[k]]
+        sag = tracks.sags[mover.slots[k], first] if last > first else 0.0
+        loaded.balls[k] = sag
+        for c in range(3):
+            loaded.points[k, c] = place[c, first]
+            loaded.points[corners + k, c] = place[c, last]
+    disc = mover.disc[RADIUS]
+    loaded.discs[0, RADIUS] = loaded.discs[1, RADIUS] = disc
+    if disc > 0.0:
+        for c in range(3):
+            loaded.discs[0, c] = runs.axis[c, first]
+            loaded.discs[1, c] = runs.axis[c, last]
+    if not task.rules.steady:
+        interval, way = min(first, BLOCK - 1), mover.way
+        while way >= 0:
+            ends.bends.drifts[way] = rows.ways[way, DRIFT, interval]
+            ends.bends.turns[way] = rows.ways[way, TURN, interval]
+            way = task.ways.before[way]
+        take_row(rows, first, ends.start)
+        take_row(rows, last, ends.end)
+    load_errors(task, mover, ends, loaded, float(last - first))
