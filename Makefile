@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-slow lint docs check urdf figures report soundness mutants bench dist clean
+.PHONY: demo test test-slow lint docs check urdf figures report claims soundness mutants bench dist clean
 
 demo: $(VENV)/.installed
 	$(BIN)/vdsm batch --out out/demo
@@ -40,6 +40,9 @@ report: figures
 	$(BIN)/python analysis/paper_table.py --out reports/paper
 	$(BIN)/python analysis/obs2_orientations.py --out reports/paper
 	$(BIN)/python analysis/scaling_choices.py --out reports/paper
+
+claims: $(VENV)/.installed
+	PYTHONPATH=. $(BIN)/python analysis/claims.py
 
 soundness: $(VENV)/.installed
 	$(BIN)/python analysis/soundness.py --queries 10000000 --save reports/soundness.md

@@ -1,6 +1,7 @@
 """Fig. 6: the tip's path in the projection, with obstacle and danger region."""
 
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from paper_figures import style
@@ -51,7 +52,9 @@ def draw_panel(axes: Axes, run: Run) -> None:
         shown = np.arange(max(part[0] - 1, 0), min(part[-1] + 2, rows.n_samples))
         line = thin(tip[part if drawn else shown])
         colour = style.TIP if drawn else style.STRATEGY_COLOURS["fewest"]
-        axes.plot(*line.T, color=colour, linewidth=1.2, zorder=3)
+        # Off the path it is wide and pale, so that both show where it runs along it.
+        look = {"linewidth": 1.2} if drawn else {"linewidth": 3.0, "alpha": 0.55}
+        axes.plot(*line.T, color=colour, zorder=3 if drawn else 2.6, **look)
     _arrows(axes, run, tip)
     square(axes, SIDE, LOW, HIGH)
     _labels(axes, run, tip)
@@ -65,6 +68,15 @@ def _equidistant_line(axes: Axes, run: Run) -> None:
     ray = section.centre - start
     ends = np.stack([start, start + ray * (1.0 / np.abs(ray).max())]) * MM_PER_M
     axes.plot(*ends.T, color=style.AUXILIARY, linewidth=0.7, zorder=2)
+    if (run.scene, run.strategy) != ("obs1", "paper"):
+        return
+    corners = shapely.LineString(run.problem.path.corners[:, 1:] * MM_PER_M)
+    behind = shapely.LineString([section.centre * MM_PER_M, 1.1 * ends[1]])
+    for at in shapely.get_coordinates(corners.intersection(behind)):
+        axes.plot(*at, "o", color="white", markersize=3.4, zorder=5,
+                  markeredgecolor=style.AUXILIARY, markeredgewidth=0.8)  # fmt: skip
+        axes.annotate("A₄′", at, (4.0, 5.0), textcoords="offset points", size=6.8,
+                      color=style.AUXILIARY)  # fmt: skip
 
 
 def _arrows(axes: Axes, run: Run, tip: FloatArray) -> None:

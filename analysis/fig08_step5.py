@@ -60,6 +60,9 @@ def _draw_slide(axes: Axes, run: Run, row: int, slide: Slide) -> None:
         axes.plot(*planar[j], "o", color=colours[j], markersize=3.4, zorder=5,
                   markeredgecolor="white", markeredgewidth=0.3)  # fmt: skip
     lines = [planar[i - 1 :], ray, SIDE(run.problem.path.corners)]
+    former = SIDE(run.centres[max(row - 1, 0)])[i - 1]
+    axes.plot(*former, "s", color="none", markersize=6.0, zorder=5.5,
+              markeredgecolor=style.AUXILIARY, markeredgewidth=0.8)  # fmt: skip
     dots = [planar[j] for j in shown]
     names = [f"P{style.subscript(j + 1)}" for j in shown]
     if slide.moved:

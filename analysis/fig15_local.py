@@ -37,7 +37,7 @@ def draw(runs: Runs) -> dict[str, Figure]:
             shade_detours(axes, run)
             draw_moments(axes, run)
             axes.set_ylim(top=top_of(first[scene]))
-            title = f"({'abcd'[k]}) {scene}, {what}, ‘{run.strategy}’"
+            title = f"({'abcdefgh'[2 * k + r]}) {scene}, {what}, ‘{run.strategy}’"
             axes.set_title(title, pad=11.0)
             if r == 0:
                 axes.set_ylabel("ψ [°]")

@@ -56,15 +56,16 @@ def _bars(axes: Axes, run: Run, shift: float) -> None:
     axes.bar(at + shift, high - low, 0.94 * BAR, bottom=low, color=colour, zorder=3)
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.9, "pad": 0.4}
     for x, top in enumerate(high[:-1]):
-        axes.text(
-            x + shift, top + 0.9, f"{top:.0f}", ha="center", va="bottom", size=4.8,
-            bbox=box, zorder=6,
-        )  # fmt: skip
+        if top > 0.0:
+            axes.text(
+                x + shift, top + 0.9, f"{top:.0f}", ha="center", va="bottom", size=6.0,
+                bbox=box, zorder=6,
+            )  # fmt: skip
     # Numbers of x0 are wider than a bar: they run outwards from the middle.
     x, side = at[-1] + np.sign(shift) * 0.03, "right" if shift < 0.0 else "left"
     for value, up in ((high[-1], 0.9), (low[-1], -0.9)):
         axes.text(
-            x, value + up, f"{value * MM_PER_DEG:.0f}", ha=side, size=4.8, bbox=box,
+            x, value + up, f"{value * MM_PER_DEG:.0f}", ha=side, size=6.0, bbox=box,
             va="bottom" if up > 0.0 else "top", zorder=6,
         )  # fmt: skip
     names = [f"ψ{style.subscript(i)}" for i in range(1, len(at))]
@@ -78,7 +79,7 @@ def _printed(axes: Axes, scene: str, n_links: int) -> None:
     key = "obs2" if scene == "obs2-small" else scene
     if key in MAX_PSI_DEG:
         axes.hlines(MAX_PSI_DEG[key], -0.5, n_links - 0.5, **look)
-    for value in (X0_MIN_MM, X0_MAX_MM.get(key)):
+    for value in (X0_MIN_MM.get(key), X0_MAX_MM.get(key)):
         if value is not None:
             y = value / MM_PER_DEG
             axes.hlines(y, n_links - 0.5, n_links + 0.5, **look)

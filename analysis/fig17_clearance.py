@@ -1,5 +1,7 @@
 """Fig. 17: distance of the arm from the obstacle, to its axis and between surfaces."""
 
+from collections.abc import Callable
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -16,7 +18,7 @@ from vdsm_pin.units import MM_PER_M
 
 NAME = "fig17"
 SCENES = tuple(AXES)
-WIDTH, HEIGHT = 1.60, 1.30  # of one panel; [inch]
+WIDTH, HEIGHT = 3.20, 1.10  # of one panel; [inch]
 TOP_AXIS = 900.0  # [mm]
 SURFACE = (1.0, 1_000.0)  # ends of the logarithmic axis; [mm]
 END = 0.9  # numbers farther right would touch the next panel's first; [-]
@@ -24,32 +26,33 @@ DECADE = 150.0  # makes a decade as long as 150 waypoints, for thinning
 
 
 def draw(runs: Runs) -> dict[str, Figure]:
-    """Environments in columns; to the axis above, between surfaces below."""
+    """One figure a measure; environments in rows, strategies in columns."""
+    return {
+        f"{NAME}-axis": _figure(runs, _axis_panel, "to the axis [mm]"),
+        f"{NAME}-surface": _figure(runs, _surface_panel, "clearance [mm]"),
+    }
+
+
+def _figure(runs: Runs, painter: Callable[[Axes, Run], None], quantity: str) -> Figure:
     pitch = HEIGHT + 0.56
-    figure = style.sheet(4.0 * pitch + 0.18)
+    figure = style.sheet(len(SCENES) * pitch + 0.18)
     for k, scene in enumerate(SCENES):
-        left = 0.44 + k * (WIDTH + 0.10)
+        low = 0.36 + (len(SCENES) - 1 - k) * pitch
         for r, strategy in enumerate(STRATEGIES):
-            run = runs(scene, strategy)
-            above = style.place(figure, left, 0.36 + (3 - 2 * r) * pitch, WIDTH, HEIGHT)
-            below = style.place(figure, left, 0.36 + (2 - 2 * r) * pitch, WIDTH, HEIGHT)
-            letters = "abcdefghijklmnop"[8 * r + k], "abcdefghijklmnop"[8 * r + 4 + k]
-            _axis_panel(above, run)
-            _surface_panel(below, run)
-            for axes, letter in zip((above, below), letters, strict=True):
-                axes.set_title(f"({letter}) {scene}, ‘{strategy}’", pad=11.0)
-                axes.grid(visible=True, axis="y")
-                last = axes.get_xlim()[1]
-                ticks = MaxNLocator(4).tick_values(0.0, last)
-                axes.set_xticks([tick for tick in ticks if 0.0 <= tick <= END * last])
-                if k > 0:
-                    axes.tick_params(labelleft=False)
-            if k == 0:
-                above.set_ylabel("to the axis [mm]")
-                below.set_ylabel("clearance [mm]")
-            if r == 1:
-                below.set_xlabel("waypoint")
-    return {NAME: figure}
+            left = 0.44 + r * (WIDTH + 0.24)
+            axes = style.place(figure, left, low, WIDTH, HEIGHT)
+            painter(axes, runs(scene, strategy))
+            letter = "abcdefgh"[2 * k + r]
+            axes.set_title(f"({letter}) {scene}, ‘{strategy}’", pad=12.0)
+            axes.grid(visible=True, axis="y")
+            last = axes.get_xlim()[1]
+            ticks = MaxNLocator(6).tick_values(0.0, last)
+            axes.set_xticks([tick for tick in ticks if 0.0 <= tick <= END * last])
+            if r == 0:
+                axes.set_ylabel(quantity)
+            if k == len(SCENES) - 1:
+                axes.set_xlabel("waypoint")
+    return figure
 
 
 def _axis_panel(axes: Axes, run: Run) -> None:
@@ -65,7 +68,7 @@ def _axis_panel(axes: Axes, run: Run) -> None:
     axes.plot(rows[k], distance[k], "o", color=style.INK, markersize=2.6, zorder=6)
     _note(axes, f"least {distance[k]:.1f}")
     shade_detours(axes, run)
-    draw_moments(axes, run, size=5.2)
+    draw_moments(axes, run, size=6.0)
 
 
 def _surface_panel(axes: Axes, run: Run) -> None:
@@ -88,7 +91,7 @@ def _surface_panel(axes: Axes, run: Run) -> None:
     axes.plot(near.interval, least, "o", color=style.INK, markersize=2.6, zorder=6)
     _note(axes, f"at least {least:.1f}")
     shade_detours(axes, run)
-    draw_moments(axes, run, size=5.2)
+    draw_moments(axes, run, size=6.0)
 
 
 def _note(axes: Axes, text: str) -> None:

@@ -82,7 +82,7 @@ def _holes(axes: Axes, run: Run) -> None:
             at = np.array([np.sin(phi), np.cos(phi)])
             axes.plot(*radius * at, "o", color=hole_colour(phi), markersize=4.2)
             axes.text(
-                *0.77 * radius * at, str(i + 1), ha="center", va="center", size=4.6
+                *0.77 * radius * at, str(i + 1), ha="center", va="center", size=6.0
             )
     axes.set(xlim=(-1.1 * body, 1.1 * body), ylim=(-1.1 * body, 1.1 * body))
     axes.set_aspect("equal")

@@ -13,12 +13,16 @@ from paper_figures.runs import Runs
 from result_files import output_folder
 
 SCRIPTS: Final = (
+    "fig01_model",
+    "fig02_angles",
+    "fig03_flow",
     "fig04_paths_free",
     "fig05_collision",
     "fig06_tip_path",
     "fig07_projected_arm",
     "fig08_step5",
     "fig09_moving_on",
+    "fig10_holes",
     "fig11_paths_obs1",
     "fig12_paths_obs2",
     "fig13_paths_obs3",

@@ -15,7 +15,7 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem import Approach, PlanningProblem
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.scene import Mesh, Scene
 from vdsm_pin.time_limit import NO_LIMIT
@@ -233,3 +233,26 @@ def test_within_the_hull_of_an_open_mesh_one_sentence_says_what_to_write() -> No
 def test_no_plan_round_the_hull_names_the_hull_first() -> None:
     with pytest.raises(Infeasible, match=r"^the inside of 'crate' cannot be told"):
         planned(with_open_box((3.126, 0.9, 0.9), 0.3))
+
+
+@pytest.mark.parametrize(
+    ("name", "strategy", "why"),
+    [
+        ("free", "paper", "no obstacle along the rail is passed"),
+        ("obs3", "paper", "no obstacle along the rail is passed"),
+        ("obs1", "paper", ""),
+        ("free", "fewest", "strategy 'fewest' chooses its way by itself"),
+    ],
+)
+def test_an_approach_that_is_not_read_is_told(
+    name: str, strategy: str, why: str
+) -> None:
+    problem = read_problem(f"paper/{name}").problem
+    robot = load_robot(problem.manipulator)
+    for approach in Approach:
+        path = replace(problem.path, approach=approach)
+        asked = replace(problem, tip_path=path)
+        notes = refinement.plan_and_verify(asked, strategy, robot).plan.notes
+        said = [note for note in notes if "is not read" in note]
+        assert len(said) == bool(why and approach is not Approach.SHORTEST)
+        assert all(why in note and repr(approach.value) in note for note in said)

@@ -19,7 +19,7 @@ from vdsm_pin.planner.records import Plan
 from vdsm_pin.planner.start import with_known_insides
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.planner.time_limit import within_time
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem import Approach, PlanningProblem
 from vdsm_pin.progress import say
 from vdsm_pin.robot_model import RobotModel
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -159,11 +159,30 @@ def plan_and_verify(
         say("margin %s: %s", in_mm(rounds[-1].margin), rounds[-1].reason)
         if rounds[-1].verdict in HANDED_OUT:
             story = (_story(rounds),) if len(rounds) > 1 else ()
-            plan = replace(plan, notes=(*plan.notes, *known.notes, *story))
+            added = (*_unread_scheme(plan), *known.notes, *story)
+            plan = replace(plan, notes=(*plan.notes, *added))
             return Refinement(plan, verification, tuple(rounds))
         if not adjustments or len(rounds) == MAX_ROUNDS:
             raise NoPlanFound("; ".join([*known.notes, _story(rounds)]))
         margins = _raised(problem, margins, adjustments)
+
+
+def _unread_scheme(plan: Plan) -> tuple[str, ...]:
+    """A note where the problem asks for an approach that this plan did not read."""
+    path = plan.problem.path
+    if path.approach is Approach.SHORTEST:
+        return ()
+    why = "the path is open"
+    if path.closed:
+        if plan.steps is not None and plan.steps.reads_approach:
+            return ()
+        why = "no obstacle along the rail is passed"
+        if plan.steps is None:
+            why = f"strategy {plan.strategy!r} chooses its way by itself"
+    return (
+        f"approach {path.approach.value!r} is not read: {why}; the path begins "
+        f"{'nearest to the start' if path.closed else 'at its first corner'}",
+    )
 
 
 def _promised(problem: PlanningProblem) -> PlanningProblem:

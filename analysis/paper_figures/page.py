@@ -22,13 +22,15 @@ def page(numbers: dict[str, Any]) -> str:
     """
     facts = numbers["facts"]
     arm = built_in("hrm8")
-    names = [f"fig{k:02d}" for k in (4, 5, 6, 7, 8, 9, 14, 15, 16, 17, 18)]
+    names = [f"fig{k:02d}" for k in (1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 14, 15, 16, 18)]
+    names += ["fig17-axis", "fig17-surface"]
     pairs = ("fig11", "fig12", "fig12-small", "fig13")
     names += [f"{name}-{s}" for name in pairs for s in ("paper", "fewest")]
     return TEMPLATE.read_text(encoding="utf-8").format(
         f=facts,
         comparison=_comparison(numbers["table"]),
         table1=table1_parameters.markdown(arm),
+        traditional=table1_parameters.traditional_markdown(arm),
         changed_table=_changed_table(facts),
         distance_table=_distance_table(facts),
         r=arm.cables.hole_radius * 1e3,

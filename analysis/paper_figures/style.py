@@ -27,9 +27,6 @@ WIDTH: Final = 7.2
 DPI: Final = 150
 """Resolution of the PNG pictures; [dots per inch]."""
 
-PNG_COLOURS: Final = 256
-"""Palette size of the PNG pictures, enough for line drawings; [-]."""
-
 INK: Final = "#1d2129"
 FAINT: Final = "#9aa1ab"
 GRID: Final = "#e4e7eb"
@@ -144,10 +141,8 @@ def save(figure: Figure, name: str, folder: Path = REPORTS) -> None:
 
 
 def save_png(figure: Figure, file: Path) -> None:
-    """Write a PNG picture with a palette, at print resolution."""
+    """Write a PNG picture in its own colours, at print resolution."""
     figure.savefig(file, dpi=DPI, metadata={"Software": None})
     with Image.open(file) as picture:
-        few = picture.convert("RGB").quantize(
-            PNG_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE
-        )
-    few.save(file, optimize=True)
+        plain = picture.convert("RGB")
+    plain.save(file, optimize=True)

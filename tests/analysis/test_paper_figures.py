@@ -37,12 +37,16 @@ COARSE = 0.04
 """Spacing of the waypoints in these tests; [m]."""
 
 PANELS = {
+    "fig01_model": {"fig01": 3},
+    "fig02_angles": {"fig02": 1},
+    "fig03_flow": {"fig03": 1},
     "fig04_paths_free": {"fig04": 4},
     "fig05_collision": {"fig05": 6},
     "fig06_tip_path": {"fig06": 6},
     "fig07_projected_arm": {"fig07": 4},
     "fig08_step5": {"fig08": 6},
     "fig09_moving_on": {"fig09": 6},
+    "fig10_holes": {"fig10": 2},
     "fig11_paths_obs1": {"fig11-paper": 11, "fig11-fewest": 11},
     "fig12_paths_obs2": {
         "fig12-paper": 11,
@@ -54,7 +58,7 @@ PANELS = {
     "fig14_link_angles": {"fig14": 10},
     "fig15_local": {"fig15": 8},
     "fig16_ranges": {"fig16": 5},
-    "fig17_clearance": {"fig17": 16},
+    "fig17_clearance": {"fig17-axis": 8, "fig17-surface": 8},
     "fig18_cables": {"fig18": 3},
 }
 """Panels that each script promises."""

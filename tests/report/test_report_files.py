@@ -12,7 +12,12 @@ import pytest
 from vdsm_pin.errors import UnknownName
 from vdsm_pin.planner.records import Plan, TipPath
 from vdsm_pin.refinement import Adjustment, Refinement, Round
-from vdsm_pin.report.facts import batch_row, plan_file, verification_file
+from vdsm_pin.report.facts import (
+    batch_row,
+    motion_facts,
+    plan_file,
+    verification_file,
+)
 from vdsm_pin.report.files import (
     SCHEMA_NAMES,
     BatchRow,
@@ -21,6 +26,7 @@ from vdsm_pin.report.files import (
     schema,
 )
 from vdsm_pin.scene import Scene
+from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import Check, Pair, Verdict, Verification
 
 
@@ -114,8 +120,11 @@ def test_motion_facts_follow_the_rows() -> None:
     np.testing.assert_allclose(motion.max_link_angle_rad, psi.max(axis=0), atol=1e-7)
     changed = (psi > np.deg2rad(0.05)).sum(axis=1)
     assert motion.changed_angles_max == changed.max()
+    drawn = rows.on_path[1:] & rows.on_path[:-1]
+    ways = np.abs(np.diff(rows.path_m)) * drawn
+    both = (changed[1:] + changed[:-1]) / 2.0
     mean = motion.changed_angles_mean_on_path
-    assert mean == pytest.approx(changed[rows.on_path].mean())
+    assert mean == pytest.approx(np.average(both, weights=ways))
     assert (motion.x0_min_m, motion.x0_max_m) == (rows.x0.min(), rows.x0.max())
 
 
@@ -124,3 +133,21 @@ def test_links_near_each_other_do_not_hide_the_obstacles() -> None:
     near = replace(judged.approaches[0], pair=Pair(1, other_link=3), lower=0.001)
     both = written(replace(judged, approaches=(near, *judged.approaches)))
     assert both.min_clearance == written(judged).min_clearance
+
+
+def test_more_rows_where_joints_move_do_not_change_the_mean() -> None:
+    """Two metres with one changed angle, one with three and ten times as many rows."""
+    along = np.concatenate([np.linspace(0, 2, 11), np.linspace(2, 3, 101)])
+    alpha = np.zeros((len(along), 8))
+    alpha[:, 0] = 0.1
+    alpha[11:, 1:3] = 0.1
+    off = np.zeros(3)
+    rows = Trajectory(
+        np.concatenate([off, np.ones(len(along)), off]),
+        np.concatenate([off, along, off + 3.0]),
+        np.zeros(len(along) + 6),
+        np.pad(alpha, ((3, 3), (0, 0)), constant_values=0.2),
+        np.zeros((len(along) + 6, 8)),
+    )
+    facts = motion_facts(made_up.problem(), rows)
+    assert facts.changed_angles_mean_on_path == pytest.approx((2 * 1 + 1 * 3) / 3)

@@ -76,6 +76,7 @@ def motion_facts(problem: PlanningProblem, trajectory: Trajectory) -> MotionFact
         largest = np.maximum(largest, psi.max(axis=0))
         changed[part] = changed_angles(psi)
     on_path = changed[trajectory.on_path & (problem.tip_path is not None)]
+    mean = _mean_by_way(changed, trajectory) if on_path.size else None
     return MotionFacts(
         waypoints=trajectory.n_samples,
         on_path_waypoints=None if problem.tip_path is None else int(on_path.size),
@@ -83,9 +84,24 @@ def motion_facts(problem: PlanningProblem, trajectory: Trajectory) -> MotionFact
         x0_min_m=float(trajectory.x0.min()),
         x0_max_m=float(trajectory.x0.max()),
         changed_angle_threshold_rad=TOLERANCES.changed_angle,
-        changed_angles_mean_on_path=float(on_path.mean()) if on_path.size else None,
+        changed_angles_mean_on_path=mean,
         changed_angles_max=int(changed.max()),
     )
+
+
+def _mean_by_way(values: IntArray, trajectory: Trajectory) -> float:
+    """Mean over the length of the drawn path, whatever the distance of the rows.
+
+    Between two rows half the way counts for each; where nothing is drawn between rows
+    all count alike.
+    """
+    on, along = trajectory.on_path, trajectory.path_m
+    ways = np.abs(np.diff(along)) * (on[1:] & on[:-1])
+    # A closed path goes on from its length to 0.
+    ways[ways > np.ptp(along) / 2.0] = 0.0
+    if not ways.any():
+        return float(values[on].mean())
+    return float(ways @ (values[1:] + values[:-1]) / (2.0 * ways.sum()))
 
 
 def in_file_frame(verification: Verification, point: FloatArray) -> Point | None:

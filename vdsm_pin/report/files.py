@@ -40,7 +40,7 @@ _COAL: Final = (
 _COVERAGE: Final = (
     "proved share of the desired path that is drawn, 0 to 1; null where there is none"
 )
-_CHANGED: Final = "mean number of changed link angles on the path"
+_CHANGED: Final = "number of changed link angles, mean over the length drawn"
 _JOINT_ERROR: Final = "largest joint error still certified; null where not sought"
 _ASSUMED: Final = "meshes whose unit nobody states, with the size assumed"
 _NOTES: Final = "what was left out, joined or odd in meshes and trajectory"

@@ -79,7 +79,14 @@ class AcrossRail:
 
     def joints(self, route: Route, reference: FloatArray) -> FloatArray:
         """Step 5: the bend moves as little as clears the region."""
-        tip_x = route.tip_path.points[:, 0]
+        return self.bent(reference, route.tip_path.points[:, 0])
+
+    def bent(self, reference: FloatArray, tip_x: FloatArray) -> FloatArray:
+        """Projected joints for reference joints and x of the tip, (n, N + 1, 2); [m].
+
+        Raises:
+            PathBlocked: If the bend cannot lead the arm round the obstacle.
+        """
         planar = reference.copy()
         blocked = np.flatnonzero(~self.clear(reference, tip_x))
         if len(blocked):

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.paper.along_rail import AlongRail
 from vdsm_pin.planner.paper.avoidance import Avoidance
 from vdsm_pin.planner.paper.tip_path import Route
 from vdsm_pin.trajectory import Trajectory
@@ -27,3 +28,8 @@ class PaperSteps:
     planar: FloatArray
     centres: FloatArray
     trajectory: Trajectory
+
+    @property
+    def reads_approach(self) -> bool:
+        """Whether Step 4 asked for the scheme of the approach (paper, 4.2.2)."""
+        return isinstance(self.avoidance, AlongRail)
