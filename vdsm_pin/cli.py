@@ -17,7 +17,7 @@ from vdsm_pin.errors import InvalidInput, NoPlanFound, OutOfTime, VdsmError
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY, STRATEGIES
 from vdsm_pin.startup import live_briefly
 from vdsm_pin.text import printable, show_everything
-from vdsm_pin.time_limit import Deadline
+from vdsm_pin.time_limit import Deadline, enforced
 
 PASSED: Final = 0
 NOT_PASSED: Final = 1
@@ -103,9 +103,10 @@ def plan(
 
     deadline, begin = Deadline.after(time_limit), time.monotonic()
     try:
-        source = read_problem(problem)
-        with shown():
-            file = plan_to_folder(source, strategy, out, context.obj, deadline)
+        with enforced(deadline):
+            source = read_problem(problem)
+            with shown():
+                file = plan_to_folder(source, strategy, out, context.obj, deadline)
     except OutOfTime as error:  # which tells its time itself
         error.args = (f"no plan found: {error}",)
         raise
@@ -166,8 +167,8 @@ def verify(
 
     deadline = Deadline.after(time_limit)
     errors = error_box(joint_error_deg, base_error_mm, obstacle_error_mm)
-    verified = verify_to_folder(
-        VerifyOrder(
+    with enforced(deadline):
+        order = VerifyOrder(
             source=read_problem(problem),
             trajectory=trajectory,
             folder=out,
@@ -178,7 +179,7 @@ def verify(
             deadline=deadline,
             all_pairs=all_pairs,
         )
-    )
+        verified = verify_to_folder(order)
     file = verified.file
     written: list[tuple[str, str]] = []
     if certificate is not None:

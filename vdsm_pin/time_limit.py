@@ -1,12 +1,17 @@
 """The one clock that ends work: a time limit as a value, passed on to whoever works.
 
-Nothing is interrupted: work asks the deadline between its steps. Compiled loops are
-given `Deadline.end` and stop in the middle of their work once it has passed; their
-result is then no result, and who called them says so with `Deadline.check` before it is
-looked at. Until then every answer is the same as without a limit.
+Work asks the deadline between its steps. Compiled loops are given `Deadline.end` and
+stop in the middle of their work once it has passed; their result is then no result, and
+who called them says so with `Deadline.check` before it is looked at. Until then every
+answer is the same as without a limit. What does not ask, as readers and writers, is
+interrupted by `enforced` a little later.
 """
 
+import signal
+import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from math import inf
 from typing import Final
@@ -50,3 +55,38 @@ class Deadline:
 
 NO_LIMIT: Final = Deadline()
 """Work may take as long as it takes."""
+
+GRACE: Final = 0.7
+"""Work that has heard of the end has so long to write down what it found; [s]."""
+
+AGAIN: Final = 1.0
+"""What took an interruption for a failure of its own is interrupted again; [s]."""
+
+
+@contextmanager
+def enforced(deadline: Deadline) -> Iterator[None]:
+    """Interrupt whatever still runs `GRACE` after a deadline.
+
+    Python code is interrupted between two of its steps; one call of a library is not.
+    Only the main thread of a process can be, and only where there are such signals:
+    elsewhere nothing is enforced.
+
+    Raises:
+        OutOfTime: Out of the block.
+    """
+    main = threading.current_thread() is threading.main_thread()
+    if deadline.end == inf or not main or not hasattr(signal, "setitimer"):
+        yield
+        return
+
+    def ring(*_: object) -> None:
+        raise OutOfTime(deadline.limit)
+
+    before = signal.signal(signal.SIGALRM, ring)
+    left = deadline.end + GRACE - time.monotonic()
+    try:
+        signal.setitimer(signal.ITIMER_REAL, max(left, 1e-6), AGAIN)
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)

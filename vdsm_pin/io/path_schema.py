@@ -28,13 +28,13 @@ class CircleModel(FileModel):
 class ArcPart(FileModel):
     """An arc in a list of points."""
 
-    arc: ArcModel
+    arc: ArcModel = Field(description="An arc after the point before.")
 
 
 class CirclePart(FileModel):
     """A circle in a list of points."""
 
-    circle: CircleModel
+    circle: CircleModel = Field(description="A circle after the point before.")
 
 
 class SplinePart(FileModel):
