@@ -257,7 +257,7 @@ def test_two_rows_that_rest_on_the_path_draw_nothing(
     assert "undecided" not in ran.out
 
 
-def test_a_problem_without_path_is_verified_and_shown_and_cannot_be_planned(
+def test_a_problem_without_path_is_verified_shown_and_planned_to_its_goal(
     vdsm: Shell, tmp_path: Path
 ) -> None:
     """A joint-space move past a ball: clearance, limits, start and goal."""
@@ -297,6 +297,18 @@ def test_a_problem_without_path_is_verified_and_shown_and_cannot_be_planned(
     assert vdsm(*view).status == 0
     assert vdsm(*view, "--trajectory", motion).status == 0
 
+    made = tmp_path / "made"
+    ran = vdsm("plan", problem, "--out", made)
+    assert ran.status == 0, ran.out
+    content = json.loads((made / "plan.json").read_text(encoding="utf-8"))
+    jsonschema.validate(content, schema("plan"))
+    for word in ("nan", "coverage", "on the path", "not available", "None"):
+        assert word not in ran.out
+    words = ["--trajectory", made / "trajectory.csv", "--out", made]
+    assert vdsm("verify", problem, *words).status == 0
+
+    goal = text.index("goal:")
+    problem.write_text(text[:goal] + text[text.index("required_clearance") :])
     ran = vdsm("plan", problem, "--out", tmp_path / "plan")
     assert ran.status == 2
     assert "move.yaml: tip_path: is missing; planning needs it" in one_message(ran)

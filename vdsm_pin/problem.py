@@ -60,6 +60,7 @@ class DesiredPath:
             [m] in the first entry, [rad] in the others.
         order: Whether pieces of the path may be drawn in another order or direction.
         pointing: Where the last link shall look meanwhile; None for anywhere.
+        home: Whether the arm shall go back to its start by the way it came.
 
     Raises:
         InvalidInput: If a value breaks its range, or directions do not fit the corners.
@@ -76,6 +77,7 @@ class DesiredPath:
     start_joints: FloatArray | None = None
     order: Order = Order.AS_GIVEN
     pointing: Pointing | None = None
+    home: bool = False
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check the values."""

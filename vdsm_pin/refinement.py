@@ -15,6 +15,7 @@ import numpy as np
 
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.goals import with_ends, with_path
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.planner.start import with_known_insides
 from vdsm_pin.planner.strategies import strategy
@@ -127,8 +128,8 @@ def plan_and_verify(
         Infeasible: If the strategy has no plan, or none that is proved.
         OutOfTime: If the time is over.
     """
-    plan_with = strategy(strategy_name)
-    known = with_known_insides(problem)
+    plan_with = with_ends(problem, strategy(strategy_name))
+    known = with_known_insides(with_path(problem))
     clearance = within_time(link_clearance(known.problem), deadline)
     rounds: list[Round] = []
     margins = np.zeros((problem.manipulator.n_links, len(problem.scene.obstacles)))
@@ -169,7 +170,7 @@ def plan_and_verify(
 
 def _unread_scheme(plan: Plan) -> tuple[str, ...]:
     """A note where the problem asks for an approach that this plan did not read."""
-    path = plan.problem.path
+    path = with_path(plan.problem).path
     if path.approach is Approach.SHORTEST:
         return ()
     why = "the path is open"

@@ -152,13 +152,14 @@ def _check_plannable(source: ProblemFile) -> None:
     """Refuse what no strategy can plan.
 
     Raises:
-        InvalidFile: If the problem has no tip path.
+        InvalidFile: If the problem has neither tip path nor start and goal.
     """
-    if source.problem.tip_path is None:
+    problem = source.problem
+    if problem.tip_path is None and (problem.start is None or problem.goal is None):
         need = (
-            "is missing; planning needs it: tip_path states the start and what the tip "
-            "shall draw, a goal alone is not planned yet. Without it `vdsm verify` "
-            "judges a given motion"
+            "is missing; planning needs it, or a start and a goal: tip_path states the "
+            "start and what the tip shall draw. Without them `vdsm verify` judges a "
+            "given motion"
         )
         raise InvalidFile(file=source.path, where="tip_path", problem=need)
 

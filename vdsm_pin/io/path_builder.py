@@ -66,18 +66,20 @@ class PathBuilder:
         corners, parts = self._corners(model)
         points = self.frame.point(corners)
         self._check_extent(points, parts)
+        home = model.retreat == "home"
         path = DesiredPath(
             start.tip,
             without_repeats(points, closed=model.closed),
             model.closed,
             spacing_of(model, self.frame),
             Approach(model.approach),
-            float(self.frame.metres(model.retreat)),
+            0.0 if home else float(self.frame.metres(model.retreat)),
             Blocked(model.blocked),
             model.required_coverage,
             start.joints,
             Order(model.order),
             self._pointing(model, points),
+            home,
         )
         self._check_rows(path)
         return path

@@ -45,6 +45,7 @@ _MODELS: Final[Mapping[str | int, type[FileModel]]] = {
 _EITHER: Final[Mapping[str | int, str]] = {
     "manipulator": "the name of a built-in arm or a mapping",
     "start": "3 numbers or a mapping with joints",
+    "retreat": "a number or home",
     "axis": "x, y, z or a list of 3 numbers",
 }
 """What fields of two forms take."""

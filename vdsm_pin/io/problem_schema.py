@@ -29,6 +29,12 @@ Radii: TypeAlias = Annotated[
 ]
 """One radius of all links, or one of each."""
 
+Retreat: TypeAlias = Annotated[
+    Annotated[Literal["home"], Tag("name")] | Annotated[NotNegative, Tag("value")],
+    Discriminator(text_or_not),
+]
+"""A length, or the word home."""
+
 Lengths: TypeAlias = Annotated[
     list[Positive], Field(min_length=2, max_length=MAX_LINKS)
 ]
@@ -226,9 +232,10 @@ class TipPathModel(FileModel):
     approach: Literal["shortest", "equidistant", "nearest_equidistant"] = Field(
         default="shortest", description="How the tip comes onto the path."
     )
-    retreat: NotNegative = Field(
+    retreat: Retreat = Field(
         default=0.0,
-        description="Step back along -X of the base while off the path [length_unit].",
+        description="Step back along -X of the base while off the path [length_unit], "
+        "or home: behind the path the arm goes back to its start by the way it came.",
     )
     blocked: Literal["detour", "fail"] = Field(
         default="detour",

@@ -233,6 +233,33 @@ def test_a_path_behind_a_pipe_is_drawn_in_visits_that_come_home() -> None:
     np.testing.assert_allclose(on_line[:, [0, 2]] - [2.4, 0.0], 0.0, atol=1e-12)
 
 
+@pytest.mark.parametrize("count", [3, 8])
+@pytest.mark.parametrize("rail", [(-0.02, 0.02), (0.0, 0.0), (-5.0, 0.0)])
+def test_between_directions_the_arm_moves_steadily(
+    count: int, rail: tuple[float, float]
+) -> None:
+    """At an end of the rail too: steps twice as small move it by half."""
+    rng = np.random.default_rng(9)
+    arm = replace(equal_links(count), base_range=rail)
+    alpha, theta = rng.uniform(-0.6, 0.6, (2, 200, count))
+    turns = rng.uniform(-0.5, 0.5, (2, 200, count))
+    x0 = np.clip(rng.uniform(-0.02, 0.02, (2, 200)), *rail)
+    here = joint_centres(arm, x0[0], alpha, theta)
+    there = joint_centres(arm, x0[1], alpha + turns[0], theta + turns[1])
+    tips = here[:, -1].copy(), there[:, -1].copy()
+    chart, steps = Directions(), []
+    lines = Intervals(*tips, chart.of_centres(arm, here), chart.of_centres(arm, there))
+    for parts in (200, 400):
+        share = np.tile(np.linspace(0.0, 1.0, parts + 1), 200)
+        places = lines.centres(arm, np.repeat(np.arange(200), parts + 1), share)
+        places = places.reshape(200, parts + 1, count + 1, 3)
+        moves = np.linalg.norm(np.diff(places, axis=1), axis=3)
+        steps.append(moves.max(axis=(1, 2)))
+    found = np.isfinite(steps[1])
+    assert found.mean() > 0.9
+    assert (steps[1][found] <= 0.6 * steps[0][found]).all()
+
+
 def test_knees_are_taken_away_and_the_motion_stays_clear() -> None:
     task = two_windows(0.09)
     judge, rows = judge_of(task), path_rows(task.path)

@@ -51,10 +51,63 @@ def _normalised(axes: FloatArray) -> None:
 
 
 @compiled
+def _solve_base(
+    tip: FloatArray, axes: FloatArray, lengths: FloatArray, x: float, size: int
+) -> float:
+    """Turn directions until the base has y = z = 0, and x too if all three are asked.
+
+    Args:
+        tip: Shape (3,); [m].
+        axes: Directions of the links, changed in place, shape (N, 3); [-].
+        lengths: Of the links, shape (N,); [m].
+        x: Where the base shall be along the rail; [m].
+        size: 2 where x counts for nothing, else 3.
+
+    Returns:
+        x of the base, NaN where there is no such turn; [m].
+    """
+    lack, matrix, base = np.zeros(3), np.zeros((3, 3)), np.nan
+    for _ in range(ROUNDS):
+        for c in range(3):
+            # The order is y, z, x.
+            a = (c + 1) % 3
+            lack[c] = tip[a]
+            for i in range(lengths.size):
+                lack[c] -= lengths[i] * axes[i, a]
+        base, lack[2] = lack[2], lack[2] - x if size == 3 else 0.0
+        off = abs(lack[0]) + abs(lack[1]) + abs(lack[2])
+        if not off > ENOUGH * lengths.sum():
+            return float(base)
+        matrix[:] = 0.0
+        for i in range(lengths.size):
+            square = lengths[i] * lengths[i]
+            for r in range(size):
+                a = axes[i, (r + 1) % 3]
+                matrix[r, r] += square
+                for c in range(size):
+                    matrix[r, c] -= square * a * axes[i, (c + 1) % 3]
+        if not _solved(matrix, lack, size):
+            return np.nan
+        for i in range(lengths.size):
+            along = 0.0
+            for r in range(size):
+                along += axes[i, (r + 1) % 3] * lack[r]
+            for r in range(3):
+                pull = lack[r] if r < size else 0.0
+                c = (r + 1) % 3
+                axes[i, c] += lengths[i] * (pull - along * axes[i, c])
+        _normalised(axes)
+    return float(base) if off <= 4.0 * ENOUGH * lengths.sum() else np.nan
+
+
+@compiled
 def _on_rail(
     tip: FloatArray, axes: FloatArray, lengths: FloatArray, low: float, high: float
 ) -> bool:
     """Turn directions until the base is on its rail.
+
+    First the base is brought onto the line of the rail; from there, if it is past an
+    end, to that end. So the result changes steadily with what it begins with.
 
     Args:
         tip: Shape (3,); [m].
@@ -66,40 +119,12 @@ def _on_rail(
     Returns:
         Whether it is.
     """
-    lack, matrix = np.zeros(3), np.zeros((3, 3))
-    for _ in range(ROUNDS):
-        for c in range(3):
-            lack[c] = tip[c]
-            for i in range(lengths.size):
-                lack[c] -= lengths[i] * axes[i, c]
-        # The order is y, z, x: x counts only past an end of the rail.
-        x = lack[0]
-        lack[0], lack[1] = lack[1], lack[2]
-        lack[2] = x - min(max(x, low), high)
-        size = 2 if lack[2] == 0.0 else 3
-        off = abs(lack[0]) + abs(lack[1]) + abs(lack[2])
-        if not off > ENOUGH * lengths.sum():
-            return True
-        matrix[:] = 0.0
-        for i in range(lengths.size):
-            square = lengths[i] * lengths[i]
-            for r in range(size):
-                a = axes[i, (r + 1) % 3]
-                matrix[r, r] += square
-                for c in range(size):
-                    matrix[r, c] -= square * a * axes[i, (c + 1) % 3]
-        if not _solved(matrix, lack, size):
-            return False
-        for i in range(lengths.size):
-            along = 0.0
-            for r in range(size):
-                along += axes[i, (r + 1) % 3] * lack[r]
-            for r in range(3):
-                pull = lack[r] if r < size else 0.0
-                c = (r + 1) % 3
-                axes[i, c] += lengths[i] * (pull - along * axes[i, c])
-        _normalised(axes)
-    return bool(off <= 4.0 * ENOUGH * lengths.sum())
+    x = _solve_base(tip, axes, lengths, 0.0, 2)
+    if low <= x <= high:
+        return True
+    if np.isnan(x):
+        return False
+    return not np.isnan(_solve_base(tip, axes, lengths, min(max(x, low), high), 3))
 
 
 @compiled

@@ -27,6 +27,9 @@ from vdsm_pin.planner.fewest.sequence import Sequence
 from vdsm_pin.planner.spacing import count_of, row_steps
 from vdsm_pin.tolerances import TOLERANCES
 
+MOST_MORE, SOME_MORE = 20, 100_000
+"""Rows at which adding rows ends: so many for each that the spacing asks for, and so
+many besides."""
 ROUNDS: Final = 12
 """Rounds of adding rows; each at least reaches what it aims at in smooth stretches."""
 
@@ -233,7 +236,11 @@ def dense_rows(
     """
     way = np.linalg.norm(np.diff(knots.tips, axis=0), axis=1)
     counts = np.maximum(1, count_of(way / spacing))
+    most = MOST_MORE * int(counts.sum()) + SOME_MORE
+    excess, rows = np.full(len(counts), np.inf), Rows(counts[:0], way[:0], way[:0])
     for _ in range(ROUNDS):
+        if counts.sum() > most:
+            break
         rows = rows_at(manipulator, knots, *spread(counts))
         alpha, theta = joint_angles(manipulator, rows.centres)
         step, _ = row_steps(manipulator, alpha, theta)
@@ -249,8 +256,8 @@ def dense_rows(
         more = np.ceil(counts * excess * 1.05).astype(np.int64)
         counts = np.where(excess > 1.0, np.maximum(more, counts + 1), counts)
     message = (
-        f"after {ROUNDS} rounds of adding rows {int((excess > 1.0).sum())} stretches "
-        f"still turn or stray {excess.max():.2f} times as far as a row may"
+        f"with {len(rows.interval)} rows {int((excess > 1.0).sum())} stretches still "
+        f"turn or stray {excess.max():.2f} times as far as a row may"
     )
     raise NoPlanFound(message)
 

@@ -17,6 +17,7 @@ from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres, link_angles
 from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.planner.joint_lines import clear_line
 from vdsm_pin.planner.records import LinkClearance, Plan, TipPath
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
@@ -33,10 +34,6 @@ TRIES: Final = 200
 SEED: Final = 0
 STRAY: Final = 0.3
 """How far these are from the line; the base goes by thirds of the arm; [rad]."""
-FEWEST: Final = 16
-"""Intervals a straight line is begun to be looked at with."""
-MOST: Final = 2048
-"""Intervals at which a line that is not known to be clear is given up."""
 
 
 def _centres(arm: Manipulator, joints: FloatArray) -> FloatArray:
@@ -65,33 +62,6 @@ def _targets(arm: Manipulator, start: FloatArray) -> Iterator[FloatArray]:
                         arm.base_range[1])  # fmt: skip
         if _ahead(arm, joints):
             yield joints
-
-
-def _line(
-    problem: PlanningProblem,
-    clearance: LinkClearance,
-    begin: FloatArray,
-    end: FloatArray,
-    need: float,
-) -> FloatArray | None:
-    """Rows from begin to end if every place in between is clear, shape (r, 1 + 2N)."""
-    arm, turn = problem.manipulator, np.abs(end - begin)
-    # No point is farther from a joint than the arm is long from there.
-    lever = np.repeat(arm.total_length - arm.stations[:-1], 2)
-    way = float(turn[0] + turn[1:] @ lever)
-    count = FEWEST
-    while count * problem.planned_row_change < turn[1:].max():
-        count *= 2
-    while count <= MOST:
-        share = np.arange(count + 1)[:, None] / count
-        rows = begin + share * (end - begin)
-        room = clearance(_centres(arm, rows)).min(axis=1)
-        if not (room >= need).all():
-            return None
-        if (room[:-1] + room[1:] - way / count >= 2.0 * need).all():
-            return np.asarray(rows)
-        count *= 2
-    return None
 
 
 def _within(arm: Manipulator, joints: FloatArray) -> bool:
@@ -124,7 +94,7 @@ def unbend(
     need = max(need, problem.required_clearance)
     targets = list(_targets(arm, start))
     for target in targets:
-        rows = _line(problem, clearance, start, target, need)
+        rows = clear_line(problem, clearance, start, target, need)
         if rows is not None:
             return rows
     rng = np.random.default_rng(SEED)
@@ -136,9 +106,11 @@ def unbend(
         middle = middle + rng.normal(0.0, spread)
         if not _within(arm, middle):
             continue
-        first = _line(problem, clearance, start, middle, need)
+        first = clear_line(problem, clearance, start, middle, need)
         rest = (
-            None if first is None else _line(problem, clearance, middle, target, need)
+            None
+            if first is None
+            else clear_line(problem, clearance, middle, target, need)
         )
         if first is not None and rest is not None:
             return np.concatenate([first, rest[1:]])

@@ -1,0 +1,170 @@
+"""Plans to a goal where nothing is drawn, and plans that come home.
+
+A goal for the tip is a path of one point. Joint values as a goal are planned towards
+from both ends: a straight line in joint space where that is clear; else from the goal
+to where the tip starts, run backwards, with such a line to or from the start; else from
+the start to the goal's tip with such a line at its end.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.cables import cable_lengths
+from vdsm_pin.errors import Infeasible, NoPlanFound
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.kinematics import joint_centres, straight_joints
+from vdsm_pin.planner.joint_lines import clear_line
+from vdsm_pin.planner.records import LinkClearance, Margin, Plan, TipPath
+from vdsm_pin.planner.strategies import Strategy
+from vdsm_pin.problem import Blocked, DesiredPath, PlanningProblem, Posture
+from vdsm_pin.trajectory import Trajectory
+
+JOINS: Final = 8
+"""Rows of a motion from which a line to its other end is tried, evenly spread."""
+
+
+def with_path(problem: PlanningProblem) -> PlanningProblem:
+    """The problem, with a path of one point where it has a start and a goal alone."""
+    if problem.tip_path is not None or problem.start is None or problem.goal is None:
+        return problem
+    return _from(problem, problem.start, problem.goal.tip)
+
+
+def _from(problem: PlanningProblem, start: Posture, tip: FloatArray) -> PlanningProblem:
+    """The problem to bring the tip from a start to a place."""
+    path = DesiredPath(
+        start.tip, tip[None], blocked=Blocked.FAIL, start_joints=start.joints
+    )
+    return replace(problem, tip_path=path, start=None, goal=None)
+
+
+def with_ends(problem: PlanningProblem, plan_with: Strategy) -> Strategy:
+    """A strategy that also does what a problem asks besides drawing.
+
+    Args:
+        problem: As it is asked, maybe without a path.
+        plan_with: Plans problems that have one.
+    """
+
+    def planned(
+        known: PlanningProblem, clearance: LinkClearance, margin: Margin
+    ) -> Plan:
+        if problem.goal is None:
+            plan = plan_with(known, clearance, margin)
+            return with_return(plan) if known.path.home else plan
+        if problem.goal.joints is None:
+            return undrawing(plan_with(known, clearance, margin))
+        return _to_joints(known, problem.goal, clearance, margin, plan_with)
+
+    return planned
+
+
+def with_return(plan: Plan) -> Plan:
+    """A plan and its rivals, each with its own way back behind it, drawing nothing."""
+    told = plan.trajectory
+    back = told.joints[-2::-1]
+    on = np.concatenate([told.on_path, np.zeros(len(back), np.bool_)])
+    stations = np.concatenate([told.path_m, np.full(len(back), told.path_m[-1])])
+    rows = np.concatenate([told.joints, back])
+    whole = _of_rows(plan, rows, on, stations)
+    note = f"behind the path the arm goes home the way it came, in {len(back)} rows"
+    return replace(
+        whole,
+        notes=(*plan.notes, note),
+        rivals=tuple(with_return(rival) for rival in plan.rivals),
+    )
+
+
+def undrawing(plan: Plan) -> Plan:
+    """A plan and its rivals that draw nothing: the path was a way to say the goal."""
+    rows = plan.trajectory.joints
+    rivals = tuple(undrawing(rival) for rival in plan.rivals)
+    return replace(_off_path(plan, rows), rivals=rivals)
+
+
+def _off_path(plan: Plan, rows: FloatArray) -> Plan:
+    """A plan of other rows, none of which draws."""
+    nothing = np.zeros(len(rows), dtype=np.bool_)
+    plan = replace(plan, notes=(), undrawn=(), rivals=())
+    return _of_rows(plan, rows, nothing, np.zeros(len(rows)))
+
+
+def _of_rows(
+    plan: Plan, rows: FloatArray, on_path: BoolArray, stations: FloatArray
+) -> Plan:
+    """A plan with these joint values, shape (r, 1 + 2N); [m], [rad]."""
+    arm = plan.problem.manipulator
+    x0, alpha, theta = rows[:, 0], rows[:, 1::2], rows[:, 2::2]
+    centres = joint_centres(arm, x0, alpha, theta)
+    return replace(
+        plan,
+        tip_path=TipPath(centres[:, -1], on_path, stations),
+        centres=centres,
+        trajectory=Trajectory(on_path, stations, x0, alpha, theta),
+        cable_lengths=cable_lengths(arm, alpha, theta),
+    )
+
+
+def _to_joints(
+    known: PlanningProblem,
+    goal: Posture,
+    clearance: LinkClearance,
+    margin: Margin,
+    plan_with: Strategy,
+) -> Plan:
+    """A plan to joint values.
+
+    Args:
+        known: From the start to the goal's tip.
+        goal: With joint values.
+        clearance: Clearance of links at given joint centres.
+        margin: Kept beyond the required clearance; [m].
+        plan_with: The strategy.
+
+    Raises:
+        Infeasible: If there is none that way; where it is proved, from one end.
+    """
+    assert goal.joints is not None
+    start, path = known.path.start_joints, known.path
+    if start is None:
+        start = straight_joints(known.manipulator, path.start)
+    need = known.required_clearance + float(np.max(margin, initial=0.0))
+    back = _from(known, goal, path.start)
+    reasons = []
+    for asked, end, turned in ((back, start, True), (known, goal.joints, False)):
+        try:
+            plan = plan_with(asked, clearance, margin)
+        except Infeasible as error:
+            side = "back from the goal" if turned else "from the start"
+            reasons.append(f"planned {side}: {error}")
+            continue
+        rows = _joined(known, clearance, plan.trajectory.joints, end, need)
+        if rows is None:
+            reasons.append("the tip comes there, and the joints were not brought there")
+            continue
+        return _off_path(plan, rows[::-1] if turned else rows)
+    raise NoPlanFound("; ".join(reasons))
+
+
+def _joined(
+    problem: PlanningProblem,
+    clearance: LinkClearance,
+    rows: FloatArray,
+    end: FloatArray,
+    need: float,
+) -> FloatArray | None:
+    """Rows of a motion up to one of them and a straight line on to an end."""
+    for k in _spread(len(rows)):
+        line = clear_line(problem, clearance, rows[k], end, need)
+        if line is not None:
+            return np.concatenate([rows[:k], line])
+    return None
+
+
+def _spread(count: int) -> Iterator[int]:
+    """The first of some rows, which is nearest to its own end, then the last ones."""
+    yield 0
+    yield from range(count - 1, 0, -max(1, count // JOINS))
