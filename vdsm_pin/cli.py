@@ -419,8 +419,9 @@ def simulate(
 ) -> None:
     """Run a plan in closed loop: elastic cables, motors, encoders, PID.
 
-    Needs MuJoCo (extra `simulation`). Writes executed.csv, simulation.csv and
-    simulation.json. Status 1 where the executed motion is not proved clear.
+    Needs MuJoCo (extra `simulation`). Writes executed.csv, simulation.csv,
+    simulation.json and simulation.html. Status 1 where the executed motion is not
+    proved clear.
     """
     from vdsm_pin.io.problem_file import read_problem
     from vdsm_pin.simulation.folder import SimulationOrder, simulate_to_folder

@@ -94,7 +94,7 @@ class Canvas:
         )
 
     def _axes(self, low: FloatArray, high: FloatArray, names: tuple[str, str]) -> None:
-        step = _round_step(float(np.max(high - low)) / TICKS)
+        step = round_step(float(np.max(high - low)) / TICKS)
         for axis, name in enumerate(names):
             first, last = math.ceil(low[axis] / step), math.floor(high[axis] / step)
             for k in range(first, last + 1):
@@ -124,7 +124,7 @@ class Canvas:
         return " ".join("{:.1f},{:.1f}".format(*self._place(p)) for p in points)
 
 
-def _round_step(step: float) -> float:
+def round_step(step: float) -> float:
     """The next larger of 1, 2, 5 times a power of ten; [m]."""
     power = 10.0 ** math.floor(math.log10(step))
     return next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= step)

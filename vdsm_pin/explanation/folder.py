@@ -13,7 +13,7 @@ from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.paper.steps import PaperSteps
 from vdsm_pin.refinement import Refinement, plan_and_verify
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
-from vdsm_pin.report.html import explain_page
+from vdsm_pin.report.html import rendered
 from vdsm_pin.robot_model import RobotModel, load_robot
 from vdsm_pin.verification.coal_clearance import coal_distances
 
@@ -56,7 +56,13 @@ def explain_to_folder(
         _checks(robot, found, row),
     )
     with staged(folder) as aside:
-        text = explain_page(source.problem, row, made.trajectory.n_samples, parts)
+        text = rendered(  # pictures are our own SVG
+            "explain.html.j2",
+            problem=source.problem,
+            waypoint=row,
+            n_waypoints=made.trajectory.n_samples,
+            parts=parts,
+        )
         (aside / PAGE).write_text(text, encoding="utf-8")
     return folder / PAGE, row
 

@@ -130,7 +130,8 @@ def _css_text(text: str) -> Markup:
     return Markup("".join(signs))
 
 
-def _rendered(template: str, **values: Any) -> str:
+def rendered(template: str, **values: Any) -> str:
+    """A template of `templates/` with its values."""
     return _environment().get_template(template).render(**values)
 
 
@@ -149,7 +150,7 @@ def write_report(
         plan: How the trajectory was planned, where that is known.
     """
     data = report_data(verification)
-    page = _rendered(
+    page = rendered(
         "report.html.j2",
         file=file,
         plan=plan,
@@ -174,27 +175,14 @@ def view_page(problem: PlanningProblem, trajectory: Trajectory, live: str = "") 
         live: State of the files shown; with it the page asks its server for changes.
     """
     data = view_data(problem, trajectory)
-    return _rendered(
+    return rendered(
         "view.html.j2", problem=problem, data=data, live=live, most_drawn=MOST_DRAWN
-    )
-
-
-def explain_page(
-    problem: PlanningProblem, waypoint: int, n_waypoints: int, parts: Sequence[Any]
-) -> str:
-    """The steps of a plan at one waypoint as one page; pictures are trusted SVG."""
-    return _rendered(
-        "explain.html.j2",
-        problem=problem,
-        waypoint=waypoint,
-        n_waypoints=n_waypoints,
-        parts=parts,
     )
 
 
 def message_page(message: str, live: str) -> str:
     """A page that says what is wrong, until the files are right again."""
-    return _rendered("message.html.j2", message=message, live=live)
+    return rendered("message.html.j2", message=message, live=live)
 
 
 def write_index(
@@ -212,7 +200,7 @@ def write_index(
     counts = {word: sum(row.outcome == word for row in rows) for word in OUTCOMES}
     passed = sum(count for word, count in counts.items() if outcome(word).passed)
     names = Counter(row.problem for row in rows)
-    page = _rendered(
+    page = rendered(
         "index.html.j2",
         rows=rows,
         repeated={name for name, times in names.items() if times > 1},

@@ -42,6 +42,8 @@ class Simulation:
         path_m: Its arc length along the path, shape (m,); [m].
         least_stiffness: Least joint stiffness at some times, shape (k, 2): time and
             value; [s], [N m/rad].
+        tension_margin: What may be added to every tension before the arm buckles, at
+            the same times, shape (k, 2): time and value; [s], [N].
     """
 
     times: FloatArray
@@ -51,6 +53,7 @@ class Simulation:
     on_path: FloatArray
     path_m: FloatArray
     least_stiffness: FloatArray
+    tension_margin: FloatArray
 
     @property
     def errors(self) -> FloatArray:
@@ -236,15 +239,9 @@ class _Loop:
         nearest = np.searchsorted(self._row_times, kept).clip(0, plan.n_samples - 1)
         at = np.linspace(0, len(rows) - 1, min(24, len(rows))).astype(int)
         planned = self._planned(kept)
-        stiffness = [
-            (
-                kept[k],
-                self._statics.least_stiffness(
-                    planned[k, 1:], self._feed_forward(float(kept[k]))
-                ),
-            )
-            for k in at
-        ]
+        held = [(planned[k, 1:], self._feed_forward(float(kept[k]))) for k in at]
+        stiffness = [self._statics.least_stiffness(*one) for one in held]
+        margin = [self._statics.tension_margin(*one) for one in held]
         return Simulation(
             times=kept,
             planned=planned,
@@ -252,5 +249,6 @@ class _Loop:
             tensions=np.array(tensions),
             on_path=plan.on_path[nearest],
             path_m=plan.path_m[nearest],
-            least_stiffness=np.array(stiffness),
+            least_stiffness=np.column_stack([kept[at], stiffness]),
+            tension_margin=np.column_stack([kept[at], margin]),
         )

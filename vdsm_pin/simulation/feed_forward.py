@@ -18,6 +18,9 @@ from vdsm_pin.simulation.settings import Settings
 STEP = 1e-5
 """Of the central differences; [rad]."""
 
+HALVINGS = 30
+"""Rounds of bisection: 4 kN / 2^30 is far below a newton."""
+
 EVENNESS = 1e-4
 """Weight of the pretension against the torque that is left over; [m]."""
 
@@ -79,6 +82,30 @@ class Statics:
 
         Below 0 the arm buckles: pretension pushes a straight chain of joints out.
         """
+        return _least_eigenvalue(self.stiffness(angles, tensions))
+
+    def tension_margin(self, angles: FloatArray, tensions: FloatArray) -> float:
+        """Tension that may be added to every cable; [N].
+
+        Before the arm buckles or a cable has its largest tension; 0 where it buckles
+        already. The stiffness is linear in the tensions.
+        """
+        room = self.settings.cables.largest_tension_n - float(tensions.max())
+        if room <= 0.0:
+            return 0.0
+        now = self.stiffness(angles, tensions)
+        more = (self.stiffness(angles, tensions + room) - now) / room
+        low, high = 0.0, room
+        if _least_eigenvalue(now + room * more) > 0.0:
+            return room
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            stands = _least_eigenvalue(now + middle * more) > 0.0
+            low, high = (middle, high) if stands else (low, middle)
+        return low
+
+    def stiffness(self, angles: FloatArray, tensions: FloatArray) -> FloatArray:
+        """Joint stiffness, motors held, shape (2N, 2N); [N m/rad]."""
         k = stiffnesses(self.manipulator, self.settings)
         rest = self.lengths(angles[None])[0] - tensions / k
 
@@ -89,7 +116,11 @@ class Statics:
         steps = 1e-4 * np.eye(angles.size)
         columns = [(torque(angles + h) - torque(angles - h)) / 2e-4 for h in steps]
         matrix = np.stack(columns, axis=1)
-        return float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[0])
+        return np.asarray(0.5 * (matrix + matrix.T))
+
+
+def _least_eigenvalue(matrix: FloatArray) -> float:
+    return float(np.linalg.eigvalsh(matrix)[0])
 
 
 def _directions_z(alpha: FloatArray, theta: FloatArray) -> FloatArray:

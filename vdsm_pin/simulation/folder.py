@@ -18,6 +18,7 @@ from vdsm_pin.report.folder import check_output_folder, staged
 from vdsm_pin.report.run_record import versions
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.simulation.closed_loop import SLACK, Simulation, simulate
+from vdsm_pin.simulation.page import page
 from vdsm_pin.simulation.plant import cable_name
 from vdsm_pin.simulation.settings import Settings
 from vdsm_pin.trajectory import Trajectory
@@ -29,6 +30,7 @@ from vdsm_pin.verification.records import ErrorBox, combine
 EXECUTED: Final = "executed.csv"
 RECORD: Final = "simulation.csv"
 SUMMARY: Final = "simulation.json"
+PAGE: Final = "simulation.html"
 
 BAND: Final = float(np.deg2rad(0.3))
 """The paper's main range of joint errors (Fig. 21); [rad]."""
@@ -61,6 +63,9 @@ class SimulationFile(FileModel):
     least_stiffness_nm_rad: float = Field(
         description="of the joints along the motion; at 0 or below the arm buckles"
     )
+    least_tension_margin_n: float = Field(
+        description="what may be added to every tension before the arm buckles"
+    )
     planned: Cleared
     executed: Cleared
     within_error_box: Cleared = Field(
@@ -87,7 +92,7 @@ class SimulationOrder:
 
 
 def simulate_to_folder(order: SimulationOrder) -> SimulationFile:
-    """Run a plan in closed loop and write executed.csv, simulation.csv and .json.
+    """Run a plan in closed loop; write executed.csv, simulation.csv, .json and .html.
 
     Raises:
         InvalidInput: If a file is bad or the folder cannot be written.
@@ -104,6 +109,8 @@ def simulate_to_folder(order: SimulationOrder) -> SimulationFile:
         write_trajectory(aside / EXECUTED, found.trajectory)
         _write_record(aside / RECORD, found)
         (aside / SUMMARY).write_text(file.text(), encoding="utf-8")
+        text = page(file, found, order.settings, problem.required_clearance)
+        (aside / PAGE).write_text(text, encoding="utf-8")
     return file
 
 
@@ -128,6 +135,7 @@ def summary(
         largest_tension_n=float(found.tensions.max()),
         slack_share=float((found.tensions < SLACK).mean()),
         least_stiffness_nm_rad=float(found.least_stiffness[:, 1].min()),
+        least_tension_margin_n=float(found.tension_margin[:, 1].min()),
         planned=cleared(problem, planned, ErrorBox()),
         executed=cleared(problem, found.trajectory, ErrorBox()),
         within_error_box=cleared(problem, planned, ErrorBox(joint=found.largest_error)),

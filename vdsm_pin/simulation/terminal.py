@@ -24,5 +24,6 @@ def show_simulation(file: SimulationFile, folder: Path) -> None:
         ("largest tension", f"{file.largest_tension_n:.0f} N"),
         ("slack", f"{percent(file.slack_share)} of all cables and times"),
         ("least joint stiffness", f"{file.least_stiffness_nm_rad:.1f} Nm/rad"),
+        ("tension margin", f"{file.least_tension_margin_n:.0f} N in every cable"),
         ("files in", str(folder)),
     )

@@ -3,7 +3,7 @@
     follow(problem, robot, clearance) -> Trajectory
 
 `clearance` ends them when their time is over; who has no motion raises `NoPlanFound`.
-They need the extra `references`: pip install 'vdsm-pin[references]'.
+Pink and OMPL need the extra `references`: pip install 'vdsm-pin[references]'.
 """
 
 from collections.abc import Callable, Mapping
@@ -20,7 +20,12 @@ Follow: TypeAlias = Callable[[PlanningProblem, RobotModel, LinkClearance], Traje
 
 REFERENCES: Final[Mapping[str, str]] = MappingProxyType(
     {
+        "pseudo-inverse": "pseudo_inverse",
+        "gradient-projection": "gradient_projection",
         "damped-least-squares": "damped_least_squares",
+        "follow-the-leader": "follow_the_leader",
+        "mda-rrt": "multi_directional",
+        "differential-evolution": "differential_evolution",
         "pink-barriers": "pink_barriers",
         "ompl-rrt-connect": "rrt_connect",
     }

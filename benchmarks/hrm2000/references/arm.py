@@ -1,7 +1,9 @@
 """What all references share: the arm in Pinocchio, its limits, the rows of the path."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeAlias
 
 import coal
 import numpy as np
@@ -191,3 +193,24 @@ class Rows:
             np.array(self.drawn), np.array(self.stations), joints[:, 0],
             joints[:, 1::2], joints[:, 2::2],
         )  # fmt: skip
+
+
+Reach: TypeAlias = Callable[[Arm, FloatArray, FloatArray], FloatArray | None]
+"""(arm, joint values before, tip) to joint values, or None."""
+
+
+def along(arm: Arm, reach: Reach, goal: Wanted | None = None) -> Trajectory:
+    """Row after row along the desired path, or any way of the tip.
+
+    Raises:
+        NoPlanFound: Where a row is not reached, or is too far from the one before.
+    """
+    goal = goal or wanted(arm.problem)
+    rows = Rows(arm.start(), goal.stations[0])
+    for tip, station, drawn in zip(goal.tips, goal.stations, goal.drawn, strict=True):
+        q = reach(arm, rows.joints[-1], tip)
+        if q is None:
+            message = f"no valid row at {station:.3f} m along the path"
+            raise NoPlanFound(message)
+        rows.add(q, station, bool(drawn))
+    return rows.trajectory()

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from benchmarks.hrm2000.references.arm import Arm, Rows, Wanted, wanted
-from vdsm_pin.errors import NoPlanFound
+from benchmarks.hrm2000.references.arm import Arm, along
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
@@ -39,23 +38,4 @@ def follow(
     Raises:
         NoPlanFound: Where a row is not reached.
     """
-    return along(wanted(problem), problem, robot, clearance)
-
-
-def along(
-    goal: Wanted, problem: PlanningProblem, robot: RobotModel, clearance: LinkClearance
-) -> Trajectory:
-    """The same along any way of the tip.
-
-    Raises:
-        NoPlanFound: Where a row is not reached.
-    """
-    arm = Arm(problem, robot, clearance)
-    rows = Rows(arm.start(), goal.stations[0])
-    for tip, station, drawn in zip(goal.tips, goal.stations, goal.drawn, strict=True):
-        q = reach(arm, rows.joints[-1], tip)
-        if q is None:
-            message = f"no valid row at {station:.3f} m along the path"
-            raise NoPlanFound(message)
-        rows.add(q, station, bool(drawn))
-    return rows.trajectory()
+    return along(Arm(problem, robot, clearance), reach)

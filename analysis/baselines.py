@@ -1,0 +1,163 @@
+"""The methods that the paper compares itself with, on its scenes, by one judge.
+
+    PYTHONPATH=. python analysis/baselines.py --out reports/paper [--sample K]
+
+Writes `baselines.json` and `baselines.md`: for each method and scene whether the motion
+is certified, and what it is like; with `--sample K` also K problems of each feasible
+family of HRM-1000. Methods are those of `benchmarks/hrm2000/references`.
+"""
+
+import argparse
+import tempfile
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Final
+
+import yaml
+from result_files import REPORTS, write_table
+
+from benchmarks.hrm1000.families import FAMILIES
+from benchmarks.hrm1000.generate import generate
+from benchmarks.hrm2000.attempt import Outcome, attempt
+from vdsm_pin.io.problem_file import built_in_text
+from vdsm_pin.units import MM_PER_M
+
+SCENES: Final = ("free", "obs1", "obs2", "obs3")
+METHODS: Final = {
+    "paper": "this package: the paper's seven steps",
+    "fewest": "this package: as few changed link angles as it finds",
+    "pseudo-inverse": "[1]",
+    "damped-least-squares": "[2,3], with a push off obstacles in the null space",
+    "gradient-projection": "[4,5]",
+    "differential-evolution": "[11,12], by scipy, each waypoint near the one before",
+    "follow-the-leader": '[21-23], "repeated path"',
+    "mda-rrt": "[23]: the tip's way to the path by a tree, the arm on its trail",
+}
+"""Methods by name, with the number of the paper's reference."""
+
+LIMIT: Final = 60.0
+"""Processor time for one plan of a paper's scene; [s]."""
+SAMPLE_LIMIT: Final = 5.0
+"""The same for a problem of the sample; [s]."""
+COARSE_MM: Final = 20.0
+"""Spacing of waypoints for evolution, a tenth of a second each; [mm]."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One method on one scene; numbers are None where there is no motion."""
+
+    method: str
+    scene: str
+    answer: str
+    reason: str
+    seconds: float
+    drawn: float
+    psi_deg: float | None
+    changed: float | None
+    clearance_mm: float | None
+
+
+def lines_of(method: str, folder: Path) -> Iterator[Line]:
+    """One method on every scene."""
+    for scene in SCENES:
+        file = folder / f"{scene}-{method}.yaml"
+        data = yaml.safe_load(built_in_text(f"paper/{scene}"))
+        if method == "differential-evolution":
+            data["tip_path"]["spacing"] = COARSE_MM
+        file.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
+        yield line(scene, attempt(file, ("paper", 0), method, LIMIT))
+
+
+def line(scene: str, found: Outcome) -> Line:
+    """An outcome in the units of the table."""
+    clearance = found.clearance_m
+    return Line(
+        found.method, scene, found.answer, found.reason, found.plan_s, found.coverage,
+        found.psi_deg, found.knees,
+        None if clearance is None else clearance * MM_PER_M,
+    )  # fmt: skip
+
+
+def sample(per_family: int, folder: Path) -> dict[str, int]:
+    """How many problems of HRM-1000's feasible families each method draws whole."""
+    solved = dict.fromkeys(METHODS, 0)
+    for family in FAMILIES:
+        if family == "infeasible":
+            continue
+        for number in range(per_family):
+            file = generate(folder / family, family, number)
+            for method in METHODS:
+                found = attempt(file, (family, number), method, SAMPLE_LIMIT)
+                solved[method] += found.answer == "certified" and not found.faults
+    return solved
+
+
+def cell(value: float | None, form: str) -> str:
+    """A number, or a dash."""
+    return "–" if value is None else format(value, form).replace("-", "−")
+
+
+def markdown(lines: list[Line], solved: dict[str, int], asked: int) -> str:
+    """The tables for reading."""
+    head = [
+        "# The methods the paper compares itself with",
+        "",
+        "Made by `python analysis/baselines.py`. The whole path is demanded; every",
+        "motion goes to the same judge, which proves limits, tip and clearance over",
+        f"continuous time. Planning may take {LIMIT:.0f} s of processor time. Numbers",
+        "in brackets are the paper's references; what each method is stands in its",
+        "file under `benchmarks/hrm2000/references`. Neural networks [6-8] and the",
+        "spiral of the ridge line [24] are not here: the first need data that nobody",
+        "has published, the second steers the arm's shape and not its tip. Clearances",
+        "of refuted motions are of their worst place, as deep as is measured.",
+        "",
+        "| method | what it is |",
+        "|---|---|",
+        *(f"| {name} | {words} |" for name, words in METHODS.items()),
+        "",
+        "| method | scene | answer | ψ max [°] | changed angles, mean | "
+        "clearance [mm] | time [s] | why |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    rows = [
+        f"| {one.method} | {one.scene} | {one.answer} | {cell(one.psi_deg, '.1f')} | "
+        f"{cell(one.changed, '.2f')} | {cell(one.clearance_mm, '.1f')} | "
+        f"{one.seconds:.2f} | {one.reason} |"
+        for one in lines
+    ]
+    if not asked:
+        return "\n".join([*head, *rows, ""])
+    table = [f"| {name} | {count} of {asked} |" for name, count in solved.items()]
+    words = [
+        "",
+        "## A sample of HRM-1000",
+        "",
+        f"Whole paths drawn and certified, {SAMPLE_LIMIT:.0f} s of processor time for",
+        "each plan; the first problems of every feasible family.",
+        "",
+        "| method | drawn |",
+        "|---|---|",
+    ]
+    return "\n".join([*head, *rows, *words, *table, ""])
+
+
+def main() -> None:
+    """Run everything and write both files."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=REPORTS)
+    parser.add_argument("--sample", type=int, default=0)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ("paper", "fewest"):  # machine code is loaded once
+            list(lines_of(name, Path(folder)))
+        lines = [one for name in METHODS for one in lines_of(name, Path(folder))]
+        solved = sample(options.sample, Path(folder)) if options.sample else {}
+    asked = options.sample * (len(FAMILIES) - 1)
+    rows = [*map(asdict, lines), {"sample": asked, "solved": solved}]
+    write_table(options.out, "baselines", rows, markdown(lines, solved, asked))
+
+
+if __name__ == "__main__":
+    main()

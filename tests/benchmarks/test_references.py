@@ -1,0 +1,108 @@
+"""The references that need no extra library, on scenes where the answer is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.hrm2000.references import REFERENCES, reference
+from benchmarks.hrm2000.references.follow_the_leader import behind
+from benchmarks.hrm2000.references.multi_directional import _turned
+from vdsm_pin.errors import NoPlanFound
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.robot_model import load_robot
+from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.verify import verify
+
+FREE = read_problem("paper/free").problem
+ROBOT = load_robot(FREE.manipulator)
+
+
+def ahead(problem: PlanningProblem = FREE) -> PlanningProblem:
+    """A gently bent path straight ahead of the arm, as long as the first links."""
+    along = np.linspace(0.0, 0.5, 26)
+    start = problem.path.start
+    points = np.stack([start[0] + along, 0.1 * along**2, 0.0 * along], axis=1)
+    path = DesiredPath(start, points[1:], spacing=0.02, retreat=0.0)
+    return replace(problem, tip_path=path)
+
+
+@pytest.mark.parametrize("name", ["pseudo-inverse", "gradient-projection"])
+def test_jacobian_methods_draw_the_free_square_and_change_every_angle(
+    name: str,
+) -> None:
+    coarse = replace(FREE, tip_path=replace(FREE.path, spacing=0.05))
+    motion = reference(name)(coarse, ROBOT, link_clearance(coarse))
+    assert verify(coarse, motion, ROBOT).verdict is Verdict.CERTIFIED
+    assert (np.abs(motion.joints[-1, 1:]) > 1e-4).any()
+
+
+def test_a_method_that_looks_at_no_obstacle_is_refuted_by_the_judge() -> None:
+    problem = read_problem("paper/obs1").problem
+    problem = replace(problem, tip_path=replace(problem.path, spacing=0.05))
+    motion = reference("pseudo-inverse")(problem, ROBOT, link_clearance(problem))
+    assert verify(problem, motion, ROBOT).verdict is Verdict.REFUTED
+
+
+def test_the_arm_lies_on_the_trail_of_its_tip() -> None:
+    problem = ahead()
+    motion = reference("follow-the-leader")(problem, ROBOT, link_clearance(problem))
+    assert verify(problem, motion, ROBOT).verdict is Verdict.CERTIFIED
+    centres = joint_centres(problem.manipulator, motion.x0, motion.alpha, motion.theta)
+    trail = centres[:, -1]
+    for place in centres[-1, :-1]:
+        if place[0] < trail[0, 0]:  # still on the rail
+            assert np.hypot(*place[1:]) < 1e-9
+        else:
+            y = np.interp(place[0], trail[:, 0], trail[:, 1])
+            assert abs(place[1] - y) < 1e-6
+
+
+@pytest.mark.parametrize("name", ["follow-the-leader", "mda-rrt"])
+def test_the_square_across_the_rail_cannot_be_followed(name: str) -> None:
+    with pytest.raises(NoPlanFound):
+        reference(name)(FREE, ROBOT, link_clearance(FREE))
+
+
+def test_evolution_reaches_a_path_ahead() -> None:
+    problem = ahead()
+    problem = replace(problem, tip_path=replace(problem.path, spacing=0.1))
+    follow = reference("differential-evolution")
+    motion = follow(problem, ROBOT, link_clearance(problem))
+    row = verify(problem, motion, ROBOT).checks
+    assert all(c.verdict is Verdict.CERTIFIED for c in row if "waypoints" in c.name)
+
+
+def test_a_place_behind_is_at_its_distance_and_on_the_trail() -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(200):
+        trail = np.cumsum(rng.normal(size=(12, 3)), axis=0)
+        length = rng.uniform(0.1, 3.0)
+        found = behind(trail, trail[-1], 10, length)
+        if found is None:
+            gaps = np.linalg.norm(trail - trail[-1], axis=1)
+            assert gaps.max() < length
+            continue
+        place, k = found
+        assert np.linalg.norm(place - trail[-1]) == pytest.approx(length)
+        ways = place - trail[k], trail[k + 1] - place
+        whole = np.linalg.norm(trail[k + 1] - trail[k])
+        assert sum(map(np.linalg.norm, ways)) == pytest.approx(whole)
+
+
+def test_a_branch_turns_no_more_than_allowed() -> None:
+    rng = np.random.default_rng(6)
+    for _ in range(200):
+        old, wish = rng.normal(size=(2, 3))
+        old /= np.linalg.norm(old)
+        new = _turned(old, wish, 0.3)
+        assert np.linalg.norm(new) == pytest.approx(1.0)
+        assert np.arccos(np.clip(old @ new, -1.0, 1.0)) <= 0.3 + 1e-9
+
+
+def test_every_reference_has_a_module() -> None:
+    for module in REFERENCES.values():
+        assert module.isidentifier()
