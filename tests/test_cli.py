@@ -175,12 +175,25 @@ def test_a_spoilt_motion_is_refuted_and_still_reported(
     assert "planner unknown" in (out / "report.html").read_text(encoding="utf-8")
 
 
-def test_an_infeasible_problem_leaves_nothing(vdsm: Shell, tmp_path: Path) -> None:
-    problem = write_problem(tmp_path / "far.yaml", OUT_OF_REACH)
-    ran = vdsm("plan", problem, "--out", tmp_path / "out", "--strategy", "paper")
+def test_an_infeasible_problem_leaves_a_page_that_says_why(
+    vdsm: Shell, tmp_path: Path
+) -> None:
+    problem, out = write_problem(tmp_path / "far.yaml", OUT_OF_REACH), tmp_path / "out"
+    ran = vdsm("plan", problem, "--out", out, "--strategy", "paper")
     assert ran.status == 1
-    assert "reach" in one_message(ran)
-    assert not (tmp_path / "out").exists()
+    message = one_message(ran)
+    assert "reach" in message
+    assert str(out / "no_plan.html") in message
+    assert [path.name for path in out.iterdir()] == ["no_plan.html"]
+    page = (out / "no_plan.html").read_text(encoding="utf-8")
+    assert message.removeprefix("vdsm: ").split("; see")[0].strip() in page
+    near = write_problem(tmp_path / "near.yaml", NEAR)
+    assert vdsm("plan", near, "--out", out, "--strategy", "paper").status == 0
+    assert not (out / "no_plan.html").exists(), "there is a plan now"
+    report = (out / "report.html").read_text(encoding="utf-8")
+    assert "planned by paper" in report
+    assert 'class="banner verdict certified"' in report
+    assert "not sought for this motion" in report
 
 
 def test_a_plan_that_draws_less_than_required_is_written_and_called_incomplete(
@@ -233,7 +246,7 @@ def test_without_detours_nothing_is_planned_that_leaves_something_out(
     ran = vdsm("plan", problem, "--out", tmp_path / "out")
     assert ran.status == 1
     assert "'wall' blocks the tip path" in one_message(ran)
-    assert not (tmp_path / "out").exists()
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["no_plan.html"]
 
 
 def test_two_rows_that_rest_on_the_path_draw_nothing(
@@ -340,7 +353,7 @@ def test_a_time_limit_ends_planning(vdsm: Shell, tmp_path: Path) -> None:
     ran = vdsm(*words, "--time-limit", "0.004")
     assert ran.status == 1
     assert "time limit of 0.004 s" in one_message(ran)
-    assert not (tmp_path / "out").exists()
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["no_plan.html"]
 
 
 def bad_inputs(folder: Path, planned: Path) -> dict[str, list[object]]:

@@ -13,7 +13,7 @@ from typing import Annotated, Final, Literal, NoReturn
 
 import typer
 
-from vdsm_pin.errors import InvalidInput, NoPlanFound, OutOfTime, VdsmError
+from vdsm_pin.errors import Infeasible, InvalidInput, NoPlanFound, OutOfTime, VdsmError
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY, STRATEGIES
 from vdsm_pin.startup import live_briefly
 from vdsm_pin.text import printable, show_everything
@@ -91,28 +91,32 @@ def plan(
 ) -> None:
     """Plan a motion.
 
-    Writes trajectory.csv, centres.csv, cables.csv and plan.json, or nothing where there
-    is no plan. A plan that draws less of the path than required is written, is called
-    incomplete, and ends with status 1.
+    Writes trajectory.csv, centres.csv, cables.csv, plan.json and report.html, or
+    no_plan.html where there is no plan. A plan that draws less of the path than
+    required is written, is called incomplete, and ends with status 1.
     """
     from vdsm_pin.io.problem_file import read_problem
     from vdsm_pin.progress import shown
     from vdsm_pin.report.terminal import show_plan
     from vdsm_pin.report.words import outcome
-    from vdsm_pin.workflow import plan_to_folder
+    from vdsm_pin.workflow import NO_PLAN, plan_to_folder
 
     deadline, begin = Deadline.after(time_limit), time.monotonic()
+    page = f"see {out / NO_PLAN}"
     try:
         with enforced(deadline):
             source = read_problem(problem)
             with shown():
                 file = plan_to_folder(source, strategy, out, context.obj, deadline)
     except OutOfTime as error:  # which tells its time itself
-        error.args = (f"no plan found: {error}",)
+        error.args = (f"no plan found: {error}; {page}",)
         raise
     except NoPlanFound as error:
         spent = time.monotonic() - begin
-        error.args = (f"no plan found: {error}; searched for {spent:.1f} s",)
+        error.args = (f"no plan found: {error}; searched for {spent:.1f} s; {page}",)
+        raise
+    except Infeasible as error:
+        error.args = (f"{error}; {page}",)
         raise
     show_plan(file, out)
     raise typer.Exit(PASSED if outcome(file.verdict).passed else NOT_PASSED)

@@ -23,6 +23,9 @@
 Messages say what, where, how much and against what; the same facts are attributes.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 from vdsm_pin.text import printable
 from vdsm_pin.units import MM_PER_M, in_mm
 
@@ -81,6 +84,36 @@ class InconsistentCables(InvalidInput):
             f"{tolerance * MM_PER_M:.1e} mm)"
         )
         super().__init__(message)
+
+
+@dataclass(frozen=True, slots=True)
+class Reached:
+    """How far a search came.
+
+    Args:
+        words: All of it in words.
+        station: Where along the desired path the first stretch begins that is not
+            drawn; [m].
+        link: Of the arm in question, the one nearest to an obstacle, from 1; 0 where
+            nobody knows.
+        obstacle: Name of that obstacle; empty where nobody knows.
+        centres: Joint centres of the arm where it came farthest, base frame; none
+            where nobody knows, then the arm in question is the straight one with its
+            tip at the station; [m].
+        narrowest: Where the best way in is narrowest, base frame; empty where there is
+            no such way; [m].
+    """
+
+    words: str
+    station: float
+    link: int = 0
+    obstacle: str = ""
+    centres: Sequence[Sequence[float]] = ()
+    narrowest: Sequence[float] = ()
+
+    def __str__(self) -> str:
+        """The words."""
+        return self.words
 
 
 class Infeasible(VdsmError):
@@ -190,10 +223,18 @@ class InsideUnknown(Infeasible):
 
 
 class PathBlocked(Infeasible):
-    """The tip cannot be brought past an obstacle by this method."""
+    """The tip cannot be brought past an obstacle by this method.
 
-    def __init__(self, *, obstacle: str, reason: str) -> None:
-        self.obstacle, self.reason = obstacle, reason
+    Args:
+        obstacle: Name of the obstacle.
+        reason: Why not.
+        station: Arc length of the place along the desired path, where it is one; [m].
+    """
+
+    def __init__(
+        self, *, obstacle: str, reason: str, station: float | None = None
+    ) -> None:
+        self.obstacle, self.reason, self.station = obstacle, reason, station
         super().__init__(f"obstacle {obstacle!r} blocks the tip path: {reason}")
 
 
@@ -230,7 +271,16 @@ class HemmedIn(Infeasible):
 
 
 class NoPlanFound(Infeasible):
-    """The search ended without a plan; this proves nothing about the problem."""
+    """The search ended without a plan; this proves nothing about the problem.
+
+    Args:
+        message: What was found instead.
+        reached: How far the search came, where that is known.
+    """
+
+    def __init__(self, message: str, reached: Reached | None = None) -> None:
+        self.reached = reached
+        super().__init__(message)
 
 
 class NoWayOut(NoPlanFound):
@@ -245,10 +295,10 @@ class OutOfTime(VdsmError):
 
     Args:
         limit: The time limit; [s].
-        reached: How far the work had come, in words; empty if nobody knows.
+        reached: How far the work had come; empty if nobody knows.
     """
 
-    def __init__(self, limit: float, reached: str = "") -> None:
+    def __init__(self, limit: float, reached: Reached | str = "") -> None:
         self.limit, self.reached = limit, reached
         message = f"the time limit of {limit:g} s came first"
         super().__init__(f"{message}; {reached}" if reached else message)

@@ -14,40 +14,18 @@ from threading import Lock
 from typing import Final
 from urllib.parse import parse_qs, urlsplit
 
-import numpy as np
-
 from vdsm_pin.errors import InvalidInput, VdsmError
 from vdsm_pin.io.atomic import write_text
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
-from vdsm_pin.kinematics import straight_joints
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.report.facts import straight_arm
 from vdsm_pin.report.folder import check_kept, check_output_file
 from vdsm_pin.report.html import message_page, view_page
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.report.postures import at_start
 
 HOST: Final = "127.0.0.1"
 _LONGEST_WAIT: Final = 20.0  # seconds a page waits for one answer
 _LOOK: Final = 0.25  # seconds between looks at the files
-
-
-def at_start(problem: PlanningProblem) -> Trajectory:
-    """The arm where it begins, as a motion of one row.
-
-    A start known by its tip is the straight arm's; where any start will do the arm is
-    straight along its rail.
-    """
-    begin = problem.begin
-    if begin is None:
-        return straight_arm(problem)
-    joints = begin.joints
-    if joints is None:
-        joints = straight_joints(problem.manipulator, begin.tip)
-    angles, zero = joints[1:].reshape(1, -1, 2), np.zeros(1)
-    return Trajectory(
-        zero.astype(bool), zero, joints[:1], angles[:, :, 0], angles[:, :, 1]
-    )
 
 
 def page(problem: PlanningProblem, trajectory: Path | None, live: str = "") -> str:

@@ -4,13 +4,13 @@ Nothing is judged here: problems are read, planned, verified and written down.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
 from pydantic import ValidationError
 
-from vdsm_pin.errors import InvalidFile, OutOfTime
+from vdsm_pin.errors import Infeasible, InvalidFile, OutOfTime
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
@@ -23,7 +23,7 @@ from vdsm_pin.report.folder import (
     staged,
 )
 from vdsm_pin.report.pdf import find_browser, print_page
-from vdsm_pin.report.run_record import RunRecord
+from vdsm_pin.report.run_record import PlanRun, RunRecord
 from vdsm_pin.report.tables import (
     ClearanceCsv,
     write_cables,
@@ -47,8 +47,10 @@ LINK_ANGLES: Final = "link_angles.csv"
 CABLES: Final = "cables.csv"
 CENTRES: Final = "centres.csv"
 
-PLANNED: Final = TRAJECTORY, PLAN, CENTRES, CABLES
-"""What planning writes to its folder."""
+NO_PLAN: Final = "no_plan.html"
+
+PLANNED: Final = TRAJECTORY, PLAN, CENTRES, CABLES, REPORT, NO_PLAN
+"""What planning writes to its folder: all but the last, or the last alone."""
 
 JUDGED: Final = VERIFICATION, REPORT, CLEARANCE, LINK_ANGLES, CENTRES, CABLES
 """What verifying writes to its folder."""
@@ -112,39 +114,61 @@ def plan_to_folder(
     folder: Path,
     command: str,
     deadline: Deadline = NO_LIMIT,
+    report: bool = True,
 ) -> PlanFile:
-    """Plan, and write trajectory.csv, centres.csv, cables.csv and plan.json.
+    """Plan, and write trajectory.csv, centres.csv, cables.csv, plan.json, report.html.
 
     A plan is certified, or incomplete: it is clear, but draws less than required.
 
+    Args:
+        source: The problem as it was read.
+        strategy: Name of the strategy.
+        folder: Where the results go.
+        command: The exact command line, for the files.
+        deadline: When to give up.
+        report: Whether a report is written; who verifies next writes a fuller one.
+
     Raises:
         UnknownName: If there is no such strategy.
-        Infeasible: If there is no such plan; nothing is written.
-        OutOfTime: If there is none in time; nothing is written.
+        Infeasible: If there is no such plan; a page that tells of it is written.
+        OutOfTime: If there is none in time; such a page is written.
         InvalidInput: If the folder cannot be written.
     """
     # Whoever has a trajectory verified needs no planner.
     from vdsm_pin.refinement import plan_and_verify
+    from vdsm_pin.report.html import write_no_plan, write_report
 
     _check_plannable(source)
     check_output_folder(folder)
     check_kept([folder / name for name in PLANNED], source.source.files)
     robot = load_robot(source.problem.manipulator)
-    refinement = plan_and_verify(source.problem, strategy, robot, deadline=deadline)
+    record = RunRecord(
+        command=command,
+        problem_file=str(source.path),
+        problem_sha256=source.sha256,
+        urdf_sha256=robot.urdf_sha256,
+    )
+    try:
+        refinement = plan_and_verify(source.problem, strategy, robot, deadline=deadline)
+    except (Infeasible, OutOfTime) as error:
+        with staged(folder) as aside:
+            run = PlanRun(strategy, record)
+            write_no_plan(aside / NO_PLAN, source.problem, error, run)
+        raise
     plan, problem = refinement.plan, source.problem
     with staged(folder) as aside:
         write_trajectory(aside / TRAJECTORY, plan.trajectory)
         write_centres(aside / CENTRES, problem, plan.trajectory, plan.centres)
         write_cables(aside / CABLES, problem, plan.trajectory)
-        record = RunRecord(
-            command=command,
-            problem_file=str(source.path),
-            problem_sha256=source.sha256,
-            trajectory_sha256=sha256_of_file(aside / TRAJECTORY),
-            urdf_sha256=robot.urdf_sha256,
-        )
+        digest = sha256_of_file(aside / TRAJECTORY)
+        record = replace(record, trajectory_sha256=digest)
         file = plan_file(refinement, record)
         (aside / PLAN).write_text(file.text(), encoding="utf-8")
+        if report:
+            judged = refinement.verification
+            words = verification_file(judged, record)
+            write_report(aside / REPORT, judged, words, file)
+    (folder / NO_PLAN).unlink(missing_ok=True)
     return file
 
 

@@ -69,7 +69,12 @@ def test_every_problem_has_its_row_and_its_folder(reference: Path) -> None:
     assert {p.name for p in (reference / "far").iterdir()} == {
         "manifest.json",
         "timing.json",
+        "no_plan.html",
     }
+    index = (reference / "index.html").read_text(encoding="utf-8")
+    assert 'href="far/no_plan.html"' in index
+    assert 'href="bad/' not in index
+    assert 'href="good/report.html"' in index
     (suite,) = junitparser.JUnitXml.fromfile(str(reference / "junit.xml"))
     assert (suite.tests, suite.failures, suite.errors) == (4, 1, 1)
     assert not (reference / ".unfinished").exists()

@@ -197,7 +197,7 @@ def test_every_text_keeps_its_contrast(
         batch_row("x", "paper", file).model_copy(update={"outcome": word})
         for word in OUTCOMES
     ]
-    write_index(tmp_path / "index.html", rows, with_files=set())
+    write_index(tmp_path / "index.html", rows, pages={})
     for name in ("report", "index"):
         address = (tmp_path / f"{name}.html").as_uri()
         watched = Watched(browser, address, color_scheme=scheme)

@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 from watched_pages import NEEDS_CHROMIUM, Watched, pixels
 
+from vdsm_pin.errors import NoPlanFound, Reached
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.report.facts import verification_file
-from vdsm_pin.report.html import write_report
+from vdsm_pin.report.html import write_no_plan, write_report
+from vdsm_pin.report.run_record import PlanRun
 
 pytestmark = NEEDS_CHROMIUM
 
@@ -281,3 +283,32 @@ def test_the_motion_plays_at_the_speed_chosen(report: Watched) -> None:
     assert page.evaluate("vdsm.motion.speed") == 4
     page.locator("[data-speed]").select_option("1")
     assert report.errors == []
+
+
+def test_a_page_without_a_plan_shows_where_the_search_ended(
+    browser: Any, tmp_path: Path
+) -> None:
+    path = tmp_path / "no_plan.html"
+    error = NoPlanFound("in vain", Reached("drew 1 m", 1.25, 3, "ball"))
+    run = PlanRun("fewest", made_up.RECORD)
+    write_no_plan(path, made_up.problem(), error, run)
+    watched = Watched(browser, path.as_uri(), viewport={"width": 900, "height": 900})
+    page = watched.page
+    page.wait_for_function("window.vdsm && window.vdsm.view")
+    colours = page.evaluate(
+        "vdsm.view.obstacles.map((one) => one.material.color.getHex())"
+    )
+    assert [one == 0xE03131 for one in colours] == [False, True] + [False] * 5
+    links = page.evaluate(
+        "vdsm.view.arm.links.map((one) => one.material.color.getHex())"
+    )
+    assert links.index(0xE03131) == 2
+    tip = page.evaluate("vdsm.view.tipNow")
+    there = made_up.problem().path.at(np.array([1.25]))[0]
+    np.testing.assert_allclose(tip, there, atol=1e-5)
+    assert page.locator("[data-play]").is_hidden()
+    assert len(np.unique((pixels(page) * 255).astype(int), axis=0)) > 300
+    watched.shot("no-plan")
+    assert watched.errors == []
+    assert len(watched.requests) == 1
+    page.close()

@@ -22,7 +22,6 @@ from vdsm_pin.batch.task import (
     Task,
     failed_row,
     folder_names,
-    keeps_files,
     perform,
     write_manifest,
 )
@@ -36,6 +35,7 @@ from vdsm_pin.report.folder import check_kept, check_output_folder
 from vdsm_pin.report.html import write_index
 from vdsm_pin.report.junit import junit_text
 from vdsm_pin.report.tables import SummaryCsv, write_summary
+from vdsm_pin.workflow import NO_PLAN, REPORT
 
 SUMMARY: Final = "summary.csv"
 RUNNING: Final = "running.csv"
@@ -212,13 +212,21 @@ def _write_summaries(batch: Batch, rows: list[BatchRow]) -> None:
     write_columns(folder / COLUMNS, ordered)
     write_text(folder / JUNIT, junit_text(ordered))
     with atomic_path(folder / INDEX) as path:
-        write_index(
-            path, ordered, {r.folder for r in rows if keeps_files(batch.keep, r)}
-        )
+        write_index(path, ordered, _pages(batch, ordered))
     seconds = {row.folder: _seconds(folder / row.folder) for row in ordered}
     known = {name: value for name, value in seconds.items() if value is not None}
     script = f"window.vdsmTiming = {json.dumps(known, indent=1)};\n"
     write_text(folder / SECONDS, script)
+
+
+def _pages(batch: Batch, rows: list[BatchRow]) -> dict[str, str]:
+    """The page of each problem that kept one, by its folder."""
+    wanted = {row.folder: REPORT if row.waypoints else NO_PLAN for row in rows}
+    return {
+        name: page
+        for name, page in wanted.items()
+        if (batch.folder / name / page).is_file()
+    }
 
 
 def _seconds(folder: Path) -> float | None:

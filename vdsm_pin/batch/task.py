@@ -26,6 +26,7 @@ from vdsm_pin.text import printable
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.workflow import (
     JUDGED,
+    NO_PLAN,
     PLANNED,
     TRAJECTORY,
     VerifyOrder,
@@ -123,12 +124,21 @@ def perform(task: Task) -> Done:
         row = failed_row(task, "error", str(error))
     except Exception as error:  # noqa: BLE001  a batch outlives any one problem
         row = failed_row(task, "error", f"{type(error).__name__}: {error}")
-    if not row.waypoints or not keeps_files(task.keep, row):
+    if not keeps_files(task.keep, row):
         shutil.rmtree(task.aside, ignore_errors=True)
+    elif not row.waypoints:
+        _clear(task.aside)
     write_manifest(task, row, digest)
     timing = TimingFile(seconds=round(time.monotonic() - started, 3))
     (task.aside / TIMING).write_text(timing.text(), encoding="utf-8")
     return Done(row, kept=False)
+
+
+def _clear(folder: Path) -> None:
+    """Leave nothing but the page that tells why there is no plan."""
+    for path in folder.iterdir() if folder.is_dir() else ():
+        if path.name != NO_PLAN:
+            path.unlink()
 
 
 def _check_apart(task: Task, source: ProblemFile) -> None:
@@ -222,7 +232,9 @@ def _hash(problem: str) -> str:
 
 
 def _plan_and_verify(task: Task, source: ProblemFile, deadline: Deadline) -> BatchRow:
-    plan = plan_to_folder(source, task.strategy, task.aside, task.command, deadline)
+    plan = plan_to_folder(
+        source, task.strategy, task.aside, task.command, deadline, report=False
+    )
     order = VerifyOrder(
         source, task.aside / TRAJECTORY, task.aside, task.command, deadline=deadline
     )

@@ -9,8 +9,9 @@ import numpy as np
 from vdsm_pin.cables import cable_lengths
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import link_angles
-from vdsm_pin.report.facts import cables, changed_angles, min_clearance, straight_arm
+from vdsm_pin.report.facts import cables, changed_angles, min_clearance
 from vdsm_pin.report.palette import link_colours, obstacle_colours
+from vdsm_pin.report.postures import straight_arm
 from vdsm_pin.report.thinning import MOST_PLOTTED, Thinned, nearest_obstacles
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.records import Verification

@@ -436,11 +436,3 @@ def batch_row(folder: str, strategy: str, file: VerificationFile) -> BatchRow:
 def cables(problem: PlanningProblem, rows: Trajectory) -> FloatArray:
     """Cable lengths of every row, shape (n_samples, N, 3); [m]."""
     return cable_lengths(problem.manipulator, rows.alpha, rows.theta)
-
-
-def straight_arm(problem: PlanningProblem) -> Trajectory:
-    """The straight arm along its rail, as a motion of one row."""
-    low, high = problem.manipulator.base_range
-    base, zero = np.array([min(max(low, 0.0), high)]), np.zeros(1)
-    angles = np.zeros((1, problem.manipulator.n_links))
-    return Trajectory(zero.astype(bool), zero, base, angles, angles)

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections import Counter
-from collections.abc import Container, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,17 +13,20 @@ from jinja2.bccache import Bucket
 from markupsafe import Markup
 
 from vdsm_pin import __version__, kept
-from vdsm_pin.errors import VerificationFailed
+from vdsm_pin.errors import NoPlanFound, OutOfTime, VdsmError, VerificationFailed
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.facts import failing, left_out_words, nearest_to_obstacle
 from vdsm_pin.report.files import BatchRow, PlanFile, Point, VerificationFile
+from vdsm_pin.report.impasse import impasse_of
 from vdsm_pin.report.inputs import assumption
-from vdsm_pin.report.page_data import report_data, view_data
+from vdsm_pin.report.page_data import impasse_data, report_data, view_data
+from vdsm_pin.report.run_record import PlanRun, machine, versions
 from vdsm_pin.report.thinning import MOST_DRAWN
 from vdsm_pin.report.words import (
     BASE_ERROR,
     MISSING,
     OUTCOMES,
+    TIME_LIMIT,
     check_title,
     depth,
     limit,
@@ -180,23 +183,52 @@ def view_page(problem: PlanningProblem, trajectory: Trajectory, live: str = "") 
     )
 
 
+def write_no_plan(
+    path: Path, problem: PlanningProblem, error: VdsmError, run: PlanRun
+) -> None:
+    """The page of a search that ended without a plan: why, how far it came, the arm.
+
+    Args:
+        path: The page.
+        problem: What was asked.
+        error: What ended the search.
+        run: How it was asked for.
+    """
+    place = impasse_of(problem, error)
+    page = rendered(
+        "no_plan.html.j2",
+        problem=problem,
+        place=place,
+        outcome_word=TIME_LIMIT if isinstance(error, OutOfTime) else "infeasible",
+        message=str(error),
+        searched=isinstance(error, NoPlanFound | OutOfTime),
+        run=run,
+        versions=versions(),
+        machine=machine(),
+        data=impasse_data(problem, place),
+        most_drawn=MOST_DRAWN,
+    )
+    path.write_text(page, encoding="utf-8")
+
+
 def message_page(message: str, live: str) -> str:
     """A page that says what is wrong, until the files are right again."""
     return rendered("message.html.j2", message=message, live=live)
 
 
 def write_index(
-    path: Path, rows: Sequence[BatchRow], with_files: Container[str] | None = None
+    path: Path, rows: Sequence[BatchRow], pages: Mapping[str, str] | None = None
 ) -> None:
     """index.html of a batch; durations stand in timing.js beside it.
 
     Args:
         path: The page.
         rows: One per problem.
-        with_files: The folders whose reports and pictures were kept; None for all.
+        pages: The page of each problem that has one, by its folder; None for the
+            report of each that was verified.
     """
-    if with_files is None:
-        with_files = {row.folder for row in rows}
+    if pages is None:
+        pages = {row.folder: "report.html" for row in rows if row.waypoints}
     counts = {word: sum(row.outcome == word for row in rows) for word in OUTCOMES}
     passed = sum(count for word, count in counts.items() if outcome(word).passed)
     names = Counter(row.problem for row in rows)
@@ -206,6 +238,6 @@ def write_index(
         repeated={name for name, times in names.items() if times > 1},
         counts=counts,
         passed=passed,
-        with_files=with_files,
+        pages=pages,
     )
     path.write_text(page, encoding="utf-8")

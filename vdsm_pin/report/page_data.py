@@ -11,6 +11,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.charts import charts, packed
 from vdsm_pin.report.facts import failing, finite
+from vdsm_pin.report.impasse import Impasse
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import detail, surface
 from vdsm_pin.report.thinning import (
@@ -144,6 +145,35 @@ def view_data(problem: PlanningProblem, trajectory: Trajectory) -> str:
             "scene": scene_data(problem, problem.scene.obstacles[:MOST_DRAWN]),
             "motion": motion_data(problem, trajectory, shown),
             "closest": [],
+            "marks": [],
+            "charts": [],
+        }
+    )
+
+
+def impasse_data(problem: PlanningProblem, place: Impasse) -> str:
+    """The data of a page about a search without a plan: the arm where it ended."""
+    scene = problem.scene.obstacles
+    # The obstacle in the way is shown, however many there are.
+    first = sorted(range(len(scene)), key=lambda k: scene[k].name != place.obstacle)
+    drawn = [scene[k] for k in sorted(first[:MOST_DRAWN])]
+    pins = [] if place.tip is None else [place.tip.tolist()]
+    pins += [list(place.narrowest)] if place.narrowest else []
+    near = {
+        "moment": 0.0,
+        "link": place.link,
+        "otherLink": 0,
+        "obstacle": place.obstacle,
+        "short": True,
+        "linkPoint": None,
+        "otherPoint": None,
+    }
+    shown = thinned(place.arm, np.zeros(0, dtype=np.int64))
+    return _embedded(
+        {
+            "scene": scene_data(problem, drawn) | {"pins": pins},
+            "motion": motion_data(problem, place.arm, shown),
+            "closest": [near],
             "marks": [],
             "charts": [],
         }

@@ -37,6 +37,19 @@ class RunRecord:
             object.__setattr__(self, name, printable(getattr(self, name)))
 
 
+@dataclass(frozen=True)
+class PlanRun:
+    """How a plan was asked for, for a page about a search without one.
+
+    Args:
+        strategy: Name of the strategy.
+        record: The run.
+    """
+
+    strategy: str
+    record: RunRecord
+
+
 @cache
 def versions() -> dict[str, str]:
     """Versions of everything a number in the report may depend on."""

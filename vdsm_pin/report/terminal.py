@@ -46,7 +46,7 @@ def show_plan(file: PlanFile, folder: Path) -> None:
         ("base travel", " to ".join(ends)),
         *(("not drawn", stretch) for stretch in file.undrawn),
         *(("note", note) for note in file.notes),
-        ("files in", str(folder)),
+        ("report", str(folder / "report.html")),
     )
 
 

@@ -15,7 +15,7 @@ from vdsm_pin.planner.fewest.levels import Effort, Insert
 from vdsm_pin.planner.fewest.nearby import nearby
 from vdsm_pin.planner.fewest.roadmap import Taste
 from vdsm_pin.planner.fewest.strategy import plan_fewest
-from vdsm_pin.planner.fewest.stuck import Stuck, told
+from vdsm_pin.planner.fewest.stuck import Stuck, where_stuck
 from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.progress import shown
 from vdsm_pin.scene import Box, Obstacle
@@ -57,7 +57,7 @@ def straight(task: PlanningProblem, x: float) -> FloatArray:
 def test_the_passage_the_stop_and_the_advice_are_named() -> None:
     task = behind(HALF)
     way = np.column_stack([np.linspace(0.0, 1.4, 141), *np.zeros((2, 141))])
-    words = told(task, Stuck(way, 51, straight(task, 0.5)))
+    words = where_stuck(task, Stuck(way, 51, straight(task, 0.5)), "", 0.0).words
     # The tip's point is 80 mm from the frame at any place within the wall.
     assert "160.000 mm wide, for a body of 123.000 mm with 3.500 mm" in words
     assert "narrowest at (580.0, 0.0, 0.0) mm" in words
@@ -75,11 +75,12 @@ def test_limits_that_are_met_are_named_first() -> None:
     way[1, 0] = 1.4
     turn = np.array([np.cos(arm.max_link_angle), np.sin(arm.max_link_angle), 0.0])
     centres[8] = centres[7] + arm.link_lengths[7] * turn
-    words = told(task, Stuck(way, 2, centres))
+    words = where_stuck(task, Stuck(way, 2, centres), "", 0.0).words
     assert "joint 8 is at its own" in words
     assert "all the way in" in words
     short = replace(arm, base_range=(float(centres[0, 0]), 1.0))
-    words = told(replace(task, manipulator=short), Stuck(way, 2, centres))
+    task = replace(task, manipulator=short)
+    words = where_stuck(task, Stuck(way, 2, centres), "", 0.0).words
     assert "try a longer rail" in words
 
 

@@ -12,6 +12,7 @@ from vdsm_pin.errors import (
     OutOfReach,
     OutOfTime,
     PathBlocked,
+    Reached,
 )
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.feasibility import curled_reach, rail_distance
@@ -24,7 +25,7 @@ from vdsm_pin.planner.fewest.motion import Intervals, Knots
 from vdsm_pin.planner.fewest.passage import narrowest
 from vdsm_pin.planner.fewest.poses import bends_of
 from vdsm_pin.planner.fewest.route import PathRows
-from vdsm_pin.planner.fewest.stuck import told
+from vdsm_pin.planner.fewest.stuck import where_stuck
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.time_limit import deadline_of
 from vdsm_pin.planner.upper_clearance import culprit, upper_clearance
@@ -66,7 +67,8 @@ def refuse(problem: PlanningProblem, outcome: Outcome) -> None:
     allowed = TOLERANCES.coverage * problem.path.length
     whole = problem.path.blocked is Blocked.FAIL
     if outcome.found is None or (whole and missing > allowed):
-        raise NoPlanFound(how_far(problem, outcome))
+        reached = how_far(problem, outcome)
+        raise NoPlanFound(str(reached), reached)
 
 
 def _drawn(problem: PlanningProblem, outcome: Outcome) -> float:
@@ -103,6 +105,7 @@ def _proved(
     _, name, room = culprit(problem, np.stack([tip, tip]))
     return PathBlocked(
         obstacle=name,
+        station=float(rows.stations[first]),
         reason=(
             f"at {in_mm(rows.stations[first])} along the path the tip itself would "
             f"have at most {in_mm(room)} to it, required are "
@@ -165,12 +168,13 @@ def say_drawn(problem: PlanningProblem, outcome: Outcome) -> None:
     )  # fmt: skip
 
 
-def how_far(problem: PlanningProblem, outcome: Outcome) -> str:
-    """Where the search came to an end, in words; not a proof."""
+def how_far(problem: PlanningProblem, outcome: Outcome) -> Reached:
+    """Where the search came to an end; not a proof."""
     drawn = _drawn(problem, outcome)
     route = None if outcome.found is None else outcome.found.route
     if outcome.found is not None and drawn >= problem.path.length:
-        return "a motion that draws the whole path was found, but not finished"
+        whole = "a motion that draws the whole path was found, but not finished"
+        return Reached(whole, problem.path.length)
     station, tip = 0.0, outcome.rows.tips[0]
     if outcome.found is not None and route is not None:
         skipped = [k for k in outcome.found.skipped if not route.closed[k]]
@@ -183,17 +187,16 @@ def how_far(problem: PlanningProblem, outcome: Outcome) -> str:
         f"{problem.in_file(tip)}"
     )
     if outcome.stuck is not None:
-        return f"{words}; {told(problem, outcome.stuck)}"
+        return where_stuck(problem, outcome.stuck, words, station)
     zero = np.zeros((1, problem.manipulator.n_links + 1, 2))
     straight = Intervals(tip[None], tip[None], zero, zero)
     place = np.zeros(1, dtype=np.int64)
     centres = straight.centres(problem.manipulator, place, np.zeros(1))[0]
-    if problem.scene.obstacles and np.isfinite(centres).all():
-        link, name, room = culprit(problem, centres)
-        words += (
-            f"; link {link} of the straight arm there has {in_mm(room)} to {name!r}"
-        )
-    return words
+    if not problem.scene.obstacles or not np.isfinite(centres).all():
+        return Reached(words, station)
+    link, name, room = culprit(problem, centres)
+    words += f"; link {link} of the straight arm there has {in_mm(room)} to {name!r}"
+    return Reached(words, station, link, name)
 
 
 def notes_of(

@@ -5,6 +5,7 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.errors import Reached
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.fewest.poses import bends_of
 from vdsm_pin.planner.upper_clearance import culprit, upper_clearance
@@ -36,14 +37,27 @@ class Stuck:
     centres: FloatArray
 
 
-def told(problem: PlanningProblem, stuck: Stuck) -> str:
-    """It in words: the narrowest passage, how far the arm came, what to try."""
-    parts = []
+def where_stuck(
+    problem: PlanningProblem, stuck: Stuck, words: str, station: float
+) -> Reached:
+    """The narrowest passage, how far the arm came, what to try.
+
+    Args:
+        problem: Arm and scene.
+        stuck: The insertion that came farthest.
+        words: What is known besides, told first.
+        station: Where along the path the first stretch begins that is not drawn; [m].
+    """
+    parts, link, obstacle = [words], 0, ""
+    narrowest: list[float] = []
     if problem.scene.obstacles:
         parts.append(_passage(problem, stuck))
+        link, obstacle, _ = culprit(problem, stuck.centres)
+        narrowest = stuck.way[_opening(problem, stuck)[0]].tolist()
     parts.append(_stop(problem, stuck))
     parts.append(f"try {' or '.join(_advice(problem, stuck))}")
-    return "; ".join(parts)
+    centres = stuck.centres.tolist()
+    return Reached("; ".join(parts), station, link, obstacle, centres, narrowest)
 
 
 def _opening(problem: PlanningProblem, stuck: Stuck) -> tuple[int, float]:

@@ -6,6 +6,7 @@ function bindControls(motion, clearances) {
   const button = document.querySelector("[data-play]");
   const speed = document.querySelector("[data-speed]");
   slider.max = motion.end;
+  slider.closest(".controls").classList.toggle("still", !motion.end);
   slider.addEventListener("input", () => {
     motion.play(false);
     motion.go(Number(slider.value));

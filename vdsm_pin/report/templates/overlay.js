@@ -44,7 +44,7 @@ class Overlay {
     this.triad();
     this.bar();
     if (this.numbers) this.linkNumbers();
-    if (this.view.due) this.dimension(this.view.shown);
+    if (this.view.due && measured(this.view.shown)) this.dimension(this.view.shown);
   }
 
   // Where a point of the base frame is seen, in pixels; null behind the camera.

@@ -59,6 +59,7 @@
   if (worst) worst.click();
   const first = document.querySelector("[data-first]");
   if (first) first.click();
+  if (view && !worst && data.closest.length) view.showWitness(data.closest[0]);
   started = true;
   window.vdsm = { motion, view, plots, data };
 })();

@@ -32,6 +32,7 @@ class ArmView {
     this.root.add(this.arm.group);
     this.addObstacles();
     this.addFloor();
+    for (const pin of scene.pins || []) this.addPin(pin);
     this.addLights();
     this.cameras = new Cameras(this);
     this.overlay = new Overlay(this);
@@ -141,6 +142,16 @@ class ArmView {
     this.root.add(this.line(rail, 0x8b93a1, 0.8));
   }
 
+  // A ring around a place of the desired path.
+  addPin(place) {
+    const { Mesh, TorusGeometry, MeshBasicMaterial } = this.three;
+    const ring = new TorusGeometry(1.8 * this.scene.radius, 0.16 * this.scene.radius, 12, 48);
+    const pin = new Mesh(ring, new MeshBasicMaterial({ color: MARKED.short }));
+    pin.rotateY(Math.PI / 2);
+    pin.position.set(...place);
+    this.root.add(pin);
+  }
+
   // Meshcat turns its scene so that z points up in a world whose y points up. Cameras
   // stay outside of the scene, in that world.
   addLights() {
@@ -175,7 +186,7 @@ class ArmView {
 
   // Show a closest approach while the arm is there.
   showWitness(approach) {
-    this.shown = approach && approach.linkPoint && approach.otherPoint ? approach : null;
+    this.shown = approach || null;
     this.mark(this.motion.time);
     this.viewer.set_dirty();
   }
@@ -193,7 +204,7 @@ class ArmView {
 
   // Fly to the gap that is shown.
   flyToWitness() {
-    if (!this.shown) return;
+    if (!this.shown || !measured(this.shown)) return;
     const { Vector3 } = this.three;
     const [a, b] = [this.shown.linkPoint, this.shown.otherPoint].map((p) =>
       this.root.localToWorld(new Vector3(...p)));
@@ -221,6 +232,11 @@ class ArmView {
       pen.drawImage(layer, 0, 0, sheet.width, sheet.height);
     return sheet.toDataURL("image/png");
   }
+}
+
+// Whether both ends of a gap are known.
+function measured({ linkPoint, otherPoint }) {
+  return Boolean(linkPoint && otherPoint);
 }
 
 // Make the view, or say plainly that there is none.

@@ -1,0 +1,38 @@
+"""Single postures of an arm, as motions of one row."""
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.kinematics import straight_joints
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.trajectory import Trajectory
+
+
+def one_row(joints: FloatArray) -> Trajectory:
+    """The motion that stays at q = (x0, alpha1, theta1, ..), shape (1 + 2N,)."""
+    angles, zero = joints[1:].reshape(1, -1, 2), np.zeros(1)
+    return Trajectory(
+        zero.astype(bool), zero, joints[:1], angles[:, :, 0], angles[:, :, 1]
+    )
+
+
+def straight_arm(problem: PlanningProblem) -> Trajectory:
+    """The straight arm along its rail."""
+    low, high = problem.manipulator.base_range
+    joints = np.zeros(1 + 2 * problem.manipulator.n_links)
+    joints[0] = min(max(low, 0.0), high)
+    return one_row(joints)
+
+
+def at_start(problem: PlanningProblem) -> Trajectory:
+    """The arm where it begins.
+
+    A start known by its tip is the straight arm's; where any start will do the arm is
+    straight along its rail.
+    """
+    begin = problem.begin
+    if begin is None:
+        return straight_arm(problem)
+    if begin.joints is None:
+        return one_row(straight_joints(problem.manipulator, begin.tip))
+    return one_row(begin.joints)
