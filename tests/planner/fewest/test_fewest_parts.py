@@ -228,7 +228,7 @@ def test_an_interval_is_clear_exactly_where_dense_samples_are(seed: int) -> None
     task = problem(PILLAR, Sphere("ball", np.array([2.0, -0.2, 0.3]), 0.15))
     chain, clearance, finest = wandering(task, seed, 400), link_clearance(task), 2e-3
     mixed = np.random.default_rng(seed).permutation(399)
-    alone = Intervals(*(getattr(chain, f.name)[mixed] for f in fields(chain)))
+    alone = Intervals(*(getattr(chain, f.name)[mixed] for f in fields(chain)[:4]))
     judge = Judge(task, clearance, 0.0, 0.0, finest)
     for intervals in (chain, alone):
         clear, begin = judge.measured(intervals)
@@ -364,3 +364,23 @@ def test_rows_of_the_path_hold_every_corner_and_keep_the_spacing(
         assert np.linalg.norm(rows.tips - corner, axis=1).min() < 1e-12
     for a, b in itertools.pairwise(rows.stations):
         assert b > a
+
+
+@pytest.mark.parametrize("start", [(3.126, 0.0, 0.0), (3.126, 0.7, 1.0)])
+def test_a_closed_path_may_be_begun_at_any_of_its_rows(
+    start: tuple[float, float, float],
+) -> None:
+    path = problem(start=start).path
+    rows = path_rows(path)
+    for first in range(0, len(rows.tips) - 1, 17):
+        other = rows.begun_at(first, path.length)
+        np.testing.assert_array_equal(other.tips[[0, -1]], rows.tips[[first, first]])
+        assert 0.0 <= other.stations[0] < path.length
+        span = other.stations[-1] - other.stations[0]
+        assert span == pytest.approx(path.length, abs=1e-12)
+        assert (np.diff(other.stations) > 0.0).all()
+        np.testing.assert_allclose(
+            path.at(np.mod(other.stations, path.length)), other.tips, atol=1e-12
+        )
+        assert other.corner[[0, -1]].all()
+        assert other.corner.sum() - rows.corner.sum() in (0, 1)

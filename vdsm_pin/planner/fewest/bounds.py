@@ -8,7 +8,7 @@ sway that is bounded (`sway.py`): N postures for each tip, and where none of the
 near being clear a second angle must change.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -38,6 +38,10 @@ class TipProof:
     buried: BoolArray
     cut_off: BoolArray
     hemmed_in: BoolArray
+
+    def take(self, rows: IntArray) -> "TipProof":
+        """What is known of some of the tips, shape (k,)."""
+        return TipProof(*(getattr(self, one.name)[rows] for one in fields(self)))
 
     @property
     def closed(self) -> BoolArray:

@@ -3,6 +3,7 @@
 Everything is counted, nothing is timed: the same problem gives the same plan.
 """
 
+import itertools
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -26,7 +27,7 @@ from vdsm_pin.planner.fewest.roadmap import (
     build_roadmap,
     link_limit,
 )
-from vdsm_pin.planner.fewest.route import PathRows, path_rows, tip_route
+from vdsm_pin.planner.fewest.route import PathRows, path_rows, rolled, tip_route
 from vdsm_pin.planner.fewest.search import (
     Found,
     Searched,
@@ -41,6 +42,9 @@ from vdsm_pin.planner.fewest.ways_in import tip_space, ways_in
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
+
+SPREAD: Final = 0.381966
+"""Part of a closed path by which places to enter it are apart (golden section); [-]."""
 
 LOG: Final = logging.getLogger(__name__)
 
@@ -113,7 +117,8 @@ def explore(
     judge = Judge(
         problem, clearance, margin, first.slack * length, first.finest * length
     )
-    best = Outcome(judge, None, rows, prove_tips(problem, clearance, rows.tips))
+    proof = prove_tips(problem, clearance, rows.tips)
+    best = Outcome(judge, None, rows, proof)
     yield best
     if best.proof.closed.all():
         return
@@ -135,23 +140,21 @@ def explore(
             problem, clearance, margin, level.slack * length, level.finest * length,
             ease, clearance.up_to(worth), kept,
         )  # fmt: skip
-        found: Found | None = None
+        now = Outcome(judge, None, rows, proof, inserted)
         try:
             if isinstance(level, Insert):
                 key = judge.required, level.step, level.cells
                 if key not in spaces:
                     spaces[key] = tip_space(judge, clearance, level)
-                now_in = ways_in(
-                    judge, spaces[key], rows, best.proof.closed, level, soon
-                )
-                found, inserted = now_in.found, now_in.stuck or inserted
+                now = _inserted(now, spaces[key], level, soon)
+                inserted = now.stuck
             else:
-                found = _look(judge, level, rows, best.proof, taste)
+                found = _look(judge, level, rows, proof, taste)
                 unreached |= level.ease == 1.0 and _unreached(found)
+                now = Outcome(judge, found, rows, proof, inserted)
         except NoWayOut as error:
             stuck = error
             unreached |= level.ease == 1.0
-        now = Outcome(judge, found, rows, best.proof, inserted)
         LOG.debug("%s: %.4f m missing", level, now.missing)
         if now.missing < best.missing:
             best = now
@@ -164,10 +167,54 @@ def explore(
             for proof in _proofs(problem, clearance, best):
                 best = replace(best, proof=proof)
                 yield best
+            proof = best.proof
             if best.proof.closed.all():
                 return
     if best.found is None and inserted is None and stuck is not None:
         raise stuck
+
+
+def _inserted(
+    before: Outcome, space: TipSpace, level: Insert, soon: Deadline
+) -> Outcome:
+    """What an insertion comes to; into a closed path from another place too.
+
+    Where it is entered farther on and drawn to its end, that place is the one to begin
+    at. Where it is not entered at all, one far from the first is tried.
+
+    Args:
+        before: Judge, rows and what is proved of them.
+        space: Has the ways of the tip.
+        level: How thoroughly to look.
+        soon: From when on what is not drawn yet is skipped.
+    """
+    path = before.judge.problem.path
+    best = _once_inserted(before, space, level, soon)
+    count = len(before.rows.tips) - 1
+    if not path.closed or count < 2 or not best.missing > 0.0:
+        return best
+    first = 0
+    if best.found is None:
+        first = int(count * (SPREAD * (1 + level.seed) % 1.0))
+    elif best.found.skipped[0] == 1:
+        left = next(k for k in itertools.count(1) if k not in best.found.skipped) - 1
+        station = best.found.route.stations[left]
+        first = int(np.searchsorted(before.rows.stations, station)) % count
+    if first == 0 or (best.found is not None and soon.passed):
+        return best
+    rows = before.rows.begun_at(first, path.length)
+    proof = before.proof.take(rolled(count + 1, first))
+    again = replace(before, rows=rows, proof=proof, stuck=best.stuck)
+    other = _once_inserted(again, space, level, soon)
+    return other if other.missing < best.missing else best
+
+
+def _once_inserted(
+    before: Outcome, space: TipSpace, level: Insert, soon: Deadline
+) -> Outcome:
+    closed = before.proof.closed
+    now = ways_in(before.judge, space, before.rows, closed, level, soon)
+    return replace(before, found=now.found, stuck=now.stuck or before.stuck)
 
 
 def _proofs(

@@ -25,6 +25,17 @@ class PathRows:
     tips: FloatArray
     corner: BoolArray
 
+    def begun_at(self, first: int, length: float) -> "PathRows":
+        """A closed path of this length [m] begun at another of its rows."""
+        order = rolled(len(self.stations), first)
+        stations = self.stations[order]
+        stations[len(stations) - 1 - first :] += length
+        if stations[0] >= length:
+            stations -= length
+        corner = self.corner[order]
+        corner[[0, -1]] = True
+        return PathRows(stations, self.tips[order], corner)
+
 
 @dataclass(frozen=True)
 class TipRoute:
@@ -48,6 +59,16 @@ class TipRoute:
     first: IntArray
     links: IntArray
     gaps: FloatArray
+
+
+def rolled(count: int, first: int) -> IntArray:
+    """Rows of a closed path in their order from another one on, shape (count,).
+
+    The last row is where the first one is: it is left out, and the new first one comes
+    again at the end.
+    """
+    once = (first + np.arange(count - 1)) % (count - 1)
+    return np.append(once, first)
 
 
 def path_rows(path: DesiredPath) -> PathRows:
