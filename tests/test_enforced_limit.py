@@ -1,0 +1,92 @@
+"""What does not ask the clock is interrupted a little after the time limit."""
+
+import signal
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import vdsm_pin.io.problem_file as problem_file
+from vdsm_pin.cli import app
+from vdsm_pin.errors import OutOfTime
+from vdsm_pin.time_limit import GRACE, NO_LIMIT, Deadline, enforced
+
+OVER = Deadline(2.0, 0.0)
+"""A limit of two seconds that was over when the machine started."""
+
+
+def for_ever(*_: object) -> None:
+    while True:
+        pass
+
+
+def test_a_loop_that_never_asks_is_interrupted_and_nothing_is_left_behind() -> None:
+    before = signal.getsignal(signal.SIGALRM)
+    with pytest.raises(OutOfTime, match="the time limit of 2 s came first"):
+        with enforced(OVER):
+            for_ever()
+    assert signal.getsignal(signal.SIGALRM) is before
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
+def test_who_takes_it_for_a_failure_is_interrupted_again() -> None:
+    heard = []
+    soon = Deadline(2.0, time.monotonic() - GRACE + 0.5)
+    with pytest.raises(OutOfTime):
+        with enforced(soon):
+            try:
+                for_ever()
+            except OutOfTime as error:
+                heard.append(error)
+            for_ever()
+    assert len(heard) == 1
+
+
+def test_work_that_ends_in_time_is_left_alone() -> None:
+    before = signal.getsignal(signal.SIGALRM)
+    with enforced(Deadline.after(1e6)):
+        left, again = signal.getitimer(signal.ITIMER_REAL)
+        assert 1e6 - 60.0 < left <= 1e6 + GRACE
+        assert again > 0.0
+    assert signal.getsignal(signal.SIGALRM) is before
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
+def test_without_a_limit_there_is_no_alarm() -> None:
+    with enforced(NO_LIMIT):
+        assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
+def test_threads_are_left_to_ask() -> None:
+    said = []
+
+    def run() -> None:
+        with enforced(OVER):
+            said.append(signal.getitimer(signal.ITIMER_REAL))
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join()
+    assert said == [(0.0, 0.0)]
+
+
+def test_work_that_heard_has_its_grace() -> None:
+    ended = Deadline(1.0, time.monotonic() - 0.5 * GRACE)
+    with enforced(ended):
+        assert ended.passed
+        assert 0.0 < signal.getitimer(signal.ITIMER_REAL)[0] <= 0.5 * GRACE
+
+
+@pytest.mark.parametrize("command", ["plan", "verify"])
+def test_a_command_that_hangs_in_reading_ends_with_one_word(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(problem_file, "read_problem", for_ever)
+    words = [command, "paper/obs1", "--out", str(tmp_path / "out")]
+    rows = [] if command == "plan" else ["--trajectory", str(tmp_path / "none.csv")]
+    found = CliRunner().invoke(app, [*words, *rows, "--time-limit", "0.1"])
+    assert isinstance(found.exception, OutOfTime)
+    assert "the time limit of 0.1 s came first" in str(found.exception)
+    assert not (tmp_path / "out").exists()
