@@ -165,6 +165,7 @@ def verify(
     and cables.csv.
     """
     from vdsm_pin.io.problem_file import read_problem
+    from vdsm_pin.report.run_record import now
     from vdsm_pin.report.terminal import show_verification
     from vdsm_pin.report.words import outcome
     from vdsm_pin.workflow import VerifyOrder, error_box, verify_to_folder
@@ -182,6 +183,7 @@ def verify(
             pdf=pdf,
             deadline=deadline,
             all_pairs=all_pairs,
+            date=now(),
         )
         verified = verify_to_folder(order)
     file = verified.file

@@ -195,11 +195,13 @@ class ProblemSource:
         sha256: Of its bytes followed by those of the files it names.
         named: The files it names: the arm's URDF, then meshes in the order of the
             obstacles.
+        of_obstacles: Names of the obstacles that have a file of their own, with it.
     """
 
     path: Path
     sha256: str
     named: tuple[Path, ...] = ()
+    of_obstacles: tuple[tuple[str, Path], ...] = ()
 
     @property
     def files(self) -> tuple[Path, ...]:

@@ -23,7 +23,7 @@ from vdsm_pin.report.folder import (
     staged,
 )
 from vdsm_pin.report.pdf import find_browser, print_page
-from vdsm_pin.report.run_record import PlanRun, RunRecord
+from vdsm_pin.report.run_record import PlanRun, RunRecord, now
 from vdsm_pin.report.tables import (
     ClearanceCsv,
     write_cables,
@@ -69,6 +69,7 @@ class VerifyOrder:
         certificate: Where the certificate of a certified motion goes; None for none.
         pdf: Where the report on paper goes; None for none.
         deadline: When to give up what is left; it is then undecided.
+        date: When, for the report; None where files shall not tell.
         all_pairs: Whether clearance.csv has every pair at every interval, not the near
             ones and the least of each alone.
     """
@@ -82,6 +83,7 @@ class VerifyOrder:
     pdf: Path | None = None
     deadline: Deadline = NO_LIMIT
     all_pairs: bool = False
+    date: str | None = None
 
 
 @dataclass(frozen=True)
@@ -147,6 +149,7 @@ def plan_to_folder(
         problem_file=str(source.path),
         problem_sha256=source.sha256,
         urdf_sha256=robot.urdf_sha256,
+        date=now() if report else None,
     )
     try:
         refinement = plan_and_verify(source.problem, strategy, robot, deadline=deadline)
@@ -283,4 +286,5 @@ def _record(order: VerifyOrder, robot: RobotModel) -> RunRecord:
         problem_sha256=order.source.sha256,
         trajectory_sha256=sha256_of_file(order.trajectory),
         urdf_sha256=robot.urdf_sha256,
+        date=order.date,
     )

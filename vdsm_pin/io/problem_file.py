@@ -72,7 +72,9 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
         model, document, name=stem, folder=path.parent, digest=digest
     )
     named = tuple(path.parent / name for name in _files_named(model))
-    source = ProblemSource(path, digest.hexdigest(), named)
+    source = ProblemSource(
+        path, digest.hexdigest(), named, _files_of_obstacles(model, path.parent)
+    )
     return ProblemFile(problem.read_from(source), source)
 
 
@@ -83,6 +85,13 @@ def _files_named(model: ProblemModel) -> list[str]:
     meshes = [one.file for one in model.obstacles if isinstance(one, MeshModel)]
     parts = path.points if path else []
     return [*urdf, *meshes, *(p.file for p in parts if isinstance(p, FilePart))]
+
+
+def _files_of_obstacles(
+    model: ProblemModel, folder: Path
+) -> tuple[tuple[str, Path], ...]:
+    files = ((one.name, getattr(one, "file", "")) for one in model.obstacles)
+    return tuple((name, folder / file) for name, file in files if file)
 
 
 def find_problem(name_or_path: str | Path) -> Path:

@@ -332,6 +332,7 @@ def verification_file(
     path = problem.tip_path
     return VerificationFile(
         problem=problem.name,
+        date=record.date,
         verdict=verification.verdict.value,
         reason=reason(verification),
         assumed_sizes=assumed_sizes(problem),

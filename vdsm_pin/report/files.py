@@ -202,6 +202,11 @@ class VerificationFile(FileModel):
         default=1, description="version of this format"
     )
     problem: str = Field(description=_PROBLEM)
+    date: str | None = Field(
+        default=None,
+        description="when it was verified, in UTC; null in a batch, whose files are "
+        "the same from run to run",
+    )
     verdict: VerdictWord
     reason: str = Field(description="the verdict in one sentence")
     assumed_sizes: tuple[str, ...] = Field(description=_ASSUMED)

@@ -21,6 +21,7 @@ from vdsm_pin.report.impasse import impasse_of
 from vdsm_pin.report.inputs import assumption
 from vdsm_pin.report.page_data import impasse_data, report_data, view_data
 from vdsm_pin.report.run_record import PlanRun, machine, versions
+from vdsm_pin.report.scene_rows import scene_rows
 from vdsm_pin.report.thinning import MOST_DRAWN
 from vdsm_pin.report.words import (
     BASE_ERROR,
@@ -162,6 +163,8 @@ def write_report(
         most_drawn=MOST_DRAWN,
         charts=data.charts,
         complete=data.complete,
+        obstacles=scene_rows(verification.problem),
+        drawn=data.triangles,
         worst=nearest_to_obstacle(verification),
         failing=failing(verification),
         left_out=left_out_words(file.left_out),

@@ -41,6 +41,7 @@ def scene_data(
                 "triangles": packed(skin.triangles, "<u4"),
                 "round": skin.round,
                 "creased": skin.creased,
+                "count": len(skin.triangles),
             }
         )
     return {
@@ -104,11 +105,13 @@ class PageData:
         text: Everything its scripts read, as JSON that is safe inside HTML.
         charts: Identifier, title and note of every plot.
         complete: Whether every row of the motion is shown.
+        triangles: How many are drawn of each obstacle drawn, by its name.
     """
 
     text: str
     charts: tuple[dict[str, Any], ...]
     complete: bool
+    triangles: dict[str, int]
 
 
 def report_data(verification: Verification) -> PageData:
@@ -120,9 +123,10 @@ def report_data(verification: Verification) -> PageData:
     plots = charts(verification, shown)
     obstacles = verification.problem.scene.obstacles
     drawn = [obstacles[k] for k in nearest_obstacles(verification, MOST_DRAWN)]
+    scene = scene_data(verification.problem, drawn)
     text = _embedded(
         {
-            "scene": scene_data(verification.problem, drawn),
+            "scene": scene,
             "motion": motion_data(verification.problem, verification.trajectory, shown),
             "closest": [
                 closest_data(verification.problem, row)
@@ -134,7 +138,8 @@ def report_data(verification: Verification) -> PageData:
             "charts": plots,
         }
     )
-    return PageData(text, tuple(plots), shown.complete)
+    triangles = {solid["name"]: solid["count"] for solid in scene["obstacles"]}
+    return PageData(text, tuple(plots), shown.complete, triangles)
 
 
 def view_data(problem: PlanningProblem, trajectory: Trajectory) -> str:

@@ -2,7 +2,9 @@
 
 import os
 import platform
+import time
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import cache
 from importlib import metadata
 from typing import Final
@@ -23,6 +25,7 @@ class RunRecord:
         problem_sha256: Of the problem file and the meshes it names.
         trajectory_sha256: Of the trajectory file; empty before there is one.
         urdf_sha256: Of the URDF the verification loaded.
+        date: When it was run; None where files shall be the same from run to run.
     """
 
     command: str
@@ -30,6 +33,7 @@ class RunRecord:
     problem_sha256: str
     trajectory_sha256: str = ""
     urdf_sha256: str = ""
+    date: str | None = None
 
     def __post_init__(self) -> None:
         """Spell what a file cannot hold: paths need not be text."""
@@ -48,6 +52,13 @@ class PlanRun:
 
     strategy: str
     record: RunRecord
+
+
+def now() -> str:
+    """The time in UTC to the second, or what SOURCE_DATE_EPOCH says instead."""
+    fixed = os.environ.get("SOURCE_DATE_EPOCH", "")
+    seconds = int(fixed) if fixed.isdecimal() else time.time()
+    return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
 
 
 @cache

@@ -1,0 +1,76 @@
+"""What the scene of a problem consists of, an obstacle a row."""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from vdsm_pin.io.source import BLOCK
+from vdsm_pin.problem import PlanningProblem, ProblemSource
+from vdsm_pin.scene import Mesh, Obstacle
+
+MOST_LISTED: Final = 200
+"""Obstacles that a page lists."""
+
+CHANGED: Final = "the file changed after it was read"
+
+
+@dataclass(frozen=True)
+class SceneRow:
+    """One obstacle.
+
+    Args:
+        name: As the problem file has it.
+        shape: Its kind, such as "half space".
+        file: The file of its own that it was read from; empty for none.
+        triangles: Of a mesh; None for other shapes.
+        inside: Whether it has one: "solid", "surface only", "not known".
+        sha256: Of its file, in hexadecimal, or why there is none; empty without a file.
+    """
+
+    name: str
+    shape: str
+    file: str
+    triangles: int | None
+    inside: str
+    sha256: str
+
+
+def scene_rows(problem: PlanningProblem) -> tuple[SceneRow, ...]:
+    """The first obstacles of a problem, `MOST_LISTED` at most."""
+    source = problem.source
+    listed = problem.scene.obstacles[:MOST_LISTED]
+    files = dict(source.of_obstacles) if source else {}
+    named = any(one.name in files for one in listed)
+    digests = _digests(source) if source and named else {}
+    return tuple(_row(one, files.get(one.name), digests) for one in listed)
+
+
+def _row(obstacle: Obstacle, file: Path | None, digests: dict[Path, str]) -> SceneRow:
+    kind = type(obstacle).__name__
+    shape = "".join(f" {c.lower()}" if c.isupper() else c for c in kind).strip()
+    triangles, inside = None, "solid"
+    if isinstance(obstacle, Mesh):
+        triangles = len(obstacle.triangles)
+        inside = "solid" if obstacle.has_inside else "not known"
+        inside = "surface only" if obstacle.is_surface else inside
+    digest = digests.get(file, CHANGED) if file else ""
+    return SceneRow(
+        obstacle.name, shape, file.name if file else "", triangles, inside, digest
+    )
+
+
+def _digests(source: ProblemSource) -> dict[Path, str]:
+    """The SHA-256 of each file that was read; none where one has changed since."""
+    whole, found = hashlib.sha256(), {}
+    try:
+        for path in source.files:
+            own = hashlib.sha256()
+            with path.open("rb") as file:
+                while part := file.read(BLOCK):
+                    own.update(part)
+                    whole.update(part)
+            found[path] = own.hexdigest()
+    except OSError:
+        return {}
+    return found if whole.hexdigest() == source.sha256 else {}
