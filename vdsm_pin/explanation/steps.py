@@ -192,7 +192,9 @@ def _bend_part(moment: Moment, rule: AcrossRail, title: str, source: str) -> Par
     arm, seen = moment.plan.problem.manipulator, list(view)
     made = pictures.canvas(moment, view, [rule.region])
     pictures.chain(made, arm, moment.centres[:, seen], "O")
-    move = moment.planar[rule.bend - 1] - moment.reference[rule.bend - 1]
+    first = rule.bends[0] - 1
+    move = moment.planar[first] - moment.reference[first]
+    joints = " and ".join(str(joint) for joint in rule.bends)
     rows = [
         (name("P", i + 1), at(moment.reference[i]), at(moment.planar[i]))
         for i in range(arm.n_links + 1)
@@ -202,7 +204,7 @@ def _bend_part(moment: Moment, rule: AcrossRail, title: str, source: str) -> Par
         title,
         source,
         (
-            f"The obstacle lies across the rail. Joint {rule.bend} moves by "
+            f"The obstacle lies across the rail. Joint {joints} moves by "
             f"{mm(float(move[rule.axis]))} mm in {letter}, as little as keeps the "
             "links out of the danger region; the joints before it follow in "
             "proportion to P₁, those after it in proportion to the tip.",

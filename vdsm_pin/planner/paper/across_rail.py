@@ -1,15 +1,17 @@
-"""One obstacle across the rail, prismatic along Z or Y (obs3): one bend.
+"""One obstacle across the rail, prismatic along Z or Y (obs3): one bend or two.
 
 Seen along the obstacle (from the top for Z, from the front for Y), the arm passes its
-section on one side. Where the straight arm would meet it, one joint b moves along the
-auxiliary line, the rest follow in proportion between O_1, O_b and the tip, so that the
-arm is two straight pieces (paper, 6.1: "adjusted in proportion between the first
-boundary and the second boundary"). The arm keeps its side all the way: to change it,
-it would have to withdraw.
+section on one side. Where the straight arm would meet it, one joint moves along the
+auxiliary line, or the two ends of one link, which so is laid past the obstacle; the
+rest follow in proportion between O_1, these joints and the tip (paper, 6.1: "adjusted
+in proportion between the first boundary and the second boundary"). Of all the choice
+with the smallest link angle is taken. The arm keeps its side all the way: to change
+it, it would have to withdraw.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -45,7 +47,7 @@ class AcrossRail:
             the side the arm must not pass.
         axis: 0 where w is y, 1 where w is z.
         side: The arm passes at larger w (1) or at smaller w (-1).
-        bend: Joint b that moves, 2..N.
+        bends: The joint that moves, 2..N, or the two at the ends of a link.
         margins: How far the region is grown for each link, shape (N,); [m].
     """
 
@@ -53,12 +55,12 @@ class AcrossRail:
     region: DangerRegion
     axis: int
     side: int
-    bend: int
+    bends: tuple[int, ...]
     margins: FloatArray
 
     def route(self, missing: float) -> Route:
         """Step 4: as without obstacles; the tip itself must stay clear."""
-        route = straight_route(self.problem.path)
+        route = replace(straight_route(self.problem.path), notes=(self._told,))
         points = route.tip_path.points[:, [0, 1 + self.axis]]
         inside = self.region.grown(self.margins[-1]).contains(points)
         if inside.any():
@@ -70,6 +72,16 @@ class AcrossRail:
             raise PathBlocked(obstacle=self.region.name, reason=reason)
         return route
 
+    @property
+    def _told(self) -> str:
+        name = self.region.name
+        if len(self.bends) == 1:
+            return f"joint {self.bends[0]} bends to pass {name!r}, the others follow"
+        return (
+            f"link {self.bends[0]} is laid past {name!r}: joints {self.bends[0]} and "
+            f"{self.bends[1]} bend, the others follow"
+        )
+
     def clearance(self, centres: FloatArray) -> float:
         """From the section and its lee, taken as endless, less the margins."""
         chains = np.ascontiguousarray(centres[..., [0, 1 + self.axis]])
@@ -78,14 +90,14 @@ class AcrossRail:
         return float(distance.min()) - reserve
 
     def joints(self, route: Route, reference: FloatArray) -> FloatArray:
-        """Step 5: the bend moves as little as clears the region."""
+        """Step 5: the bends move as little as clears the region."""
         return self.bent(reference, route.tip_path.points[:, 0])
 
     def bent(self, reference: FloatArray, tip_x: FloatArray) -> FloatArray:
         """Projected joints for reference joints and x of the tip, (n, N + 1, 2); [m].
 
         Raises:
-            PathBlocked: If the bend cannot lead the arm round the obstacle.
+            PathBlocked: If the bends cannot lead the arm round the obstacle.
         """
         planar = reference.copy()
         blocked = np.flatnonzero(~self.clear(reference, tip_x))
@@ -97,13 +109,13 @@ class AcrossRail:
         return self._moved(reference, self._least_move(reference, tip_x))
 
     def _least_move(self, reference: FloatArray, tip_x: FloatArray) -> FloatArray:
-        """Smallest move of the bend that clears the region, (n,); [m]."""
+        """Smallest move of the bends that clears the region, (n,); [m]."""
         moves = least_moves(
             self.region.corners,
             self._radii,
             self._pieces,
             self.axis,
-            reference[:, self.bend - 1],
+            self._knots(reference),
             reference[:, -1],
             tip_x,
             self.side * self._farthest(reference),
@@ -113,64 +125,70 @@ class AcrossRail:
         if np.isnan(moves).any():
             row = int(np.argmax(np.isnan(moves)))
             tip = np.array([tip_x[row], *reference[row, -1]])
+            joints = " and ".join(f"joint {joint}" for joint in self.bends)
             reason = (
-                f"joint {self.bend} cannot lead the arm round it within the limit of "
-                f"psi_1 with the tip at {self.problem.in_file(tip)}"
+                f"{joints} cannot lead the arm round it within the limit of psi_1 with "
+                f"the tip at {self.problem.in_file(tip)}"
             )
             raise PathBlocked(obstacle=self.region.name, reason=reason)
         return np.asarray(self.side * moves)
 
     def _farthest(self, reference: FloatArray) -> FloatArray:
-        """Largest move of the bend that leaves psi_1 within its cone, (n,); [m]."""
-        manipulator = self.problem.manipulator
-        at = reference[:, self.bend - 1]
+        """Largest move of the bends that leaves psi_1 within its cone, (n,); [m]."""
+        manipulator, first = self.problem.manipulator, self.bends[0] - 1
+        at = reference[:, first]
         cone = np.sin(manipulator.max_link_angle)
-        reach = manipulator.stations[self.bend - 1] * cone
+        reach = manipulator.stations[first] * cone
         along, across = at[:, self.axis], at[:, 1 - self.axis]
         room = np.sqrt(np.maximum(reach**2 - across**2, 0.0))
         return np.asarray(self.side * (self.side * room - along))
 
     def _moved(self, reference: FloatArray, move: FloatArray) -> FloatArray:
-        """Bend moved to its side, the others in proportion, as `reference`; [m]."""
-        stations, b = self.problem.manipulator.stations, self.bend - 1
-        part = np.concatenate(
-            [
-                stations[: b + 1] / stations[b],
-                (stations[-1] - stations[b + 1 :]) / (stations[-1] - stations[b]),
-            ]
-        )
+        """Bends moved to their side, the others in proportion, as `reference`; [m]."""
+        stations = self.problem.manipulator.stations
+        knots = stations[self._ends]
+        part = np.interp(stations, knots, [0.0, *[1.0] * len(self.bends), 0.0])
         planar = reference.copy()
         planar[..., self.axis] += self.side * move[:, None] * part
         return planar
 
     def clear(self, planar: FloatArray, tip_x: FloatArray) -> BoolArray:
-        """Whether the arm of one bend stays out of the region, (n,)."""
+        """Whether the arm of straight pieces stays out of the region, (n,)."""
         return clear_bends(
             self.region.corners,
             self._radii,
             self._pieces,
             self.axis,
-            planar[:, self.bend - 1],
+            self._knots(planar),
             planar[:, -1],
             tip_x,
         )
 
+    def _knots(self, planar: FloatArray) -> FloatArray:
+        """The joints that move, shape (n, len(bends), 2); [m]."""
+        return np.ascontiguousarray(planar[:, self._ends[1:-1]])
+
+    @property
+    def _ends(self) -> list[int]:
+        """Rows of the joints between which the arm is straight."""
+        bends = (bend - 1 for bend in self.bends)
+        return [0, *bends, self.problem.manipulator.n_links]
+
     @property
     def _pieces(self) -> FloatArray:
-        """Lengths of the two straight pieces, shape (2,); [m]."""
-        return np.diff(self.problem.manipulator.stations[[0, self.bend - 1, -1]])
+        """Lengths of the straight pieces, shape (k,); [m]."""
+        return np.diff(self.problem.manipulator.stations[self._ends])
 
     @property
     def _radii(self) -> FloatArray:
-        """Radius of the region for each of the two straight pieces, shape (2,); [m]."""
-        b = self.bend - 1
-        margins = self.margins[:b].max(), self.margins[b:].max()
+        """Radius of the region for each of the straight pieces, shape (k,); [m]."""
+        margins = [self.margins[a:b].max() for a, b in pairwise(self._ends)]
         return self.region.radius + np.array(margins)
 
     def largest_angle(self, points: FloatArray) -> float:
         """Largest link angle with the tip at points; infinite where there is none.
 
-        The link angles follow from the directions of the two straight pieces.
+        The link angles follow from the directions of the straight pieces.
 
         Args:
             points: Shape (n, 3); [m].
@@ -185,12 +203,15 @@ class AcrossRail:
             planar = self._bent(reference[blocked], tip_x[blocked])
         except PathBlocked:
             return np.inf
-        b = self.bend - 1
-        lengths = np.diff(manipulator.stations[[0, b, -1]])
-        across = np.diff(planar[:, [0, b, -1]], axis=1) / lengths[:, None]
-        along = np.sqrt(1.0 - (across**2).sum(axis=2))
-        cosine = along.prod(axis=1) + across.prod(axis=1).sum(axis=1)
-        return float(np.arccos(np.append(cosine, along[:, 0])).max(initial=0.0))
+        across = np.diff(planar[:, self._ends], axis=1) / self._pieces[:, None]
+        square = 1.0 - (across**2).sum(axis=2)
+        if not (square > 0.0).all():  # a piece longer than it may be
+            return np.inf
+        along = np.sqrt(square)
+        cosine = along[:, 1:] * along[:, :-1]
+        cosine += (across[:, 1:] * across[:, :-1]).sum(axis=2)
+        angles = np.append(cosine.ravel(), along[:, 0])
+        return float(np.arccos(np.minimum(angles, 1.0)).max(initial=0.0))
 
 
 def across_rail(
@@ -209,13 +230,14 @@ def across_rail(
     which = VIEWS[axis][1] - 1
     points = drawn_rows(problem.path, 0.0).points
     points = points[:: max(1, len(points) // TRIAL_ROWS)]
+    joints = range(2, manipulator.n_links + 1)
+    bends = [*((joint,) for joint in joints), *pairwise(joints)]
     # The side nearer to the rail first: from there the straight arm comes.
     first = -1 if section.centre[1] > 0.0 else 1
     for side in (first, -first):
         region = _with_lee(section, growth, side, problem)
         choices = [
-            AcrossRail(problem, region, which, side, bend, margins)
-            for bend in range(2, manipulator.n_links + 1)
+            AcrossRail(problem, region, which, side, some, margins) for some in bends
         ]
         yield from sorted(choices, key=lambda choice: choice.largest_angle(points))
 

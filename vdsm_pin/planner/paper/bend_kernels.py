@@ -1,4 +1,8 @@
-"""Compiled Step 5 across the rail: an arm of one bend, and its least move."""
+"""Compiled Step 5 across the rail: an arm of straight pieces, and its least move.
+
+The joints between the pieces (knots) all move by the same way along one axis: one of
+them, or the two at the ends of a link that is laid past the obstacle.
+"""
 
 import numpy as np
 
@@ -13,23 +17,27 @@ def _clear(
     radii: FloatArray,
     lengths: FloatArray,
     axis: int,
-    bend: FloatArray,
+    knots: FloatArray,
     moved: float,
     tip: FloatArray,
     tip_x: float,
 ) -> bool:
-    """`clear_bends` for one arm, its bend moved along the axis."""
-    along, across = bend[axis] + moved, bend[1 - axis]
-    first = lengths[0] ** 2 - along * along - across * across
-    ahead, aside = tip[axis] - along, tip[1 - axis] - across
-    second = lengths[1] ** 2 - ahead * ahead - aside * aside
-    if not (first > 0.0 and second > 0.0):
-        return False
-    bend_x = tip_x - np.sqrt(second)
-    base_x = bend_x - np.sqrt(first)
-    return keeps_out(corners, radii[0], base_x, 0.0, bend_x, along) and keeps_out(
-        corners, radii[1], bend_x, along, tip_x, tip[axis]
-    )
+    """`clear_bends` for one arm, its knots moved along the axis."""
+    x, along, across = tip_x, tip[axis], tip[1 - axis]
+    for i in range(lengths.shape[0] - 1, -1, -1):
+        next_along, next_across = 0.0, 0.0
+        if i > 0:
+            next_along = knots[i - 1, axis] + moved
+            next_across = knots[i - 1, 1 - axis]
+        square = lengths[i] ** 2 - (along - next_along) ** 2
+        square -= (across - next_across) ** 2
+        if not square > 0.0:
+            return False
+        next_x = x - np.sqrt(square)
+        if not keeps_out(corners, radii[i], next_x, next_along, x, along):
+            return False
+        x, along, across = next_x, next_along, next_across
+    return True
 
 
 @compiled
@@ -38,25 +46,26 @@ def clear_bends(
     radii: FloatArray,
     lengths: FloatArray,
     axis: int,
-    bends: FloatArray,
+    knots: FloatArray,
     tips: FloatArray,
     tip_x: FloatArray,
 ) -> BoolArray:
-    """Which arms of one bend stay out of the region, shape (n,).
+    """Which arms of straight pieces stay out of the region, shape (n,).
 
     Args:
         corners: Of the region in the view (x, w), shape (m, 2); [m].
-        radii: Of the region for each straight piece, shape (2,); [m].
-        lengths: Of the two straight pieces, shape (2,); [m].
+        radii: Of the region for each straight piece, shape (k,); [m].
+        lengths: Of the straight pieces, shape (k,); [m].
         axis: 0 where w is y, 1 where w is z.
-        bends: Projected bend P_b, shape (n, 2); P_1 is the origin; [m].
+        knots: Projected joints between the pieces, shape (n, k - 1, 2); P_1 is the
+            origin; [m].
         tips: Projected tip P_{N+1}, shape (n, 2); [m].
         tip_x: x of the tip, shape (n,); [m].
     """
     able = np.zeros(len(tips), np.bool_)
     for k in range(len(tips)):
         able[k] = _clear(
-            corners, radii, lengths, axis, bends[k], 0.0, tips[k], tip_x[k]
+            corners, radii, lengths, axis, knots[k], 0.0, tips[k], tip_x[k]
         )
     return able
 
@@ -67,21 +76,21 @@ def least_moves(
     radii: FloatArray,
     lengths: FloatArray,
     axis: int,
-    bends: FloatArray,
+    knots: FloatArray,
     tips: FloatArray,
     tip_x: FloatArray,
     farthest: FloatArray,
     scan: int,
     halvings: int,
 ) -> FloatArray:
-    """Smallest moves of the bends that clear the region, shape (n,); nan for none.
+    """Smallest moves of the knots that clear the region, shape (n,); nan for none.
 
     Args:
         corners: As in `clear_bends`, and all up to `tip_x`.
         radii: As there.
         lengths: As there.
         axis: As there.
-        bends: As there.
+        knots: As there.
         tips: As there.
         tip_x: As there.
         farthest: Signed largest move along the axis, shape (n,); [m].
@@ -94,7 +103,7 @@ def least_moves(
         for step in range(1, scan + 1):
             part = step / scan
             move = part * farthest[k]
-            if _clear(corners, radii, lengths, axis, bends[k], move, tips[k], tip_x[k]):
+            if _clear(corners, radii, lengths, axis, knots[k], move, tips[k], tip_x[k]):
                 high = part
                 break
             low = part
@@ -103,7 +112,7 @@ def least_moves(
         for _ in range(halvings):
             middle = 0.5 * (low + high)
             move = middle * farthest[k]
-            if _clear(corners, radii, lengths, axis, bends[k], move, tips[k], tip_x[k]):
+            if _clear(corners, radii, lengths, axis, knots[k], move, tips[k], tip_x[k]):
                 high = middle
             else:
                 low = middle

@@ -1,0 +1,74 @@
+"""Arms of straight pieces across the rail, against shapely and against each other."""
+
+import numpy as np
+import pytest
+import shapely
+
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.kinematics import joint_angles, link_angles
+from vdsm_pin.planner.paper.across_rail import AcrossRail, across_rail
+from vdsm_pin.planner.paper.lift import lift
+from vdsm_pin.planner.paper.project import project
+from vdsm_pin.planner.paper.scale import scale
+from vdsm_pin.planner.paper.sections import section_along
+from vdsm_pin.planner.paper.tip_path import drawn_rows
+
+OBS3 = read_problem("paper/obs3").problem
+ARM = OBS3.manipulator
+POINTS = drawn_rows(OBS3.path, 0.0).points[::9]
+
+
+def choices() -> list[AcrossRail]:
+    section = section_along(OBS3.scene.obstacles[0], "z")
+    assert section is not None
+    return list(across_rail(OBS3, section, "z", np.zeros(ARM.n_links)))
+
+
+def test_single_joints_and_both_ends_of_a_link_are_tried_on_both_sides() -> None:
+    found = {(one.side, one.bends) for one in choices()}
+    assert len(found) == 2 * (7 + 6)
+    assert (-1, (5,)) in found
+    assert (-1, (4, 5)) in found
+
+
+def test_the_largest_angle_is_that_of_the_lifted_arm() -> None:
+    tried = 0
+    for one in choices():
+        angle = one.largest_angle(POINTS)
+        if not np.isfinite(angle):
+            continue
+        reference = scale(ARM, project(POINTS))
+        planar = one.bent(reference, POINTS[:, 0])
+        centres = lift(ARM, planar, POINTS[:, 0])
+        alpha, theta = joint_angles(ARM, centres)
+        psi = link_angles(alpha, theta)
+        assert psi.max() == pytest.approx(angle, abs=1e-9)
+        unmoved = np.delete(psi, [0, *(bend - 1 for bend in one.bends)], axis=1)
+        assert unmoved.max() < 1e-7, "only psi_1 and the bends change"
+        tried += 1
+    assert tried >= 6
+
+
+def test_what_is_called_clear_is_clear_by_shapely() -> None:
+    rng = np.random.default_rng(4)
+    for one in choices()[::3]:
+        core = shapely.MultiPoint(one.region.corners).convex_hull
+        reference = scale(ARM, project(POINTS))
+        planar = one._moved(reference, rng.uniform(0.0, 0.6, len(POINTS)))
+        told = one.clear(planar, POINTS[:, 0])
+        for row, able in zip(range(len(POINTS)), told, strict=True):
+            try:
+                arm = lift(ARM, planar[row : row + 1], POINTS[row : row + 1, 0])[0]
+            except Exception:  # noqa: BLE001 - a link is too short: not clear either
+                assert not able
+                continue
+            line = shapely.LineString(arm[:, [0, 1 + one.axis]])
+            gap = line.distance(core) - one.region.radius
+            if abs(gap) > 1e-6:
+                assert able == (gap > 0.0)
+
+
+def test_the_first_choice_has_the_smallest_angle() -> None:
+    angles = [one.largest_angle(POINTS) for one in choices() if one.side == -1]
+    assert angles == sorted(angles)
+    assert np.rad2deg(angles[0]) < 27.0
