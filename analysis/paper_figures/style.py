@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import matplotlib as mpl
+import numpy as np
 
 mpl.use("Agg")
 
@@ -26,6 +27,13 @@ WIDTH: Final = 7.2
 
 DPI: Final = 150
 """Resolution of the PNG pictures; [dots per inch]."""
+
+PNG_COLOURS: Final = 256
+"""Palette size of the PNG pictures, enough for line drawings; [-]."""
+
+NEAR_TINT: Final = 24
+"""A palette's colour this near to a shared tint stands for it, red, green and blue
+together; [-]."""
 
 INK: Final = "#1d2129"
 FAINT: Final = "#9aa1ab"
@@ -76,6 +84,7 @@ _SETTINGS: Final[dict[str, Any]] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "vdsm-pin",
     "path.simplify": True,
+    "path.simplify_threshold": 0.3,  # points; the default is a third of it
     "figure.dpi": DPI,
 }
 
@@ -141,8 +150,20 @@ def save(figure: Figure, name: str, folder: Path = REPORTS) -> None:
 
 
 def save_png(figure: Figure, file: Path) -> None:
-    """Write a PNG picture in its own colours, at print resolution."""
+    """Write a PNG picture with a palette, at print resolution.
+
+    The tints that many figures share are the same in all of them.
+    """
     figure.savefig(file, dpi=DPI, metadata={"Software": None})
     with Image.open(file) as picture:
-        plain = picture.convert("RGB")
-    plain.save(file, optimize=True)
+        few = picture.convert("RGB").quantize(
+            PNG_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE
+        )
+    palette = np.array(few.getpalette()).reshape(-1, 3)
+    for tint in (OBSTACLE, OBSTACLE_EDGE, DANGER, DANGER_EDGE, GRID, FAINT):
+        exact = np.array([int(tint[k : k + 2], 16) for k in (1, 3, 5)])
+        off = np.abs(palette - exact).sum(axis=1)
+        if off.min() <= NEAR_TINT:
+            palette[np.argmin(off)] = exact
+    few.putpalette(palette.ravel().tolist())
+    few.save(file, optimize=True)
