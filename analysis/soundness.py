@@ -11,6 +11,10 @@ not contradict the truth either. Queries about error boxes are certified falsely
 motion within the box is known, or found, to come too near; they are far from the limit
 where a known plane proves the whole box with 1 um to spare. The same seed gives the
 same queries on any number of processes.
+
+Bodies on random trees of 1 to 20 joints go through `prove`, both sides moving, along
+lines, cubic and quintic pieces; how near they come is sampled, ever closer, by closed
+forms.
 """
 
 import argparse
@@ -41,29 +45,32 @@ from oracles.adversarial import (
 from oracles.adversarial_bodies import pack
 from oracles.adversarial_boxes import Boxed, attacked, make_boxed
 from oracles.adversarial_truth import exact_bracket
+from oracles.tree_queries import at as tree_rows
+from oracles.tree_queries import clearances, make_query, random_box, wrong_poses
 
 from vdsm_pin.arm_bodies import arm_bodies
 from vdsm_pin.arm_tree import arm_tree, link_frame
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.proof.blocks import sweep
-from vdsm_pin.proof.bodies import Body, PairTable
-from vdsm_pin.proof.broad_phase import new_broad_phase
+from vdsm_pin.proof.bodies import Body, Pair, PairTable
+from vdsm_pin.proof.budget import Budget, rounding_pad
 from vdsm_pin.proof.packing import pack_task
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.terms import WORLD, Rules
-from vdsm_pin.proof.workspace import new_workspace
+from vdsm_pin.proof.prover import prove
+from vdsm_pin.proof.proving import new_proving
+from vdsm_pin.proof.terms import WORLD
 from vdsm_pin.scene import Scene
-from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.proving import BUDGET, new_results
 from vdsm_pin.verification.records import ClearanceChunk, ErrorBox
-from vdsm_pin.verification.task import SLACK, with_errors
+from vdsm_pin.verification.task import with_errors
 
 FAR: Final = 1e-6
 """From here on a query must be decided; [m]."""
+
+KNOWN: Final = 1e-9
+"""How well distances on random trees are known; [m]."""
 
 UNDECIDED_LIMIT: Final = 1e-3
 """Largest share of undecided queries among those far from the limit; [-]."""
@@ -71,8 +78,17 @@ UNDECIDED_LIMIT: Final = 1e-3
 BOXES: Final = "boxes"
 """Not a motion: error boxes around any of them."""
 
+TREES: Final = {"tree_linear": 1, "tree_cubic": 3, "tree_quintic": 5}
+"""Bodies on random trees, both sides moving, and the degree of their paths."""
+
+MOST_JOINTS: Final = 20
+"""Of a random tree."""
+
+ATTACKS: Final = 20
+"""Configurations tried of an error box that is certified."""
+
 SHARES: Final = {
-    "none": 0.40,
+    "none": 0.391,
     "still": 0.16,
     "rail": 0.13,
     "away": 0.13,
@@ -82,6 +98,7 @@ SHARES: Final = {
     "links_still": 0.02,
     "links_swing": 0.02,
     BOXES: 0.06,
+    **dict.fromkeys(TREES, 0.003),
 }
 """Share of each kind of motion; turns near the limit take many slices each."""
 
@@ -102,6 +119,7 @@ WHOLE: Final = 100
 
 CERTIFIED, REFUTED, UNDECIDED = 0, 1, 2
 NOMINAL: Final = ErrorBox()
+BUDGET: Final = Budget()
 
 
 def _pack(batch: Batch) -> PackedPieces:
@@ -123,15 +141,7 @@ def verdicts(batch: Batch, errors: ErrorBox = NOMINAL) -> Any:
     values = (pieces.points, pieces.centre, pieces.extent, pieces.radius)
     extent = max(float(np.abs(x).max(initial=0.0)) for x in values)
     extent = max(extent, arm.total_length, *np.abs(arm.base_range))
-    rules = Rules(
-        steady=True,
-        nominal=True,
-        pad=TOLERANCES.arithmetic * max(1.0, extent / TOLERANCES.scene_extent),
-        goal=TOLERANCES.bracket_gap,
-        gap=TOLERANCES.least_bracket,
-        slack=SLACK,
-        until=np.inf,
-    )
+    rules = BUDGET.rules(rounding_pad(extent))
     tree, path = arm_tree(arm), Path(np.ascontiguousarray(batch.rows))
     moving = [Body(link_frame(b.link), (b.piece,)) for b in arm_bodies(arm)]
     # Obstacles are packed already; links that rest are the links that move.
@@ -145,11 +155,10 @@ def verdicts(batch: Batch, errors: ErrorBox = NOMINAL) -> Any:
     bodies = [*obstacles, *moving]
     task = pack_task(tree, bodies, table, rules, path.reach, pieces=pieces)
     task = with_errors(task, errors)
-    results, desk = new_results(n, 1, 1), new_workspace(task, tree.n_columns, BUDGET)
     # No obstacle is named as such, so that none is settled by its box.
-    broad = new_broad_phase(task, 0)
-    sweep(task, path.packed(), desk, results, broad, (0, 1), False)
-    return results.counts.argmax(axis=1)
+    proving = new_proving(task, path.packed(), 1, 0, BUDGET)
+    proving.sweep(0, 1)
+    return proving.results.counts.argmax(axis=1)
 
 
 # ---- the same, as the product is called ----------------------------------------------
@@ -272,6 +281,41 @@ def judge(batch: Batch, rng: np.random.Generator, tally: Counter[str]) -> None:
         tally["scenes judged whole"] += 1
 
 
+def judge_tree(rng: np.random.Generator, motion: str, tally: Counter[str]) -> None:
+    """Judge a query about two bodies of a random tree: missed, kept, with errors.
+
+    A limit beyond the nearest that is known is missed, so it must not be certified.
+    What is refuted must come as near as its witness says. A box is attacked from
+    corners.
+    """
+    query = make_query(rng, TREES[motion], int(rng.integers(1, MOST_JOINTS + 1)))
+    off = float(10.0 ** rng.uniform(-9.0, -3.0))
+    args = query.tree, query.bodies, query.path
+    for required in (query.nearest + off, query.nearest - off):
+        missed = required > query.nearest
+        proof = prove(*args, [Pair(*rng.permutation(2).tolist(), required)])
+        met = np.array([proof.share[0]])
+        poses = query.tree.poses(tree_rows(query.path, met))
+        nearest = clearances(query.tree, query.bodies, poses)[0]
+        truth = Truth(
+            lost=np.array([missed and off > KNOWN]),
+            kept=np.array([nearest >= required + KNOWN]),
+            far=np.array([missed and off >= FAR]),
+        )
+        _count(motion, np.array([query.shape]), truth, proof.verdict, tally)
+    box = random_box(rng, query.tree)
+    proof = prove(*args, [Pair(0, 1, query.nearest - 10.0 * off)], box)
+    wrong = False
+    for t in rng.uniform(size=ATTACKS if proof.is_certified else 0):
+        row = tree_rows(query.path, np.array([t]))[0]
+        poses = wrong_poses(query.tree, row, box, rng)[None]
+        near = clearances(query.tree, query.bodies, poses)[0]
+        wrong |= bool(near < query.nearest - 10.0 * off - KNOWN)
+    truth = Truth(np.array([wrong]), np.array([False]), np.array([False]))
+    _count(f"box_{motion}", np.array([query.shape]), truth, proof.verdict, tally)
+    tally["certified boxes attacked"] += int(proof.is_certified)
+
+
 def run_block(seed: np.random.SeedSequence, queries: int, size: int) -> Counter[str]:
     """Judge the queries of one random stream, at least as many as asked for."""
     tally: Counter[str] = Counter()
@@ -281,6 +325,10 @@ def run_block(seed: np.random.SeedSequence, queries: int, size: int) -> Counter[
         wanted = int(np.ceil(share * queries))
         done = 0
         while done < wanted:
+            if motion in TREES:
+                judge_tree(rng, motion, tally)
+                done += 3
+                continue
             part = min(SIZES.get(motion, size), wanted - done)
             if motion == BOXES:
                 boxed = make_boxed(rng, part, 1e-12)
@@ -382,8 +430,9 @@ def report(tally: Counter[str], command: str) -> str:
         f"* {versions}, Python {platform.python_version()}, {platform.machine()}",
         "",
         "What the motions and shapes are: `tests/oracles/adversarial.py`,",
-        "`adversarial_bodies.py` and `adversarial_boxes.py`. `far`: at least 1 um from",
-        "the limit; of a box, proved by a known plane with as much to spare.",
+        "`adversarial_bodies.py`, `adversarial_boxes.py` and `tree_queries.py`. `far`:",
+        "at least 1 um from the limit; of a box, proved by a known plane with as much",
+        "to spare; on a random tree, a limit that is missed.",
         "",
         *_table(tally, 1, "motion"),
         "",

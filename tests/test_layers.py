@@ -127,11 +127,13 @@ def test_only_the_upper_layers_know_robotics_libraries(path: Path) -> None:
     assert not found
 
 
-def test_the_proof_imports_numpy_and_geometry_only() -> None:
+def test_the_proof_imports_numpy_geometry_and_tolerances_only() -> None:
     for path in (PACKAGE / "proof").rglob("*.py"):
         for name in imported(path):
             if name.startswith("vdsm_pin."):
-                assert owner(name) in ("proof", "geometry"), f"{path}: {name}"
+                assert owner(name) in ("proof", "geometry", "tolerances"), (
+                    f"{path}: {name}"
+                )
             else:
                 top = name.split(".")[0]
                 assert top == "numpy" or top in sys.stdlib_module_names, name

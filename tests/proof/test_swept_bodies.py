@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from proof_trees import random_box, random_path, random_tree
+from oracles.tree_queries import random_box, random_path, random_tree, wrong_poses
 
 from vdsm_pin.arm_tree import arm_tree
 from vdsm_pin.geometry.arrays import FloatArray
@@ -44,34 +44,10 @@ class Case:
 
     def seen(self, q: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Points of the body at q, with errors of the box, in the partner's frame."""
-        poses = wrong_poses(self.tree, q, self.box, rng)
+        # Shifts cost every plane the same: they are no part of the body.
+        poses = wrong_poses(self.tree, q, self.box, rng, shifting=False)
         seen = np.linalg.inv(poses[self.rest]) @ poses[self.frame]
         return np.asarray(self.points @ seen[:3, :3].T + seen[:3, 3])
-
-
-def wrong_poses(
-    tree: Tree, q: FloatArray, box: ErrorBox, rng: np.random.Generator
-) -> FloatArray:
-    """Poses of one row with errors in corners of the box, (n_frames, 4, 4).
-
-    Shifts are left out where they cost every plane the same.
-    """
-    poses, values = np.tile(np.eye(4), (tree.n_frames, 1, 1)), tree.values(q[None])[0]
-    for number, joint in enumerate(tree.joints):
-        off = box.joints[number] * rng.choice([-1.0, 1.0])
-        off = off if joint.kind is Kind.REVOLUTE else 0.0
-        moved = Tree((type(joint)(0, joint.kind, joint.axis, column=0),))
-        value = values[number] + off if joint.kind is not Kind.FIXED else 0.0
-        motion = np.eye(4)
-        if joint.kind is not Kind.FIXED:
-            motion = moved.poses(np.array([[value]]))[0, 1]
-        axis = rng.normal(size=3)
-        turn = Tree(
-            (type(joint)(0, Kind.REVOLUTE, axis / np.linalg.norm(axis), column=0),)
-        )
-        tilt = turn.poses(np.array([[box.tilts[number]]]))[0, 1]
-        poses[number + 1] = poses[joint.parent] @ joint.placement @ tilt @ motion
-    return poses
 
 
 def random_case(rng: np.random.Generator, degree: int) -> Case:

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio
 import pytest
-from proof_trees import random_tree
+from oracles.tree_queries import random_tree
 
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.kinematics import joint_centres, link_frames

@@ -16,7 +16,7 @@ from vdsm_pin.scene import Mesh, Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.proving import new_proving
+from vdsm_pin.verification.proving import prove_problem
 from vdsm_pin.verification.records import ClearanceChunk, ErrorBox
 
 ARM = built_in("hrm8")
@@ -85,8 +85,8 @@ def test_the_hierarchy_is_not_walked_for_every_row() -> None:
     """Ten times the rows of one motion: the walks do not multiply with them."""
     walks = []
     for n_rows in (200, 2000):
-        proving = new_proving(problem_of(tunnel(0.55)), swaying(n_rows), ErrorBox())
-        proving.sweep(proving.results, 0, proving.n_intervals)
+        proving = prove_problem(problem_of(tunnel(0.55)), swaying(n_rows), ErrorBox())
+        proving.sweep(0, proving.n_intervals)
         walks.append(int(proving.results.tally[RENEWED]))
     assert walks[1] < 2 * walks[0]
     assert walks[1] < 0.1 * 2000 * N

@@ -16,8 +16,8 @@ class ErrorBox:
         joints: Of each joint's value, shape (n_joints,); [rad] or [m].
         shifts: Of the origin of each joint's placement, shape (n_joints,); [m].
         tilts: Turn of each placement about its origin, shape (n_joints,); [rad].
-        surfaces: By how much the surface of each body may be off where it is the second
-            one of a pair, shape (n_bodies,); [m]. None for not at all.
+        surfaces: By how much the surface of each body may be off, shape (n_bodies,);
+            [m]. None for not at all.
     """
 
     joints: FloatArray

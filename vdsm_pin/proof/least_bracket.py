@@ -94,7 +94,7 @@ def narrow(
 
     Returns:
         Number of slices in the heap: together with `results.overflow` they hold all
-        that is not proved to be above the limit, less the gap, unless the time is over.
+        that is not proved to be above the limit, less the gap; -1 if the time is over.
     """
     task = borrowed(task)
     motion = borrowed(motion)
@@ -120,4 +120,4 @@ def narrow(
             best[UP], best[AT_UPPER] = found.upper[pair], found.interval[pair]
             best[TIME], best[OWN:] = found.time[pair], found.points[pair]
         results.limit[group] = min(results.limit[group], found.instant[pair])
-    return count
+    return -1 if clock() > task.rules.until else count

@@ -42,8 +42,9 @@ def _only_piece(body: Body) -> Hull | FlatCylinder:
     raise ValueError(message)
 
 
-def _pack_bodies(bodies: Sequence[Body], columns: IntArray) -> Bodies:
-    """Convex bodies, and where the profile has their bounds."""
+def _pack_bodies(every: Sequence[Body], numbers: IntArray, columns: IntArray) -> Bodies:
+    """Some bodies, each convex, and where the profile has the bounds of all."""
+    bodies = [every[k] for k in numbers.tolist()]
     solids = [_only_piece(body) for body in bodies]
     corners = [corners_of(solid) for solid in solids]
     discs, radius = np.zeros((len(solids), 4)), np.zeros(len(solids))
@@ -57,6 +58,7 @@ def _pack_bodies(bodies: Sequence[Body], columns: IntArray) -> Bodies:
         for points, disc in zip(corners, discs[:, 3], strict=True)
     ]
     return Bodies(
+        number=numbers.astype(np.int64),
         frame=np.array([body.frame for body in bodies], dtype=np.int64),
         first=np.cumsum([0, *map(len, corners)], dtype=np.int64),
         corners=np.concatenate([np.zeros((0, 3)), *corners]),
@@ -64,7 +66,7 @@ def _pack_bodies(bodies: Sequence[Body], columns: IntArray) -> Bodies:
         radius=radius,
         discs=discs,
         inverse=np.array([_inverse(solid) for solid in solids]),
-        column=columns.astype(np.int64),
+        column=columns[numbers].astype(np.int64),
     )
 
 
@@ -198,7 +200,7 @@ def pack_task(
         reach: How large each column of q gets, where that is known, (n_columns,); where
             placements may turn and it is not, nothing is proved.
         columns: Where a profile has each body's bounds, -1 for nowhere, (n_bodies,).
-        pieces: `pack_bodies_pieces(bodies)`, where they are packed already.
+        pieces: Those of the bodies packed already, at least of the second ones.
 
     Raises:
         ValueError: If a first body is not of that kind, or both ride on one frame.
@@ -228,7 +230,7 @@ def pack_task(
         lost=np.zeros(n),
         rise=np.zeros(n),
     )
-    moving = _pack_bodies([bodies[k] for k in each.tolist()], columns[each])
+    moving = _pack_bodies(bodies, each, columns)
     ways, places, packed = _pack_pairs(joints, moving, frames[pairs.other], packed)
     if pieces is None:
         pieces = pack_pieces([body.pieces for body in bodies])
@@ -247,7 +249,8 @@ def with_errors(task: Task, box: ErrorBox) -> Task:
     shift = erring.shifted[pairs.way]
     surfaces = box.surfaces
     if surfaces is not None:
-        shift = shift + surfaces[pairs.obstacle]
+        moving = task.bodies.number[pairs.body]
+        shift = shift + surfaces[pairs.obstacle] + surfaces[moving]
     steady = not erring.any_turn
     rules = task.rules._replace(steady=steady, nominal=steady and not shift.any())
     radius = task.bodies.radius[pairs.body]

@@ -31,6 +31,7 @@ class Bodies(NamedTuple):
     """Convex solids that ride on frames: hulls of corners, grown by ball and disc.
 
     Args:
+        number: Which of all bodies each is, shape (n_bodies,).
         frame: The frame that each rides on, shape (n_bodies,).
         first: Where a body's corners start, shape (n_bodies + 1,).
         corners: In their frames, shape (n_corners, 3); [m].
@@ -43,6 +44,7 @@ class Bodies(NamedTuple):
         column: Where the profile has its bounds, shape (n_bodies,).
     """
 
+    number: IntArray
     frame: IntArray
     first: IntArray
     corners: FloatArray

@@ -21,6 +21,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import FIRST, LAST, PLANE_NORMAL, RECORD
 from vdsm_pin.proof.packed_tree import straight_motion
 from vdsm_pin.proof.recording import record
@@ -38,7 +39,6 @@ from vdsm_pin.verification.certificate_file import (
 )
 from vdsm_pin.verification.inside import locate_start, unlocated
 from vdsm_pin.verification.limits import extremes
-from vdsm_pin.verification.proving import BUDGET
 from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.task import all_pairs, make_task
 
@@ -98,7 +98,9 @@ def write_certificate(
     hulls = unlocated(locate_start(problem, trajectory))
     scene = with_hulls(problem.scene, hulls)
     task = make_task(
-        replace(problem, scene=scene), verification.errors, deadline=deadline
+        replace(problem, scene=scene),
+        verification.errors,
+        budget=Budget(until=deadline.end),
     )
     digest = hashlib.sha256()
     with atomic_path(path) as temporary, temporary.open("wb") as file:
@@ -225,7 +227,7 @@ def _lines(
     for k, obstacle in enumerate(verification.problem.scene.obstacles):
         if obstacle.name in hulls:
             whole[k] = len(obstacle.pieces)
-    desk = new_workspace(task, motion.knots.shape[1], BUDGET)
+    desk = new_workspace(task, motion.knots.shape[1], Budget().slices)
     records, first = np.zeros((ROOM, RECORD)), 0
     while first < n_intervals:
         last = min(first + CHUNK, n_intervals)

@@ -14,25 +14,20 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import (
-    AT_LOWER,
     AT_UPPER,
-    HELD,
-    KEY,
     LOW,
     OTHER,
     OWN,
-    PAIR,
-    SLICE,
     SLICES,
     TALLY,
     TIME,
     UP,
 )
-from vdsm_pin.proof.least_bracket import narrow
+from vdsm_pin.proof.proving import Proving, dense_rows, room_for
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.rows import BLOCK
-from vdsm_pin.proof.search import Witnesses
 from vdsm_pin.proof.terms import (
     CERTIFIED,
     LINKS,
@@ -40,18 +35,10 @@ from vdsm_pin.proof.terms import (
     REFUTED,
     UNDECIDED,
 )
-from vdsm_pin.proof.witnesses import place_best, place_points
 from vdsm_pin.scene import Scene
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.proving import (
-    BUDGET,
-    CANDIDATES,
-    Proving,
-    dense_rows,
-    new_proving,
-    room_for,
-)
+from vdsm_pin.verification.proving import prove_problem
 from vdsm_pin.verification.records import (
     ClearanceChunk,
     ClearanceProfile,
@@ -152,19 +139,11 @@ def prove_clearance(
     Returns:
         The proof, its least brackets narrowed unless the time ended before.
     """
-    proving = new_proving(problem, trajectory, errors, pieces, deadline=deadline)
-    results = proving.results
-    proving.sweep(results, 0, proving.n_intervals)
-    late = proving.deadline.passed
-    _merge_far(proving)
-    _own_up(proving)
-    for group in (OBSTACLES, LINKS):
-        _narrow(proving, group)
-    sent = 0
+    budget = Budget(until=deadline.end)
+    proving = prove_problem(problem, trajectory, errors, pieces, budget)
+    late, results, sent = not proving.run(), proving.results, 0
     if sinks:
         sent = _send(problem, trajectory, errors, proving, sinks, reach)
-    order = np.lexsort((results.best[:, TIME], results.best[:, AT_UPPER]))
-    place_best(proving.task, proving.motion, proving.desk.ends, results.best, order)
     return ClearanceProof(
         pairs=all_pairs(problem),
         counts=frozen(results.counts, np.int64),
@@ -175,84 +154,6 @@ def prove_clearance(
         late=late,
         sent=sent,
     )
-
-
-def _own_up(proving: Proving) -> None:
-    """Call undecided what the time did not allow to judge."""
-    results = proving.results
-    left = proving.n_intervals - results.counts.sum(axis=1)
-    if left.any():
-        results.counts[:, UNDECIDED] += left
-        results.best[left > 0, LOW] = -np.inf
-        results.profile[0] = -np.inf
-
-
-def _merge_far(proving: Proving) -> None:
-    """Bring what culling settled to the results of the pairs."""
-    far, task = proving.broad, proving.task
-    body, obstacle = np.nonzero(far.number >= 0)
-    pair, at = far.number[body, obstacle], (body, obstacle)
-    best = proving.results.best
-    proving.results.counts[pair, CERTIFIED] += far.settled[at]
-    better = far.lower[at] < best[pair, LOW]
-    best[pair[better], LOW] = far.lower[at][better]
-    best[pair[better], AT_LOWER] = far.at_lower[at][better]
-    found = np.flatnonzero(far.upper[at] < best[pair, UP])
-    body, pair, rows = body[found], pair[found], far.at_upper[at][found]
-    corner = task.bodies.corners[task.bodies.first[body]]
-    place = _places(proving, rows, task.bodies.frame[body], corner)
-    point = far.point.T[obstacle[found]]
-    gap = np.linalg.norm(point - place, axis=1)
-    best[pair, UP] = gap - task.bodies.radius[body] + task.rules.pad
-    best[pair, AT_UPPER], best[pair, TIME] = rows, 0.0
-    best[pair, OWN:OTHER], best[pair, OTHER:] = corner, point
-
-
-def _places(
-    proving: Proving, rows: IntArray, frames: IntArray, at: FloatArray
-) -> FloatArray:
-    """Points of frames, shape (n, 3), at rows, in the base frame, (n, 3); [m]."""
-    task, motion = proving.task, proving.motion
-    return place_points(task.tree, motion, rows, frames, np.ascontiguousarray(at))
-
-
-def _narrow(proving: Proving, group: int) -> None:
-    """Narrow the least bracket over the obstacles or over the links."""
-    if proving.deadline.passed:
-        return
-    task, results = proving.task, proving.results
-    mine = task.pairs.group == group
-    held, n = results.candidates, results.tally[HELD]
-    near = np.flatnonzero(mine[held.pair[:n]])
-    near = near[held.lower[near] < results.limit[group] - task.rules.gap]
-    if not near.size:
-        return
-    # The least first, since it lowers the limit most; then block by block.
-    order = near[np.lexsort((held.pair[near], held.first[near]))]
-    least = np.argmin(held.lower[order])
-    order = np.concatenate([order[[least]], np.delete(order, least)])
-    n_pairs = len(mine)
-    found = Witnesses(
-        upper=np.full(n_pairs, np.inf),
-        interval=np.zeros(n_pairs, np.int64),
-        time=np.zeros(n_pairs),
-        points=np.zeros((n_pairs, 6)),
-        instant=np.full(n_pairs, np.inf),
-        limit=np.inf,
-    )
-    heap = np.zeros((CANDIDATES + BUDGET, SLICE))
-    again = results._replace(counts=np.zeros_like(results.counts))
-    count = narrow(task, proving.motion, proving.desk, again, order, heap, found)
-    if proving.deadline.passed:
-        return  # not all was looked at again: what was proved before holds
-    proved = np.full(n_pairs, results.limit[group] - task.rules.gap)
-    np.minimum.at(proved, heap[:count, PAIR].astype(np.int64), heap[:count, KEY])
-    proved = np.minimum(proved, results.overflow[group])[mine]
-    results.best[mine, LOW] = np.maximum(results.best[mine, LOW], proved)
-    if group == OBSTACLES:
-        # Every interval keeps what the narrowing proved of all of them.
-        lower = results.profile[0]
-        np.maximum(lower, proved.min(), out=lower)
 
 
 def _send(
@@ -276,9 +177,8 @@ def _send(
     if near.size < len(obstacles):
         scene = Scene(tuple(obstacles[k] for k in near))
         near_problem = replace(problem, scene=scene)
-        proving = new_proving(
-            near_problem, trajectory, errors, deadline=proving.deadline
-        )
+        budget = proving.budget
+        proving = prove_problem(near_problem, trajectory, errors, budget=budget)
     length = CHUNK_VALUES // max(1, pairs.size) // BLOCK * BLOCK
     length = min(CHUNK, proving.n_intervals, max(BLOCK, length))
     results = proving.results._replace(
@@ -293,8 +193,7 @@ def _send(
     again = replace(proving, results=results)
     for first in range(0, proving.n_intervals, length):
         last = min(first + length, proving.n_intervals)
-        again.sweep(results, first, last)
-        if again.deadline.passed:
+        if not again.sweep(first, last):
             return first
         chunk = _chunk(again, first, last - first, known.best[pairs, LOW], pairs)
         for sink in sinks:

@@ -6,11 +6,12 @@ import numpy as np
 
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.blocks import sweep
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.workspace import forget
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.proving import new_proving
+from vdsm_pin.verification.proving import prove_problem
 from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.task import with_errors
 
@@ -38,9 +39,9 @@ class HastyProof:
         deadline: Deadline = NO_LIMIT,
     ) -> None:
         # Nobody asks for a profile: all intervals share its one bin.
-        self._proving = new_proving(
-            problem, trajectory, ErrorBox(), values=1, deadline=deadline
-        )
+        budget = Budget(profile=1, until=deadline.end)
+        self._proving = prove_problem(problem, trajectory, ErrorBox(), budget=budget)
+        self._deadline = deadline
         task = self._proving.task
         pairs = task.pairs._replace(required=task.pairs.required + BEYOND)
         self._task = task._replace(pairs=pairs)
@@ -61,7 +62,7 @@ class HastyProof:
         known.results.limit[:] = -np.inf
         args = task, known.motion, known.desk, known.results, known.broad
         proved = bool(sweep(*args, (first, last), True))
-        known.deadline.check()
+        self._deadline.check()
         return proved
 
 

@@ -11,6 +11,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.links import link_clearances
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.proof.budget import rounding_pad
 from vdsm_pin.scene import covers_of
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -29,7 +30,7 @@ def arithmetic_pad(problem: PlanningProblem, pieces: PackedPieces) -> float:
     largest = max(arm.total_length, *np.abs(arm.base_range))
     for values in (pieces.points, pieces.centre, pieces.radius, pieces.extent):
         largest = max(largest, np.abs(values).max(initial=0.0))
-    return TOLERANCES.arithmetic * max(1.0, float(largest) / TOLERANCES.scene_extent)
+    return rounding_pad(float(largest))
 
 
 def link_clearance(problem: PlanningProblem) -> Callable[[FloatArray], FloatArray]:

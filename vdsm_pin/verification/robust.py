@@ -16,6 +16,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.proof.terms import UNDECIDED
 from vdsm_pin.scene import Scene
@@ -24,7 +25,7 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.counterexample import Search, moments_of
 from vdsm_pin.verification.hasty import HastyProof, is_certified
-from vdsm_pin.verification.proving import new_proving
+from vdsm_pin.verification.proving import prove_problem
 from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.task import all_pairs
 
@@ -263,10 +264,9 @@ def _smallest(
     deadline: Deadline,
 ) -> list[float]:
     """Joint errors of counterexamples of pairs that a few slices leave undecided."""
-    proving = new_proving(
-        problem, trajectory, errors, values=1, budget=LOOKS, deadline=deadline
-    )
-    proving.sweep(proving.results, 0, proving.n_intervals)
+    budget = Budget(slices=LOOKS, profile=1, until=deadline.end)
+    proving = prove_problem(problem, trajectory, errors, budget=budget)
+    proving.sweep(0, proving.n_intervals)
     best, counts = proving.results.best, proving.results.counts
     among = np.flatnonzero(counts[:, UNDECIDED] > 0)
     nearest = among[np.argsort(best[among, LOW], kind="stable")][:SOUGHT]

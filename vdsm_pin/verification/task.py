@@ -2,7 +2,6 @@
 
 import math
 from functools import cached_property
-from typing import Final
 
 import numpy as np
 
@@ -11,18 +10,14 @@ from vdsm_pin.arm_tree import RAIL, arm_tree, link_frame
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.bodies import Body, PairTable
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.error_box import ErrorBox as ProofBox
 from vdsm_pin.proof.packed_tree import REVOLUTE
 from vdsm_pin.proof.packing import pack_task
 from vdsm_pin.proof.packing import with_errors as with_box
-from vdsm_pin.proof.terms import OBSTACLES, WORLD, Rules, Task
-from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.proof.terms import OBSTACLES, WORLD, Task
 from vdsm_pin.verification.link_clearance import arithmetic_pad
 from vdsm_pin.verification.records import ErrorBox, Pair
-
-SLACK: Final = 0.02
-"""How wide a bracket may be, as a part of the clearance."""
 
 
 class ArmPairs:
@@ -102,7 +97,7 @@ def make_task(
     problem: PlanningProblem,
     errors: ErrorBox,
     pieces: PackedPieces | None = None,
-    deadline: Deadline = NO_LIMIT,
+    budget: Budget | None = None,
     reach: float = math.inf,
 ) -> Task:
     """What the kernels need to know of a problem.
@@ -111,7 +106,7 @@ def make_task(
         problem: Arm, scene, required clearances.
         errors: What the proof covers.
         pieces: `pack_scene(problem)`, where it is known already.
-        deadline: When to stop.
+        budget: Sizes and when to stop.
         reach: How large x0 gets; where the base may turn, nothing is proved of a motion
             of which that is not known; [m].
     """
@@ -122,15 +117,7 @@ def make_task(
     bodies += [Body(link_frame(b.link), (b.piece,), b.name) for b in table.bodies]
     columns = arm.n_links + np.arange(len(bodies))
     columns[len(obstacles) :] = [body.link - 1 for body in table.bodies]
-    rules = Rules(
-        steady=True,
-        nominal=True,
-        pad=arithmetic_pad(problem, pieces),
-        goal=TOLERANCES.bracket_gap,
-        gap=TOLERANCES.least_bracket,
-        slack=SLACK,
-        until=deadline.end,
-    )
+    rules = (budget or Budget()).rules(arithmetic_pad(problem, pieces))
     reaches = np.full(2 * arm.n_links + 1, reach)
     tree, numbers = arm_tree(arm), table.numbers()
     task = pack_task(tree, bodies, numbers, rules, reaches, columns, pieces)
@@ -143,7 +130,8 @@ def with_errors(task: Task, errors: ErrorBox) -> Task:
     shifts, tilts = np.zeros((2, tree.parent.size))
     shifts[RAIL], tilts[RAIL] = errors.base, errors.base_turn
     joints = np.where(tree.kind == REVOLUTE, errors.joint, 0.0)
-    surfaces = np.zeros(task.pieces.root.size)
+    asked = task.bodies.number.max(initial=0), task.pairs.obstacle.max(initial=0)
+    surfaces = np.zeros(1 + max(asked))
     obstacles = task.pairs.obstacle[task.pairs.group == OBSTACLES]
     surfaces[obstacles] = errors.obstacle
     return with_box(task, ProofBox(joints, shifts, tilts, surfaces))

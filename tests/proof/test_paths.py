@@ -1,0 +1,96 @@
+"""Oracle: the polynomials themselves, by their coefficients."""
+
+import numpy as np
+import pytest
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.proof.packed_tree import bound_column, interpolate
+from vdsm_pin.proof.paths import Path, cubic_path, quintic_path, together
+
+
+def value(path: Path, k: int, t: float) -> FloatArray:
+    q = np.zeros(path.knots.shape[1])
+    interpolate(path.packed(), k, t, q)
+    return q
+
+
+def made(degree: int, rng: np.random.Generator) -> tuple[Path, FloatArray]:
+    """A path whose only column is a polynomial of its degree in time."""
+    times = np.cumsum(rng.uniform(0.3, 2.0, 4))
+    p = np.polynomial.Polynomial(rng.normal(size=degree + 1))
+    q, rates, changes = (p.deriv(m)(times)[:, None] for m in range(3))
+    if degree == 1:
+        return Path(q, times=times), p
+    if degree == 3:
+        return cubic_path(q, rates, times), p
+    return quintic_path(q, rates, changes, times), p
+
+
+@pytest.mark.parametrize("degree", [1, 3, 5])
+def test_pieces_are_the_polynomials_that_they_fit(degree: int) -> None:
+    rng = np.random.default_rng(degree)
+    for _ in range(20):
+        path, p = made(degree, rng)
+        for k in range(3):
+            start, end = path.times[k : k + 2]
+            for t in [0.0, 1.0, *rng.uniform(size=5)]:
+                assert value(path, k, t)[0] == pytest.approx(
+                    p(start + t * (end - start))
+                )
+
+
+@pytest.mark.parametrize("degree", [1, 3, 5])
+def test_bounds_hold_over_every_slice(degree: int) -> None:
+    rng, out = np.random.default_rng(degree), np.zeros(3)
+    for _ in range(40):
+        path, p = made(degree, rng)
+        start, end = np.sort(rng.uniform(size=2))
+        first, after = path.times[1:3]
+        bound_column(path.packed(), 1, 0, start, end, out)
+        t = first + np.linspace(start, end, 50) * (after - first)
+        for m in range(3):
+            most = np.abs(p.deriv(m)(t)).max() * (after - first) ** m
+            assert most <= out[m] * (1.0 + 1e-9) + 1e-9
+            if degree > 1:
+                far = np.abs(p.deriv(m)(np.linspace(first, after, 50))).max()
+                assert out[m] <= 40.0 * far * (after - first) ** m + 1e-9
+
+
+def test_paths_together_move_as_each_does_alone() -> None:
+    rng = np.random.default_rng(7)
+    for _ in range(60):
+        paths = [made(int(rng.choice([1, 3, 5])), rng)[0] for _ in range(3)]
+        shifted = [
+            Path(p.knots, p.inner, p.times + rng.uniform(-2.0, 2.0)) for p in paths
+        ]
+        both = together(*shifted)
+        assert set(both.times) == set(np.concatenate([p.times for p in shifted]))
+        for k in range(both.n_intervals):
+            for t in (0.0, 0.3, 1.0):
+                now = both.times[k] + t * (both.times[k + 1] - both.times[k])
+                for column, path in enumerate(shifted):
+                    at = int(np.searchsorted(path.times, now, side="right")) - 1
+                    at = min(max(at, 0), path.n_intervals - 1)
+                    length = path.times[at + 1] - path.times[at]
+                    share = np.clip((now - path.times[at]) / length, 0.0, 1.0)
+                    expected = value(path, at, float(share))[0]
+                    assert value(both, k, t)[column] == pytest.approx(
+                        expected, abs=1e-9
+                    )
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Path(np.zeros(3)), "expected"),
+        (lambda: Path(np.full((2, 1), np.nan)), "not finite"),
+        (lambda: Path(np.zeros((3, 1)), np.zeros((2, 1, 1))), "control points"),
+        (lambda: Path(np.zeros((2, 1)), times=np.zeros(2)), "rise"),
+        (lambda: Path(np.zeros((2, 1)), times=np.zeros(3)), "times have shape"),
+        (lambda: cubic_path(np.zeros((2, 1)), np.zeros((2, 2)), np.arange(2)), "rates"),
+        (lambda: together(Path(np.zeros((2, 1)))), "need times"),
+    ],
+)
+def test_what_is_no_path_is_refused(make: object, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        make()  # type: ignore[operator]

@@ -1,0 +1,249 @@
+"""One proof for everything that moves.
+
+If the verdict of a pair is CERTIFIED, then at every instant of the path and for every
+motion within the error box its two bodies keep their required clearance, rounding
+included. If it is REFUTED, two points, one of each body, come nearer at a stated time.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, frozen
+from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
+from vdsm_pin.proof.bodies import Body, Pair, PairTable
+from vdsm_pin.proof.budget import Budget, rounding_pad
+from vdsm_pin.proof.error_box import ErrorBox
+from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, OWN, TIME, UP
+from vdsm_pin.proof.packing import pack_task, with_errors
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.proving import Proving, new_proving
+from vdsm_pin.proof.results import Results
+from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED, WORLD
+from vdsm_pin.proof.tree import Tree
+
+
+@dataclass(frozen=True)
+class Proof:
+    """What was proved of each pair, in the order asked.
+
+    Args:
+        verdict: CERTIFIED, REFUTED or UNDECIDED, shape (n_pairs,).
+        lower: The clearance that is proved at every time, shape (n_pairs,); within
+            `TOLERANCES.least_bracket` of `upper` for the nearest pair, within a part of
+            the clearance for others; [m].
+        upper: Clearance at the witness, below zero where the bodies meet, the depth as
+            deep as is measured, shape (n_pairs,); [m].
+        lower_interval: Interval of the least lower bound, shape (n_pairs,).
+        interval: Interval of the witness, shape (n_pairs,).
+        share: When in that interval, 0 to 1, shape (n_pairs,).
+        points: Witnesses on the first and on the second body, in the world's frame,
+            shape (n_pairs, 2, 3); [m].
+        in_time: Whether there was time for all; what is not judged is undecided.
+    """
+
+    verdict: IntArray
+    lower: FloatArray
+    upper: FloatArray
+    lower_interval: IntArray
+    interval: IntArray
+    share: FloatArray
+    points: FloatArray
+    in_time: bool
+
+    @property
+    def is_certified(self) -> bool:
+        """Whether every pair is; never of no pairs."""
+        return bool(self.verdict.size and (self.verdict == CERTIFIED).all())
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """How pairs of bodies are asked: each as some of a convex part and a partner.
+
+    Args:
+        bodies: Those at rest in the world first, then the others, then parts.
+        pairs: Of parts and partners.
+        owner: The pair that each stands for, shape (n,).
+        swapped: Whether its first body is the partner, shape (n,).
+        number: Number of the body as it was given, of each body, (n_bodies,).
+        n_obstacles: Number of those at rest in the world.
+    """
+
+    bodies: list[Body]
+    pairs: PairTable
+    owner: IntArray
+    swapped: BoolArray
+    number: IntArray
+    n_obstacles: int
+
+
+def _mover(one: Body, other: Body) -> bool:
+    """Whether the second of two bodies moves past the first, not the reverse.
+
+    Raises:
+        ValueError: If both have a half-space.
+    """
+    if not one.is_bounded and not other.is_bounded:
+        message = (
+            f"{one.name!r} and {other.name!r} are both unbounded: they always meet"
+        )
+        raise ValueError(message)
+    if not one.is_bounded:
+        return True
+    if not other.is_bounded:
+        return False
+    if WORLD in (one.frame, other.frame):
+        return one.frame == WORLD
+    return len(other.pieces) < len(one.pieces)
+
+
+def _planned(bodies: Sequence[Body], pairs: PairTable) -> _Plan:
+    """Which side of each pair moves, and its convex parts."""
+    order = sorted(range(len(bodies)), key=lambda k: bodies[k].frame != WORLD)
+    place = {number: k for k, number in enumerate(order)}
+    all_bodies, number = [bodies[k] for k in order], list(order)
+    parts: dict[int, range] = {}
+    rows: list[tuple[int, int, float, int, bool]] = []
+    asked = zip(
+        pairs.one.tolist(), pairs.other.tolist(), pairs.required.tolist(), strict=True
+    )
+    for row, (one, other, required) in enumerate(asked):
+        swapped = _mover(bodies[one], bodies[other])
+        mover, partner = (other, one) if swapped else (one, other)
+        if mover not in parts:
+            body, first = bodies[mover], len(all_bodies)
+            parts[mover] = range(first, first + len(body.pieces))
+            all_bodies += [Body(body.frame, (p,), body.name) for p in body.pieces]
+            number += [mover] * len(body.pieces)
+        partner = place[partner]
+        rows += [(k, partner, required, row, swapped) for k in parts[mover]]
+    table = PairTable(
+        np.array([row[0] for row in rows], dtype=np.int64),
+        np.array([row[1] for row in rows], dtype=np.int64),
+        np.array([row[2] for row in rows], dtype=np.float64),
+    )
+    return _Plan(
+        bodies=all_bodies,
+        pairs=table,
+        owner=np.array([row[3] for row in rows], dtype=np.int64),
+        swapped=np.array([row[4] for row in rows], dtype=np.bool_),
+        number=np.array(number, dtype=np.int64),
+        n_obstacles=sum(body.frame == WORLD for body in bodies),
+    )
+
+
+def _extent(tree: Tree, path: Path, pieces: PackedPieces) -> float:
+    """Bound of all lengths and coordinates; [m]."""
+    far = 0.0
+    for joint in tree.joints:
+        far += float(np.linalg.norm(np.asarray(joint.placement)[:3, 3]))
+        moved = 0.0 if joint.column is None else path.reach[joint.column]
+        far += abs(joint.ratio) * float(moved) + abs(joint.offset)
+    values = (pieces.points, pieces.centre, pieces.extent, pieces.radius)
+    return far + max(float(np.abs(x).max(initial=0.0)) for x in values)
+
+
+def start_proof(
+    tree: Tree,
+    bodies: Sequence[Body],
+    path: Path,
+    pairs: PairTable,
+    errors: ErrorBox | None = None,
+    budget: Budget | None = None,
+) -> tuple[Proving, _Plan]:
+    """Everything ready, nothing judged; arguments as for `prove`."""
+    budget, plan = budget or Budget(), _planned(bodies, pairs)
+    _check(tree, bodies, path)
+    pieces = pack_pieces([body.pieces for body in plan.bodies])
+    rules = budget.rules(rounding_pad(_extent(tree, path, pieces)))
+    task = pack_task(tree, plan.bodies, plan.pairs, rules, path.reach, pieces=pieces)
+    if errors is not None:
+        surfaces = errors.surfaces
+        if surfaces is not None:
+            surfaces = np.asarray(surfaces, dtype=np.float64)[plan.number]
+        task = with_errors(
+            task, ErrorBox(errors.joints, errors.shifts, errors.tilts, surfaces)
+        )
+    return new_proving(task, path.packed(), 1, plan.n_obstacles, budget), plan
+
+
+def _check(tree: Tree, bodies: Sequence[Body], path: Path) -> None:
+    """Refuse what does not fit together.
+
+    Raises:
+        ValueError: If a body rides on no frame of the tree, has no piece, or the path
+            has other columns than the tree.
+    """
+    for body in bodies:
+        if not 0 <= body.frame < tree.n_frames or not len(body.pieces):
+            message = (
+                f"body {body.name!r} has {len(body.pieces)} pieces on frame "
+                f"{body.frame}, expected at least one and a frame below {tree.n_frames}"
+            )
+            raise ValueError(message)
+    if path.knots.shape[1] != tree.n_columns:
+        message = (
+            f"the path has {path.knots.shape[1]} columns, the tree {tree.n_columns}"
+        )
+        raise ValueError(message)
+
+
+def prove(
+    tree: Tree,
+    bodies: Sequence[Body],
+    path: Path,
+    pairs: Sequence[Pair] | PairTable,
+    errors: ErrorBox | None = None,
+    budget: Budget | None = None,
+) -> Proof:
+    """Bracket the clearance of every pair over the whole path.
+
+    Args:
+        tree: The joints; what moves by itself is a branch of its own.
+        bodies: The bodies, on its frames.
+        path: How the joints move.
+        pairs: Which bodies are held apart, and how far.
+        errors: The proof covers every motion within it; None for the path itself.
+        budget: How long it may take.
+
+    Returns:
+        The proof, its least brackets narrowed unless the time ended before.
+
+    Raises:
+        ValueError: If bodies, pairs, path and tree do not fit together.
+    """
+    table = pairs if isinstance(pairs, PairTable) else PairTable.of(pairs)
+    proving, plan = start_proof(tree, bodies, path, table, errors, budget)
+    in_time = proving.run()
+    return _summed(proving.results, plan, table.size, in_time)
+
+
+def _summed(results: Results, plan: _Plan, n: int, in_time: bool) -> Proof:
+    """What was proved of parts, summed up by pair."""
+    best, owner, judged = results.best, plan.owner, np.zeros((n, 3), np.int64)
+    np.add.at(judged, owner, results.counts)
+    verdict = np.where(judged[:, UNDECIDED] > 0, UNDECIDED, CERTIFIED)
+    verdict[judged[:, REFUTED] > 0] = REFUTED
+    least, met = _least(best[:, LOW], owner, n), _least(best[:, UP], owner, n)
+    points = best[met, OWN:].reshape(-1, 2, 3)
+    turned = plan.swapped[met]
+    points[turned] = points[turned, ::-1]
+    return Proof(
+        verdict=frozen(verdict, np.int64),
+        lower=frozen(best[least, LOW]),
+        upper=frozen(best[met, UP]),
+        lower_interval=frozen(best[least, AT_LOWER], np.int64),
+        interval=frozen(best[met, AT_UPPER], np.int64),
+        share=frozen(best[met, TIME]),
+        points=frozen(points),
+        in_time=in_time,
+    )
+
+
+def _least(values: FloatArray, owner: IntArray, n: int) -> IntArray:
+    """Of each owner the number of its least value, shape (n,)."""
+    order = np.lexsort((values, owner))
+    first: IntArray = np.searchsorted(owner[order], np.arange(n))
+    return np.asarray(order[first])

@@ -1,0 +1,226 @@
+"""A proof at work: what is asked, its working space, where it writes."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import IntArray
+from vdsm_pin.proof.blocks import sweep
+from vdsm_pin.proof.broad_phase import BroadPhase, new_broad_phase
+from vdsm_pin.proof.budget import Budget
+from vdsm_pin.proof.layouts import (
+    AT_LOWER,
+    AT_UPPER,
+    BEST,
+    HELD,
+    KEY,
+    LOW,
+    OTHER,
+    OWN,
+    PAIR,
+    SLICE,
+    TALLY,
+    TIME,
+    UP,
+)
+from vdsm_pin.proof.least_bracket import narrow
+from vdsm_pin.proof.packed_tree import Motion
+from vdsm_pin.proof.results import Candidates, Dense, Results
+from vdsm_pin.proof.search import Witnesses
+from vdsm_pin.proof.terms import CERTIFIED, LINKS, OBSTACLES, UNDECIDED, Task
+from vdsm_pin.proof.witnesses import place_best, place_points
+from vdsm_pin.proof.workspace import Workspace, new_workspace
+
+SIDES: Final = 2
+"""Sides of a profile: lower and upper bounds."""
+
+
+def new_results(
+    n_pairs: int, columns: int, n_intervals: int, budget: Budget
+) -> Results:
+    """Where a sweep writes, with nothing found yet and no dense rows.
+
+    Args:
+        n_pairs: Number of pairs.
+        columns: Of its profile.
+        n_intervals: Of the motion.
+        budget: Sizes.
+    """
+    stride = max(1, -(-n_intervals * columns * SIDES // budget.profile))
+    n_bins = -(-n_intervals // stride)
+    best = np.full((n_pairs, BEST), np.inf)
+    best[:, [AT_LOWER, AT_UPPER, TIME]] = 0.0
+    return Results(
+        best=best,
+        counts=np.zeros((n_pairs, 3), np.int64),
+        profile=np.full((SIDES, columns, n_bins), np.inf),
+        stride=stride,
+        limit=np.full(2, np.inf),
+        candidates=room_for(budget.candidates),
+        overflow=np.full(2, np.inf),
+        tally=np.zeros(TALLY, np.int64),
+        dense=dense_rows(0, n_pairs),
+    )
+
+
+def room_for(size: int) -> Candidates:
+    """Room for so many candidates."""
+    numbers = (np.zeros(size, np.int64) for _ in range(3))
+    return Candidates(np.zeros(size), *numbers)
+
+
+def dense_rows(size: int, n_pairs: int) -> Dense:
+    """Room for the brackets of so many intervals."""
+    shape = (size, n_pairs)
+    return Dense(
+        lower=np.zeros(shape),
+        upper=np.zeros(shape),
+        time=np.zeros(shape),
+        verdict=np.zeros(shape, np.int64),
+        own=np.zeros((*shape, 3)),
+        other=np.zeros((*shape, 3)),
+    )
+
+
+@dataclass(frozen=True)
+class Proving:
+    """One question and motion, and the working space of their proof."""
+
+    task: Task
+    motion: Motion
+    desk: Workspace
+    results: Results
+    broad: BroadPhase
+    budget: Budget
+
+    @property
+    def n_intervals(self) -> int:
+        """Intervals of the motion; one row counts as an interval without motion."""
+        return max(1, len(self.motion.knots) - 1)
+
+    def sweep(self, first: int, last: int) -> bool:
+        """Judge some intervals; whether there was time for all."""
+        span = first, last
+        args = self.task, self.motion, self.desk, self.results, self.broad
+        return bool(sweep(*args, span, False))
+
+    def run(self) -> bool:
+        """Judge all intervals, narrow the least brackets, place the witnesses.
+
+        Returns:
+            Whether there was time to judge all; what is not judged is undecided.
+        """
+        in_time = self.sweep(0, self.n_intervals)
+        self._merge_far()
+        self._own_up()
+        for group in (OBSTACLES, LINKS):
+            if in_time:
+                self._narrow(group)
+        best = self.results.best
+        order = np.lexsort((best[:, TIME], best[:, AT_UPPER]))
+        place_best(self.task, self.motion, self.desk.ends, best, order)
+        return in_time
+
+    def _own_up(self) -> None:
+        """Call undecided what the time did not allow to judge."""
+        results = self.results
+        left = self.n_intervals - results.counts.sum(axis=1)
+        if left.any():
+            results.counts[:, UNDECIDED] += left
+            results.best[left > 0, LOW] = -np.inf
+            results.profile[0] = -np.inf
+
+    def _merge_far(self) -> None:
+        """Bring what the broad phase settled to the results of the pairs."""
+        far, task = self.broad, self.task
+        body, obstacle = np.nonzero(far.number >= 0)
+        pair, at = far.number[body, obstacle], (body, obstacle)
+        best = self.results.best
+        self.results.counts[pair, CERTIFIED] += far.settled[at]
+        better = far.lower[at] < best[pair, LOW]
+        best[pair[better], LOW] = far.lower[at][better]
+        best[pair[better], AT_LOWER] = far.at_lower[at][better]
+        found = np.flatnonzero(far.upper[at] < best[pair, UP])
+        body, pair, rows = body[found], pair[found], far.at_upper[at][found]
+        corner = task.bodies.corners[task.bodies.first[body]]
+        frames = task.bodies.frame[body]
+        place = place_points(task.tree, self.motion, rows, frames, corner)
+        point = far.point.T[obstacle[found]]
+        gap = np.linalg.norm(point - place, axis=1)
+        best[pair, UP] = gap - task.bodies.radius[body] + task.rules.pad
+        best[pair, AT_UPPER], best[pair, TIME] = rows, 0.0
+        best[pair, OWN:OTHER], best[pair, OTHER:] = corner, point
+
+    def _narrow(self, group: int) -> None:
+        """Narrow the least bracket of one group of pairs."""
+        task, results = self.task, self.results
+        mine, order = task.pairs.group == group, self._candidates(group)
+        if not order.size:
+            return
+        found = _no_witnesses(len(mine))
+        heap = np.zeros((self.budget.candidates + self.budget.slices, SLICE))
+        again = results._replace(counts=np.zeros_like(results.counts))
+        count = narrow(task, self.motion, self.desk, again, order, heap, found)
+        if count < 0:
+            return  # not all was looked at again: what was proved before holds
+        proved = np.full(len(mine), results.limit[group] - task.rules.gap)
+        np.minimum.at(proved, heap[:count, PAIR].astype(np.int64), heap[:count, KEY])
+        proved = np.minimum(proved, results.overflow[group])[mine]
+        results.best[mine, LOW] = np.maximum(results.best[mine, LOW], proved)
+        if group == OBSTACLES:
+            # Every interval keeps what the narrowing proved of all of them.
+            lower = results.profile[0]
+            np.maximum(lower, proved.min(), out=lower)
+
+    def _candidates(self, group: int) -> IntArray:
+        """What may hold the least bound.
+
+        The least first, since it lowers the limit most, then block by block.
+        """
+        task, results = self.task, self.results
+        held, n = results.candidates, results.tally[HELD]
+        near = np.flatnonzero(task.pairs.group[held.pair[:n]] == group)
+        near = near[held.lower[near] < results.limit[group] - task.rules.gap]
+        if not near.size:
+            return np.zeros(0, np.int64)
+        order = near[np.lexsort((held.pair[near], held.first[near]))]
+        least = np.argmin(held.lower[order])
+        found: IntArray = np.concatenate([order[[least]], np.delete(order, least)])
+        return found
+
+
+def _no_witnesses(n_pairs: int) -> Witnesses:
+    """Nothing met yet."""
+    return Witnesses(
+        upper=np.full(n_pairs, np.inf),
+        interval=np.zeros(n_pairs, np.int64),
+        time=np.zeros(n_pairs),
+        points=np.zeros((n_pairs, 6)),
+        instant=np.full(n_pairs, np.inf),
+        limit=np.inf,
+    )
+
+
+def new_proving(
+    task: Task, motion: Motion, columns: int, n_obstacles: int, budget: Budget
+) -> Proving:
+    """Everything ready, nothing judged.
+
+    Args:
+        task: What is asked.
+        motion: The motion; one row counts as an interval without motion.
+        columns: Columns of the profile.
+        n_obstacles: So many of the first obstacles of the packed scene rest in the
+            world.
+        budget: Sizes.
+    """
+    n_intervals = max(1, len(motion.knots) - 1)
+    return Proving(
+        task=task,
+        motion=motion,
+        desk=new_workspace(task, motion.knots.shape[1], budget.slices),
+        results=new_results(task.pairs.body.size, columns, n_intervals, budget),
+        broad=new_broad_phase(task, n_obstacles),
+        budget=budget,
+    )
