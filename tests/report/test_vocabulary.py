@@ -24,7 +24,7 @@ OURS = [name for name in SCHEMA_NAMES if name != "problem"]
 RESULTS = [name for name in OURS if name != "certificate"]  # it has a page of its own
 WITHOUT_UNIT = {
     "worst", "limit", "value",  # a key `unit` stands beside them
-    "moment", "first_moment",  # in waypoints
+    "moment", "first_moment", "last_moment",  # in waypoints
     "coverage",  # a share
     "changed_angles_mean_on_path",  # a number
     "proofs",  # said in its description

@@ -98,3 +98,33 @@ def test_links_that_meet_are_named_at_their_first_moment_and_at_their_worst() ->
     assert moments[lost - 1] - 1e-3 <= row.first <= moments[lost] + 1e-3
     assert row.first < row.moment
     assert "link 1 and link 4; first too close at waypoint" in row.where
+
+
+@pytest.mark.parametrize("n", [11, 501])
+def test_a_contact_has_its_end_and_its_intervals(n: int) -> None:
+    """In and out of the wall's margin twice: closed forms of all four moments."""
+    there = np.concatenate([np.linspace(0, 1, n), np.linspace(1, 0, n)[1:]])
+    motion, problem = advance(np.concatenate([there, there[1:]])), wall(0.3507)
+    row = next(
+        one for one in verify(problem, motion, load_robot(ARM)).checks
+        if one.name == "clearance from obstacles"
+    )  # fmt: skip
+    enters = 0.3407 * (n - 1)
+    assert row.first == pytest.approx(enters, abs=2e-6)
+    assert row.last == pytest.approx(4 * (n - 1) - enters, abs=2e-6)
+    x0 = motion.x0
+    above = (np.maximum(x0[:-1], x0[1:]) > 0.3407).sum()
+    assert row.too_close == above
+    assert row.stretches == 2
+    assert f"{above} intervals in 2 stretches" in row.where
+
+
+def test_a_motion_that_ends_too_close_is_so_to_its_end() -> None:
+    for motion, last in (
+        (advance(np.linspace(0, 1, 6)), 5),
+        (advance(np.array([0.5])), 0),
+    ):
+        judged = verify(wall(0.05), motion, load_robot(ARM))
+        (row,) = (one for one in judged.checks if "obstacles" in one.name)
+        assert row.last == pytest.approx(last, abs=1e-6)
+        assert row.stretches == 1

@@ -124,6 +124,9 @@ def check_row(check: Check) -> CheckRow:
         unit=check.unit,
         moment=finite(check.moment),
         first_moment=finite(check.first),
+        last_moment=finite(check.last),
+        too_close_intervals=check.too_close or None,
+        too_close_stretches=check.stretches or None,
         where=check.where,
         deeper=check.deeper,
     )

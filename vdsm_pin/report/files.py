@@ -75,6 +75,19 @@ class CheckRow(FileModel):
         description="when a clearance is first lost; null where it is not, or was not "
         f"looked for; {_MOMENT}",
     )
+    last_moment: FiniteFloat | None = Field(
+        default=None,
+        description="when a clearance is last lost; null where it is not, or was not "
+        f"looked for; {_MOMENT}",
+    )
+    too_close_intervals: int | None = Field(
+        default=None,
+        description="intervals in which a clearance is lost; null where it is not, or "
+        "they were not counted",
+    )
+    too_close_stretches: int | None = Field(
+        default=None, description="how many runs of neighbours those intervals make"
+    )
     where: str = Field(description="place of the worst case in words, without moment")
     deeper: bool = Field(description=f"of worst: {_DEEPER}")
 

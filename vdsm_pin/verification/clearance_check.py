@@ -93,7 +93,18 @@ def _first(row: Check, contact: FirstContact) -> Check:
     pair = f"link {contact.pair.link} and {contact.pair.label}"
     moment = f"{contact.moment:.6f}".rstrip("0").rstrip(".")
     where = f"{row.where}; {found} at waypoint {moment}: {pair}"
-    return replace(row, where=where, first=contact.moment)
+    if contact.intervals:
+        last = f"{contact.last:.6f}".rstrip("0").rstrip(".")
+        runs = "" if contact.stretches == 1 else f" in {contact.stretches} stretches"
+        where += f"; last at waypoint {last}; {contact.intervals} intervals{runs}"
+    return replace(
+        row,
+        where=where,
+        first=contact.moment,
+        last=contact.last,
+        too_close=contact.intervals,
+        stretches=contact.stretches,
+    )
 
 
 def _refuted(row: Check, found: Counterexample) -> Check:

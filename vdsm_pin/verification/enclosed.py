@@ -7,6 +7,7 @@ reported as minus the link's radius, whatever the depth.
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from math import nan
 from typing import Final
 
 import numpy as np
@@ -163,6 +164,9 @@ def enclosed_checks(
         where="; ".join(f"the arm is inside {name!r}" for name in around),
         moment=0.0,
         first=0.0,
+        last=nan,
+        too_close=0,
+        stretches=0,
         deeper=True,
     )
     return refuted, *rows[1:]

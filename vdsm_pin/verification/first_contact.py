@@ -1,6 +1,8 @@
-"""When a motion first comes too close: the beginning of a collision, not its depth."""
+"""When a motion is too close: a collision's begin, end and intervals, not its depth."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import nan
 from typing import Final
 
 import numpy as np
@@ -12,7 +14,7 @@ from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
-from vdsm_pin.verification.records import ErrorBox, Pair
+from vdsm_pin.verification.records import ClearanceChunk, ErrorBox, Pair
 from vdsm_pin.verification.task import pack_scene
 
 STRETCH: Final = 64
@@ -33,11 +35,45 @@ class FirstContact:
         pair: The pair.
         moment: In waypoints: 12.25 is a quarter of the way from 12 to 13.
         clear_before: Whether every pair of its kind is proved clear before.
+        last: The last moment at which some pair of its kind is proved to be too close;
+            NaN where nobody noted the intervals; in waypoints.
+        intervals: How many intervals some pair of its kind is too close in; 0 where
+            nobody noted them.
+        stretches: How many runs of neighbours they make.
     """
 
     pair: Pair
     moment: float
     clear_before: bool
+    last: float = nan
+    intervals: int = 0
+    stretches: int = 0
+
+
+class TooClose:
+    """Notes the intervals in which a pair is too close; receives brackets as a sink.
+
+    Args:
+        pairs: Every pair, as chunks number them.
+        n_intervals: Of the motion.
+    """
+
+    def __init__(self, pairs: Sequence[Pair], n_intervals: int) -> None:
+        self._of_obstacles = np.array([bool(pair.obstacle) for pair in pairs], bool)
+        self._noted = np.zeros((2, n_intervals), dtype=np.bool_)
+
+    def __call__(self, chunk: ClearanceChunk) -> None:
+        """Receive a chunk."""
+        mine = self._of_obstacles
+        mine = mine if chunk.pairs is None else mine[chunk.pairs]
+        refuted = chunk.verdict == REFUTED
+        here = slice(chunk.first_interval, chunk.first_interval + len(refuted))
+        for noted, columns in zip(self._noted, (~mine, mine), strict=True):
+            noted[here] |= refuted[:, columns].any(axis=1)
+
+    def of(self, *, obstacles: bool) -> BoolArray:
+        """Whether each interval is one, shape (n_intervals,)."""
+        return np.asarray(self._noted[int(obstacles)])
 
 
 def first_contacts(
@@ -46,6 +82,7 @@ def first_contacts(
     errors: ErrorBox,
     proof: ClearanceProof,
     deadline: Deadline = NO_LIMIT,
+    noted: TooClose | None = None,
 ) -> tuple[FirstContact, ...]:
     """Where the clearance is first lost, from obstacles and between links.
 
@@ -55,6 +92,7 @@ def first_contacts(
         errors: The box that `proof` covers.
         proof: Of the whole motion; what it does not refute has no contact.
         deadline: When to give up.
+        noted: The intervals that are too close, where the whole motion was noted.
 
     Returns:
         One at most of either kind.
@@ -64,12 +102,13 @@ def first_contacts(
     """
     of_obstacles = np.array([bool(pair.obstacle) for pair in proof.pairs], dtype=bool)
     search = _Search(problem, trajectory, errors, deadline)
-    found = (
-        search.first(mine)
-        for mine in (of_obstacles, ~of_obstacles)
-        if proof.counts[mine, REFUTED].any()
-    )
-    return tuple(one for one in found if one is not None)
+    contacts = []
+    for mine, kind in ((of_obstacles, True), (~of_obstacles, False)):
+        found = search.first(mine) if proof.counts[mine, REFUTED].any() else None
+        if found is not None and noted is not None:
+            found = search.with_end(found, mine, noted.of(obstacles=kind))
+        contacts += [] if found is None else [found]
+    return tuple(contacts)
 
 
 class _Search:
@@ -113,6 +152,27 @@ class _Search:
                 low = share
         moment = round(first + high, DIGITS) if self.trajectory.n_samples > 1 else 0.0
         return FirstContact(pair, moment, clear)
+
+    def with_end(
+        self, found: FirstContact, mine: BoolArray, noted: BoolArray
+    ) -> FirstContact:
+        """The contact with its end, and the intervals it is in."""
+        intervals = np.flatnonzero(noted)
+        if not intervals.size or self.trajectory.n_samples == 1:
+            return replace(found, last=found.moment, intervals=1, stretches=1)
+        last, low, high = int(intervals[-1]), 0.0, 1.0
+        for _ in range(HALVINGS):
+            share = (low + high) / 2.0
+            if self._refuted(self._within(last, share, 1.0), mine):
+                low = share
+            else:
+                high = share
+        return replace(
+            found,
+            last=round(last + low, DIGITS),
+            intervals=intervals.size,
+            stretches=1 + int((np.diff(intervals) > 1).sum()),
+        )
 
     def _refuted(self, rows: Trajectory, mine: BoolArray) -> bool:
         """Whether some pair is refuted; keeps which, and whether all are proved."""

@@ -40,7 +40,7 @@ from vdsm_pin.verification.enclosed import (
     enclosed_least,
     enclosed_profile,
 )
-from vdsm_pin.verification.first_contact import FirstContact, first_contacts
+from vdsm_pin.verification.first_contact import FirstContact, TooClose, first_contacts
 from vdsm_pin.verification.inside import (
     arm_inside,
     check_inside,
@@ -61,6 +61,7 @@ from vdsm_pin.verification.records import (
     is_deepest,
 )
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
+from vdsm_pin.verification.task import all_pairs
 from vdsm_pin.verification.tip import check_tip
 
 T = TypeVar("T")
@@ -111,8 +112,10 @@ def verify(
     located = locate_arm(problem, trajectory, box, deadline)
     around, kept = arm_inside(located), _Lowers(problem, trajectory)
     wanted = [EnclosedSink(sink, problem, around) if around else sink for sink in sinks]
+    noted: TooClose | None = None
     if sinks or kept.fits:
-        wanted.append(kept.keep)
+        noted = TooClose(all_pairs(problem), max(1, trajectory.n_samples - 1))
+        wanted += [kept.keep, noted]
     near = coal_clearance.reach_of(problem) if reach is None else reach
     near = math.inf if around else near
     proof = prove_clearance(
@@ -128,7 +131,14 @@ def verify(
     nowhere: tuple[FirstContact, ...] = ()
     contacts = besides.take(
         "first contact",
-        lambda: first_contacts(problem, trajectory, box, proof, deadline),
+        lambda: first_contacts(
+            problem,
+            trajectory,
+            box,
+            proof,
+            deadline,
+            noted if proof.sent == proof.n_intervals else None,
+        ),
         nowhere,
     )
     if sinks and proof.sent < proof.n_intervals:
