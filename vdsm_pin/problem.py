@@ -61,6 +61,8 @@ class DesiredPath:
         order: Whether pieces of the path may be drawn in another order or direction.
         pointing: Where the last link shall look meanwhile; None for anywhere.
         home: Whether the arm shall go back to its start by the way it came.
+        insertion: Places between start and path that `follow-the-leader` takes, in this
+            order, shape (k, 3); [m].
 
     Raises:
         InvalidInput: If a value breaks its range, or directions do not fit the corners.
@@ -78,11 +80,16 @@ class DesiredPath:
     order: Order = Order.AS_GIVEN
     pointing: Pointing | None = None
     home: bool = False
+    insertion: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check the values."""
         object.__setattr__(self, "start", frozen(self.start))
         object.__setattr__(self, "points", frozen(self.points))
+        object.__setattr__(self, "insertion", frozen(self.insertion))
+        if self.insertion.shape[1:] != (3,) or not np.isfinite(self.insertion).all():
+            message = "tip_path.insertion is not a list of points"
+            raise InvalidInput(message)
         if self.start_joints is not None:
             object.__setattr__(self, "start_joints", frozen(self.start_joints))
         if self.start.shape != (3,) or not np.isfinite(self.start).all():

@@ -80,6 +80,7 @@ class PathBuilder:
             Order(model.order),
             self._pointing(model, points),
             home,
+            self.frame.point(np.array(model.insertion).reshape(-1, 3)),
         )
         self._check_rows(path)
         return path

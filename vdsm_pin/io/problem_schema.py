@@ -254,6 +254,11 @@ class TipPathModel(FileModel):
         description="Whether pieces of the path may be drawn in another order or "
         "direction.",
     )
+    insertion: list[Vector] = Field(
+        default=[],
+        description="Places between start and path by way of which strategy "
+        "follow-the-leader brings the tip in [length_unit].",
+    )
     pointing: PointingModel | None = Field(
         default=None,
         description="Where the last link's axis looks wherever the tip draws. Default: "

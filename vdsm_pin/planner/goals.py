@@ -105,6 +105,7 @@ def _of_rows(
         centres=centres,
         trajectory=Trajectory(on_path, stations, x0, alpha, theta),
         cable_lengths=cable_lengths(arm, alpha, theta),
+        steps=None,
     )
 
 

@@ -23,6 +23,7 @@ STRATEGIES: Final[Mapping[str, str]] = MappingProxyType(
         "fewest": "vdsm_pin.planner.fewest.strategy:plan_fewest",
         "clearest": "vdsm_pin.planner.fewest.strategy:plan_clearest",
         "sturdiest": "vdsm_pin.planner.fewest.strategy:plan_sturdiest",
+        "follow-the-leader": "vdsm_pin.planner.leader:plan_follow_the_leader",
         "paper": "vdsm_pin.planner.paper.pipeline:plan_paper",
     }
 )

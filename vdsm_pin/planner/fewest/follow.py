@@ -7,7 +7,7 @@ from vdsm_pin.geometry.compiled import compiled
 
 
 @compiled
-def _beyond(
+def beyond(
     curve: FloatArray, at: int, place: FloatArray, length: float, found: FloatArray
 ) -> int:
     """The next place on a polyline at a distance from a place on it.
@@ -72,7 +72,7 @@ def followed(centres: FloatArray, tips: FloatArray, lengths: FloatArray) -> Floa
         result[r, count] = place
         for joint in range(count - 1, 0, -1):
             found = np.zeros(3)
-            at = _beyond(curve, at, place, lengths[joint], found)
+            at = beyond(curve, at, place, lengths[joint], found)
             if at == curve.shape[0]:
                 break
             result[r, joint], place = found, found

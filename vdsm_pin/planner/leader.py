@@ -1,0 +1,172 @@
+"""Strategy `follow-the-leader`: the arm runs along the curve that its tip has taken.
+
+What operators know as nose following. The curve is the arm as it starts, then the
+insertion that the problem gives, then the path. Each joint lies on it, a link's length
+behind the next one; the base is fed along its rail. Obstacles are not looked at: the
+verification says whether the motion keeps clear of them.
+"""
+
+import itertools
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.cables import cable_lengths
+from vdsm_pin.errors import NoPlanFound
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.kinematics import joint_angles, link_angles
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.planner.fewest.follow import beyond
+from vdsm_pin.planner.fewest.route import path_rows
+from vdsm_pin.planner.records import LinkClearance, Margin, Plan, TipPath
+from vdsm_pin.planner.start import check_start, start_centres
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+
+FINEST: Final = 64
+"""Parts into which a step is cut at most so that no joint turns too far in one."""
+
+
+@compiled
+def laid(
+    curve: FloatArray, first: IntArray, tips: FloatArray, lengths: FloatArray
+) -> FloatArray:
+    """Arms whose joints lie on a curve behind their tips.
+
+    Args:
+        curve: Its corners from the far end back, shape (k, 3); [m].
+        first: The corner that comes next behind each tip, shape (n,).
+        tips: Places on the curve, shape (n, 3); [m].
+        lengths: Of the links, shape (N,); [m].
+
+    Returns:
+        Joint centres, shape (n, N + 1, 3), NaN where the curve has no place for a
+        joint, or the base cannot be on the rail; [m].
+    """
+    count = lengths.size
+    result = np.full((tips.shape[0], count + 1, 3), np.nan)
+    for r in range(tips.shape[0]):
+        row, at, place = result[r], first[r], tips[r].copy()
+        row[count] = place
+        for joint in range(count - 1, 0, -1):
+            found = np.zeros(3)
+            at = beyond(curve, at, place, lengths[joint], found)
+            if at == curve.shape[0]:
+                break
+            row[joint], place = found, found
+        square = lengths[0] ** 2 - place[1] ** 2 - place[2] ** 2
+        if at < curve.shape[0] and square >= 0.0:
+            row[0, 0] = place[0] - np.sqrt(square)
+            row[0, 1] = row[0, 2] = 0.0
+    return result
+
+
+def plan_follow_the_leader(
+    problem: PlanningProblem, clearance: LinkClearance, margin: Margin
+) -> Plan:
+    """A plan whose arm follows its tip along the insertion and the path.
+
+    Args:
+        problem: What is asked.
+        clearance: Clearance of links at given joint centres.
+        margin: Not read: there is one such motion.
+
+    Raises:
+        Infeasible: If the start is too close to an obstacle, or `NoPlanFound` where a
+            joint or the base would pass a limit.
+    """
+    check_start(problem, clearance)
+    arm, rows = problem.manipulator, path_rows(problem.path)
+    start = start_centres(problem)
+    way = np.vstack([start[-1:], problem.path.insertion, rows.tips[:1]])
+    parts, alpha, theta = 1, np.zeros((0, 0)), np.zeros((0, 0))
+    while True:
+        step = problem.path.spacing / parts
+        approach = _stepped(way, step)
+        inner = _stepped(rows.tips, step)
+        stations = _stepped(rows.stations[:, None], step)[:, 0]
+        tips = np.concatenate([approach[:-1], inner])
+        on_path = np.arange(len(tips)) >= len(approach) - 1
+        along = np.append(np.full(len(approach) - 1, stations[0]), stations)
+        centres = _following(arm, start, tips)
+        _check(problem, centres, tips)
+        alpha, theta = joint_angles(arm, centres)
+        turn = np.abs(np.diff(np.stack([alpha, theta]), axis=1)).max(initial=0.0)
+        if turn <= problem.planned_row_change or parts == FINEST:
+            break
+        parts *= 2
+    trajectory = Trajectory(on_path, along, centres[:, 0, 0], alpha, theta)
+    note = "the arm follows the curve of its tip; obstacles were not looked at"
+    return Plan(
+        problem,
+        "follow-the-leader",
+        TipPath(tips, on_path, along),
+        centres,
+        trajectory,
+        cable_lengths(arm, alpha, theta),
+        notes=(note,),
+    )
+
+
+def _stepped(corners: FloatArray, step: float) -> FloatArray:
+    """Points along a polyline at most a step apart, corners kept, shape (n, d)."""
+    made = [corners[:1]]
+    for a, b in itertools.pairwise(corners):
+        count = max(
+            1, int(np.ceil(np.linalg.norm(b - a) / step - TOLERANCES.whole_parts))
+        )
+        share = np.arange(1, count + 1)[:, None] / count
+        side = (1.0 - share) * a + share * b
+        side[-1] = b
+        made.append(side)
+    return np.concatenate(made)
+
+
+def _following(arm: Manipulator, start: FloatArray, tips: FloatArray) -> FloatArray:
+    """Joint centres of the arm behind each tip, shape (n, N + 1, 3); [m].
+
+    Args:
+        arm: The arm.
+        start: Its joint centres at the start, shape (N + 1, 3); [m].
+        tips: Places of the tip in order, the first one at the start, shape (n, 3); [m].
+    """
+    behind = start[:1] - np.array([2.0 * arm.total_length, 0.0, 0.0])
+    curve = np.concatenate([tips[::-1], start[-2::-1], behind])
+    # The tip of row r is corner n - 1 - r of the curve.
+    first = np.arange(len(tips))[::-1] + 1
+    centres = laid(np.ascontiguousarray(curve), first, tips, arm.link_lengths)
+    centres[0] = start
+    return np.asarray(centres)
+
+
+def _check(problem: PlanningProblem, centres: FloatArray, tips: FloatArray) -> None:
+    """Refuse a motion that passes a limit.
+
+    Raises:
+        NoPlanFound: With the joint, its angle and where the tip is.
+    """
+    arm = problem.manipulator
+    low, high = arm.base_range
+    placed = np.asarray(np.isfinite(centres).all(axis=(1, 2)))
+    base = np.where(placed, centres[:, 0, 0], 0.0)
+    off: BoolArray = ~placed | (base < low) | (base > high)
+    if off.any():
+        row = int(np.argmax(off))
+        message = (
+            f"with the tip at {problem.in_file(tips[row])} the base would have to "
+            "leave its rail to follow"
+        )
+        raise NoPlanFound(message)
+    psi = link_angles(*joint_angles(arm, centres))
+    limit = arm.max_link_angle + TOLERANCES.joint_limit
+    if not (psi <= limit).all():
+        row, joint = divmod(int(np.argmax(psi)), arm.n_links)
+        message = (
+            f"with the tip at {problem.in_file(tips[row])} joint {joint + 1} would "
+            f"bend by {np.rad2deg(psi[row, joint]):.1f} deg to follow it, the limit is "
+            f"{np.rad2deg(arm.max_link_angle):.1f} deg: round the corners of "
+            "`insertion`, which no link should pass at once"
+        )
+        raise NoPlanFound(message)
