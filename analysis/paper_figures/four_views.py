@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from paper_figures import style
+from paper_figures.marks import marks
 from paper_figures.runs import Run
 from paper_figures.scenery import (
     ROOM,
@@ -83,7 +84,8 @@ def _oblique(axes: Axes, run: Run) -> None:
     seen = OBLIQUE(corners)
     axes.set_xlim(seen[:, 0].min(), seen[:, 0].max())
     axes.set_ylim(seen[:, 1].min(), seen[:, 1].max())
-    axes.set_title(f"     (d) oblique view, arm at waypoint {row}")
+    here = {mark.row: mark.name for mark in marks(run)}.get(row, f"waypoint {row}")
+    axes.set_title(f"     (d) oblique view, arm at {here}")
 
 
 def _legend(figure: Figure, beside: Axes, run: Run) -> None:

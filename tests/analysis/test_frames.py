@@ -53,3 +53,17 @@ def test_the_printed_matrix_is_not_the_product() -> None:
     )
     printed = tables.printed_matrix(0.3, 0.4, -0.2)[:3, :3]
     assert np.abs(printed @ printed.T - np.eye(3)).max() > 0.1
+
+
+def test_the_printed_step_5_takes_the_nearest_of_four_points() -> None:
+    """One joint, a disc: the tip goes over it, and the joint follows by hand."""
+    from step5_choices import literal_rule
+
+    from vdsm_pin.planner.paper.danger_region import DangerRegion
+
+    region = DangerRegion("disc", np.array([[1.0, 0.0]]), 0.5)
+    tips = np.array([[2.0, 2.0], [2.0, 0.2], [2.0, -0.2]])
+    planar = literal_rule(np.array([0.0, 0.5]), tips, region)
+    np.testing.assert_allclose(planar[0, 1], [1.0, 1.0])  # in proportion
+    np.testing.assert_allclose(planar[1, 1], [1.0, 0.5])  # up is nearest
+    np.testing.assert_allclose(planar[2, 1], [1.0, 0.5])

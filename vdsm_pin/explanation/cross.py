@@ -79,13 +79,13 @@ def crosses(
         region = rule.region.grown(float(margin))
         points = np.full((4, 2), np.nan)
         if region.contains(proportional[None])[0]:
-            points = np.stack([_leave(region, proportional, u) for u in DIRECTIONS])
+            points = np.stack([leave(region, proportional, u) for u in DIRECTIONS])
         place = former[i - 1], planar[i - 1]
         found.append(Cross(i, proportional, *place, region, points))
     return tuple(found)
 
 
-def _leave(region: DangerRegion, point: FloatArray, way: FloatArray) -> FloatArray:
+def leave(region: DangerRegion, point: FloatArray, way: FloatArray) -> FloatArray:
     """Where the line from a point in a direction leaves it, shape (2,); [m]."""
     far = leave_along(region.corners, region.sides, region.radius, *point, *way)
     return np.asarray(point + far * way)

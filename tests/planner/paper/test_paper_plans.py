@@ -282,9 +282,6 @@ def test_path_wholly_in_the_danger_region_is_refused() -> None:
 
 
 def test_scenes_the_rule_does_not_cover_are_refused() -> None:
-    two = (pillar(0.7, 0.6, 0.2), replace(pillar(-0.3, 0.6, 0.2), name="second"))
-    with pytest.raises(NoPlanFound, match="2 obstacles"):
-        planned(with_obstacles(*two))
     ball = Sphere("ball", np.array([2.0, 0.4, 0.4]), 0.2)
     with pytest.raises(NoPlanFound, match="'ball' is not prismatic"):
         planned(with_obstacles(ball))

@@ -58,6 +58,11 @@ class AcrossRail:
     bends: tuple[int, ...]
     margins: FloatArray
 
+    @property
+    def passed(self) -> str:
+        """Names of the obstacles that are gone round."""
+        return self.region.name
+
     def route(self, missing: float) -> Route:
         """Step 4: as without obstacles; the tip itself must stay clear."""
         route = replace(straight_route(self.problem.path), notes=(self._told,))

@@ -52,6 +52,11 @@ class AlongRail:
     rules: dict[int, SideRule]
     margins: FloatArray
 
+    @property
+    def passed(self) -> str:
+        """Names of the obstacles that are gone round."""
+        return self.region.name
+
     def route(self, missing: float) -> Route:
         """Step 4."""
         return detour_route(self.problem.path, self.region, self.stands, missing)
@@ -124,7 +129,8 @@ def _shapes(
 
 
 def _grown(section: Section, growth: float) -> DangerRegion:
-    return DangerRegion(section.name, section.points, section.radius + growth)
+    radius = section.radius + growth
+    return DangerRegion(section.name, section.points, radius, section.centres)
 
 
 def _choice(
@@ -145,7 +151,8 @@ def _choice(
     grown = max(r.radius - shapes[_rank(r, shapes)].radius for r in regions)
     # The tip ends the last link, whose margin it keeps.
     radius = shapes[_rank(bluntest, shapes)].radius + grown + margins[-1]
-    region = DangerRegion(forbidden.name, bluntest.corners, radius)
+    name, centres = forbidden.name, forbidden.centres
+    region = DangerRegion(name, bluntest.corners, radius, centres)
     return AlongRail(problem, forbidden, region, rules, margins)
 
 

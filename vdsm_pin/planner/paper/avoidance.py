@@ -4,8 +4,9 @@ An avoidance fixes Steps 4 and 5: where the tip goes, and where the joints go in
 projection. The pipeline tries them in the order given here.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Final, Protocol
 
 import numpy as np
@@ -14,10 +15,13 @@ from vdsm_pin.errors import Infeasible, NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.paper.across_rail import across_rail
 from vdsm_pin.planner.paper.along_rail import along_rail
-from vdsm_pin.planner.paper.sections import section_along
+from vdsm_pin.planner.paper.sections import Section, merged, section_along
 from vdsm_pin.planner.paper.tip_path import Route, straight_route
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
+
+MOST_OBSTACLES: Final = 4
+"""Of so many obstacles 15 groups can be made, and each is tried; [-]."""
 
 SPARSE: Final = 16
 """Every so manieth waypoint is looked at first."""
@@ -25,6 +29,11 @@ SPARSE: Final = 16
 
 class Avoidance(Protocol):
     """Steps 4 and 5 of one plan."""
+
+    @property
+    def passed(self) -> str:
+        """Names of the obstacles that are gone round."""
+        ...
 
     def route(self, missing: float) -> Route:
         """Step 4: the tip's route that leaves less than this of the path undrawn; [m].
@@ -64,6 +73,11 @@ class Straight:
     link_clearance: LinkClearance
     margins: FloatArray
 
+    @property
+    def passed(self) -> str:
+        """None."""
+        return ""
+
     def clearance(self, centres: FloatArray) -> float:
         """By the function handed in; a few waypoints tell where it is hopeless."""
         if not self.problem.scene.obstacles:
@@ -85,10 +99,12 @@ class Straight:
 
 
 def avoidances(problem: PlanningProblem, margins: FloatArray) -> Iterator[Avoidance]:
-    """Every way the paper's rule offers to go round the scene's obstacle.
+    """Every way the paper's rule offers to go round the scene's obstacles.
 
     A body that is prismatic along several axes is tried along X first, where only its
-    section matters, then along Z and Y.
+    section matters, then along Z and Y. Of several obstacles one alone is gone round
+    first, then more of them together, as the hull of their sections: the others must
+    keep clear by themselves.
 
     Args:
         problem: What was asked.
@@ -99,23 +115,27 @@ def avoidances(problem: PlanningProblem, margins: FloatArray) -> Iterator[Avoida
         PathBlocked: If a view rules its obstacle out.
     """
     obstacles = problem.scene.obstacles
-    if len(obstacles) != 1:
+    if len(obstacles) > MOST_OBSTACLES:
         message = (
-            f"{len(obstacles)} obstacles are in the straight arm's way or near it; the "
-            "paper's rule goes round one (the strategy 'fewest' takes any number)"
+            f"there are {len(obstacles)} obstacles, and the straight arm is not clear "
+            f"of all; the paper's rule goes round up to {MOST_OBSTACLES} (the strategy "
+            "'fewest' takes any number)"
         )
         raise NoPlanFound(message)
-    sections = {axis: section_along(obstacles[0], axis) for axis in "xzy"}
-    if not any(sections.values()):
+    seen = {
+        axis: [section_along(obstacle, axis) for obstacle in obstacles]
+        for axis in "xzy"
+    }
+    groups = _groups(seen)
+    if not groups:
+        names = " or ".join(repr(obstacle.name) for obstacle in obstacles)
         message = (
-            f"obstacle {obstacles[0].name!r} is not prismatic along X, Y or Z, which "
-            "the paper's rule needs (the strategy 'fewest' takes any shape)"
+            f"obstacle {names} is not prismatic along X, Y or Z, which the paper's "
+            "rule needs (the strategy 'fewest' takes any shape)"
         )
         raise NoPlanFound(message)
     refusal: Infeasible | None = None
-    for axis, section in sections.items():
-        if section is None:
-            continue
+    for axis, section in groups:
         try:
             if axis == "x":
                 yield from along_rail(problem, section, margins)
@@ -125,3 +145,19 @@ def avoidances(problem: PlanningProblem, margins: FloatArray) -> Iterator[Avoida
             refusal = refusal or error
     if refusal is not None:
         raise refusal
+
+
+def _groups(seen: Mapping[str, list[Section | None]]) -> list[tuple[str, Section]]:
+    """Sections to go round with their axes: of one obstacle, of two together, ..
+
+    Args:
+        seen: Section of every obstacle along each axis; None where it is none.
+    """
+    sections = {axis: [one for one in found if one] for axis, found in seen.items()}
+    most = max(map(len, sections.values()))
+    return [
+        (axis, merged(some))
+        for size in range(1, most + 1)
+        for axis, found in sections.items()
+        for some in combinations(found, size)
+    ]

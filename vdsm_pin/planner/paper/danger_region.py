@@ -29,11 +29,14 @@ class DangerRegion:
         name: Name of the obstacle.
         corners: Counterclockwise, shape (n, 2), n >= 1; [m].
         radius: [m].
+        centres: Of the obstacles that it stands for, where there are several, shape
+            (k, 2); [m].
     """
 
     name: str
     corners: FloatArray
     radius: float
+    centres: FloatArray | None = None
 
     def __post_init__(self) -> None:
         """Freeze the array."""

@@ -11,7 +11,7 @@ other side (A5).
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -33,6 +33,10 @@ from vdsm_pin.planner.paper.tip_path import (
 from vdsm_pin.problem import Approach, DesiredPath
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
+
+WIDER: Final = (0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3)
+"""By how much wider than the region ways round it are tried, too, where the arm cannot
+follow the taut one; [m]."""
 
 Judge: TypeAlias = Callable[[FloatArray, int], BoolArray]
 """(tip positions (n, 3), side) to whether the arm can stand there so, shape (n,)."""
@@ -68,15 +72,37 @@ def first_station(path: DesiredPath, region: DangerRegion) -> tuple[float, str]:
     """Where the tip joins a closed path, by the scheme asked for (paper, 4.2.2).
 
     The equidistant points are those where the line from the start through the centre of
-    the obstacle meets the path behind the obstacle: there both ways round are equal.
+    the obstacle meets the path behind the obstacle: there both ways round are equal. Of
+    several obstacles the line goes through the middle of all, or, for the nearest
+    equidistant point, one line through each.
 
     Returns:
         The arc length [m], and a note where the scheme had to be widened.
     """
     if path.approach is Approach.SHORTEST or not path.closed:
         return path.entry, ""
+    each = path.approach is Approach.NEAREST_EQUIDISTANT and region.centres is not None
+    centres = region.centres if each else region.centre[None]
+    assert centres is not None
+    found = [_behind(path, centre) for centre in centres]
+    stations = np.concatenate([one[0] for one in found])
+    distances = np.concatenate([one[1] for one in found])
+    if not len(stations):
+        return path.entry, "no equidistant point: the nearest point is used"
+    note = ""
+    if path.approach is Approach.EQUIDISTANT and len(stations) > 1:
+        note = f"{len(stations)} equidistant points: the nearest is used"
+    return float(stations[np.argmin(distances)]), note
+
+
+def _behind(path: DesiredPath, centre: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Where the line from the start through a centre meets the path behind it.
+
+    Returns:
+        Arc lengths along the path, and distances from the start, shape (k,) each; [m].
+    """
     start = path.start[1:]
-    ray = region.centre - start
+    ray = centre - start
     offsets = project(path.corners) - start
     across = ray[0] * offsets[:, 1] - ray[1] * offsets[:, 0]
     crossed = np.flatnonzero((across[:-1] <= 0.0) != (across[1:] <= 0.0))
@@ -84,13 +110,8 @@ def first_station(path: DesiredPath, region: DangerRegion) -> tuple[float, str]:
     sides = np.diff(path.corner_stations)[crossed]
     stations = path.corner_stations[crossed] + part * sides
     along = (project(path.at(stations)) - start) @ ray / (ray @ ray)
-    stations, along = stations[along > 1.0], along[along > 1.0]
-    if not len(stations):
-        return path.entry, "no equidistant point: the nearest point is used"
-    note = ""
-    if path.approach is Approach.EQUIDISTANT and len(stations) > 1:
-        note = f"{len(stations)} equidistant points: the nearest is used"
-    return float(stations[np.argmin(along)]), note
+    behind = along > 1.0
+    return stations[behind], along[behind] * float(np.hypot(*ray))
 
 
 def detour_route(
@@ -265,14 +286,16 @@ def _connect(
 def _ways_round(
     region: DangerRegion, begin: FloatArray, end: FloatArray
 ) -> list[FloatArray]:
-    """The straight line where it is clear, and the taut ways round either side."""
+    """The straight line where it is clear, and ways round, taut or wider."""
     straight = np.stack([begin, end])
-    clear = (
-        region.core_distance(straight[None])[0]
-        >= region.radius - TOLERANCES.on_boundary
-    )
-    ways = [region.walk(begin, end, sense) for sense in (1, -1)]
-    return [straight, *ways] if clear else ways
+    touch = region.radius - TOLERANCES.on_boundary
+    ways = [straight] if region.core_distance(straight[None])[0] >= touch else []
+    ends = region.core_distance(np.stack([straight[[0, 0]], straight[[1, 1]]]))
+    for wider in WIDER:
+        grown = region.grown(wider)
+        if wider == 0.0 or ends.min() >= grown.radius:
+            ways += [grown.walk(begin, end, sense) for sense in (1, -1)]
+    return ways
 
 
 def _sides_on_way(

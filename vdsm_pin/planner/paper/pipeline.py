@@ -61,7 +61,7 @@ def plan_paper(
         cables,
         tuple(
             f"from {in_mm(a)} to {in_mm(b)} along the path (left out by the paper's "
-            f"rule on its way round {problem.scene.names[0]!r}; nothing is proved)"
+            f"rule on its way round {motion.avoidance.passed!r}; nothing is proved)"
             for a, b in motion.route.undrawn
         ),
         motion.route.notes,
@@ -117,7 +117,10 @@ def _best_motion(
         try:
             route = avoidance.route(missing)  # Step 4
             motion = _motion(problem, avoidance, route)
-            kept = avoidance.clearance(motion.centres) + reserve
+            kept = avoidance.clearance(motion.centres)
+            if len(problem.scene.obstacles) > 1:  # the rule may know some of them only
+                kept = straight.clearance(motion.centres)
+            kept += reserve
             grazing = min(grazing, problem.required_clearance - kept)
             _refuse_touch(problem, kept)
         except Infeasible as error:
@@ -171,7 +174,7 @@ def _motion(problem: PlanningProblem, avoidance: Avoidance, route: Route) -> Pap
 def _refuse_touch(problem: PlanningProblem, clearance: float) -> None:
     if not clearance >= problem.required_clearance:
         message = (
-            f"off the path the links come within {in_mm(clearance)} of the obstacle, "
+            f"the links come within {in_mm(clearance)} of an obstacle, "
             f"{in_mm(problem.required_clearance)} are required"
         )
         raise NoPlanFound(message)
@@ -184,4 +187,4 @@ def _refuse_gaps(problem: PlanningProblem, motion: PaperSteps) -> None:
             f"the desired path cannot be drawn from {in_mm(first)} to {in_mm(last)}, "
             "and the problem allows no detour (blocked: fail)"
         )
-        raise PathBlocked(obstacle=problem.scene.names[0], reason=reason)
+        raise PathBlocked(obstacle=motion.avoidance.passed, reason=reason)

@@ -6,6 +6,7 @@ taken as endless, and a section that is not convex as its hull; both are on the 
 side.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -31,14 +32,17 @@ class Section:
         points: Corners of the hull in counterclockwise order, shape (n, 2), n >= 1;
             [m].
         radius: 0 or more; [m].
+        centres: Of the obstacles that it stands for, where there are several, shape
+            (k, 2); [m].
     """
 
     name: str
     points: FloatArray
     radius: float
+    centres: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        """Freeze the array."""
+        """Freeze the arrays."""
         object.__setattr__(self, "points", frozen(self.points))
 
     @cached_property
@@ -60,7 +64,29 @@ class Section:
             offset = offset[:1] * 0.0
         reach = float(np.linalg.norm(self.points - self.centre, axis=1).max())
         points = self.centre + (1.0 - rounding) * offset
-        return Section(self.name, points, self.radius + rounding * reach)
+        radius = self.radius + rounding * reach
+        return Section(self.name, points, radius, self.centres)
+
+
+def merged(sections: Sequence[Section]) -> Section:
+    """One convex section that holds several; one alone stays as it is.
+
+    Points are grown by the largest radius of all, which is on the safe side.
+    """
+    if len(sections) == 1:
+        return sections[0]
+    hull = shapely.MultiPoint(
+        np.vstack([section.points for section in sections])
+    ).convex_hull
+    corners = shapely.get_coordinates(hull)
+    if hull.geom_type == "Polygon":
+        corners = shapely.get_coordinates(shapely.orient_polygons(hull))[:-1]
+    return Section(
+        " and ".join(section.name for section in sections),
+        corners,
+        max(section.radius for section in sections),
+        np.stack([section.centre for section in sections]),
+    )
 
 
 def section_along(obstacle: Obstacle, axis: str) -> Section | None:
