@@ -8,6 +8,7 @@ import shlex
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Final, Literal, NoReturn
 
@@ -32,7 +33,6 @@ MOST_TOLD: Final = 20
 # Without rich markup the help page is plain text and opens twice as fast.
 app = typer.Typer(
     rich_markup_mode=None,
-    add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -46,6 +46,19 @@ Problem = Annotated[
 ]
 OutFolder = Annotated[Path, typer.Option("--out", help="Folder for the results.")]
 Strategy = Annotated[str, typer.Option(help=f"How to plan: {', '.join(STRATEGIES)}.")]
+JointError = Annotated[
+    float, typer.Option(min=0.0, help="Largest error of every joint angle [deg].")
+]
+BaseError = Annotated[
+    float, typer.Option(min=0.0, help="Largest shift of the base, any direction [mm].")
+]
+ObstacleError = Annotated[
+    float, typer.Option(min=0.0, help="Largest error of the obstacles [mm].")
+]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")]
+AsJson = Annotated[
+    bool, typer.Option("--json", help="Print the result as JSON, for other programs.")
+]
 Trajectory = Annotated[Path, typer.Option(help="A trajectory.csv.")]
 PlanningTime = Annotated[
     float, typer.Option(min=0.001, help="Time limit in seconds; inf for none.")
@@ -88,6 +101,8 @@ def plan(
     out: OutFolder,
     strategy: Strategy = DEFAULT_STRATEGY,
     time_limit: PlanningTime = 60.0,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
 ) -> None:
     """Plan a motion.
 
@@ -106,7 +121,7 @@ def plan(
     try:
         with enforced(deadline):
             source = read_problem(problem)
-            with shown():
+            with nullcontext() if quiet else shown():
                 file = plan_to_folder(source, strategy, out, context.obj, deadline)
     except OutOfTime as error:  # which tells its time itself
         error.args = (f"no plan found: {error}; {page}",)
@@ -118,7 +133,10 @@ def plan(
     except Infeasible as error:
         error.args = (f"{error}; {page}",)
         raise
-    show_plan(file, out)
+    if as_json:
+        typer.echo(file.text(), nl=False)
+    elif not quiet:
+        show_plan(file, out)
     raise typer.Exit(PASSED if outcome(file.verdict).passed else NOT_PASSED)
 
 
@@ -134,16 +152,9 @@ def verify(
     problem: Problem,
     trajectory: Trajectory,
     out: OutFolder,
-    joint_error_deg: Annotated[
-        float, typer.Option(min=0.0, help="Largest error of every joint angle [deg].")
-    ] = 0.0,
-    base_error_mm: Annotated[
-        float,
-        typer.Option(min=0.0, help="Largest shift of the base, any direction [mm]."),
-    ] = 0.0,
-    obstacle_error_mm: Annotated[
-        float, typer.Option(min=0.0, help="Largest error of the obstacles [mm].")
-    ] = 0.0,
+    joint_error_deg: JointError = 0.0,
+    base_error_mm: BaseError = 0.0,
+    obstacle_error_mm: ObstacleError = 0.0,
     certificate: Annotated[
         Path | None, typer.Option(help="Write the proof to this file.")
     ] = None,
@@ -158,6 +169,8 @@ def verify(
             "--all-pairs", help="Every pair at every interval in clearance.csv."
         ),
     ] = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
 ) -> None:
     """Verify a trajectory of any planner.
 
@@ -193,7 +206,10 @@ def verify(
         written.append(("certificate", f"none: {none}" if none else str(certificate)))
     if pdf is not None:
         written.append(("report on paper", str(pdf)))
-    show_verification(file, out, *written)
+    if as_json:
+        typer.echo(file.text(), nl=False)
+    elif not quiet:
+        show_verification(file, out, *written)
     complete = certificate is None or not verified.no_certificate
     passed = outcome(file.verdict).passed and complete
     raise typer.Exit(PASSED if passed else NOT_PASSED)
@@ -231,12 +247,26 @@ def batch(
         Literal["all", "failed", "none"],
         typer.Option(help="Whose files stay; every problem keeps its row."),
     ] = "all",
+    joint_error_deg: JointError = 0.0,
+    base_error_mm: BaseError = 0.0,
+    obstacle_error_mm: ObstacleError = 0.0,
+    certificate: Annotated[
+        bool, typer.Option("--certificate", help="Write a proof of each to its folder.")
+    ] = False,
+    pdf: Annotated[
+        bool, typer.Option("--pdf", help="Print each report to its folder too.")
+    ] = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
 ) -> None:
     """Plan and verify many problems.
 
     Each gets a folder with its report; summary.csv, junit.xml and index.html show all.
     """
+    import json
+
     from vdsm_pin.batch.run import Batch, Interrupted, run_batch
+    from vdsm_pin.batch.task import Proving
     from vdsm_pin.report.words import outcome
 
     asked = Batch(
@@ -248,13 +278,20 @@ def batch(
         time_limit=time_limit,
         scheduler=scheduler,
         keep=keep,
+        proving=Proving(
+            joint_error_deg, base_error_mm, obstacle_error_mm, certificate, pdf
+        ),
+        quiet=quiet or as_json,
     )
     try:
         rows = run_batch(asked)
     except Interrupted as error:
         _fail(error, INTERRUPTED)
     passed = sum(outcome(row.outcome).passed for row in rows)
-    typer.echo(f"{passed} of {len(rows)} certified; see {out / 'index.html'}")
+    if as_json:
+        typer.echo(json.dumps([row.model_dump() for row in rows], indent=2))
+    elif not quiet:
+        typer.echo(f"{passed} of {len(rows)} certified; see {out / 'index.html'}")
     raise typer.Exit(PASSED if passed == len(rows) else NOT_PASSED)
 
 

@@ -1,12 +1,13 @@
 """Oracle: rows that differ in exactly one known way."""
 
+import math
 from pathlib import Path
 
 import made_up
 import pytest
 
 from vdsm_pin.errors import InvalidFile
-from vdsm_pin.report.diff import compare_folders, diff_lines
+from vdsm_pin.report.diff import THRESHOLD, compare_folders, diff_lines
 from vdsm_pin.report.facts import batch_row, verification_file
 from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.tables import write_summary
@@ -25,7 +26,18 @@ def folder(path: Path, *rows: BatchRow) -> Path:
 def test_equal_folders_have_no_difference(tmp_path: Path) -> None:
     old, new = folder(tmp_path / "old", ROW), folder(tmp_path / "new", ROW)
     assert compare_folders(old, new) == ()
-    assert diff_lines(()) == ["no difference"]
+    assert diff_lines(()) == [f"no difference; {THRESHOLD}"]
+
+
+def test_a_change_that_cannot_be_seen_is_none(tmp_path: Path) -> None:
+    """0.209 deg against 0.209 deg is not worse; 0.2084 against 0.2096 is."""
+    shown = [math.radians(value) for value in (0.20930, 0.20895, 0.2084)]
+    rows = [ROW.model_copy(update={"max_joint_error_rad": one}) for one in shown]
+    first, same, less = (folder(tmp_path / str(k), row) for k, row in enumerate(rows))
+    assert compare_folders(first, same) == ()
+    (change,) = compare_folders(first, less)
+    assert change.worse
+    assert "0.209° → 0.208°" in change.what
 
 
 @pytest.mark.parametrize(

@@ -19,15 +19,17 @@ class Progress:
 
     Args:
         total: Number of problems.
+        quiet: Whether there is no bar.
     """
 
-    def __init__(self, total: int) -> None:
+    def __init__(self, total: int, quiet: bool = False) -> None:
+        self._wanted = not quiet and sys.stdout.isatty()
         self._total, self._count = total, 0
         self._bar: Bar | None = None
 
     def __enter__(self) -> Self:
         """Start the bar where there is a terminal."""
-        if sys.stdout.isatty():
+        if self._wanted:
             from rich.progress import Progress as Bar
 
             self._bar = Bar(transient=True)

@@ -6,7 +6,7 @@ import shutil
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 from typing import Final
@@ -19,6 +19,7 @@ from vdsm_pin.batch.task import (
     TIMING,
     WRITTEN,
     Done,
+    Proving,
     Task,
     failed_row,
     folder_names,
@@ -34,8 +35,9 @@ from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.folder import check_kept, check_output_folder
 from vdsm_pin.report.html import write_index
 from vdsm_pin.report.junit import junit_text
+from vdsm_pin.report.pdf import find_browser
 from vdsm_pin.report.tables import SummaryCsv, write_summary
-from vdsm_pin.workflow import NO_PLAN, REPORT
+from vdsm_pin.workflow import NO_PLAN, REPORT, error_box
 
 SUMMARY: Final = "summary.csv"
 RUNNING: Final = "running.csv"
@@ -64,6 +66,8 @@ class Batch:
         time_limit: For each problem; [s].
         scheduler: Address of a Dask scheduler whose workers do it; None for here.
         keep: Whose files stay: "all", "failed" (all that did not pass) or "none".
+        proving: What each problem is proved for and written besides.
+        quiet: Whether nothing is said of problems that end.
     """
 
     problems: tuple[str, ...]
@@ -74,6 +78,8 @@ class Batch:
     time_limit: float | None = None
     scheduler: str | None = None
     keep: str = ALL
+    proving: Proving = field(default_factory=Proving)
+    quiet: bool = False
 
 
 class Interrupted(VdsmError):
@@ -91,6 +97,10 @@ def run_batch(batch: Batch) -> tuple[BatchRow, ...]:
         Interrupted: On Ctrl-C or SIGTERM, after everything finished is written down.
     """
     strategy(batch.strategy)
+    asked = batch.proving
+    error_box(asked.joint_error_deg, asked.base_error_mm, asked.obstacle_error_mm)
+    if asked.pdf:
+        find_browser()
     check_output_folder(batch.folder)
     tasks = _tasks(batch)
     batch.folder.mkdir(parents=True, exist_ok=True)
@@ -98,13 +108,17 @@ def run_batch(batch: Batch) -> tuple[BatchRow, ...]:
         shutil.rmtree(batch.folder / _ASIDE, ignore_errors=True)
         rows: list[BatchRow] = []
         running = batch.folder / RUNNING
-        with Progress(len(tasks)) as progress, SummaryCsv(running) as so_far:
+        with (
+            Progress(len(tasks), batch.quiet) as progress,
+            SummaryCsv(running) as so_far,
+        ):
             try:
                 for ended in _all_ended(batch, tasks):
                     done = _settle(ended)
                     rows.append(done.row)
                     so_far(done.row)
-                    progress.show(done)
+                    if not batch.quiet:
+                        progress.show(done)
                     if stop.asked:
                         break
             except KeyboardInterrupt:
@@ -167,6 +181,7 @@ def _tasks(batch: Batch) -> list[Task]:
             batch.resume,
             batch.keep,
             batch.time_limit,
+            batch.proving,
         )
         tasks.append(task)
     return tasks

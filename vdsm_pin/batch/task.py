@@ -7,13 +7,19 @@ import shutil
 import time
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Final
 
 from pydantic import ValidationError
 
-from vdsm_pin.errors import Infeasible, InvalidFile, OutOfTime, VdsmError
+from vdsm_pin.errors import (
+    Infeasible,
+    InvalidFile,
+    OutOfTime,
+    VdsmError,
+    VerificationFailed,
+)
 from vdsm_pin.io.problem_file import ProblemFile, read_problem
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.refinement import HANDED_OUT
@@ -24,12 +30,14 @@ from vdsm_pin.report.run_record import versions
 from vdsm_pin.report.words import TIME_LIMIT, outcome
 from vdsm_pin.text import printable
 from vdsm_pin.time_limit import Deadline
+from vdsm_pin.verification.records import Verdict
 from vdsm_pin.workflow import (
     JUDGED,
     NO_PLAN,
     PLANNED,
     TRAJECTORY,
     VerifyOrder,
+    error_box,
     plan_to_folder,
     verify_to_folder,
 )
@@ -39,8 +47,12 @@ TIMING: Final = "timing.json"
 """Seconds of one problem; the only file that differs from run to run."""
 
 PICTURE: Final = "picture.svg"
+CERTIFICATE: Final = "certificate.jsonl"
+PDF: Final = "report.pdf"
 
-WRITTEN: Final = frozenset({*PLANNED, *JUDGED, PICTURE, MANIFEST, TIMING})
+WRITTEN: Final = frozenset(
+    {*PLANNED, *JUDGED, PICTURE, CERTIFICATE, PDF, MANIFEST, TIMING}
+)
 """Every file of a problem's folder."""
 
 
@@ -51,6 +63,34 @@ ALL: Final = "all"
 FAILED: Final = "failed"
 NONE: Final = "none"
 """Whose files stay: every problem's, those of problems that did not pass, nobody's."""
+
+
+@dataclass(frozen=True)
+class Proving:
+    """What each problem of a batch is proved for and written besides.
+
+    Args:
+        joint_error_deg: Largest error of every joint angle; [deg].
+        base_error_mm: Largest shift of the base; [mm].
+        obstacle_error_mm: Largest error of the obstacles; [mm].
+        certificate: Whether each certified motion gets its certificate.
+        pdf: Whether each report is printed too.
+    """
+
+    joint_error_deg: float = 0.0
+    base_error_mm: float = 0.0
+    obstacle_error_mm: float = 0.0
+    certificate: bool = False
+    pdf: bool = False
+
+    @property
+    def options(self) -> list[str]:
+        """The options of the command line that ask for it."""
+        found = []
+        for one in fields(self):
+            value, option = getattr(self, one.name), f"--{one.name.replace('_', '-')}"
+            found += [option] if value is True else [option, f"{value:g}"] * bool(value)
+        return found
 
 
 @dataclass(frozen=True)
@@ -66,6 +106,7 @@ class Task:
         resume: Whether a finished and intact folder may stay.
         keep: Which problems keep their files: "all", "failed" or "none".
         time_limit: From when a worker begins; None for none; [s].
+        proving: What is proved besides, and written.
     """
 
     problem: str
@@ -76,17 +117,19 @@ class Task:
     resume: bool
     keep: str = ALL
     time_limit: float | None = None
+    proving: Proving = field(default_factory=Proving)
 
     @property
     def settings(self) -> dict[str, str]:
         """What a finished folder must agree with to be kept."""
-        return {"strategy": self.strategy, "keep": self.keep} | versions()
+        besides = {name: str(value) for name, value in asdict(self.proving).items()}
+        return {"strategy": self.strategy, "keep": self.keep} | besides | versions()
 
     @property
     def command(self) -> str:
         """A command that repeats exactly this problem."""
         words = ["vdsm", "batch", self.problem, "--strategy", self.strategy]
-        return shlex.join([*words, "--out", "out"])
+        return shlex.join([*words, *self.proving.options, "--out", "out"])
 
 
 @dataclass(frozen=True)
@@ -235,10 +278,24 @@ def _plan_and_verify(task: Task, source: ProblemFile, deadline: Deadline) -> Bat
     plan = plan_to_folder(
         source, task.strategy, task.aside, task.command, deadline, report=False
     )
+    asked = task.proving
     order = VerifyOrder(
-        source, task.aside / TRAJECTORY, task.aside, task.command, deadline=deadline
+        source,
+        task.aside / TRAJECTORY,
+        task.aside,
+        task.command,
+        errors=error_box(
+            asked.joint_error_deg, asked.base_error_mm, asked.obstacle_error_mm
+        ),
+        certificate=task.aside / CERTIFICATE if asked.certificate else None,
+        pdf=task.aside / PDF if asked.pdf else None,
+        deadline=deadline,
     )
     verified = verify_to_folder(order)
+    certified = verified.records.verdict is Verdict.CERTIFIED
+    if asked.certificate and certified and verified.no_certificate:
+        message = f"certified, but without a certificate: {verified.no_certificate}"
+        raise VerificationFailed(message)
     if deadline.passed and verified.records.verdict not in HANDED_OUT:
         raise OutOfTime(deadline.limit, "a plan was found and proved, but not reported")
     drawing = picture(verified.records)

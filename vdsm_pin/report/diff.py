@@ -24,6 +24,9 @@ _ORDER: Final = (
     "incomplete",
     "certified",
 )
+THRESHOLD: Final = "a change that the digits shown do not show is none"
+"""Told with every comparison."""
+
 _RANK: Final = {word: rank for rank, word in enumerate(_ORDER)}
 
 
@@ -85,7 +88,7 @@ def compare_folders(old: Path, new: Path) -> tuple[Change, ...]:
 def diff_lines(changes: Sequence[Change]) -> list[str]:
     """The changes as lines for a person: worse first."""
     if not changes:
-        return ["no difference"]
+        return [f"no difference; {THRESHOLD}"]
     ordered = sorted(changes, key=lambda change: not change.worse)
     lines = [
         printable(
@@ -95,7 +98,7 @@ def diff_lines(changes: Sequence[Change]) -> list[str]:
         for change in ordered
     ]
     worse = sum(change.worse for change in changes)
-    return [*lines, f"{worse} worse, {len(changes) - worse} better"]
+    return [*lines, f"{worse} worse, {len(changes) - worse} better; {THRESHOLD}"]
 
 
 def _compare(name: str, old: BatchRow, new: BatchRow) -> list[Change]:
@@ -123,7 +126,7 @@ def _measured(
     if first is None or second is None:
         return Change(name, what, second is None)
     gain = second - first if measure.more_is_better else first - second
-    if abs(gain) <= TOLERANCES.result_change:
+    if was == now or abs(gain) <= TOLERANCES.result_change:
         return None
     return Change(name, what, gain < 0.0)
 
