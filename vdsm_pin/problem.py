@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from vdsm_pin.pointing import Pointing
 from vdsm_pin.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M, in_mm
+
+if TYPE_CHECKING:  # it brings compiled code, for which readers need not wait
+    from vdsm_pin.geometry.pieces import PackedPieces
 
 
 class Approach(StrEnum):
@@ -305,6 +309,16 @@ class PlanningProblem(Summarised):
         if joints.shape != (count,) or not np.isfinite(joints).all():
             message = f"joint values are {joints.tolist()}, expected {count} numbers"
             raise InvalidInput(message)
+
+    @cached_property
+    def packed(self) -> "PackedPieces":
+        """The obstacles, then the bodies of the arm in the frames of their links."""
+        from vdsm_pin.arm_bodies import arm_bodies  # compiled code, which few need
+        from vdsm_pin.geometry.pieces import pack_pieces
+
+        bodies = [[body.piece] for body in arm_bodies(self.manipulator)]
+        obstacles = [obstacle.pieces for obstacle in self.scene.obstacles]
+        return pack_pieces([*obstacles, *bodies])
 
     @property
     def path(self) -> DesiredPath:

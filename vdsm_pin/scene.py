@@ -19,8 +19,8 @@ from vdsm_pin.geometry.convex import (
     FlatCylinder,
     HalfSpacePiece,
     Hull,
+    Hulls,
     Piece,
-    Triangles,
 )
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -45,6 +45,15 @@ def _check_positive(name: str, **values: float) -> None:
         if not value > 0.0:
             message = f"obstacle {name!r}: {field} is {value} m, expected above 0"
             raise InvalidInput(message)
+
+
+def _check_rows(name: str, rows: FloatArray, field: str) -> None:
+    if rows.ndim != 2 or rows.shape[1:] != (3,) or not rows.size:
+        message = f"obstacle {name!r}: {field} have shape {rows.shape}, expected (n, 3)"
+        raise InvalidInput(message)
+    if not np.isfinite(rows).all():
+        message = f"obstacle {name!r}: {field} are not all finite numbers"
+        raise InvalidInput(message)
 
 
 def _freeze(obstacle: object, *fields: str) -> None:
@@ -296,9 +305,9 @@ class Mesh:
             raise InvalidInput(message)
 
     @cached_property
-    def pieces(self) -> Triangles:
+    def pieces(self) -> Hulls:
         """One hull per triangle."""
-        return Triangles(self.vertices[self.triangles])
+        return Hulls(self.vertices[self.triangles])
 
     @cached_property
     def closed_mesh(self) -> ClosedMesh:
@@ -335,7 +344,76 @@ class ConvexCover:
     pieces: tuple[Hull]
 
 
-Obstacle: TypeAlias = Sphere | Capsule | Cylinder | Box | Prism | HalfSpace | Mesh
+@dataclass(frozen=True)
+class PointCloud:
+    """Measured points, each a ball of the scan's error.
+
+    Args:
+        name: Unique name.
+        points: Shape (n, 3), n >= 1; [m].
+        radius: Of the balls; [m].
+        assumed_size: As of a mesh.
+        notes: As of a mesh.
+    """
+
+    name: str
+    points: FloatArray
+    radius: float
+    assumed_size: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Freeze the array and check the sizes."""
+        _freeze(self, "points")
+        _check_rows(self.name, self.points, "points")
+        _check_finite(self.name, radius=self.radius)
+        _check_positive(self.name, radius=self.radius)
+
+    @cached_property
+    def pieces(self) -> Hulls:
+        """One ball per point."""
+        return Hulls(self.points[:, None], self.radius)
+
+
+@dataclass(frozen=True)
+class Voxels:
+    """Occupied cells of a grid, each a cuboid; they need not touch.
+
+    Args:
+        name: Unique name.
+        centres: Shape (n, 3), n >= 1; [m].
+        rotation: R_base_grid, shape (3, 3); [-].
+        half_size: Half the edge lengths of a cell, shape (3,); [m].
+        assumed_size: As of a mesh.
+        notes: As of a mesh.
+    """
+
+    name: str
+    centres: FloatArray
+    rotation: FloatArray
+    half_size: FloatArray
+    assumed_size: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check the sizes."""
+        _freeze(self, "centres", "rotation", "half_size")
+        _check_rows(self.name, self.centres, "centres")
+        _check_finite(self.name, rotation=self.rotation)
+        for value in self.half_size:
+            _check_positive(self.name, half_size=float(value))
+
+    @cached_property
+    def pieces(self) -> Hulls:
+        """One cuboid per cell."""
+        corners = (BOX_CORNERS * self.half_size) @ self.rotation.T
+        return Hulls(self.centres[:, None] + corners)
+
+
+FromFile: TypeAlias = Mesh | PointCloud | Voxels
+"""Obstacles that stand in files of their own."""
+
+Obstacle: TypeAlias = Sphere | Capsule | Cylinder | Box | Prism | HalfSpace | FromFile
 
 
 def reach_of(obstacle: Obstacle | ConvexCover) -> float:
@@ -361,6 +439,10 @@ def reach_of(obstacle: Obstacle | ConvexCover) -> float:
             points, grown = obstacle.origin + section @ obstacle.rotation.T, 0.0
         case Mesh():
             points, grown = obstacle.vertices, 0.0
+        case PointCloud():
+            points, grown = obstacle.points, obstacle.radius
+        case Voxels():
+            points, grown = obstacle.centres, math.hypot(*obstacle.half_size.tolist())
         case _:
             hulls = [piece for piece in obstacle.pieces if isinstance(piece, Hull)]
             return max((_reach_of_hull(hull) for hull in hulls), default=0.0)

@@ -140,6 +140,12 @@ def solid(obstacle: scene.Obstacle) -> Solid:
             foot = normal * dot(normal, column(*obstacle.point.tolist()))
             found = Solid(name, [[[float(entry) for entry in foot.entries()]]])
             found.normal = normal
+        case scene.PointCloud():
+            found = Solid(name, obstacle.points[:, None], radius=obstacle.radius)
+        case scene.Voxels():
+            corners = np.array([*product((-1, 1), repeat=3)]) * obstacle.half_size
+            corners = obstacle.centres[:, None] + corners @ obstacle.rotation.T
+            found = Solid(name, corners, origin=obstacle.centres)
         case scene.Mesh():
             return Mesh(obstacle)
     return found

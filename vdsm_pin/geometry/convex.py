@@ -57,29 +57,30 @@ class HalfSpacePiece:
 Piece: TypeAlias = Hull | FlatCylinder | HalfSpacePiece
 
 
-class Triangles(Sequence[Hull]):
-    """Many triangles; each is made a hull only when it is asked for.
+class Hulls(Sequence[Hull]):
+    """Many hulls of as many points; each is made one only when it is asked for.
 
     Args:
-        corners: Shape (n, 3, 3); [m].
+        corners: Shape (n, k, 3): k is 3 for triangles, 1 for balls; [m].
+        radius: By which all are grown; [m].
     """
 
-    def __init__(self, corners: FloatArray) -> None:
+    def __init__(self, corners: FloatArray, radius: float = 0.0) -> None:
         """Keep the corners, read-only."""
-        self.corners = frozen(corners)
+        self.corners, self.radius = frozen(corners), radius
 
     def __len__(self) -> int:
-        """Number of triangles."""
+        """Number of hulls."""
         return len(self.corners)
 
     @overload
     def __getitem__(self, index: int) -> Hull: ...
 
     @overload
-    def __getitem__(self, index: slice) -> "Triangles": ...
+    def __getitem__(self, index: slice) -> "Hulls": ...
 
-    def __getitem__(self, index: int | slice) -> "Hull | Triangles":
-        """One triangle, or some."""
+    def __getitem__(self, index: int | slice) -> "Hull | Hulls":
+        """One hull, or some."""
         if isinstance(index, slice):
-            return Triangles(self.corners[index])
-        return Hull(self.corners[index])
+            return Hulls(self.corners[index], self.radius)
+        return Hull(self.corners[index], self.radius)

@@ -16,8 +16,8 @@ from vdsm_pin.geometry.convex import (
     FlatCylinder,
     HalfSpacePiece,
     Hull,
+    Hulls,
     Piece,
-    Triangles,
 )
 from vdsm_pin.geometry.ordering import coherent_order
 
@@ -68,7 +68,7 @@ class PackedPieces(NamedTuple):
 
 def _order(group: Sequence[Piece]) -> IntArray:
     """The order in which an obstacle's pieces are packed."""
-    if isinstance(group, Triangles):
+    if isinstance(group, Hulls):
         centres = group.corners.mean(axis=1)
     elif len(group) <= SHORT or not all(isinstance(piece, Hull) for piece in group):
         return np.arange(len(group))
@@ -89,12 +89,12 @@ class _Table:
     centres: list[FloatArray] = field(default_factory=lambda: [np.zeros((0, 3))])
     flat: dict[int, FlatCylinder | HalfSpacePiece] = field(default_factory=dict)
 
-    def add_triangles(self, corners: FloatArray) -> None:
-        """Append triangles, corners of shape (n, 3, 3)."""
+    def add_hulls(self, corners: FloatArray, radius: float) -> None:
+        """Append hulls, corners of shape (n, k, 3), grown by a radius; [m]."""
         n = len(corners)
         self.kind += [HULL] * n
-        self.radius += [0.0] * n
-        self.n_points += [3] * n
+        self.radius += [radius] * n
+        self.n_points += [corners.shape[1]] * n
         self.points.append(corners.reshape(-1, 3))
         self.centres.append(corners.mean(axis=1))
 
@@ -122,8 +122,8 @@ class _Table:
 def _collect(obstacles: Sequence[Sequence[Piece]], orders: list[IntArray]) -> _Table:
     table = _Table()
     for group, order in zip(obstacles, orders, strict=True):
-        if isinstance(group, Triangles):
-            table.add_triangles(group.corners[order])
+        if isinstance(group, Hulls):
+            table.add_hulls(group.corners[order], group.radius)
         else:
             for k in order:
                 table.add(group[k])
@@ -197,6 +197,28 @@ def _fill_tree(
         rights[at] = right
         low[at] = np.minimum(low[left], low[right])
         high[at] = np.maximum(high[left], high[right])
+
+
+def first_groups(pieces: PackedPieces, count: int) -> PackedPieces:
+    """The first so many obstacles of packed ones, as views."""
+    n = int(pieces.first_piece[count])
+    nodes = max(0, 2 * n - count)
+    return PackedPieces(
+        order=pieces.order[:n],
+        kind=pieces.kind[:n],
+        first_point=pieces.first_point[: n + 1],
+        points=pieces.points[: pieces.first_point[n]],
+        radius=pieces.radius[:n],
+        centre=pieces.centre[:n],
+        axis=pieces.axis[:n],
+        extent=pieces.extent[:n],
+        first_piece=pieces.first_piece[: count + 1],
+        root=pieces.root[:count],
+        node_range=pieces.node_range[:nodes],
+        node_right=pieces.node_right[:nodes],
+        node_low=pieces.node_low[:nodes],
+        node_high=pieces.node_high[:nodes],
+    )
 
 
 def pack_pieces(obstacles: Sequence[Sequence[Piece]]) -> PackedPieces:

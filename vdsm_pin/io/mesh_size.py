@@ -1,4 +1,4 @@
-"""How large a mesh is: by the problem, by its file, or assumed and then told."""
+"""How large a mesh or cloud is: by the problem, by its file, or assumed and told."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -7,8 +7,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.frames import Frame
-from vdsm_pin.io.meshes.raw import RawMesh
-from vdsm_pin.io.obstacle_schema import MeshModel
+from vdsm_pin.io.obstacle_schema import FromFileModel
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import UNITS_PER_METRE
@@ -29,24 +28,37 @@ class MeshSize:
         stated: Whether the problem or the mesh's file states its unit or scale.
     """
 
-    model: MeshModel
+    model: FromFileModel
     frame: Frame
     extents: FloatArray
     scale: float
     stated: bool
 
     @classmethod
-    def of(cls, mesh: RawMesh, model: MeshModel, frame: Frame) -> "MeshSize":
-        """The size of a mesh; the problem has the first word, then the mesh's file."""
+    def of(
+        cls,
+        points: FloatArray,
+        model: FromFileModel,
+        frame: Frame,
+        unit: float | None = None,
+    ) -> "MeshSize":
+        """The size of points; the problem has the first word, then their file.
+
+        Args:
+            points: Shape (n, 3), in their own unit.
+            model: What the problem says of them.
+            frame: The problem's frame and unit.
+            unit: Metres per unit as their file states it; None where it does not.
+        """
         stated, per_unit = True, 1.0
         if model.length_unit is not None:
             here, there = (UNITS_PER_METRE[u] for u in (frame.unit, model.length_unit))
             per_unit = here / there
-        elif mesh.unit is not None:
-            per_unit = mesh.unit * UNITS_PER_METRE[frame.unit]
+        elif unit is not None:
+            per_unit = unit * UNITS_PER_METRE[frame.unit]
         else:
             stated = "scale" in model.model_fields_set
-        extents = np.ptp(mesh.vertices, axis=0)
+        extents = np.ptp(points, axis=0)
         return cls(model, frame, extents, model.scale * per_unit, stated)
 
     @property
@@ -86,6 +98,8 @@ class MeshSize:
             InvalidFile: If the mesh is far too large or small; or rather small, taken
                 in millimetres without a word, and of a usual size in metres.
         """
+        if not self.extents.any():  # a single point
+            return
         low, high = TOLERANCES.mesh_size_low, TOLERANCES.mesh_size_high
         ratio = self.diagonal / arm_length
         beside = f"beside an arm of {self.frame.shown(arm_length)}"

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import singledispatchmethod
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -13,12 +13,16 @@ from vdsm_pin import scene
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import obstacle_schema as schema
+from vdsm_pin.io.clouds import RawCloud, read_cloud
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.mesh_size import MeshSize
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.units import UNITS_PER_METRE
+
+T = TypeVar("T")
 
 AXES: Final = {"x": 0, "y": 1, "z": 2}
 _LINK_NAME: Final = re.compile(r"link ?\d+", re.IGNORECASE)
@@ -179,21 +183,11 @@ class ObstacleBuilder:
 
     @build.register
     def _(self, model: schema.MeshModel, at: Location) -> scene.Obstacle:
-        try:
-            mesh = read_mesh(self.folder / model.file, self.digest)
-        except InvalidFile as error:
-            place = f" {error.where}:" if error.where else ""
-            problem = f"{model.file!r}:{place} {error.problem}"
-            raise self.document.invalid((*at, "file"), problem) from None
-        size = MeshSize.of(mesh, model, self.frame)
-        if model.check_size:
-            size.check(self.arm_length, self.document, at)
-        corners = self.frame.placed(
-            mesh.vertices, size.scale, model.rpy_deg, model.center
-        )
+        mesh = self._read(read_mesh, model, at)
+        size = MeshSize.of(mesh.vertices, model, self.frame, mesh.unit)
         found = scene.Mesh(
             model.name,
-            corners,
+            self._placed(mesh.vertices, size, at),
             mesh.triangles,
             model.solid,
             assumed_size="" if size.stated else size.shown,
@@ -203,6 +197,69 @@ class ObstacleBuilder:
             problem = f"is true, but {model.file!r} {found.closed_mesh.why_open}"
             raise self.document.invalid((*at, "solid"), problem)
         return found
+
+    @build.register
+    def _(self, model: schema.PointsModel, at: Location) -> scene.Obstacle:
+        cloud = self._read(read_cloud, model, at)
+        if cloud.grid:
+            problem = f"{model.file!r} is a grid of cells; expected points, or "
+            raise self.document.invalid((*at, "file"), problem + "shape: voxels")
+        size = MeshSize.of(cloud.points, model, self.frame)
+        return scene.PointCloud(
+            model.name,
+            self._placed(cloud.points, size, at),
+            float(self.frame.metres(model.radius)),
+            assumed_size="" if size.stated else size.shown,
+            notes=cloud.notes,
+        )
+
+    @build.register
+    def _(self, model: schema.VoxelsModel, at: Location) -> scene.Obstacle:
+        cloud = self._read(read_cloud, model, at)
+        points, edges = cloud.points, np.array(model.size)
+        stray = [
+            key for key in ("length_unit", "scale") if key in model.model_fields_set
+        ]
+        if cloud.grid and stray:
+            problem = (
+                f"has no meaning: {model.file!r} is a grid, whose cells are `size`"
+            )
+            raise self.document.invalid((*at, stray[0]), problem)
+        points = points * edges if cloud.grid else points
+        size = MeshSize.of(points, model, self.frame, self._unit_of_grid(cloud))
+        return scene.Voxels(
+            model.name,
+            self._placed(points, size, at),
+            self.frame.orientation(model.rpy_deg),
+            self.frame.metres(edges / 2.0),
+            assumed_size="" if size.stated else size.shown,
+            notes=cloud.notes,
+        )
+
+    def _unit_of_grid(self, cloud: RawCloud) -> float | None:
+        """A grid is in the problem's unit, as the size of its cells; [m]."""
+        return 1.0 / UNITS_PER_METRE[self.frame.unit] if cloud.grid else None
+
+    def _read(
+        self,
+        reader: Callable[[Path, Digest], T],
+        model: schema.FromFileModel,
+        at: Location,
+    ) -> T:
+        """The content of an obstacle's own file."""
+        try:
+            return reader(self.folder / model.file, self.digest)
+        except InvalidFile as error:
+            place = f" {error.where}:" if error.where else ""
+            problem = f"{model.file!r}:{place} {error.problem}"
+            raise self.document.invalid((*at, "file"), problem) from None
+
+    def _placed(self, points: FloatArray, size: MeshSize, at: Location) -> FloatArray:
+        """Points of a file in the base frame, of a size that is no slip; [m]."""
+        model = size.model
+        if model.check_size:
+            size.check(self.arm_length, self.document, at)
+        return self.frame.placed(points, size.scale, model.rpy_deg, model.center)
 
     def _unit(self, vector: list[float], at: Location) -> FloatArray:
         unit = unit_vector(np.array(vector))

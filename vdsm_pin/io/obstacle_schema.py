@@ -1,4 +1,4 @@
-"""The seven shapes of the problem file as pydantic models."""
+"""The nine shapes of the problem file as pydantic models."""
 
 from typing import Annotated, Literal, TypeAlias
 
@@ -89,38 +89,63 @@ class HalfSpaceModel(_Named):
     normal: Vector = Field(description="Out of the solid, of any length.")
 
 
-class MeshModel(_Named):
-    """Triangles from an STL or OBJ file, solid where they close."""
+class FromFileModel(_Named):
+    """What stands in a file of its own, and where it goes."""
 
-    shape: Literal["mesh"]
     file: Annotated[str, Field(min_length=1, max_length=4096)] = Field(
         description="Path, relative to this file."
     )
     length_unit: Literal["mm", "m"] | None = Field(
         default=None,
-        description="Unit of the mesh. Default: what its file states; else that of "
+        description="Unit of that file. Default: what it states itself; else that of "
         "this file, and the verdict names the size so assumed.",
     )
     scale: Positive = Field(
-        default=1.0, description="Factor on the coordinates of the mesh."
+        default=1.0, description="Factor on the coordinates of that file."
     )
     center: Vector = Field(
         default=[0.0, 0.0, 0.0],
-        description="Where the origin of the mesh goes [length_unit].",
+        description="Where the origin of that file goes [length_unit].",
     )
     rpy_deg: Vector = Field(
         default=[0.0, 0.0, 0.0], description="Roll, pitch, yaw, R = Rz Ry Rx [deg]."
     )
+    check_size: bool = Field(
+        default=True,
+        description="Refuse what is so large or small beside the arm that its unit "
+        "must be wrong.",
+    )
+
+
+class MeshModel(FromFileModel):
+    """Triangles from an STL or OBJ file, solid where they close."""
+
+    shape: Literal["mesh"]
     solid: bool | None = Field(
         default=None,
         description="true: the mesh must close, else it is refused; false: only its "
         "surface is meant, it has no inside; left out: a mesh that does not close is "
         "undecided.",
     )
-    check_size: bool = Field(
-        default=True,
-        description="Refuse a mesh so large or small beside the arm that its unit "
-        "must be wrong.",
+
+
+class PointsModel(FromFileModel):
+    """Measured points from a PLY, PCD, XYZ or NPY file."""
+
+    shape: Literal["points"]
+    radius: Positive = Field(
+        description="Of the ball that each point is, the error of the scan "
+        "[length_unit]."
+    )
+
+
+class VoxelsModel(FromFileModel):
+    """Occupied cells: their centres, or a NPY array of true and false."""
+
+    shape: Literal["voxels"]
+    size: Annotated[list[Positive], Field(min_length=3, max_length=3)] = Field(
+        description="Edge lengths of a cell [length_unit]; the first cell of an array "
+        "begins at its origin."
     )
 
 
@@ -131,6 +156,8 @@ ObstacleModel: TypeAlias = Annotated[
     | CapsuleModel
     | BoxModel
     | HalfSpaceModel
-    | MeshModel,
+    | MeshModel
+    | PointsModel
+    | VoxelsModel,
     Field(discriminator="shape"),
 ]

@@ -13,7 +13,8 @@ from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.schema_types import NAME_PATTERN, FileModel
 from vdsm_pin.io.yaml_reader import Data, Location, YamlDocument
 
-_SHAPES: Final = ("cylinder", "prism", "sphere", "capsule", "box", "half_space", "mesh")
+_SOLIDS: Final = ("cylinder", "prism", "sphere", "capsule", "box", "half_space")
+_SHAPES: Final = (*_SOLIDS, "mesh", "points", "voxels")
 
 LONGEST_SHOWN: Final = 60
 """Values are cut to this many characters in a message."""
@@ -39,6 +40,8 @@ _MODELS: Final[Mapping[str | int, type[FileModel]]] = {
     "prism": shapes.PrismModel,
     "half_space": shapes.HalfSpaceModel,
     "mesh": shapes.MeshModel,
+    "points": shapes.PointsModel,
+    "voxels": shapes.VoxelsModel,
 }
 """The model that holds a field, by the step before it in pydantic's location."""
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from vdsm_pin.errors import InvalidFile, UnknownName
-from vdsm_pin.io.obstacle_schema import MeshModel
+from vdsm_pin.io.obstacle_schema import FromFileModel
 from vdsm_pin.io.path_schema import FilePart
 from vdsm_pin.io.problem_builder import build_problem
 from vdsm_pin.io.problem_errors import first_error
@@ -79,12 +79,12 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
 
 
 def _files_named(model: ProblemModel) -> list[str]:
-    """Arm, meshes and path files, in the order in which the hash takes them."""
+    """Arm, obstacles and path files, in the order in which the hash takes them."""
     arm, path = model.manipulator, model.tip_path
     urdf = [arm.urdf] if isinstance(arm, UrdfManipulatorModel) else []
-    meshes = [one.file for one in model.obstacles if isinstance(one, MeshModel)]
+    files = [one.file for one in model.obstacles if isinstance(one, FromFileModel)]
     parts = path.points if path else []
-    return [*urdf, *meshes, *(p.file for p in parts if isinstance(p, FilePart))]
+    return [*urdf, *files, *(p.file for p in parts if isinstance(p, FilePart))]
 
 
 def _files_of_obstacles(

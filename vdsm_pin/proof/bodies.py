@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
-from vdsm_pin.geometry.convex import HalfSpacePiece, Piece, Triangles
+from vdsm_pin.geometry.convex import HalfSpacePiece, Hulls, Piece
 
 
 @dataclass(frozen=True)
@@ -20,13 +20,13 @@ class Body:
     """
 
     frame: int
-    pieces: Sequence[Piece] | Triangles
+    pieces: Sequence[Piece]
     name: str = ""
 
     @property
     def is_bounded(self) -> bool:
         """Whether none of its pieces is a half-space."""
-        if isinstance(self.pieces, Triangles):
+        if isinstance(self.pieces, Hulls):
             return True
         return not any(isinstance(piece, HalfSpacePiece) for piece in self.pieces)
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scene import Mesh
+from vdsm_pin.scene import FromFile, Mesh
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.inside import mesh_notes
 
@@ -19,11 +19,11 @@ BEHIND: Final = (
 
 
 def assumed_sizes(problem: PlanningProblem) -> tuple[str, ...]:
-    """The meshes whose unit nobody states, with the size they were taken to have."""
+    """The obstacles whose unit nobody states, with the size they were taken to have."""
     return tuple(
-        f"{mesh.name!r} is {mesh.assumed_size}"
-        for mesh in problem.scene.obstacles
-        if isinstance(mesh, Mesh) and mesh.assumed_size
+        f"{one.name!r} is {one.assumed_size}"
+        for one in problem.scene.obstacles
+        if isinstance(one, FromFile) and one.assumed_size
     )
 
 
@@ -38,10 +38,12 @@ def assumption(sizes: Sequence[str]) -> str:
 
 def input_notes(problem: PlanningProblem, trajectory: Trajectory) -> tuple[str, ...]:
     """What the readers have to say and what is behind the base, a sentence each."""
-    meshes = (mesh for mesh in problem.scene.obstacles if isinstance(mesh, Mesh))
-    of_meshes = (
-        f"mesh {mesh.name!r}: {note}" for mesh in meshes for note in mesh.notes
+    files = (one for one in problem.scene.obstacles if isinstance(one, FromFile))
+    of_files = (
+        f"{'mesh' if isinstance(one, Mesh) else 'cloud'} {one.name!r}: {note}"
+        for one in files
+        for note in one.notes
     )
     of_rows = (f"trajectory: {note}" for note in trajectory.notes)
     behind = (BEHIND,) if problem.scene.obstacles else ()
-    return (*behind, *mesh_notes(problem), *of_meshes, *of_rows)
+    return (*behind, *mesh_notes(problem), *of_files, *of_rows)

@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct
 from vdsm_pin.scene import (
     BOX_CORNERS,
     Box,
@@ -14,8 +14,10 @@ from vdsm_pin.scene import (
     HalfSpace,
     Mesh,
     Obstacle,
+    PointCloud,
     Prism,
     Sphere,
+    Voxels,
 )
 
 _PAGE_TRIANGLES: Final = 60_000  # of all obstacles of a page: about two megabytes
@@ -97,6 +99,12 @@ def surface(obstacle: Obstacle, extent: float, fine: Detail = FINE) -> Surface:
             return _plane(obstacle, extent)
         case Mesh():
             return _coarse(obstacle, fine.triangles)
+        case PointCloud():
+            half = np.full(3, obstacle.radius)
+            return _cells(obstacle.points, np.eye(3), half, fine.triangles)
+        case Voxels():
+            turn, half = obstacle.rotation, obstacle.half_size
+            return _cells(obstacle.centres, turn, half, fine.triangles)
 
 
 def frame_along(axis: FloatArray) -> FloatArray:
@@ -187,6 +195,21 @@ def _plane(solid: HalfSpace, extent: float) -> Surface:
     middle = solid.normal * float(solid.normal @ solid.point)
     signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * extent
     return _polygons(middle + signs @ across.T, ((0, 1, 2, 3),))
+
+
+def _cells(
+    centres: FloatArray, turn: FloatArray, half: FloatArray, most: int
+) -> Surface:
+    """A cuboid at each point; of too many points larger ones that hold several."""
+    while len(centres) * 2 * len(_BOX_FACES) > most:
+        half = 2.0 * half
+        grid = np.floor(centres @ turn / (2.0 * half))
+        centres = (distinct(grid, axis=0) + 0.5) * (2.0 * half) @ turn.T
+    cube = _polygons(BOX_CORNERS * half @ turn.T, _BOX_FACES)
+    starts = len(cube.vertices) * np.arange(len(centres))
+    triangles = (starts[:, None, None] + cube.triangles).reshape(-1, 3)
+    vertices = (centres[:, None] + cube.vertices).reshape(-1, 3)
+    return Surface(vertices, triangles)
 
 
 def _coarse(solid: Mesh, most: int) -> Surface:

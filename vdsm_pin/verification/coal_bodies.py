@@ -8,13 +8,15 @@ to its skin, so that the sign of a body in a mesh has to come from elsewhere.
 """
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 
 from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.scene import (
     Box,
     Capsule,
@@ -22,10 +24,15 @@ from vdsm_pin.scene import (
     HalfSpace,
     Mesh,
     Obstacle,
+    PointCloud,
     Prism,
     Sphere,
+    Voxels,
 )
 from vdsm_pin.tolerances import TOLERANCES
+
+GROUP: Final = 64
+"""Bodies of a cloud that share a ball around them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +64,62 @@ class Measured:
     far: FloatArray
 
 
+class CoalCloud:
+    """Many equal bodies, of which those that can be the nearest are measured.
+
+    Args:
+        shape: The coal.CollisionGeometry of each.
+        rotation: Of each, shape (3, 3); [-].
+        centres: Shape (n, 3), base frame; [m].
+        reach: No point of a body is farther than this from its centre; [m].
+    """
+
+    def __init__(
+        self, shape: Any, rotation: FloatArray, centres: FloatArray, reach: float
+    ) -> None:
+        centres = centres[coherent_order(centres)]
+        n = len(centres)
+        self._shape, self._rotation, self._centres = shape, rotation, centres
+        self._first = np.arange(0, n, GROUP)
+        low = np.minimum.reduceat(centres, self._first)
+        high = np.maximum.reduceat(centres, self._first)
+        self._middle = 0.5 * (low + high)
+        self._reach = np.linalg.norm(high - self._middle, axis=1) + reach
+
+    def nearest_first(self, geometry: Any, pose: Any) -> Iterator["Group"]:
+        """Groups of the bodies with a lower bound of their distance, least first."""
+        geometry.computeLocalAABB()
+        box = geometry.aabb_local
+        place = (self._middle - pose.getTranslation()) @ pose.getRotation()
+        gaps = np.maximum(np.maximum(place - box.max_, box.min_ - place), 0.0)
+        bounds = np.linalg.norm(gaps, axis=1) - self._reach
+        for k in np.argsort(bounds):
+            part = self._centres[self._first[k] : self._first[k] + GROUP]
+            yield Group(float(bounds[k]), self._bodies(part))
+
+    def _bodies(self, centres: FloatArray) -> Iterator[CoalBody]:
+        import coal
+
+        for centre in centres:
+            pose = coal.Transform3s(np.array(self._rotation), centre)
+            yield CoalBody(self._shape, pose)
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Some bodies of an obstacle.
+
+    Args:
+        bound: Lower bound of their distance; [m].
+        bodies: Made as they are asked for.
+    """
+
+    bound: float
+    bodies: Iterable[CoalBody]
+
+
+CoalObstacle: TypeAlias = tuple[CoalBody, ...] | CoalCloud
+
 NOTHING: Final = Measured(
     float("inf"), frozen(np.full(3, np.nan)), frozen(np.full(3, np.nan))
 )
@@ -66,14 +129,15 @@ LARGEST: Final = float(np.finfo(np.float64).max)
 """Coal's way to say that it has no answer, with a minus sign."""
 
 
-def coal_bodies(obstacle: Obstacle) -> tuple[CoalBody, ...]:
+def coal_bodies(obstacle: Obstacle) -> CoalObstacle:
     """The Coal geometry of an obstacle, in the base frame.
 
     Args:
         obstacle: Any obstacle of a scene.
 
     Returns:
-        One body; for a prism over a non-convex polygon one per convex section.
+        One body; for a prism over a non-convex polygon one per convex section, for
+        points and voxels one each.
 
     Raises:
         VerificationFailed: If Coal refuses the shape.
@@ -87,7 +151,7 @@ def coal_bodies(obstacle: Obstacle) -> tuple[CoalBody, ...]:
         raise VerificationFailed(message) from error
 
 
-def _bodies(coal: Any, obstacle: Obstacle) -> tuple[CoalBody, ...]:
+def _bodies(coal: Any, obstacle: Obstacle) -> CoalObstacle:
     match obstacle:
         case Sphere():
             return (_placed(coal, coal.Sphere(obstacle.radius), obstacle.centre),)
@@ -112,6 +176,13 @@ def _bodies(coal: Any, obstacle: Obstacle) -> tuple[CoalBody, ...]:
             return tuple(_placed(coal, part, np.zeros(3)) for part in parts)
         case Mesh():
             return (_placed(coal, _surface(coal, obstacle), np.zeros(3)),)
+        case PointCloud():
+            ball, radius = coal.Sphere(obstacle.radius), obstacle.radius
+            return CoalCloud(ball, np.eye(3), obstacle.points, radius)
+        case Voxels():
+            cell, half = coal.Box(2.0 * obstacle.half_size), obstacle.half_size
+            reach = float(np.linalg.norm(half))
+            return CoalCloud(cell, obstacle.rotation, obstacle.centres, reach)
 
 
 def _placed(
@@ -181,9 +252,7 @@ def distance_request() -> Any:
     return request
 
 
-def measure(
-    request: Any, geometry: Any, pose: Any, bodies: tuple[CoalBody, ...]
-) -> Measured:
+def measure(request: Any, geometry: Any, pose: Any, bodies: CoalObstacle) -> Measured:
     """Distance between one body and the nearest part of an obstacle.
 
     Args:
@@ -195,6 +264,20 @@ def measure(
     Returns:
         The nearest part's answer; one unusable answer makes the whole unusable.
     """
+    if not isinstance(bodies, CoalCloud):
+        return _nearest(request, geometry, pose, bodies)
+    best = NOTHING
+    for group in bodies.nearest_first(geometry, pose):
+        if group.bound > max(best.distance, 0.0):
+            break  # where they meet the sign is known
+        found = _nearest(request, geometry, pose, group.bodies)
+        best = min(best, found, key=lambda one: one.distance)
+    return best
+
+
+def _nearest(
+    request: Any, geometry: Any, pose: Any, bodies: Iterable[CoalBody]
+) -> Measured:
     import coal
 
     best = NOTHING

@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
+from vdsm_pin.geometry.pieces import PackedPieces, first_groups
 from vdsm_pin.geometry.row_bounds import coarse_bounds, row_brackets
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
@@ -29,7 +29,7 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.coal_bodies import (
-    CoalBody,
+    CoalObstacle,
     coal_bodies,
     distance_request,
     measure,
@@ -95,7 +95,7 @@ class CoalScene:
     """
 
     pieces: PackedPieces
-    bodies: tuple[tuple[CoalBody, ...], ...]
+    bodies: tuple[CoalObstacle, ...]
 
     @classmethod
     def of(cls, problem: PlanningProblem, deadline: Deadline) -> "CoalScene":
@@ -105,7 +105,7 @@ class CoalScene:
             OutOfTime: If the time is over.
         """
         obstacles = problem.scene.obstacles
-        pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
+        pieces = first_groups(problem.packed, len(obstacles))
         return cls(pieces, tuple(_bodies_of(one, deadline) for one in obstacles))
 
 
@@ -322,7 +322,7 @@ def coal_distances(
             yield _measured(robot, trajectory, scene, some)
 
 
-def _bodies_of(obstacle: Obstacle, deadline: Deadline) -> tuple[CoalBody, ...]:
+def _bodies_of(obstacle: Obstacle, deadline: Deadline) -> CoalObstacle:
     deadline.check()
     return coal_bodies(obstacle)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from vdsm_pin.arm_bodies import ArmBody, SelfPairs, arm_bodies, self_pairs
 from vdsm_pin.arm_tree import RAIL, arm_tree, link_frame
-from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
+from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.budget import Budget
@@ -88,9 +88,7 @@ def all_pairs(problem: PlanningProblem) -> tuple[Pair, ...]:
 
 def pack_scene(problem: PlanningProblem) -> PackedPieces:
     """The obstacles, then the bodies of the arm in the frames of their links."""
-    bodies = [[body.piece] for body in arm_bodies(problem.manipulator)]
-    obstacles = [obstacle.pieces for obstacle in problem.scene.obstacles]
-    return pack_pieces([*obstacles, *bodies])
+    return problem.packed
 
 
 def make_task(

@@ -79,18 +79,38 @@ def read_ply(stream: MeshStream) -> RawMesh:
     if "tristrips" in header.elements:
         problem = "has triangle strips, expected faces"
         raise stream.invalid(problem)
-    read = _Binary(stream, header).read() if header.order else _text(stream, header)
-    vertex, face = read.get("vertex", {}), read.get("face", {})
+    read = _elements(stream, header)
+    face = read.get("face", {})
     corners = face.get("vertex_indices") or face.get("vertex_index")
-    axes = [vertex.get(axis) for axis in "xyz"]
-    if corners is None or None in axes:
-        problem = "has no x, y, z of its vertices or no vertex_indices of its faces"
+    if corners is None:
+        problem = "has no vertex_indices of its faces"
         raise stream.invalid(problem)
+    return _mesh(stream, _vertices(stream, read), corners)
+
+
+def read_ply_points(stream: MeshStream) -> FloatArray:
+    """The vertices of a PLY file, shape (n, 3), whether or not it has faces.
+
+    Raises:
+        InvalidFile: If the header is no PLY's, or the file is damaged.
+    """
+    return _vertices(stream, _elements(stream, _header(stream)))
+
+
+def _elements(stream: MeshStream, header: _Header) -> dict[str, _Columns]:
+    return _Binary(stream, header).read() if header.order else _text(stream, header)
+
+
+def _vertices(stream: MeshStream, read: dict[str, _Columns]) -> FloatArray:
+    axes = [read.get("vertex", {}).get(axis) for axis in "xyz"]
     columns = [axis.values for axis in axes if axis is not None]
+    if len(columns) != 3:
+        problem = "has no x, y, z of its vertices"
+        raise stream.invalid(problem)
     if len({len(column) for column in columns}) != 1:
         problem = "has lists where x, y and z are meant"
         raise stream.invalid(problem)
-    return _mesh(stream, np.column_stack(columns), corners)
+    return np.column_stack(columns)
 
 
 def _mesh(stream: MeshStream, vertices: FloatArray, faces: _Column) -> RawMesh:

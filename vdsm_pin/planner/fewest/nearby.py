@@ -6,13 +6,14 @@ inside the obstacles tell of links that are too near, and the distance from a me
 known but for rounding. The function passed in is asked only where they leave a doubt.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import borrowed, compiled
-from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Piece
+from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hulls, Piece
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.planner.fewest.cores import blocked_by, cores_of
 from vdsm_pin.planner.fewest.surfaces import STEP, Surfaces, surfaces_of
@@ -115,13 +116,22 @@ def nearby(problem: PlanningProblem, clearance: LinkClearance) -> Nearby:
 
 def _cover(obstacle: Obstacle) -> FloatArray:
     """Boxes that cover an obstacle but for its half-spaces, shape (n, 2, 3); [m]."""
-    boxes = np.concatenate([_boxes(piece) for piece in obstacle.pieces])
+    boxes = _all_boxes(obstacle.pieces)
     if len(boxes) <= MOST_BOXES:
         return boxes
     order = coherent_order(boxes.mean(axis=1))
     groups = [boxes[part] for part in np.array_split(order, MOST_BOXES)]
     pairs = [[part[:, 0].min(axis=0), part[:, 1].max(axis=0)] for part in groups]
     return np.array(pairs)
+
+
+def _all_boxes(pieces: Sequence[Piece]) -> FloatArray:
+    """The boxes of all pieces, shape (n, 2, 3); [m]."""
+    if isinstance(pieces, Hulls):
+        low = pieces.corners.min(axis=1) - pieces.radius
+        high = pieces.corners.max(axis=1) + pieces.radius
+        return np.stack([low, high], axis=1)
+    return np.concatenate([_boxes(piece) for piece in pieces])
 
 
 def _boxes(piece: Piece) -> FloatArray:

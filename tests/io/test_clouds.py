@@ -1,0 +1,244 @@
+"""Point clouds and voxels: all formats give the same points, odd files a message."""
+
+import hashlib
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.io.clouds import RawCloud, read_cloud
+from vdsm_pin.io.pcd import _from_lzf
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.report.inputs import assumed_sizes, input_notes
+from vdsm_pin.scene import PointCloud, Voxels
+from vdsm_pin.trajectory import Trajectory
+
+POINTS = np.array([[0.5, -1.25, 3.0], [1e-3, 2.0, -7.5], [100.0, 0.0, 0.125]])
+SINGLE = POINTS.astype(np.float32)
+
+
+def pcd(data: str, body: bytes, points: int = 3, fields: str = "x y z") -> bytes:
+    n = len(fields.split())
+    text = (
+        f"# .PCD v0.7\nVERSION 0.7\nFIELDS {fields}\nSIZE {'4 ' * n}\n"
+        f"TYPE {'F ' * n}\nCOUNT {'1 ' * n}\nWIDTH {points}\nHEIGHT 1\n"
+        f"VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {points}\nDATA {data}\n"
+    )
+    return text.encode() + body
+
+
+def literal_lzf(data: bytes) -> bytes:
+    """Packed without any copies: the simplest writer of the format."""
+    parts = [data[i : i + 32] for i in range(0, len(data), 32)]
+    return b"".join(bytes([len(part) - 1]) + part for part in parts)
+
+
+def compressed(data: bytes) -> bytes:
+    packed = literal_lzf(data)
+    return struct.pack("<II", len(packed), len(data)) + packed
+
+
+def npy(path: Path, array: np.ndarray) -> bytes:
+    np.save(path, array)
+    return path.read_bytes()
+
+
+def lines(rows: np.ndarray, between: str = " ") -> bytes:
+    return "".join(between.join(map(repr, r)) + "\n" for r in rows.tolist()).encode()
+
+
+def ply(form: str, body: bytes) -> bytes:
+    axes = "".join(f"property float {axis}\n" for axis in "xyz")
+    return (
+        f"ply\nformat {form} 1.0\nelement vertex 3\n{axes}end_header\n".encode() + body
+    )
+
+
+FILES = {
+    "a.xyz": lines(POINTS),
+    "b.txt": b"# remark\n\n" + lines(POINTS, "\t") + b"// more\n",
+    "c.csv": b"x,y,z\n" + lines(POINTS, ", "),
+    "count.xyz": b"3\n" + lines(POINTS),
+    "d.xyz": lines(np.hstack([POINTS, np.ones((3, 3))])),
+    "e.pcd": pcd("ascii", lines(POINTS)),
+    "f.pcd": pcd("binary", SINGLE.tobytes()),
+    "g.pcd": pcd("binary_compressed", compressed(SINGLE.T.tobytes())),
+    "i.pcd": pcd(
+        "binary",
+        np.hstack([np.zeros((3, 1), np.float32), SINGLE]).tobytes(),
+        fields="rgb x y z",
+    ),
+    "j.ply": ply("ascii", lines(POINTS)),
+    "k.ply": ply("binary_big_endian", SINGLE.astype(">f4").tobytes()),
+}
+
+
+def read(path: Path, content: bytes) -> RawCloud:
+    path.write_bytes(content)
+    digest = hashlib.sha256()
+    cloud = read_cloud(path, digest)
+    assert digest.hexdigest() == hashlib.sha256(content).hexdigest()
+    return cloud
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_format_has_the_same_points(tmp_path: Path, name: str) -> None:
+    found = read(tmp_path / name, FILES[name]).points
+    exact = np.array_equal(found, POINTS) or np.array_equal(found, SINGLE)
+    assert exact
+
+
+def test_arrays_are_points_or_cells(tmp_path: Path) -> None:
+    path = tmp_path / "a.npy"
+    assert np.array_equal(read(path, npy(path, POINTS)).points, POINTS)
+    grid = np.zeros((2, 3, 4), np.bool_)
+    grid[1, 2, 3] = grid[0, 0, 0] = True
+    cells = read(path, npy(path, grid))
+    assert cells.grid
+    assert cells.points.tolist() == [[0.5, 0.5, 0.5], [1.5, 2.5, 3.5]]
+
+
+def test_points_without_a_measurement_are_told(tmp_path: Path) -> None:
+    holes = np.vstack([POINTS, [[np.nan, 0.0, 0.0]]])
+    path = tmp_path / "a.npy"
+    cloud = read(path, npy(path, holes))
+    assert np.array_equal(cloud.points, POINTS)
+    assert cloud.notes == ("points without a measurement (NaN) left out: 1",)
+
+
+def test_copies_of_what_came_before_are_unpacked() -> None:
+    # "abc", then 9 bytes from 3 back: an overlapping copy; then a short copy.
+    packed = bytes([2]) + b"abc" + bytes([7 << 5, 0, 2]) + bytes([1 << 5, 11])
+    assert _from_lzf(packed, 15) == b"abc" * 4 + b"abc"
+
+
+BAD = {
+    "a.las": (b"x", "has the ending '.las', expected .ply, .pcd"),
+    "b.xyz": (b"1 2\n", "line 1: found '1 2', expected 3 numbers"),
+    "c.xyz": (b"1 2 3\n1 b 3\n", "line 2: found '1 b 3', expected 3 numbers"),
+    "d.xyz": (b"1,5 2,5 3,5\n", "has commas inside numbers"),
+    "e.csv": (b"1,5;2,5;3,5\n", "has commas inside numbers"),
+    "f.xyz": (b"# nothing\n", "has no point"),
+    "g.xyz": (b"1 2 inf\n", "point 1: has a coordinate that is not a number"),
+    "h.xyz": (b"nan nan nan\n", "has no point"),
+    "i.npy": (b"no", "is no array of numbers"),
+    "j.pcd": (b"DATA binary\n", "has a header that is no PCD's"),
+    "k.pcd": (b"hello\n" * 300, "no line DATA"),
+    "l.pcd": (pcd("binary", b"123"), "promises 3 points"),
+    "m.pcd": (pcd("ascii", b"1 2 3\n1 2\n1 2 3\n"), "line 13: has 2 values"),
+    "n.pcd": (pcd("binary_compressed", b"12345678"), "promises 3 points"),
+    "o.pcd": (pcd("binary", b"", 999999999999), "no PCD's"),
+    "p.pcd": (
+        pcd("binary_compressed", struct.pack("<II", 4, 36) + b"\xff\x00\x00\x01"),
+        "compressed data that is damaged",
+    ),
+    "q.ply": (FILES["j.ply"].replace(b"float z", b"float w"), "has no x, y, z"),
+    "r.pcd": (pcd("ascii", b"", 0), "has no point"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_odd_files_are_refused_in_one_sentence(tmp_path: Path, name: str) -> None:
+    content, expected = BAD[name]
+    with pytest.raises(InvalidFile) as caught:
+        read(tmp_path / name, content)
+    assert expected in str(caught.value)
+
+
+def test_arrays_of_other_shapes_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.npy"
+    odd = (
+        np.zeros(3),
+        np.zeros((3, 2)),
+        np.full((1, 1, 1), 2),
+        np.zeros((2, 2, 2)),
+        np.array([["a", "b", "c"]]),
+    )
+    for array in odd:
+        with pytest.raises(InvalidFile):
+            read(path, npy(path, array))
+
+
+def test_damaged_files_never_end_in_a_traceback(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    files = [*FILES.items(), ("z.npy", npy(tmp_path / "z.npy", POINTS))]
+    for name, content in files:
+        for _ in range(40):
+            data = bytearray(content)
+            for _ in range(int(rng.integers(1, 4))):
+                data[int(rng.integers(len(data)))] = int(rng.integers(256))
+            cut = int(rng.integers(1, len(data) + 1))
+            (tmp_path / name).write_bytes(bytes(data[:cut]))
+            try:
+                cloud = read_cloud(tmp_path / name, hashlib.sha256())
+            except InvalidFile:
+                continue
+            assert np.isfinite(cloud.points).all()
+
+
+PROBLEM = """\
+vdsm_problem: 1
+length_unit: mm
+manipulator: hrm8
+base: {position: [10, 20, 30], rpy_deg: [0, 0, 90]}
+obstacles:
+  - OBSTACLE
+required_clearance: 1
+"""
+
+
+def problem(folder: Path, obstacle: str) -> Path:
+    path = folder / "p.yaml"
+    path.write_text(PROBLEM.replace("OBSTACLE", obstacle))
+    return path
+
+
+def test_points_stand_where_a_mesh_with_their_corners_would(tmp_path: Path) -> None:
+    (tmp_path / "a.xyz").write_bytes(lines(POINTS))
+    text = (
+        "{name: scan, shape: points, file: a.xyz, scale: 10, center: [1, 2, 3], "
+        "rpy_deg: [0, 0, 90], radius: 2}"
+    )
+    found = read_problem(problem(tmp_path, text)).problem
+    (cloud,) = found.scene.obstacles
+    assert isinstance(cloud, PointCloud)
+    x, y, z = (10.0 * POINTS).T
+    file = np.column_stack([1.0 - y, 2.0 + x, 3.0 + z]) - [10.0, 20.0, 30.0]
+    base = np.column_stack([file[:, 1], -file[:, 0], file[:, 2]]) / 1000.0
+    np.testing.assert_allclose(cloud.points, base, atol=1e-15)
+    assert cloud.radius == 0.002
+    assert len(cloud.pieces) == 3
+    assert cloud.pieces[1].radius == 0.002
+
+
+def test_a_cloud_without_unit_says_what_was_assumed(tmp_path: Path) -> None:
+    (tmp_path / "a.xyz").write_bytes(lines(100.0 * POINTS) + b"nan 0 0\n")
+    text = "{name: scan, shape: points, file: a.xyz, radius: 2, check_size: false}"
+    found = read_problem(problem(tmp_path, text)).problem
+    assert assumed_sizes(found) == ("'scan' is 1e+04 x 325 x 1050 mm",)
+    none = Trajectory(*(np.zeros(1) for _ in range(3)), *np.zeros((2, 1, 8)))
+    assert any("cloud 'scan': points" in note for note in input_notes(found, none))
+
+
+def test_a_grid_has_its_cells_and_no_unit_of_its_own(tmp_path: Path) -> None:
+    grid = np.zeros((2, 1, 1), np.uint8)
+    grid[1] = 1
+    np.save(tmp_path / "a.npy", grid)
+    text = "{name: map, shape: voxels, file: a.npy, size: [100, 40, 20]}"
+    found = read_problem(problem(tmp_path, text)).problem
+    (cells,) = found.scene.obstacles
+    assert isinstance(cells, Voxels)
+    corners = cells.pieces[0].points
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    # In the file's frame x from 100 to 200, y 0 to 40, z 0 to 20.
+    np.testing.assert_allclose(low, [-0.02, -0.19, -0.03], atol=1e-15)
+    np.testing.assert_allclose(high, [0.02, -0.09, -0.01], atol=1e-15)
+    assert assumed_sizes(found) == ()
+    for odd in ("length_unit: m", "scale: 2"):
+        with pytest.raises(InvalidFile, match="is a grid, whose cells"):
+            read_problem(problem(tmp_path, text.replace("}", f", {odd}}}")))
+    points = "{name: map, shape: points, file: a.npy, radius: 1}"
+    with pytest.raises(InvalidFile, match="expected points, or shape: voxels"):
+        read_problem(problem(tmp_path, points))

@@ -1,0 +1,146 @@
+"""Files of measured points, and of the occupied cells of a grid."""
+
+import io
+import re
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.meshes.ply import read_ply_points
+from vdsm_pin.io.meshes.raw import MeshStream, doubles
+from vdsm_pin.io.pcd import read_pcd
+from vdsm_pin.io.source import Digest, opened
+
+MAX_BYTES: Final = 1 << 30
+MAX_POINTS: Final = 5_000_000
+
+_REMARK: Final = ("#", "//")
+_DECIMAL_COMMA: Final = re.compile(rb"\d[ \t;]+[-+.\d]")
+"""Numbers apart by other signs: commas in the same file are then decimal ones."""
+
+_BETWEEN: Final = re.compile(r"[\s,;]+")
+
+
+@dataclass(frozen=True)
+class RawCloud:
+    """Points as a file has them.
+
+    Args:
+        points: Shape (n, 3), n >= 1, in the unit of the file.
+        notes: What was left out.
+        grid: Whether the file is an array of cells, and the points are the middles of
+            those occupied, in cells from its corner.
+    """
+
+    points: FloatArray
+    notes: tuple[str, ...] = ()
+    grid: bool = False
+
+
+def read_cloud(path: Path, digest: Digest) -> RawCloud:
+    """The points of a PLY, PCD, XYZ or NPY file.
+
+    Args:
+        path: The file; its ending tells the format.
+        digest: Gets every byte of the file.
+
+    Returns:
+        Its points; those without a measurement, which are NaN, are left out and a
+        note says how many.
+
+    Raises:
+        InvalidFile: If the file cannot be read, is of another kind, is damaged, has no
+            point or too many, or one that is infinite.
+    """
+    kind = path.suffix.lower()
+    if kind not in _READERS:
+        *most, last = _READERS
+        problem = f"has the ending {kind!r}, expected {', '.join(most)} or {last}"
+        raise InvalidFile(file=path, problem=problem)
+    with opened(path, limit=MAX_BYTES, digest=digest) as file:
+        stream = MeshStream(path, file.size, file.content)
+        points = _READERS[kind](stream)
+    grid = points.ndim == 3
+    if grid:
+        points = doubles(np.argwhere(points)) + 0.5
+    lost = np.isnan(points).any(axis=1)
+    count = int(lost.sum())
+    points = points[~lost] if count else points
+    if not len(points):
+        raise InvalidFile(file=path, problem="has no point")
+    if len(points) > MAX_POINTS:
+        problem = f"has {len(points)} points, the most is {MAX_POINTS}"
+        raise InvalidFile(file=path, problem=problem)
+    stream.check_numbers(points, "point")
+    note = f"points without a measurement (NaN) left out: {count}"
+    return RawCloud(points, (note,) if count else (), grid)
+
+
+def _npy(stream: MeshStream) -> FloatArray:
+    """Points, shape (n, 3), or the cells of a grid, 0 or 1 each, shape (a, b, c)."""
+    data = io.BytesIO(stream.content.read())
+    try:
+        array = np.load(data, allow_pickle=False)
+    except (ValueError, EOFError, OSError, SyntaxError, MemoryError) as error:
+        problem = f"is no array of numbers: {str(error)[:120].splitlines()[0]}"
+        raise stream.invalid(problem) from None
+    if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiub":
+        problem = "is no array of numbers"
+        raise stream.invalid(problem)
+    if array.ndim == 3:
+        if not ((array == 0) | (array == 1)).all():
+            problem = "has values besides 0 and 1, expected one of them for each cell"
+            raise stream.invalid(problem)
+        return np.asarray(array)
+    if array.ndim != 2 or array.shape[1] < 3:
+        problem = f"has an array of shape {array.shape}, expected (n, 3)"
+        raise stream.invalid(problem)
+    return doubles(array[:, :3])
+
+
+def _text(stream: MeshStream) -> FloatArray:
+    """Lines that begin with x y z; others stand behind # or // or are blank."""
+    data = stream.content.read()
+    if not (b"," in data and _DECIMAL_COMMA.search(data)):
+        plain = data.replace(b",", b" ").replace(b";", b" ")
+        with suppress(ValueError, UserWarning), warnings.catch_warnings():
+            warnings.simplefilter("error")  # where there is no line of numbers
+            columns: dict[str, Any] = {
+                "usecols": (0, 1, 2),
+                "comments": list(_REMARK),
+                "ndmin": 2,
+            }
+            return np.asarray(np.loadtxt(io.BytesIO(plain), **columns))
+    return _line_by_line(stream, data)
+
+
+def _line_by_line(stream: MeshStream, data: bytes) -> FloatArray:
+    """The same where a line is odd: the first may be the number of points, or names."""
+    rows = []
+    for number, line in enumerate(data.decode("latin-1").splitlines(), 1):
+        words = _BETWEEN.split(line.partition("#")[0].partition("//")[0].strip())
+        mixed = "," in line and _DECIMAL_COMMA.search(line.encode())
+        if mixed:
+            problem = "has commas inside numbers, expected decimal points"
+            raise stream.invalid(problem, line=number)
+        title = number == 1 and (len(words) == 1 or words[0][:1].isalpha())
+        if words != [""] and not title:
+            rows.append(stream.numbers(words[:3], 3, number))
+    return np.array(rows).reshape(-1, 3)
+
+
+_READERS: Final[dict[str, Callable[[MeshStream], FloatArray]]] = {
+    ".ply": read_ply_points,
+    ".pcd": read_pcd,
+    ".xyz": _text,
+    ".txt": _text,
+    ".csv": _text,
+    ".npy": _npy,
+}

@@ -1,0 +1,185 @@
+"""PCD, the format of the Point Cloud Library: text, binary, binary and compressed."""
+
+import io
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.meshes.raw import MAX_LINE, MeshStream, doubles
+
+_KINDS: Final = {"F": "f", "I": "i", "U": "u"}
+_SIZES: Final = (1, 2, 4, 8)
+_MOST_LINES: Final = 100
+
+
+@dataclass(frozen=True)
+class _Header:
+    """What stands before the data: a record's type, and how many follow."""
+
+    kind: np.dtype[np.void]
+    points: int
+    data: str
+    lines: int
+
+
+def read_pcd(stream: MeshStream) -> FloatArray:
+    """The points of a PCD file, shape (n, 3), NaN where nothing was measured.
+
+    Raises:
+        InvalidFile: If the header is no PCD's, or the file is damaged.
+    """
+    header = _header(stream)
+    data = stream.content.read()
+    match header.data:
+        case "ascii":
+            return _text(stream, header, data)
+        case "binary_compressed":
+            return _columns(stream, header, _unpacked(stream, header, data))
+        case _:
+            size = header.points * header.kind.itemsize
+            if len(data) < size:
+                raise _cut_short(stream, header)
+            table = np.frombuffer(data[:size], header.kind)
+            return np.column_stack([_first(table[axis]) for axis in "xyz"])
+
+
+def _first(column: FloatArray) -> FloatArray:
+    """A field's first value, where it has several."""
+    return doubles(column.reshape(len(column), -1)[:, 0])
+
+
+def _header(stream: MeshStream) -> _Header:
+    said: dict[str, list[str]] = {}
+    for number in range(1, _MOST_LINES):
+        words = stream.content.readline(MAX_LINE).decode("latin-1").split()
+        if not words and number == 1:
+            break
+        if not words or words[0].startswith("#"):
+            continue
+        said[words[0]] = words[1:]
+        if words[0] == "DATA":
+            return _understood(stream, said, number)
+    problem = "is no PCD file: no line DATA in its header"
+    raise stream.invalid(problem)
+
+
+def _understood(stream: MeshStream, said: dict[str, list[str]], lines: int) -> _Header:
+    names = said.get("FIELDS", [])
+    sizes, kinds = said.get("SIZE", []), said.get("TYPE", [])
+    counts = said.get("COUNT", ["1"] * len(names))
+    form = " ".join(said["DATA"])
+    points = said.get("POINTS", said.get("WIDTH", []))
+    numbers = [*sizes, *counts, *points]
+    good = (
+        len(names) == len(sizes) == len(kinds) == len(counts)
+        and len(points) == 1
+        and all(word.isdecimal() and len(word) < 12 for word in numbers)
+        and {int(size) for size in sizes} <= set(_SIZES)
+        and set(kinds) <= set(_KINDS)
+        and all(
+            (kind, int(size)) not in (("F", 1), ("F", 2))
+            for kind, size in zip(kinds, sizes, strict=True)
+        )
+        and form in ("ascii", "binary", "binary_compressed")
+    )
+    if not good or any(names.count(axis) != 1 for axis in "xyz"):
+        problem = "has a header that is no PCD's: expected FIELDS with x y z, SIZE, "
+        problem += "TYPE, POINTS, DATA ascii, binary or binary_compressed"
+        raise stream.invalid(problem)
+    stream.check_room(int(points[0]))
+    if not int(points[0]):
+        problem = "has no point"
+        raise stream.invalid(problem)
+    fields = [
+        (f"{name}" if name in "xyz" else f"{name} {k}", f"<{_KINDS[t]}{s}", (int(c),))
+        for k, (name, t, s, c) in enumerate(
+            zip(names, kinds, sizes, counts, strict=True)
+        )
+    ]
+    return _Header(np.dtype(fields), int(points[0]), form, lines)
+
+
+def _text(stream: MeshStream, header: _Header, data: bytes) -> FloatArray:
+    """One line a point, as many values as the fields have."""
+    names = header.kind.names or ()
+    starts = np.cumsum([0, *(int(np.prod(header.kind[name].shape)) for name in names)])
+    place = [int(starts[names.index(axis)]) for axis in "xyz"]
+    lines = data.decode("latin-1").splitlines()[: header.points]
+    if len(lines) < header.points:
+        raise _cut_short(stream, header)
+    with suppress(ValueError):  # told line by line below
+        text = io.StringIO("\n".join(lines))
+        table = np.loadtxt(text, usecols=place, ndmin=2, comments=None)
+        if len(table) == header.points:
+            return table
+    rows = []
+    for number, line in enumerate(lines, header.lines + 1):
+        words = line.split()
+        if len(words) != starts[-1]:
+            problem = f"has {len(words)} values, expected {starts[-1]}"
+            raise stream.invalid(problem, line=number)
+        rows.append(stream.numbers([words[k] for k in place], 3, number))
+    return np.array(rows).reshape(-1, 3)
+
+
+def _columns(stream: MeshStream, header: _Header, data: bytes) -> FloatArray:
+    """Fields one after the other, each with all its values."""
+    found, start = {}, 0
+    for name in header.kind.names or ():
+        kind = header.kind[name]
+        size = header.points * kind.itemsize
+        column = np.frombuffer(data[start : start + size], kind.base)
+        found[name] = column.reshape(header.points, -1)
+        start += size
+    return np.column_stack([_first(found[axis]) for axis in "xyz"])
+
+
+def _unpacked(stream: MeshStream, header: _Header, data: bytes) -> bytes:
+    """What LZF packed, of the size that the header promises."""
+    packed, size = np.frombuffer(data[:8].ljust(8, b"\0"), "<u4").tolist()
+    wanted = header.points * header.kind.itemsize
+    if len(data) < 8 + packed or size != wanted:
+        raise _cut_short(stream, header)
+    found = _from_lzf(data[8 : 8 + packed], wanted)
+    if len(found) != wanted:
+        problem = "has compressed data that is damaged"
+        raise stream.invalid(problem)
+    return found
+
+
+def _from_lzf(data: bytes, size: int) -> bytes:
+    """LZF: runs of bytes as they are, and copies of what came before.
+
+    Returns:
+        What was packed; another length than `size` where the data is damaged.
+    """
+    out, at, end = bytearray(), 0, len(data)
+    while at < end and len(out) < size:
+        head = data[at]
+        at += 1
+        if head < 32:
+            out += data[at : at + head + 1]
+            at += head + 1
+            continue
+        if at + (head >= 224) >= end:
+            return b""
+        length = head >> 5
+        if length == 7:
+            length += data[at]
+            at += 1
+        back = ((head & 31) << 8 | data[at]) + 1
+        at += 1
+        start, length = len(out) - back, length + 2
+        if start < 0:
+            return b""
+        part = bytes(out[start : start + length])
+        out += (part * (length // back + 1))[:length] if back < length else part
+    return bytes(out)
+
+
+def _cut_short(stream: MeshStream, header: _Header) -> Exception:
+    problem = f"is cut short: its header promises {header.points} points"
+    return stream.invalid(problem)
