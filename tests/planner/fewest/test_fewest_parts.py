@@ -11,13 +11,13 @@ from vdsm_pin.kinematics import joint_angles, link_angles
 from vdsm_pin.manipulator import built_in
 from vdsm_pin.planner.fewest.bounds import prove_tips
 from vdsm_pin.planner.fewest.cores import blocked_by, cores_of
-from vdsm_pin.planner.fewest.growth import Garden, Grown, vary
+from vdsm_pin.planner.fewest.growth import Grown, Population, vary
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.kernels import pose_shapes
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.nearby import nearby
 from vdsm_pin.planner.fewest.poses import bends_of, room_along
-from vdsm_pin.planner.fewest.roadmap import Pricing, Taste, build_roadmap
+from vdsm_pin.planner.fewest.roadmap import CostWeights, Pricing, build_roadmap
 from vdsm_pin.planner.fewest.route import path_rows, tip_route
 from vdsm_pin.planner.fewest.shapes import Shapes, one_knee_shapes
 from vdsm_pin.problem import PlanningProblem
@@ -178,7 +178,7 @@ def test_bent_arms_are_tried_only_near_where_the_straight_one_does_not_do() -> N
     shut = np.zeros(len(rows.tips), dtype=np.bool_)
     route = tip_route(task, rows, shut, 0.08, 0.0)
     shapes = one_knee_shapes(ARM, ARM.max_link_angle, 0.08, 8)
-    pricing = Pricing(0.0035, 0.74, ARM.total_length, Taste())
+    pricing = Pricing(0.0035, 0.74, ARM.total_length, CostWeights())
     every, some = (
         build_roadmap(task, clearance, pricing, route, shapes, around)
         for around in (None, 3)
@@ -266,10 +266,10 @@ def test_pieces_cut_at_other_knees_have_the_least_room_of_what_they_share() -> N
         np.testing.assert_array_equal(found[row], expected)
 
 
-def grown(task: PlanningProblem, tips: np.ndarray) -> tuple[Judge, Garden, Grown]:
+def grown(task: PlanningProblem, tips: np.ndarray) -> tuple[Judge, Population, Grown]:
     judge = Judge(task, link_clearance(task), 0.0, 0.0, 2e-3)
-    garden = Garden(judge, tips, np.random.default_rng(0))
-    return judge, garden, garden.grow(np.zeros((1, 9, 2)), 0, len(tips) - 1)
+    population = Population(judge, tips, np.random.default_rng(0))
+    return judge, population, population.grow(np.zeros((1, 9, 2)), 0, len(tips) - 1)
 
 
 def lines(tips: np.ndarray, tree: Grown) -> Intervals:
@@ -295,15 +295,15 @@ def test_nothing_grows_through_a_rod_though_children_stand_behind_it() -> None:
     along = np.array([0.0, 0.0, 1.0])
     task = problem(Cylinder("rod", np.array([2.0, 0.3, 0.0]), along, 3.0, 0.002))
     tips = np.linspace([3.126, 0.0, 0.0], [3.126, 0.9, 0.0], 6)
-    judge, garden, tree = grown(task, tips)
+    judge, population, tree = grown(task, tips)
     assert tree.layer[-1] == 5
     assert judge.clear(lines(tips, tree)).all()
     # Where no way is looked at, some children are beyond the rod at one bound.
     root = np.zeros((1, 9, 2))
-    jumped, _ = garden._grown(root, 0, 5, every_way=False)
+    jumped, _ = population._grown(root, 0, 5, every_way=False)
     clear = judge.clear(lines(tips, jumped))
     assert 0.5 < clear.mean() < 1.0
-    assert len(garden._reached(jumped, root, 0).layer) < clear.sum()
+    assert len(population._reached(jumped, root, 0).layer) < clear.sum()
 
 
 def test_a_motion_past_a_limit_is_refused() -> None:

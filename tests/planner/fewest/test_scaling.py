@@ -12,7 +12,7 @@ from vdsm_pin.planner.fewest.explore import explore
 from vdsm_pin.planner.fewest.levels import QUICK, THOROUGH, Effort, Insert
 from vdsm_pin.planner.fewest.motion import Knots
 from vdsm_pin.planner.fewest.nearby import nearby
-from vdsm_pin.planner.fewest.roadmap import Taste
+from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.smooth import smooth
 from vdsm_pin.planner.fewest.strategy import CLEAREST, FEWEST
 from vdsm_pin.planner.fewest.unbend import unbend
@@ -93,12 +93,12 @@ def scaled(task: PlanningProblem, factor: float) -> PlanningProblem:
     )
 
 
-def found(task: PlanningProblem, taste: Taste, effort: Effort) -> Knots:
+def found(task: PlanningProblem, weights: CostWeights, effort: Effort) -> Knots:
     """The motion of the last search, smoothed."""
     clearance = nearby(task, link_clearance(task))
-    *_, outcome = explore(task, clearance, 0.0, taste, effort)
+    *_, outcome = explore(task, clearance, 0.0, weights, effort)
     assert outcome.found is not None
-    return smooth(outcome.judge, outcome.found.knots, taste)
+    return smooth(outcome.judge, outcome.found.knots, weights)
 
 
 def frame() -> list[Obstacle]:
@@ -145,16 +145,19 @@ CASES = [
 
 
 @pytest.mark.parametrize("large", [False, True])
-@pytest.mark.parametrize(("make", "taste", "effort", "factors"), CASES)
+@pytest.mark.parametrize(("make", "weights", "effort", "factors"), CASES)
 def test_a_problem_in_another_size_has_the_same_plan_in_that_size(
     make: Callable[[], PlanningProblem],
-    taste: Taste,
+    weights: CostWeights,
     effort: Effort,
     factors: tuple[float, float],
     large: bool,
 ) -> None:
     task, factor = make(), factors[large]
-    one, other = found(task, taste, effort), found(scaled(task, factor), taste, effort)
+    one, other = (
+        found(task, weights, effort),
+        found(scaled(task, factor), weights, effort),
+    )
     assert len(one.tips) == len(other.tips)
     np.testing.assert_array_equal(one.drawn, other.drawn)
     np.testing.assert_allclose(other.tips, one.tips * factor, atol=1e-7 * factor)

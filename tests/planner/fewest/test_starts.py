@@ -15,9 +15,9 @@ from vdsm_pin.io.problem_file import built_in_text, read_problem
 from vdsm_pin.kinematics import joint_centres, link_angles
 from vdsm_pin.manipulator import CableLayout, Manipulator, paper_hole_angles
 from vdsm_pin.planner.fewest import explore
-from vdsm_pin.planner.fewest.home import with_start
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste
+from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap
+from vdsm_pin.planner.fewest.start_node import with_start
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.unbend import leans_ahead, unbend
 from vdsm_pin.planner.fewest.ways_in import Inserted
@@ -155,11 +155,13 @@ def test_a_start_that_is_left_by_a_finer_search_alone_is_left(
 ) -> None:
     tried: list[Judge] = []
 
-    def seldom(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, int]:
+    def seldom(
+        judge: Judge, roadmap: Roadmap, weights: CostWeights
+    ) -> tuple[Roadmap, int]:
         tried.append(judge)
         if len(tried) < needed:
             raise NoWayOut
-        return with_start(judge, roadmap, taste)
+        return with_start(judge, roadmap, weights)
 
     monkeypatch.setattr(explore, "with_start", seldom)
     task, needed = problem(), 2

@@ -13,7 +13,7 @@ from vdsm_pin.planner.fewest.explain import refuse
 from vdsm_pin.planner.fewest.explore import explore
 from vdsm_pin.planner.fewest.levels import Effort, Insert
 from vdsm_pin.planner.fewest.nearby import nearby
-from vdsm_pin.planner.fewest.roadmap import Taste
+from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.stuck import Stuck, where_stuck
 from vdsm_pin.problem import Blocked, PlanningProblem
@@ -96,7 +96,9 @@ def test_a_search_in_vain_tells_where_it_ended(
     clearance = nearby(task, link_clearance(task))
     effort = Insert(step=0.02, population=10, ways=1, returns=1, seed=0)
     with shown(quiet=0.0):
-        *_, outcome = explore(task, clearance, 0.0, Taste(), Effort((effort,), False))
+        *_, outcome = explore(
+            task, clearance, 0.0, CostWeights(), Effort((effort,), False)
+        )
     with pytest.raises(NoPlanFound) as ended:
         refuse(task, outcome)
     words = str(ended.value)

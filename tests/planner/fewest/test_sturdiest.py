@@ -12,7 +12,7 @@ from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
-from vdsm_pin.planner.fewest.roadmap import Taste, build_roadmap
+from vdsm_pin.planner.fewest.roadmap import CostWeights, build_roadmap
 from vdsm_pin.planner.fewest.route import path_rows, tip_route
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes
 from vdsm_pin.planner.fewest.strategy import (
@@ -77,15 +77,15 @@ def test_each_link_keeps_its_own() -> None:
         Sphere("ball", np.array([2.0, 0.5, 0.3]), 0.2),
         Cylinder("bar", np.array([1.0, -0.6, 0.0]), np.array([0.0, 0, 1]), 2.0, 0.1),
     )
-    clearance, taste = link_clearance(task), Taste(taper=0.01)
-    kept = kept_by_links(ARM, taste.taper)
+    clearance, weights = link_clearance(task), CostWeights(taper=0.01)
+    kept = kept_by_links(ARM, weights.taper)
     rows = path_rows(task.path)
     route = tip_route(task, rows, np.zeros(len(rows.tips), dtype=np.bool_), 0.2, 0.0)
     shapes = one_knee_shapes(ARM, ARM.max_link_angle, 0.2, 8)
     judge = Judge(task, clearance, 0.0, 0.0, 2e-3, kept=kept)
     made, free = (
         build_roadmap(task, clearance, judge.pricing(one), route, shapes)
-        for one in (taste, Taste())
+        for one in (weights, CostWeights())
     )
     tip, shape = np.divmod(free.node, shapes.size)
     tips = route.tips[tip]

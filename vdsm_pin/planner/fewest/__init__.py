@@ -8,7 +8,8 @@ Words of these modules:
   tip has it; chart: tip and offsets together, in which motions are straight lines.
 * knee: a joint whose link angle is not zero; shape: the offsets of an arm with few of
   them, at any tip; node: a shape at a tip that keeps limits and clearance.
-* room: the clearance of a configuration; taste: what a strategy prefers among nodes.
+* room: the clearance of a configuration; weights: what a strategy prefers among nodes;
+  population: arms that are varied and selected from layer to layer.
 * home: the node the motion starts from; way: a motion off the path; leg: a run of nodes
   that is drawn, or a way; sequence: all legs.
 * knot: a corner of the motion in the chart; row: a configuration of the trajectory.

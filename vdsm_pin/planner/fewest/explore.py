@@ -14,16 +14,15 @@ import numpy as np
 from vdsm_pin.errors import NoWayOut
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.planner.fewest.bounds import TipProof, prove_tips
-from vdsm_pin.planner.fewest.graft import fill
-from vdsm_pin.planner.fewest.home import largest_start_angle, with_start
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.last_link import hemmed_in
 from vdsm_pin.planner.fewest.levels import FULL, SEED, Effort, Insert, Level
 from vdsm_pin.planner.fewest.nearby import Nearby
 from vdsm_pin.planner.fewest.passage import cut_off
+from vdsm_pin.planner.fewest.population import fill
 from vdsm_pin.planner.fewest.roadmap import (
+    CostWeights,
     Roadmap,
-    Taste,
     build_roadmap,
     link_limit,
 )
@@ -35,6 +34,7 @@ from vdsm_pin.planner.fewest.search import (
     search,
 )
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes
+from vdsm_pin.planner.fewest.start_node import largest_start_angle, with_start
 from vdsm_pin.planner.fewest.stuck import Stuck
 from vdsm_pin.planner.fewest.taper import kept_by_links
 from vdsm_pin.planner.fewest.tip_ways import TipSpace
@@ -90,7 +90,7 @@ def explore(
     problem: PlanningProblem,
     clearance: Nearby,
     margin: float,
-    taste: Taste,
+    weights: CostWeights,
     effort: Effort = FULL,
     soon: Deadline = NO_LIMIT,
 ) -> Iterator[Outcome]:
@@ -100,7 +100,7 @@ def explore(
         problem: What is asked.
         clearance: The clearance function.
         margin: Kept beyond the required clearance; [m].
-        taste: What the strategy prefers.
+        weights: What the strategy prefers.
         effort: How much is done before giving up.
         soon: From when on what has been found will do.
 
@@ -125,7 +125,7 @@ def explore(
     # The way out of a start that is bent more than is liked must be allowed.
     bent = largest_start_angle(problem) + TOLERANCES.joint_limit
     least_ease = min(1.0, bent / link_limit(problem))
-    unreached, kept = False, kept_by_links(problem.manipulator, taste.taper)
+    unreached, kept = False, kept_by_links(problem.manipulator, weights.taper)
     stuck: NoWayOut | None = None
     inserted: Stuck | None = None
     spaces: dict[tuple[float, float, int], TipSpace] = {}
@@ -134,7 +134,7 @@ def explore(
             continue
         ease = max(level.ease, least_ease)
         worth = problem.required_clearance + margin
-        worth += (level.slack + taste.room) * length
+        worth += (level.slack + weights.clearance) * length
         worth += 0.0 if kept is None else float(kept[-1])
         judge = Judge(
             problem, clearance, margin, level.slack * length, level.finest * length,
@@ -149,7 +149,7 @@ def explore(
                 now = _inserted(now, spaces[key], level, soon)
                 inserted = now.stuck
             else:
-                found = _look(judge, level, rows, proof, taste)
+                found = _look(judge, level, rows, proof, weights)
                 unreached |= level.ease == 1.0 and _unreached(found)
                 now = Outcome(judge, found, rows, proof, inserted)
         except NoWayOut as error:
@@ -232,7 +232,7 @@ def _proofs(
 
 
 def _look(
-    judge: Judge, level: Level, rows: PathRows, proof: TipProof, taste: Taste
+    judge: Judge, level: Level, rows: PathRows, proof: TipProof, weights: CostWeights
 ) -> Searched | None:
     """One level: a roadmap, a search, and growth where it falls short."""
     problem = judge.problem
@@ -242,9 +242,9 @@ def _look(
     shapes = one_knee_shapes(arm, judge.limit, level.step, level.places)
     route = tip_route(problem, rows, proof.closed, coarse, back)
     roadmap = build_roadmap(
-        problem, judge.rough, judge.pricing(taste), route, shapes, level.around
+        problem, judge.rough, judge.pricing(weights), route, shapes, level.around
     )
-    roadmap, home = with_start(judge, roadmap, taste)
+    roadmap, home = with_start(judge, roadmap, weights)
     rng = np.random.default_rng(SEED)
     found = search(judge, roadmap, home, level.rounds, nothing_blocked())
     for _ in range(level.grow):
@@ -253,7 +253,7 @@ def _look(
         skipped = tuple(k for k in found.skipped if not route.closed[k])
         if back == 0.0 and _unreached(found):
             break
-        more = fill(judge, found.roadmap, found.ways, skipped, rng, taste)
+        more = fill(judge, found.roadmap, found.ways, skipped, rng, weights)
         if more is None:
             break
         home = int(_same_nodes(found.roadmap, more, np.array(found.home)))

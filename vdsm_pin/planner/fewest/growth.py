@@ -173,7 +173,7 @@ def lacking(judge: Judge, room: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(0.0, 1.0 - (room - judge.required) / wanted))
 
 
-class Garden:
+class Population:
     """Grows configurations along given tips.
 
     Args:

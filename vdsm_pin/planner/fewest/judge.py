@@ -15,7 +15,7 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.motion import Intervals, Knots
 from vdsm_pin.planner.fewest.parts import Parts
 from vdsm_pin.planner.fewest.poses import bends_of, pieces_of, room_along
-from vdsm_pin.planner.fewest.roadmap import Pricing, Taste, link_limit
+from vdsm_pin.planner.fewest.roadmap import CostWeights, Pricing, link_limit
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.pointing import angles_between
 from vdsm_pin.problem import PlanningProblem
@@ -79,10 +79,10 @@ class Judge:
         self.limit = ease * link_limit(problem)
         self.cone = _cone(problem, slack)
 
-    def pricing(self, taste: Taste) -> Pricing:
-        """What configurations keep and cost to a taste."""
+    def pricing(self, weights: CostWeights) -> Pricing:
+        """What configurations keep and cost by some weights."""
         length = self.problem.manipulator.total_length
-        return Pricing(self.required, self.limit, length, taste, self.cone)
+        return Pricing(self.required, self.limit, length, weights, self.cone)
 
     def lines(self, knots: Knots, intervals: IntArray) -> Intervals:
         """Some intervals of a motion, with where the last link shall look on the path.

@@ -24,22 +24,22 @@ KNEES: Final = slice(1, None)
 
 
 @dataclass(frozen=True)
-class Taste:
+class CostWeights:
     """What a strategy prefers among clear configurations.
 
     Args:
         angle: Cost of one changed angle; costs are those of a length drawn.
-        room: Clearance beyond the required one that is wanted, over the arm's length;
+        clearance: Beyond the required one that is wanted, over the arm's length;
             [-].
-        room_cost: Cost of having none of it.
+        clearance_cost: Cost of having none of it.
         easy_bend: Link angles up to this cost nothing more; [rad].
         bend_cost: Cost of bending to the limit.
         taper: Error of all joints that what each link keeps shall make up for; [rad].
     """
 
     angle: float = 1.0
-    room: float = 0.016
-    room_cost: float = 0.5
+    clearance: float = 0.016
+    clearance_cost: float = 0.5
     easy_bend: float = float(np.deg2rad(30.0))
     bend_cost: float = 4.0
     taper: float = 0.0
@@ -53,14 +53,14 @@ class Pricing:
         required: Clearance to keep; [m].
         limit: Largest link angle; [rad].
         length: Of the arm; [m].
-        taste: What the strategy prefers.
+        weights: What the strategy prefers.
         cone: Largest angle between the last link and where it shall look; [rad].
     """
 
     required: float
     limit: float
     length: float
-    taste: Taste
+    weights: CostWeights
     cone: float = np.inf
 
     def prices(
@@ -72,15 +72,15 @@ class Pricing:
             bends: Link angles, shape (v, k); [rad].
             room: Clearances, shape (v,); [m].
         """
-        taste, most = self.taste, bends.max(axis=1, initial=0.0)
+        weights, most = self.weights, bends.max(axis=1, initial=0.0)
         changed = (bends > TOLERANCES.changed_angle).sum(axis=1)
         spare = (room - self.required) / self.length
-        lack = np.maximum(0.0, 1.0 - spare / taste.room)
-        over = np.maximum(0.0, most - taste.easy_bend)
-        bent = (over / max(self.limit - taste.easy_bend, 0.02)) ** 2
-        narrow, steep = taste.room_cost * lack**2, taste.bend_cost * bent
+        lack = np.maximum(0.0, 1.0 - spare / weights.clearance)
+        over = np.maximum(0.0, most - weights.easy_bend)
+        bent = (over / max(self.limit - weights.easy_bend, 0.02)) ** 2
+        narrow, steep = weights.clearance_cost * lack**2, weights.bend_cost * bent
         return (
-            np.asarray(taste.angle * changed + narrow + steep),
+            np.asarray(weights.angle * changed + narrow + steep),
             np.asarray(STRAIN * (0.2 * narrow + steep)),
         )
 
@@ -167,8 +167,8 @@ def build_roadmap(
         around: Only the straight arm is tried at tips farther than this many tips from
             where the straight arm does not do; None: every shape at every tip.
     """
-    arm, taste, required = problem.manipulator, pricing.taste, pricing.required
-    kept, aims = kept_by_links(arm, taste.taper), _aims(problem, route)
+    arm, weights, required = problem.manipulator, pricing.weights, pricing.required
+    kept, aims = kept_by_links(arm, weights.taper), _aims(problem, route)
 
     def tried(whole: BoolArray) -> Roadmap:
         node, ends, bends = pose_shapes(
@@ -191,7 +191,7 @@ def build_roadmap(
         return tried(np.ones(count, dtype=np.bool_))
     straight = tried(np.zeros(count, dtype=np.bool_))
     poor = np.ones(count, dtype=np.bool_)
-    poor[straight.tips_of(np.flatnonzero(straight.cost <= 2.0 * taste.angle))] = False
+    poor[straight.tips_of(np.flatnonzero(straight.cost <= 2.0 * weights.angle))] = False
     return tried(_spread(route, poor, around)) if poor.any() else straight
 
 

@@ -9,7 +9,7 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Knots
 from vdsm_pin.planner.fewest.poses import farthest_apart, on_line
-from vdsm_pin.planner.fewest.roadmap import Taste
+from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.tolerances import TOLERANCES
 
 
@@ -66,7 +66,7 @@ def _allowed(state: _State, new: _State, span: tuple[int, int], drawn: bool) -> 
     return int(new.changed[a + 1 : b].sum()) <= int(state.changed[a + 1 : b].sum())
 
 
-def smooth(judge: Judge, knots: Knots, taste: Taste) -> Knots:
+def smooth(judge: Judge, knots: Knots, weights: CostWeights) -> Knots:
     """Knots pulled straight wherever that keeps clearance, limits and sparsity.
 
     Long stretches are tried first, then ever shorter ones, all of one length at once.
@@ -79,7 +79,7 @@ def smooth(judge: Judge, knots: Knots, taste: Taste) -> Knots:
         for phase in (0, stride // 2):
             spans = _spans(knots, stride, phase)
             if spans:
-                knots, state = _round(judge, knots, state, taste, spans)
+                knots, state = _round(judge, knots, state, weights, spans)
         stride //= 2
     return knots
 
@@ -88,7 +88,7 @@ def _round(
     judge: Judge,
     knots: Knots,
     state: _State,
-    taste: Taste,
+    weights: CostWeights,
     spans: list[tuple[int, int]],
 ) -> tuple[Knots, _State]:
     trial = _flattened(judge, knots, spans)
@@ -102,7 +102,7 @@ def _round(
     bends = judge.bends(trial.tips[picked], trial.offsets[picked])
     new.changed[picked] = (bends > TOLERANCES.changed_angle).sum(axis=1)
     new.bend[picked] = bends.max(axis=1)
-    need, bend = _guards(judge, knots, state, taste, spans)
+    need, bend = _guards(judge, knots, state, weights, spans)
     good, new.room[picked] = judge.measured(judge.lines(trial, picked), need, bend)
     kept = []
     place = 0
@@ -122,16 +122,16 @@ def _guards(
     judge: Judge,
     knots: Knots,
     state: _State,
-    taste: Taste,
+    weights: CostWeights,
     spans: list[tuple[int, int]],
 ) -> tuple[FloatArray, FloatArray]:
     """Clearance to keep and angle not to exceed, interval by interval of the spans."""
     need, bend = [], []
-    wanted = taste.room * judge.problem.manipulator.total_length
+    wanted = weights.clearance * judge.problem.manipulator.total_length
     for a, b in spans:
         room = float(state.room[a : b + 1].min())
         room = max(min(room, judge.required + wanted / 2.0), judge.required)
-        most = max(float(state.bend[a : b + 1].max()), taste.easy_bend)
+        most = max(float(state.bend[a : b + 1].max()), weights.easy_bend)
         need += [room] * (b - a)
         bend += [most] * (b - a)
     return np.array(need), np.array(bend)

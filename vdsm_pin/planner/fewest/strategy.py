@@ -23,7 +23,7 @@ from vdsm_pin.planner.fewest.explore import Outcome, explore
 from vdsm_pin.planner.fewest.levels import FULL, LEANING, QUICK, Effort, pointed
 from vdsm_pin.planner.fewest.motion import Knots, Rows, dense_rows
 from vdsm_pin.planner.fewest.nearby import Nearby, nearby
-from vdsm_pin.planner.fewest.roadmap import Taste
+from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.search import Searched
 from vdsm_pin.planner.fewest.smooth import lifted, smooth, straightened
 from vdsm_pin.planner.fewest.sparsify import sparser
@@ -46,8 +46,8 @@ from vdsm_pin.units import in_mm
 
 SEARCHED: Final = 0.6
 """Part of the time after which a search ends that has found something; [-]."""
-FEWEST: Final = Taste()
-CLEAREST: Final = Taste(angle=0.2, room=0.064, room_cost=8.0)
+FEWEST: Final = CostWeights()
+CLEAREST: Final = CostWeights(angle=0.2, clearance=0.064, clearance_cost=8.0)
 
 
 def plan_fewest(
@@ -97,7 +97,7 @@ def plan_sturdiest(
     of `plan_fewest`.
     """
     lean = _Search(problem, clearance, _largest(margin), "sturdiest", FEWEST)
-    wide = replace(lean, taste=CLEAREST)
+    wide = replace(lean, weights=CLEAREST)
     found = _if_found(wide.plan)
     if not found:
         return lean.plan()
@@ -135,7 +135,7 @@ class _Search:
     clearance: LinkClearance
     margin: float
     name: str
-    taste: Taste
+    weights: CostWeights
 
     @property
     def kept(self) -> float:
@@ -143,17 +143,19 @@ class _Search:
         return self.problem.required_clearance + self.margin
 
     def plan(self) -> Plan:
-        return _plan(self.problem, self.clearance, self.margin, self.name, self.taste)
+        return _plan(self.problem, self.clearance, self.margin, self.name, self.weights)
 
     def with_reserve(self, reserve: float) -> Plan:
         return _plan(
             self.problem, self.clearance, self.margin + reserve, self.name,
-            self.taste, QUICK,
+            self.weights, QUICK,
         )  # fmt: skip
 
     def with_taper(self, error: float) -> Plan:
-        taste = replace(self.taste, taper=error)
-        return _plan(self.problem, self.clearance, self.margin, self.name, taste, QUICK)
+        weights = replace(self.weights, taper=error)
+        return _plan(
+            self.problem, self.clearance, self.margin, self.name, weights, QUICK
+        )
 
     def clearer(self, first: Plan) -> tuple[list[Plan], float]:
         """Plans with more and more clearance, and what the last has in reserve; [m]."""
@@ -188,7 +190,7 @@ def _plan(
     clearance: LinkClearance,
     margin: float,
     name: str,
-    taste: Taste,
+    weights: CostWeights,
     effort: Effort = FULL,
 ) -> Plan:
     check_start(problem, clearance)
@@ -196,26 +198,26 @@ def _plan(
         try:
             rows = unbend(problem, clearance, margin)
             there = from_there(problem, rows[-1])
-            rest = _plan(there, clearance, margin, name, taste, effort)
+            rest = _plan(there, clearance, margin, name, weights, effort)
             return with_unbending(problem, rows, rest)
         except NoPlanFound:
             effort = LEANING
     if problem.path.pointing is not None and effort is not LEANING:
         effort = pointed(effort)
     # What is kept is judged exactly, however much it is.
-    most = margin + taste.taper * float(levers(problem.manipulator)[-1])
+    most = margin + weights.taper * float(levers(problem.manipulator)[-1])
     quick = nearby(problem, clearance)
     quick = quick.up_to(quick.far + most)
     best: Outcome | None = None
     try:
         soon = _soon(problem, clearance)
-        for outcome in explore(problem, quick, margin, taste, effort, soon):
+        for outcome in explore(problem, quick, margin, weights, effort, soon):
             best = outcome
             say_drawn(problem, best)
             refuse_proved(problem, best)
         assert best is not None
         refuse(problem, best)
-        return _written(problem, quick, name, taste, best)
+        return _written(problem, quick, name, weights, best)
     except OutOfTime as ended:
         reached = "" if best is None else how_far(problem, best)
         raise OutOfTime(ended.limit, reached) from None
@@ -233,7 +235,7 @@ def _written(
     problem: PlanningProblem,
     clearance: Nearby,
     name: str,
-    taste: Taste,
+    weights: CostWeights,
     outcome: Outcome,
 ) -> Plan:
     """What was found, smoothed and row by row."""
@@ -242,7 +244,7 @@ def _written(
     knots = outcome.found.knots
     if not isinstance(outcome.found, Searched):
         knots = sparser(judge, knots)
-    knots = smooth(judge, knots, taste)
+    knots = smooth(judge, knots, weights)
     knots = lifted(judge, straightened(judge, knots))
     turn = problem.planned_row_change
     rows = dense_rows(arm, knots, problem.path.spacing, turn, judge.slack)

@@ -14,7 +14,6 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.fewest.charts import Chart, Directions, Projections
-from vdsm_pin.planner.fewest.home import checked_start
 from vdsm_pin.planner.fewest.insertion import Chain, Insertion, Layers
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
@@ -22,6 +21,7 @@ from vdsm_pin.planner.fewest.motion import Intervals, Knots
 from vdsm_pin.planner.fewest.nearby import Nearby
 from vdsm_pin.planner.fewest.route import PathRows, TipRoute, tip_route
 from vdsm_pin.planner.fewest.search import Found
+from vdsm_pin.planner.fewest.start_node import checked_start
 from vdsm_pin.planner.fewest.stuck import Stuck
 from vdsm_pin.planner.fewest.tip_ways import TipSpace
 from vdsm_pin.progress import say

@@ -8,7 +8,7 @@ from vdsm_pin.kinematics import joint_centres, link_angles
 from vdsm_pin.planner.fewest.charts import Chart, Projections
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
-from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste, extended
+from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap, extended
 from vdsm_pin.planner.fewest.sequence import TURN
 from vdsm_pin.planner.start import start_centres
 from vdsm_pin.problem import PlanningProblem
@@ -61,7 +61,9 @@ def checked_start(judge: Judge, tip: FloatArray, chart: Chart) -> FloatArray:
     return shape
 
 
-def with_start(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, int]:
+def with_start(
+    judge: Judge, roadmap: Roadmap, weights: CostWeights
+) -> tuple[Roadmap, int]:
     """The roadmap with the start as a node, tied to what can be reached from it.
 
     Raises:
@@ -92,7 +94,7 @@ def with_start(judge: Judge, roadmap: Roadmap, taste: Taste) -> tuple[Roadmap, i
     turn = gap[near[good]] / (TURN * judge.problem.manipulator.total_length)
     links = np.column_stack([ids, there, turn])
     more = extended(
-        roadmap, judge.pricing(taste), np.zeros(1, dtype=np.int64),
+        roadmap, judge.pricing(weights), np.zeros(1, dtype=np.int64),
         judge.bends(tip, offsets), room, shapes.with_grown(offsets, links),
     )  # fmt: skip
     return more, int(more.index[shapes.size])

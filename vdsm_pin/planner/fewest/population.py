@@ -3,19 +3,19 @@
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct
-from vdsm_pin.planner.fewest.growth import POPULATION, Garden, Grown
+from vdsm_pin.planner.fewest.growth import POPULATION, Grown, Population
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
-from vdsm_pin.planner.fewest.roadmap import Roadmap, Taste, extended
+from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap, extended
 from vdsm_pin.planner.fewest.sequence import TURN
 
 
-def graft(
+def tied_in(
     judge: Judge,
     roadmap: Roadmap,
     grown: list[Grown],
     roots: list[IntArray],
-    taste: Taste,
+    weights: CostWeights,
 ) -> Roadmap:
     """The roadmap with grown configurations, tied to what is near them.
 
@@ -24,7 +24,7 @@ def graft(
         roadmap: The graph before.
         grown: Trees, each rooted in nodes of the graph.
         roots: For each tree the nodes of its roots.
-        taste: What the strategy prefers.
+        weights: What the strategy prefers.
     """
     shapes, route = roadmap.shapes, roadmap.route
     tips, offsets, links = [], [], []
@@ -44,7 +44,7 @@ def graft(
     room, _, _ = judge.look(positions, every)
     bends = judge.bends(positions, every)
     return extended(
-        roadmap, judge.pricing(taste), places, bends, room,
+        roadmap, judge.pricing(weights), places, bends, room,
         shapes.with_grown(every, np.vstack(links)),
     )  # fmt: skip
 
@@ -93,7 +93,7 @@ def fill(
     lengths: FloatArray,
     skipped: tuple[int, ...],
     rng: np.random.Generator,
-    taste: Taste,
+    weights: CostWeights,
 ) -> Roadmap | None:
     """The roadmap with what could be grown into the stretches not drawn.
 
@@ -103,7 +103,7 @@ def fill(
         lengths: Of the way from home to each node, inf if none, shape (v,).
         skipped: Layers k whose stretch from layer k - 1 is not drawn.
         rng: Source of chance.
-        taste: What the strategy prefers.
+        weights: What the strategy prefers.
 
     Returns:
         None if nothing grew.
@@ -125,10 +125,10 @@ def fill(
             if not len(nodes):
                 continue
             _, offsets = roadmap.poses_of(arm, nodes)
-            garden = Garden(judge, route.tips[route.layers], rng)
-            tree = garden.grow(offsets, first, last)
+            population = Population(judge, route.tips[route.layers], rng)
+            tree = population.grow(offsets, first, last)
             if len(tree.layer):
                 trees.append(tree)
                 roots.append(nodes)
                 crossed = bool((tree.layer == last).any())
-    return graft(judge, roadmap, trees, roots, taste) if trees else None
+    return tied_in(judge, roadmap, trees, roots, weights) if trees else None
