@@ -237,22 +237,25 @@ def pack_task(
     blank = np.zeros(joints.parent.size)
     exact = way_errors(joints, ways, blank, blank, blank)
     task = Task(pieces, joints, ways, exact, places, moving, packed, rules)
-    return with_errors(task, ErrorBox.none(tree))
+    return _erring(task, exact, np.zeros(n))
 
 
 def with_errors(task: Task, box: ErrorBox) -> Task:
     """The same asked about another error box."""
-    pairs, pad = task.pairs, task.rules.pad
-    erring: WayErrors = way_errors(
-        task.tree, task.ways, box.joints, box.shifts, box.tilts
-    )
+    pairs = task.pairs
+    arrays = (np.ascontiguousarray(x) for x in (box.joints, box.shifts, box.tilts))
+    erring = way_errors(task.tree, task.ways, *arrays)
     shift = erring.shifted[pairs.way]
-    surfaces = box.surfaces
-    if surfaces is not None:
+    if box.surfaces is not None:
         moving = task.bodies.number[pairs.body]
-        shift = shift + surfaces[pairs.obstacle] + surfaces[moving]
-    steady = not erring.any_turn
+        shift = shift + box.surfaces[pairs.obstacle] + box.surfaces[moving]
+    return _erring(task, erring, shift)
+
+
+def _erring(task: Task, errors: WayErrors, shift: FloatArray) -> Task:
+    """The same with what errors come to, and by how much each pair is shifted."""
+    pairs, pad, steady = task.pairs, task.rules.pad, not errors.any_turn
     rules = task.rules._replace(steady=steady, nominal=steady and not shift.any())
     radius = task.bodies.radius[pairs.body]
     pairs = pairs._replace(lost=radius + pad + shift, rise=pad - radius)
-    return task._replace(pairs=pairs, rules=rules, errors=erring)
+    return task._replace(pairs=pairs, rules=rules, errors=errors)

@@ -224,10 +224,10 @@ def _note_stretch(
     results: Results,
     pair: int,
     stretch: Stretch,
-    local: int,
-    done: int,
+    span: tuple[int, int],
 ) -> None:
-    """Count and record the intervals [local, done) that one plane proves."""
+    """Count and record the intervals, first to below last, that one plane proves."""
+    local, done = span
     runs, best, group = desk.runs, results.best[pair], task.pairs.group[pair]
     results.counts[pair, CERTIFIED] += done - local
     points = desk.planes[pair, OWN_POINT:WIDTH]
@@ -282,7 +282,8 @@ def sweep_pair(
             # This interval allows no more, and may be proved nevertheless.
             done += runs.lower[local] >= required
         if done > local:
-            _note_stretch(task, mover, desk, results, pair, stretch, local, done)
+            span = local, done
+            _note_stretch(task, mover, desk, results, pair, stretch, span)
         elif fresh:
             if yes_or_no and runs.upper[local] < required:
                 return False

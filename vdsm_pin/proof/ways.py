@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.proof.packed_tree import PRISMATIC, REVOLUTE, PackedTree
 
 
@@ -113,6 +114,7 @@ class WayTable:
         return Ways(rest, frame, before, joint, up != 0)
 
 
+@compiled
 def way_errors(
     tree: PackedTree,
     ways: Ways,
@@ -129,52 +131,57 @@ def way_errors(
         shifts: How far each placement may be shifted, shape (n_joints,); [m].
         tilts: How far it may be turned about its origin, shape (n_joints,); [rad].
     """
-    turns = np.where(tree.kind == REVOLUTE, joints, 0.0)
-    slides = np.where(tree.kind == PRISMATIC, joints, 0.0)
-    any_turn = bool(turns.any() or tilts.any())
-    erring, turned, shifted, second, crude, swing = np.zeros((6, ways.rest.size))
-    found = WayErrors(
-        turns, tilts.copy(), erring, turned, shifted, second, crude, swing, any_turn
-    )
-    cosine = _cosines(tree, ways)
-    for way, before in enumerate(ways.before.tolist()):
+    n = ways.rest.size
+    turns, any_turn = np.zeros(joints.size), False
+    for joint in range(joints.size):
+        if tree.kind[joint] == REVOLUTE:
+            turns[joint] = joints[joint]
+        any_turn |= turns[joint] > 0.0 or tilts[joint] > 0.0
+    erring, turned, shifted = np.zeros(n), np.zeros(n), np.zeros(n)
+    second, crude, swing = np.zeros(n), np.zeros(n), np.zeros(n)
+    met = np.zeros(n, np.bool_)
+    for way in range(n):
+        before, joint = ways.before[way], ways.joint[way]
         if before < 0:
             continue
-        joint, swing = ways.joint[way], found.swing[before]
-        error = turns[joint] + tilts[joint]
-        turned = found.turned[before]
-        found.erring[way] = found.erring[before] + turns[joint]
-        found.turned[way] = turned + error
-        swing += error
-        if cosine[way] < 1.0 and not cosine[before] < 1.0:
+        tilt, lever = tilts[joint], tree.lever[joint]
+        erring[way] = erring[before] + turns[joint]
+        turned[way] = turned[before] + turns[joint] + tilt
+        swing[way] = swing[before] + turns[joint] + tilt
+        cosine = _cosine(tree, ways, way)
+        if cosine < 1.0 and not met[before]:
+            # Errors of two axes that meet turn a point about one: a sum of vectors.
+            met[way] = True
             one, other = turns[ways.joint[before]], turns[joint]
-            both = one**2 + other**2 + 2.0 * cosine[way] * one * other
-            swing += sqrt(both) - one - other
-        found.swing[way] = swing
-        lever = tree.lever[joint]
-        stroke = tree.stroke[joint] if found.turned[way] > 0.0 else 0.0
-        up = ways.up[way]
-        inner = found.turned[way] if up else turned
-        swung = swing if up else found.swing[before]
-        found.second[way] = found.second[before] + 0.5 * (
-            lever * inner**2 + stroke * found.turned[way] ** 2
-        )
-        found.crude[way] = found.crude[before] + lever * swung + stroke * swing
-        found.shifted[way] = found.shifted[before] + shifts[joint] + slides[joint]
-    return found
+            both = one * one + other * other + 2.0 * cosine * one * other
+            swing[way] += sqrt(both) - one - other
+        at = way if ways.up[way] else before
+        second[way] = second[before] + 0.5 * lever * turned[at] ** 2
+        crude[way] = crude[before] + lever * swing[at]
+        shifted[way] = shifted[before] + shifts[joint]
+        if tree.kind[joint] == PRISMATIC:
+            shifted[way] += joints[joint]
+            if turned[way] > 0.0:
+                second[way] += 0.5 * tree.stroke[joint] * turned[way] ** 2
+                crude[way] += tree.stroke[joint] * swing[way]
+    return WayErrors(
+        turns, tilts.copy(), erring, turned, shifted, second, crude, swing, any_turn
+    )
 
 
-def _cosines(tree: PackedTree, ways: Ways) -> FloatArray:
-    """Of the angle between the axes of a way's last two joints, where they meet, or 1.
-
-    Errors of both together turn a point about one axis, the sum of two vectors.
-    """
-    found = np.ones(ways.rest.size)
-    for way, before in enumerate(ways.before.tolist()):
-        if before < 0 or ways.before[before] < 0 or ways.up[way] or ways.up[before]:
-            continue
-        joint, last = ways.joint[way], ways.joint[before]
-        if tree.lever[joint] == 0.0 and (tree.kind[[joint, last]] == REVOLUTE).all():
-            axis = tree.rotation[joint] @ tree.axis[joint]
-            found[way] = min(1.0, abs(axis @ tree.axis[last]))
-    return found
+@compiled
+def _cosine(tree: PackedTree, ways: Ways, way: int) -> float:
+    """Of the angle of the axes of a way's last two joints where they meet, or 1."""
+    before, joint = ways.before[way], ways.joint[way]
+    last = ways.joint[before]
+    if ways.before[before] < 0 or ways.up[way] or ways.up[before]:
+        return 1.0
+    if tree.kind[joint] != REVOLUTE or tree.kind[last] != REVOLUTE:
+        return 1.0
+    if tree.lever[joint] > 0.0:
+        return 1.0
+    along, turn = 0.0, tree.rotation[joint]
+    for c in range(3):
+        for d in range(3):
+            along += tree.axis[last, c] * turn[c, d] * tree.axis[joint, d]
+    return min(1.0, abs(along))
