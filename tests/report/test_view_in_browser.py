@@ -17,6 +17,7 @@ from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.report.facts import verification_file
 from vdsm_pin.report.html import write_no_plan, write_report
 from vdsm_pin.report.run_record import PlanRun
+from vdsm_pin.scene import Scene
 
 pytestmark = NEEDS_CHROMIUM
 
@@ -311,4 +312,23 @@ def test_a_page_without_a_plan_shows_where_the_search_ended(
     watched.shot("no-plan")
     assert watched.errors == []
     assert len(watched.requests) == 1
+    page.close()
+
+
+@pytest.mark.parametrize("n", [1, 40])
+def test_a_scene_without_obstacles_and_a_motion_of_one_row_have_a_page(
+    browser: Any, tmp_path: Path, n: int
+) -> None:
+    judged = made_up.verification(n=n, scene=Scene())
+    judged = replace(judged, approaches=())
+    path = tmp_path / "report.html"
+    write_report(path, judged, verification_file(judged, made_up.RECORD))
+    watched = Watched(browser, path.as_uri(), viewport={"width": 900, "height": 700})
+    page = watched.page
+    page.wait_for_function("window.vdsm && window.vdsm.view")
+    page.locator("[data-look=side]").click()
+    page.locator("[data-toggle=numbers]").check()
+    assert page.locator("[data-section=axis]").count() == 0
+    assert page.locator("[data-play]").is_hidden() is (n == 1)
+    assert watched.errors == []
     page.close()

@@ -91,6 +91,7 @@ function bindView(view, title) {
     link.download = `${title.replace(/[^\p{L}\p{N}]+/gu, "-")}-${view.motion.time.toFixed(1)}.png`;
     link.click();
   });
+  if (!view.obstacles.length) return; // nothing to cut, nothing to hide
   bindSection(view);
   bindObstacles(view);
 }
@@ -126,7 +127,6 @@ function bindSection(view) {
 // The list of obstacles, made when it is opened: a scene may have two thousand.
 function bindObstacles(view) {
   const list = document.querySelector("[data-obstacles]");
-  if (!list) return;
   const all = list.querySelector("select");
   const choices = all.innerHTML;
   const apply = (body, look) => {
