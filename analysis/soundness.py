@@ -50,6 +50,7 @@ from oracles.tree_queries import clearances, make_query, random_box, wrong_poses
 
 from vdsm_pin.arm_bodies import arm_bodies
 from vdsm_pin.arm_tree import arm_tree, link_frame
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.problem import DesiredPath, PlanningProblem
@@ -63,8 +64,8 @@ from vdsm_pin.proof.terms import WORLD
 from vdsm_pin.scene import Scene
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.records import ClearanceChunk, ErrorBox
-from vdsm_pin.verification.task import with_errors
+from vdsm_pin.verification.records import ClearanceChunk
+from vdsm_pin.verification.task import with_growth
 
 FAR: Final = 1e-6
 """From here on a query must be decided; [m]."""
@@ -154,7 +155,7 @@ def verdicts(batch: Batch, errors: ErrorBox = NOMINAL) -> Any:
     )
     bodies = [*obstacles, *moving]
     task = pack_task(tree, bodies, table, rules, path.reach, pieces=pieces)
-    task = with_errors(task, errors)
+    task = with_growth(task, errors, [errors.obstacle] * len(obstacles))
     # No obstacle is named as such, so that none is settled by its box.
     proving = new_proving(task, path.packed(), 1, 0, BUDGET)
     proving.sweep(0, 1)

@@ -21,6 +21,7 @@ import coal
 import numpy as np
 
 from benchmarks.common import surroundings, timed
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import Manipulator, built_in
@@ -28,7 +29,6 @@ from vdsm_pin.problem import DesiredPath, PlanningProblem
 from vdsm_pin.scene import Cylinder, Mesh, Obstacle, Scene, Sphere
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
-from vdsm_pin.verification.records import ErrorBox
 
 ARM = built_in("hrm8")
 MM = 1e-3

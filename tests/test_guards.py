@@ -17,6 +17,7 @@ from numba.core import event
 from problem_files import NEAR, write_problem
 
 from vdsm_pin.cables import angles_from_cables, cable_lengths
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
@@ -28,7 +29,6 @@ from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification import coal_clearance
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.link_clearance import link_clearance
-from vdsm_pin.verification.records import ErrorBox
 
 COUNTED = """
 import sys

@@ -10,6 +10,7 @@ import pytest
 import trimesh
 
 import vdsm_pin.refinement as refinement
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.errors import Infeasible, InsideUnknown, NoPlanFound
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.fewest.strategy import plan_fewest
@@ -23,7 +24,7 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_clearance, coal_missing
 from vdsm_pin.verification.coal_clearance import CoalDistances, coal_distances
 from vdsm_pin.verification.link_clearance import link_clearance
-from vdsm_pin.verification.records import ErrorBox, Verdict
+from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robust import largest_joint_error
 
 

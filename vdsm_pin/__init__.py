@@ -23,8 +23,16 @@ if TYPE_CHECKING:
         write_report,
         write_trajectory,
     )
+    from vdsm_pin.error_box import ErrorBox, ObstacleError
     from vdsm_pin.errors import Infeasible, InvalidInput, VdsmError
-    from vdsm_pin.manipulator import CableLayout, Manipulator, built_in
+    from vdsm_pin.manipulator import (
+        CableLayout,
+        Feed,
+        LinkBody,
+        Manipulator,
+        Tool,
+        built_in,
+    )
     from vdsm_pin.problem import DesiredPath
     from vdsm_pin.problem import PlanningProblem as Problem
     from vdsm_pin.scene import (
@@ -38,7 +46,7 @@ if TYPE_CHECKING:
         Sphere,
     )
     from vdsm_pin.trajectory import Trajectory
-    from vdsm_pin.verification.records import ErrorBox, Verdict
+    from vdsm_pin.verification.records import Verdict
 
 __version__ = "0.1.0"
 
@@ -49,15 +57,19 @@ __all__ = [
     "Cylinder",
     "DesiredPath",
     "ErrorBox",
+    "Feed",
     "HalfSpace",
     "Infeasible",
     "InvalidInput",
+    "LinkBody",
     "Manipulator",
     "Mesh",
+    "ObstacleError",
     "Prism",
     "Problem",
     "Scene",
     "Sphere",
+    "Tool",
     "Trajectory",
     "VdsmError",
     "Verdict",
@@ -73,15 +85,18 @@ __all__ = [
 ]
 
 _HOMES: Final = {
+    "error_box": ("ErrorBox", "ObstacleError"),
     "errors": ("Infeasible", "InvalidInput", "VdsmError"),
-    "manipulator": ("CableLayout", "Manipulator", "built_in"),
+    "manipulator": (
+        *("CableLayout", "Feed", "LinkBody", "Manipulator", "Tool", "built_in"),
+    ),
     "problem": ("DesiredPath",),
     "scene": (
         *("Box", "Capsule", "Cylinder", "HalfSpace", "Mesh", "Prism"),
         *("Scene", "Sphere"),
     ),
     "trajectory": ("Trajectory",),
-    "verification.records": ("ErrorBox", "Verdict"),
+    "verification.records": ("Verdict",),
 }
 """Where names live that are not in `api`."""
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io import problem_file, trajectory_file
 from vdsm_pin.io.atomic import atomic_path
@@ -20,7 +21,7 @@ from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.records import ErrorBox, Verification
+from vdsm_pin.verification.records import Verification
 
 PYTHON = "from Python"
 """What a report names as command and problem file where there is none."""
@@ -81,7 +82,11 @@ def plan(
 
 
 def error_box(
-    *, joint_deg: float = 0.0, base_mm: float = 0.0, obstacle_mm: float = 0.0
+    *,
+    joint_deg: float = 0.0,
+    base_mm: float = 0.0,
+    obstacle_mm: float = 0.0,
+    base_deg: float = 0.0,
 ) -> ErrorBox:
     """How far the real motion may stray from the nominal one.
 
@@ -89,6 +94,7 @@ def error_box(
         joint_deg: Largest error of every joint angle; [deg].
         base_mm: Largest displacement of the base in any direction; [mm].
         obstacle_mm: Largest displacement of an obstacle's surface; [mm].
+        base_deg: Largest turn of the base about its origin; [deg].
 
     Example:
         >>> error_box(base_mm=2.0).base
@@ -96,7 +102,7 @@ def error_box(
     """
     from vdsm_pin.workflow import error_box as from_typed
 
-    return from_typed(joint_deg, base_mm, obstacle_mm)
+    return from_typed(joint_deg, base_mm, obstacle_mm, base_deg)
 
 
 def verify(
@@ -112,7 +118,8 @@ def verify(
     Args:
         problem: What is asked.
         trajectory: Rows of joint values, joined by straight lines in joint space.
-        errors: The clearance is proved for every motion within it.
+        errors: The clearance is proved for every motion within it, and within the
+            errors that the problem states.
         joint_error: Whether to look for the largest joint error that is certified.
         time_limit: What is not judged by then is undecided; None for none; [s].
 

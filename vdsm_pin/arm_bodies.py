@@ -14,7 +14,7 @@ from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
-from vdsm_pin.manipulator import PART, LinkBody, Manipulator
+from vdsm_pin.manipulator import FEED, PART, LinkBody, Manipulator
 from vdsm_pin.scene import Mesh
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -27,16 +27,24 @@ class ArmBody:
     """A convex solid in the frame of its link: origin at O_i, x along the link.
 
     Args:
-        name: `link 3`, `tool`, or as in the problem file.
-        link: The link that it rides on, 1 to N.
+        name: `link 3`, `tool`, `feed`, or as in the problem file.
+        link: The link that it rides on, 1 to N; 0 for the feed, which moves with O_1
+            and never turns.
         piece: The solid.
         axial: Whether it is the whole axis of its link, grown by a radius.
+        carried: Whether it is none of the arm's own: links, tool and feed.
     """
 
     name: str
     link: int
     piece: Hull | FlatCylinder
     axial: bool = False
+    carried: bool = False
+
+    @property
+    def owner(self) -> str:
+        """The name without the number of its part."""
+        return self.name.split(PART)[0]
 
     @property
     def corners(self) -> FloatArray:
@@ -80,7 +88,7 @@ class SelfPairs:
 
 
 def arm_bodies(arm: Manipulator) -> tuple[ArmBody, ...]:
-    """Every convex body: links 1 to N, the tool, then the others in file order."""
+    """Every convex body: links 1 to N, tool, feed, then the others in file order."""
     found = []
     for k, (name, span) in enumerate(zip(arm.axis_names, arm.axis_spans, strict=True)):
         link, axis = min(k + 1, arm.n_links), np.zeros((2, 3))
@@ -88,11 +96,14 @@ def arm_bodies(arm: Manipulator) -> tuple[ArmBody, ...]:
         whole = span[0] == 0.0 and span[1] == arm.link_lengths[link - 1]
         solid = Hull(axis, float(arm.axis_radii[k]))
         found.append(ArmBody(name, link, solid, axial=bool(whole)))
+    if arm.feed:
+        axis = np.array([[-arm.feed.length, 0.0, 0.0], [0.0, 0.0, 0.0]])
+        found.append(ArmBody(FEED, 0, Hull(axis, arm.feed.radius)))
     for body in arm.bodies:
         pieces = convex_cover(body)
         for k, piece in enumerate(pieces, start=1):
             part = f"{body.name}{PART}{k}" if len(pieces) > 1 else body.name
-            found.append(ArmBody(part, body.link, piece))
+            found.append(ArmBody(part, body.link, piece, carried=True))
     return tuple(found)
 
 
@@ -142,48 +153,35 @@ def self_pairs(arm: Manipulator, bodies: tuple[ArmBody, ...]) -> SelfPairs:
         bodies: `arm_bodies(arm)`.
 
     Returns:
-        Pairs in the order of the bodies. Left out are bodies of one link, neighbours
-        that meet at the joint between them in every pose, and what the file says.
+        Pairs in the order of the bodies. Left out are bodies of one link, links, tool
+        and feed that meet at the joint between them in every pose, and what the file
+        says. Parts of one body are no pair.
     """
-    held, left_out = [], []
+    held, left_out = [], {}
     for i, one in enumerate(bodies):
         for k in range(i + 1, len(bodies)):
             other = bodies[k]
             near, far = (one, other) if one.link <= other.link else (other, one)
             reason = _reason(arm, near, far)
             if reason:
-                left_out.append(LeftOut(one.name, other.name, reason))
+                names = one.owner, other.owner
+                left_out[names] = LeftOut(*names, reason)
             else:
                 held.append((i, k) if near is one else (k, i))
     pairs = np.array(held, dtype=np.int64).reshape(-1, 2)
-    return SelfPairs(pairs, tuple(left_out))
+    told = (row for row in left_out.values() if row.body != row.other)
+    return SelfPairs(pairs, tuple(told))
 
 
 def _reason(arm: Manipulator, near: ArmBody, far: ArmBody) -> str:
     """Why two bodies are not held apart; empty where they are."""
     if near.link == far.link:
         return f"both ride on link {near.link}"
-    if far.link == near.link + 1:
-        end = np.array([arm.link_lengths[near.link - 1], 0.0, 0.0])
-        gap = _distance(near, end) + _distance(far, np.zeros(3))
+    if far.link == near.link + 1 and not (near.carried or far.carried):
+        length = arm.link_lengths[near.link - 1] if near.link else 0.0
+        gap = (length - near.corners[1, 0]) + far.corners[0, 0]
         if gap <= near.ball + far.ball:
             return f"meet at joint {far.link} in every pose"
     if arm.ignores(near.name, far.name):
         return "left out by the problem file"
     return ""
-
-
-def _distance(body: ArmBody, point: FloatArray) -> float:
-    """Distance of a point from the core of a body, from above; [m]."""
-    core = body.piece
-    if isinstance(core, Hull):
-        if len(core.points) == 2 and not (core.points[:, 1:].any() or point[1:].any()):
-            start, end = core.points[:, 0]  # an axis along x, as those of the links
-            return max(0.0, float(start - point[0]), float(point[0] - end))
-        core = Hull(core.points)
-    pieces = pack_pieces([[core]])
-    ends = np.repeat(point[None, None], 2, axis=1)
-    goal = TOLERANCES.bracket_gap
-    return max(
-        0.0, float(row_brackets(pieces, ends, np.zeros(1, np.int64), goal)[0, 1])
-    )

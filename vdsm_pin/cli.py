@@ -52,6 +52,10 @@ JointError = Annotated[
 BaseError = Annotated[
     float, typer.Option(min=0.0, help="Largest shift of the base, any direction [mm].")
 ]
+BaseTurn = Annotated[
+    float,
+    typer.Option(min=0.0, help="Largest turn of the base about its origin [deg]."),
+]
 ObstacleError = Annotated[
     float, typer.Option(min=0.0, help="Largest error of the obstacles [mm].")
 ]
@@ -154,6 +158,7 @@ def verify(
     out: OutFolder,
     joint_error_deg: JointError = 0.0,
     base_error_mm: BaseError = 0.0,
+    base_error_deg: BaseTurn = 0.0,
     obstacle_error_mm: ObstacleError = 0.0,
     certificate: Annotated[
         Path | None, typer.Option(help="Write the proof to this file.")
@@ -184,7 +189,9 @@ def verify(
     from vdsm_pin.workflow import VerifyOrder, error_box, verify_to_folder
 
     deadline = Deadline.after(time_limit)
-    errors = error_box(joint_error_deg, base_error_mm, obstacle_error_mm)
+    errors = error_box(
+        joint_error_deg, base_error_mm, obstacle_error_mm, base_error_deg
+    )
     with enforced(deadline):
         order = VerifyOrder(
             source=read_problem(problem),
@@ -249,6 +256,7 @@ def batch(
     ] = "all",
     joint_error_deg: JointError = 0.0,
     base_error_mm: BaseError = 0.0,
+    base_error_deg: BaseTurn = 0.0,
     obstacle_error_mm: ObstacleError = 0.0,
     certificate: Annotated[
         bool, typer.Option("--certificate", help="Write a proof of each to its folder.")
@@ -279,7 +287,12 @@ def batch(
         scheduler=scheduler,
         keep=keep,
         proving=Proving(
-            joint_error_deg, base_error_mm, obstacle_error_mm, certificate, pdf
+            joint_error_deg=joint_error_deg,
+            base_error_mm=base_error_mm,
+            obstacle_error_mm=obstacle_error_mm,
+            certificate=certificate,
+            pdf=pdf,
+            base_error_deg=base_error_deg,
         ),
         quiet=quiet or as_json,
     )
@@ -408,7 +421,8 @@ def urdf(
     from vdsm_pin.io.problem_file import built_in_names, read_problem
     from vdsm_pin.manipulator import BUILT_IN, built_in
     from vdsm_pin.report.folder import check_output_file
-    from vdsm_pin.urdf_writer import urdf_text
+    from vdsm_pin.report.solids import obj_text
+    from vdsm_pin.urdf_writer import mesh_names, urdf_text
 
     known = name in BUILT_IN or name in built_in_names() or Path(name).exists()
     if not known:
@@ -416,9 +430,17 @@ def urdf(
     arm = BUILT_IN.get(name) or read_problem(name).problem.manipulator
     text = urdf_text(arm)
     check_output_file(out)
-    with atomic_path(out) as path:
-        path.write_text(text, encoding="utf-8")
-    typer.echo(f"wrote {out}")
+    shapes = {solid.name: solid for _, solid in arm.carried}
+    files = {
+        out.with_name(file): obj_text(shapes[body])
+        for body, file in mesh_names(arm).items()
+    }
+    for file in files:
+        check_output_file(file)
+    for file, content in {**files, out: text}.items():
+        with atomic_path(file) as path:
+            path.write_text(content, encoding="utf-8")
+    typer.echo(f"wrote {', '.join(map(str, (out, *files)))}")
 
 
 @app.command(

@@ -1,16 +1,16 @@
 """The arm: a rail, N links on universal joints, cables (paper, section 2, Table 1)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import FloatArray, frozen
-from vdsm_pin.scene import Box, Capsule, Cylinder, Mesh, Prism, Sphere
+from vdsm_pin.scene import Box, Capsule, Cylinder, Mesh, Prism, Sphere, corners_of
 from vdsm_pin.units import MM_PER_M
 
 MAX_LINKS: Final = 40
@@ -22,6 +22,9 @@ MAX_LENGTH: Final = 1e6
 
 TOOL: Final = "tool"
 """Name of the tool among the bodies."""
+
+FEED: Final = "feed"
+"""Name of the feed among the bodies."""
 
 PART: Final = " part "
 """Between the name of a body and the number of its convex part."""
@@ -75,12 +78,12 @@ def paper_hole_angles(n_links: int) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Tool:
-    """A straight extension of the last link; its end draws the path.
+class _Extension:
+    """A straight extension of the arm, a capsule about its axis.
 
     Args:
-        length: From the end of the last link to the tip; [m].
-        radius: Of a capsule about its axis; [m].
+        length: From the arm to its end; [m].
+        radius: Of the capsule; [m].
     """
 
     length: float
@@ -90,9 +93,21 @@ class Tool:
         """Refuse impossible sizes."""
         for name in ("length", "radius"):
             if not 0.0 < getattr(self, name) <= MAX_LENGTH:
-                value = getattr(self, name)
-                message = f"tool: {name} is {value} m, expected above 0"
+                value, kind = getattr(self, name), type(self).__name__.lower()
+                message = f"{kind}: {name} is {value} m, expected above 0"
                 raise InvalidInput(message)
+
+
+class Tool(_Extension):
+    """A straight extension of the last link; its end draws the path."""
+
+
+class Feed(_Extension):
+    """What pushes the arm along its rail: from O_1 backwards, moved by x0 alone."""
+
+
+BodySolid: TypeAlias = Sphere | Capsule | Cylinder | Box | Prism | Mesh
+"""What may ride on a link."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +121,7 @@ class LinkBody:
     """
 
     link: int
-    solid: Sphere | Capsule | Cylinder | Box | Prism | Mesh
+    solid: BodySolid
     parts: int = 1
 
     @property
@@ -130,6 +145,7 @@ class Manipulator:
         cables: Cable holes.
         radii: Radius of each link where they differ, shape (N,); [m].
         tool: What is mounted at the end of the last link.
+        feed: What is behind the first joint; None where nothing is known of it.
         bodies: What else rides on the links.
         ignore_pairs: Names of two bodies, or of a body and an obstacle, that are not
             held apart.
@@ -147,6 +163,7 @@ class Manipulator:
     cables: CableLayout
     radii: FloatArray | None = None
     tool: Tool | None = None
+    feed: Feed | None = None
     bodies: tuple[LinkBody, ...] = ()
     ignore_pairs: tuple[tuple[str, str], ...] = ()
 
@@ -203,13 +220,12 @@ class Manipulator:
         if self.tool and not self.tool.length < last:
             message = f"tool: length is {self.tool.length} m, expected below {last}"
             raise InvalidInput(message)
-        names = [f"link {i + 1}" for i in range(self.n_links)]
-        names += [TOOL] if self.tool else []
+        names = {*self.axis_names, TOOL, FEED}
         for body in self.bodies:
             if body.name in names:
                 message = f"body {body.name!r}: another body has this name"
                 raise InvalidInput(message)
-            names.append(body.name)
+            names.add(body.name)
             if not 1 <= body.link <= self.n_links or body.parts < 1:
                 known = f"1 to {self.n_links} and 1 or more"
                 found = f"link is {body.link} and parts is {body.parts}"
@@ -225,9 +241,42 @@ class Manipulator:
         """Radius of a link, counted from 1; [m]."""
         return self.link_radius if self.radii is None else float(self.radii[link - 1])
 
-    def radius_at(self, link: int, body: str) -> float:
-        """Radius of a link, counted from 1, or of the tool on it; [m]."""
-        return self.tool.radius if self.tool and body == TOOL else self.radius_of(link)
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Names of everything that is held against obstacles, links first."""
+        feed = (FEED,) if self.feed else ()
+        return (*self.axis_names, *feed, *(body.name for body in self.bodies))
+
+    @cached_property
+    def carried(self) -> tuple[tuple[int, BodySolid], ...]:
+        """What is no link and no tool, each with its link, 0 for the feed's frame."""
+        found = [(body.link, body.solid) for body in self.bodies]
+        if self.feed:
+            half, axis = self.feed.length / 2.0, np.array([1.0, 0.0, 0.0])
+            rod = Capsule(FEED, -half * axis, axis, half, self.feed.radius)
+            found.insert(0, (0, rod))
+        return tuple(found)
+
+    def check_ignored(self, pair: tuple[str, str], obstacles: Sequence[str]) -> None:
+        """Hold a pair that is not to be judged against the names there are.
+
+        Args:
+            pair: Two names of `ignore_pairs`.
+            obstacles: Names of the obstacles.
+
+        Raises:
+            UnknownName: If there is no such body or obstacle.
+            InvalidInput: If neither is a body, or both are the same one.
+        """
+        own = self.body_names
+        bodies = [name.split(PART)[0] in own for name in pair]
+        for name, is_body in zip(pair, bodies, strict=True):
+            if not is_body and name not in obstacles:
+                known = (*own, *obstacles)
+                raise UnknownName(kind="body or obstacle", name=name, known=known)
+        if not any(bodies) or pair[0] == pair[1]:
+            message = f"{list(pair)} are not a body and what it is held apart from"
+            raise InvalidInput(message)
 
     def ignores(self, one: str, other: str) -> bool:
         """Whether two named bodies, or parts of bodies, are not to be held apart."""
@@ -236,11 +285,6 @@ class Manipulator:
             (a in names[0] and b in names[1]) or (b in names[0] and a in names[1])
             for a, b in self.ignore_pairs
         )
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether the arm is equal capsules and nothing else."""
-        return self.radii is None and self.tool is None and not self.bodies
 
     @cached_property
     def axis_radii(self) -> FloatArray:
@@ -268,10 +312,27 @@ class Manipulator:
         """Within it every place along the arm's axis has matter; [m]."""
         return float(self.axis_radii.min())
 
-    @property
+    @cached_property
     def most_radius(self) -> float:
-        """Within it of the arm's axis is all matter of links and tool; [m]."""
-        return float(self.axis_radii.max())
+        """Within it of the arm's axis is all matter that the links carry; [m]."""
+        return float(self.reaches.max())
+
+    @cached_property
+    def reaches(self) -> FloatArray:
+        """Within it of a link's axis is all that it is and carries, shape (N,); [m]."""
+        found = np.array([self.radius_of(i + 1) for i in range(self.n_links)])
+        if self.tool:
+            found[-1] = max(found[-1], self.tool.radius)
+        for body in self.bodies:
+            found[body.link - 1] = max(found[body.link - 1], self._reach_of(body))
+        return frozen(found)
+
+    def _reach_of(self, body: LinkBody) -> float:
+        """Largest distance of a body from the axis of its link; [m]."""
+        points, grown = corners_of(body.solid)
+        away = points.copy()
+        away[:, 0] -= points[:, 0].clip(0.0, self.link_lengths[body.link - 1])
+        return float(np.linalg.norm(away, axis=1).max()) + grown
 
     def axes(self, centres: FloatArray) -> FloatArray:
         """Ends of the axes of the links and of the tool, one after the other.

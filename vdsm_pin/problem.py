@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, frozen, running_sums
 from vdsm_pin.manipulator import Manipulator
@@ -262,6 +263,8 @@ class PlanningProblem(Summarised):
             is asked for; [rad].
         start: Where a motion without tip path begins; None where anywhere will do.
         goal: Where a motion without tip path ends; None where anywhere will do.
+        errors: How far the motion, base and obstacles may be off: every clearance is
+            asked for under them.
         source: Where it was read; None where it was built in Python or changed since.
 
     Raises:
@@ -281,6 +284,7 @@ class PlanningProblem(Summarised):
     max_row_change: float | None = None
     start: Posture | None = None
     goal: Posture | None = None
+    errors: ErrorBox = field(default_factory=ErrorBox)
     source: ProblemSource | None = field(default=None, init=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -300,6 +304,10 @@ class PlanningProblem(Summarised):
         if self.tip_path is not None and (self.start or self.goal):
             message = "start and goal belong to problems without tip_path"
             raise InvalidInput(message)
+        for name in self.scene.names:
+            if name in self.manipulator.body_names:
+                message = f"obstacle {name!r}: a body of the arm has this name"
+                raise InvalidInput(message)
         for posture in (self.begin, self.goal):
             if posture is not None and posture.joints is not None:
                 self._check_joints(posture.joints)

@@ -13,6 +13,7 @@ from typing import Final, Literal
 
 import numpy as np
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.goals import with_ends, with_path
@@ -28,7 +29,7 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
 from vdsm_pin.verification.coal_missing import coal_missing
 from vdsm_pin.verification.link_clearance import link_clearance
-from vdsm_pin.verification.records import ErrorBox, Verdict, Verification
+from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.robust import (
     largest_joint_error,
     refuted_joint_error,

@@ -139,7 +139,8 @@ def load_robot(manipulator: Manipulator) -> RobotModel:
     # Read once and written once: other threads may load other arms meanwhile.
     robot = _last[0]
     if robot is None or robot.manipulator is not manipulator:
-        text = urdf_text(manipulator)
+        bare = replace(manipulator, feed=None, bodies=(), ignore_pairs=())
+        text = urdf_text(bare)  # Coal has the shapes of what is carried as they are
         if robot is None or robot.urdf_sha256 != sha256_of([text.encode()]):
             robot = read_robot(manipulator, text)
         robot = replace(robot, manipulator=manipulator)

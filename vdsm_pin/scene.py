@@ -421,36 +421,14 @@ def reach_of(obstacle: Obstacle | ConvexCover) -> float:
 
     Not below that of its own points; of a half-space that of the stated point alone.
     """
-    match obstacle:
-        case HalfSpace():
-            return math.hypot(*obstacle.point.tolist())
-        case Sphere():
-            return math.hypot(*obstacle.centre.tolist()) + obstacle.radius
-        case Box():
-            half = math.hypot(*obstacle.half_size.tolist())
-            return math.hypot(*obstacle.centre.tolist()) + half
-        case Cylinder() | Capsule():
-            arm, grown = obstacle.half_length * obstacle.axis, obstacle.radius
-            points = np.array([obstacle.centre + arm, obstacle.centre - arm])
-        case Prism():
-            corners = np.repeat(obstacle.polygon, 2, axis=0)
-            ends = np.tile(np.array(obstacle.span), len(obstacle.polygon))
-            section = np.column_stack([corners, ends])
-            points, grown = obstacle.origin + section @ obstacle.rotation.T, 0.0
-        case Mesh():
-            points, grown = obstacle.vertices, 0.0
-        case PointCloud():
-            points, grown = obstacle.points, obstacle.radius
-        case Voxels():
-            points, grown = obstacle.centres, math.hypot(*obstacle.half_size.tolist())
-        case _:
-            hulls = [piece for piece in obstacle.pieces if isinstance(piece, Hull)]
-            return max((_reach_of_hull(hull) for hull in hulls), default=0.0)
+    if isinstance(obstacle, ConvexCover):
+        (hull,) = obstacle.pieces
+        points, grown = hull.points, hull.radius
+    elif isinstance(obstacle, Voxels):
+        points, grown = obstacle.centres, math.hypot(*obstacle.half_size.tolist())
+    else:
+        points, grown = corners_of(obstacle)
     return float(np.linalg.norm(points, axis=1).max()) + grown
-
-
-def _reach_of_hull(hull: Hull) -> float:
-    return float(np.linalg.norm(hull.points, axis=1).max()) + hull.radius
 
 
 @dataclass(frozen=True)
@@ -486,6 +464,34 @@ class Scene:
     def names(self) -> tuple[str, ...]:
         """Names in file order."""
         return tuple(obstacle.name for obstacle in self.obstacles)
+
+
+def corners_of(solid: Obstacle) -> tuple[FloatArray, float]:
+    """Points, shape (n, 3), whose hull grown by a radius holds a solid; [m].
+
+    Of a half-space the point that it is given by.
+    """
+    match solid:
+        case HalfSpace():
+            return solid.point[None], 0.0
+        case Mesh():
+            return solid.vertices[solid.triangles].reshape(-1, 3), 0.0
+        case PointCloud():
+            return solid.points, solid.radius
+        case Voxels():
+            cell = (BOX_CORNERS * solid.half_size) @ solid.rotation.T
+            return (solid.centres[:, None] + cell).reshape(-1, 3), 0.0
+        case Prism():
+            ends = [np.insert(solid.polygon, 2, s, axis=1) for s in solid.span]
+            return solid.origin + np.vstack(ends) @ solid.rotation.T, 0.0
+        case Sphere():
+            return solid.centre[None], solid.radius
+        case Box():
+            corners = (BOX_CORNERS * solid.half_size) @ solid.rotation.T
+            return solid.centre + corners, 0.0
+        case Cylinder() | Capsule():
+            arm = solid.half_length * solid.axis
+            return np.array([solid.centre + arm, solid.centre - arm]), solid.radius
 
 
 def with_hulls(scene: Scene, names: Collection[str]) -> Scene:

@@ -15,10 +15,15 @@ collision shape. Nothing in this package uses them; simulators want them.
 """
 
 import math
+import re
 import xml.etree.ElementTree as ET
 from typing import Final
 
-from vdsm_pin.manipulator import Manipulator
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.manipulator import BodySolid, Manipulator
+from vdsm_pin.scene import Box, Capsule, Cylinder, Mesh, Prism, Sphere, corners_of
 
 DENSITY: Final = 1000.0
 """Assumed mean density of a link: metal skin, joints and mostly air; [kg/m^3]."""
@@ -49,7 +54,8 @@ def urdf_text(manipulator: Manipulator) -> str:
     Returns:
         XML text that ends with a newline. Links `rail`, `base`, `yaw<i>`, `link<i>`,
         `tip`, and `tool` where there is one; joints `x0`, `alpha<i>`, `theta<i>`,
-        `tip_mount`, `tool_mount`.
+        `tip_mount`, `tool_mount`. What the arm carries is a link `body<k>` each, on a
+        fixed joint; prisms and meshes are in the files that `mesh_names` says.
     """
     robot = ET.Element("robot", name=manipulator.name)
     ET.SubElement(robot, "link", name="rail")
@@ -72,9 +78,23 @@ def urdf_text(manipulator: Manipulator) -> str:
         _capsule_link(robot, "tool", end - start, radii[-1])
     _joint(robot, "tip_mount", "fixed", (parent, "tip"), offset)
     ET.SubElement(robot, "link", name="tip")
+    files = mesh_names(manipulator)
+    for k, (number, solid) in enumerate(manipulator.carried, start=1):
+        on, name = f"link{number}" if number else "base", f"body{k}"
+        _joint(robot, f"{name}_mount", "fixed", (on, name), 0.0)
+        _carried_link(robot, name, solid, files.get(solid.name, ""))
     ET.indent(robot)
     body = ET.tostring(robot, encoding="unicode")
     return HEADER.format(density=DENSITY) + body + "\n"
+
+
+def mesh_names(manipulator: Manipulator) -> dict[str, str]:
+    """Files beside the URDF that have the shape of prisms and meshes, by their name."""
+    return {
+        solid.name: f"body{k}_{re.sub(r'[^A-Za-z0-9]+', '_', solid.name)}.obj"
+        for k, (_, solid) in enumerate(manipulator.carried, start=1)
+        if isinstance(solid, Prism | Mesh)
+    }
 
 
 def _vector(*values: float) -> str:
@@ -146,6 +166,68 @@ def _capsule_link(robot: ET.Element, name: str, length: float, radius: float) ->
         geometry = _shape(link, kind, f"{name}_body", length / 2.0, turned)
         size = {"radius": _vector(radius), "length": _vector(length)}
         ET.SubElement(geometry, "cylinder", size)
+
+
+def _carried_link(robot: ET.Element, name: str, solid: BodySolid, file: str) -> None:
+    """What the arm carries: the inertia of the box around it, its shapes."""
+    link = ET.SubElement(robot, "link", name=name)
+    points, grown = corners_of(solid)
+    low, high = points.min(axis=0) - grown, points.max(axis=0) + grown
+    x, y, z = (high - low) ** 2
+    mass = DENSITY * float(np.prod(high - low))
+    inertial = ET.SubElement(link, "inertial")
+    middle = _vector(*(low + high) / 2.0)
+    ET.SubElement(inertial, "origin", xyz=middle, rpy=_vector(0, 0, 0))
+    ET.SubElement(inertial, "mass", value=_vector(mass))
+    moments = {"ixx": y + z, "iyy": x + z, "izz": x + y}
+    values = {key: _vector(mass * size / 12.0) for key, size in moments.items()}
+    zero = dict.fromkeys(("ixy", "ixz", "iyz"), _vector(0.0))
+    ET.SubElement(inertial, "inertia", values | zero)
+    for kind in ("visual", "collision"):
+        for number, (at, rpy, tag, size) in enumerate(_shapes_of(solid, file)):
+            where = {"xyz": _vector(*at), "rpy": _vector(*rpy)}
+            shape = ET.SubElement(link, kind, name=f"{name}_{number}")
+            ET.SubElement(shape, "origin", where)
+            ET.SubElement(ET.SubElement(shape, "geometry"), tag, size)
+
+
+_Shape = tuple[FloatArray, FloatArray, str, dict[str, str]]
+
+
+def _shapes_of(solid: BodySolid, file: str) -> list[_Shape]:
+    """Place, roll-pitch-yaw, tag and sizes of the shapes that make a solid up."""
+    still = np.zeros(3)
+    match solid:
+        case Sphere():
+            size = {"radius": _vector(solid.radius)}
+            return [(solid.centre, still, "sphere", size)]
+        case Capsule() | Cylinder():
+            radius, arm = _vector(solid.radius), solid.half_length * solid.axis
+            rod = {"radius": radius, "length": _vector(2.0 * solid.half_length)}
+            found: list[_Shape] = [(solid.centre, _along(solid.axis), "cylinder", rod)]
+            if isinstance(solid, Capsule):
+                for end in (solid.centre - arm, solid.centre + arm):
+                    found.append((end, still, "sphere", {"radius": radius}))
+            return found
+        case Box():
+            size = {"size": _vector(*(2.0 * solid.half_size))}
+            return [(solid.centre, _angles(solid.rotation), "box", size)]
+    return [(still, still, "mesh", {"filename": file})]
+
+
+def _along(axis: FloatArray) -> FloatArray:
+    """Roll, pitch and yaw that turn z to an axis; [rad]."""
+    x, y, z = axis.tolist()
+    return np.array([0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x)])
+
+
+def _angles(rotation: FloatArray) -> FloatArray:
+    """Roll, pitch and yaw of a rotation; [rad]."""
+    pitch = math.atan2(-rotation[2, 0], math.hypot(rotation[0, 0], rotation[1, 0]))
+    if math.hypot(rotation[0, 0], rotation[1, 0]) < 1e-9:  # roll and yaw are one
+        return np.array([math.atan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0])
+    roll = math.atan2(rotation[2, 1], rotation[2, 2])
+    return np.array([roll, pitch, math.atan2(rotation[1, 0], rotation[0, 0])])
 
 
 def _shape(link: ET.Element, kind: str, name: str, x: float, rpy: str) -> ET.Element:

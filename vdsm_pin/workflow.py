@@ -10,6 +10,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.errors import Infeasible, InvalidFile, OutOfTime
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
@@ -34,7 +35,7 @@ from vdsm_pin.robot_model import RobotModel, load_robot
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.coal_clearance import reach_of
-from vdsm_pin.verification.records import ErrorBox, Verdict, Verification
+from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.task import all_pairs
 from vdsm_pin.verification.verify import verify
 
@@ -101,12 +102,15 @@ class Verified:
     no_certificate: str = ""
 
 
-def error_box(joint_deg: float, base_mm: float, obstacle_mm: float) -> ErrorBox:
+def error_box(
+    joint_deg: float, base_mm: float, obstacle_mm: float, base_deg: float = 0.0
+) -> ErrorBox:
     """The error box from what a user types."""
     return ErrorBox(
         joint=math.radians(joint_deg),
         base=base_mm / MM_PER_M,
         obstacle=obstacle_mm / MM_PER_M,
+        base_turn=math.radians(base_deg),
     )
 
 

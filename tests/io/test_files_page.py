@@ -33,6 +33,7 @@ def test_the_defaults_shown_are_the_defaults(tmp_path: Path) -> None:
         *(("tip_path", key) for key in ("closed", "spacing", "approach", "retreat")),
         *(("tip_path", key) for key in ("blocked", "required_coverage", "order")),
         ("base",),
+        ("errors",),
         ("required_self_clearance",),
         ("tip_tolerance",),
         ("max_change_per_row_deg",),

@@ -1,5 +1,6 @@
 """Random small problems with certificates, over all shapes of the problem file."""
 
+import gzip
 import json
 import struct
 from pathlib import Path
@@ -26,6 +27,13 @@ CUBE_FACES = [
     *[(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1)],
     *[(2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)],
 ]
+
+
+def certificate_lines(path: Path) -> list[Any]:
+    """The lines of a certificate that is stored packed."""
+    return [
+        json.loads(line) for line in gzip.decompress(path.read_bytes()).splitlines()
+    ]
 
 
 def write_cube(path: Path, half: float, *, skip: int = 0) -> None:

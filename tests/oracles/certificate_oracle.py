@@ -109,12 +109,12 @@ class OracleWriter:
     Args:
         problem_path: The problem file.
         trajectory_path: The trajectory file.
-        errors: E, B, O.
+        errors: E, of all angles or one by one, B, O.
     """
 
     problem_path: Path
     trajectory_path: Path
-    errors: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    errors: tuple[Any, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         """Read the two files."""
@@ -123,6 +123,8 @@ class OracleWriter:
         self.arm = self.problem.manipulator
         self.trajectory = read_trajectory(self.trajectory_path, self.arm)
         self.lengths = np.array(self.arm.link_lengths)
+        count = 2 * len(self.lengths)
+        self.joint_errors = np.broadcast_to(np.ravel(self.errors[0]), count)
         self.q = self.trajectory.joints
         if len(self.q) == 1:
             self.q = np.repeat(self.q, 2, axis=0)
@@ -141,10 +143,10 @@ class OracleWriter:
                     change[1 + 2 * m] + change[2 + 2 * m]
                     for m in range(first, link + 1)
                 )
-                angles = 2 * (link - first + 1)
+                turned = self.joint_errors[2 * first : 2 * link + 2].sum()
                 bend[j] += self.lengths[link] * rate**2
-                drift[j] += angles * self.lengths[link] * rate
-                second[j] += 0.5 * self.lengths[link] * (angles * self.errors[0]) ** 2
+                drift[j] += turned * self.lengths[link] * rate
+                second[j] += 0.5 * self.lengths[link] * turned**2
         return bend, drift, second
 
     @cache  # noqa: B019
@@ -165,11 +167,12 @@ class OracleWriter:
             heights.append(m @ (centres[j] - (centres[first - 1] if first else 0.0)))
             gain = 0.0
             for p in range(first, j):
-                for axis in (frames[p][:, 2], frames[p + 1][:, 1]):
-                    gain += abs(m @ np.cross(axis, centres[j] - centres[p]))
+                axes = frames[p][:, 2], frames[p + 1][:, 1]
+                for axis, error in zip(axes, self.joint_errors[2 * p :], strict=False):
+                    gain += error * abs(m @ np.cross(axis, centres[j] - centres[p]))
             gains.append(gain)
-        h, error = b - a, self.errors[0]
-        growth = error * (sum(gains) / 2 + h * drift / 2) + second
+        h = b - a
+        growth = sum(gains) / 2 + h * drift / 2 + second
         return max(heights) + bend * h * h / 8 + growth
 
     def plane_to_pieces(
@@ -341,16 +344,20 @@ class OracleWriter:
             for i, other in self.partners()
         ]
         return {
-            "vdsm_certificate": 3,
+            "vdsm_certificate": 4,
             "problem_sha256": self.file.sha256,
             "trajectory_sha256": sha256(self.trajectory_path.read_bytes()),
             "urdf_sha256": "0" * 64,
             "versions": {"vdsm_pin": "0", "numpy": np.__version__},
             "required_clearance_m": self.problem.required_clearance,
             "required_self_clearance_m": self.problem.required_self_clearance,
-            "errors": dict(
-                zip(("joint_rad", "base_m", "obstacle_m"), self.errors, strict=True)
-            ),
+            "errors": {
+                "joints_rad": self.joint_errors.reshape(-1, 2).tolist(),
+                "base_m": self.errors[1],
+                "base_rad": 0.0,
+                "obstacle_m": self.errors[2],
+                "obstacles": {},
+            },
             "n_rows": self.trajectory.n_samples,
             "pairs": pairs,
             "pieces": self.pieces(),

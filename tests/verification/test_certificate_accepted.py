@@ -6,18 +6,18 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from oracles.certificate_cases import SHAPES, random_case
+from oracles.certificate_cases import SHAPES, certificate_lines, random_case
 from oracles.certificate_mutations import forged
 from oracles.certificate_oracle import sha256
 
 from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.verification.certificate_file import certificate_schema
 from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
-from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.robust import largest_joint_error
 from vdsm_pin.verification.verify import verify
 
@@ -45,7 +45,7 @@ def test_the_verifiers_certificate_is_accepted(seed: int, tmp_path: Path) -> Non
     written(case, case.certificate)
     outcome = check_certificate(case.certificate, case.problem, case.trajectory)
     assert outcome.accepted, outcome.reason
-    lines = [json.loads(line) for line in case.certificate.read_text().splitlines()]
+    lines = certificate_lines(case.certificate)
     fits = jsonschema.Draft202012Validator(certificate_schema()).is_valid
     assert all(map(fits, lines))
     assert not fits(lines[0] | {"coverage": 2.0})
@@ -106,8 +106,7 @@ def test_mutations_of_the_verifiers_certificate_are_rejected(tmp_path: Path) -> 
     rng = np.random.default_rng(9)
     case = random_case(rng, tmp_path, ["mesh_stl", "prism_notched"])
     written(case, case.certificate)
-    text = case.certificate.read_text().splitlines()
-    lines, accepted = [json.loads(line) for line in text[:-1]], 0
+    lines, accepted = certificate_lines(case.certificate)[:-1], 0
     for _ in range(60):
         _, content, _ = forged(lines, rng)
         case.certificate.write_bytes(content)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
@@ -15,7 +16,7 @@ from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.hasty import is_certified
 from vdsm_pin.verification.inside import check_inside, locate_start
-from vdsm_pin.verification.records import ClearanceChunk, ErrorBox, Verdict
+from vdsm_pin.verification.records import ClearanceChunk, Verdict
 from vdsm_pin.verification.verify import verify
 
 ARM = built_in("hrm8")

@@ -16,6 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from vdsm_pin import scene
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.manipulator import CableLayout, Manipulator, paper_hole_angles
@@ -27,7 +28,7 @@ from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_bodies import coal_bodies, distance_request, measure
 from vdsm_pin.verification.coal_clearance import capsule_transforms
 from vdsm_pin.verification.counterexample import find_counterexamples
-from vdsm_pin.verification.records import ClearanceChunk, ErrorBox
+from vdsm_pin.verification.records import ClearanceChunk
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 
 N_LINKS, RADIUS, SAMPLES = 3, 0.05, 1000

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
 from vdsm_pin.problem import DesiredPath, PlanningProblem
@@ -24,7 +25,7 @@ from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.counterexample import find_counterexamples
 from vdsm_pin.verification.hasty import is_certified
-from vdsm_pin.verification.records import Counterexample, ErrorBox, Verdict
+from vdsm_pin.verification.records import Counterexample, Verdict
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.verify import verify
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
 from vdsm_pin.problem import PlanningProblem
@@ -11,7 +12,7 @@ from vdsm_pin.scene import HalfSpace, Scene, Sphere
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.first_contact import first_contacts
-from vdsm_pin.verification.records import ErrorBox, Verdict
+from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.verify import verify
 
 ARM = built_in("hrm8")

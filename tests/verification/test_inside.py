@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from oracles.certificate_cases import certificate_lines
 from oracles.certificate_oracle import sealed, sha256
 from oracles.closed_solids import (
     CLEAN,
@@ -20,6 +21,7 @@ from oracles.closed_solids import (
 )
 
 from vdsm_pin.certificate_checker import check_certificate, main
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.errors import InsideUnknown, InvalidFile, StartInside
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import ProblemFile, read_problem
@@ -30,12 +32,7 @@ from vdsm_pin.robot_model import load_robot
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
 from vdsm_pin.verification.link_clearance import link_clearance
-from vdsm_pin.verification.records import (
-    ClearanceChunk,
-    ErrorBox,
-    Verdict,
-    Verification,
-)
+from vdsm_pin.verification.records import ClearanceChunk, Verdict, Verification
 from vdsm_pin.verification.verify import verify
 
 RADIUS = 0.002
@@ -123,7 +120,7 @@ def hold(folder: Path, corners: FloatArray) -> str:
     alone = found.verdict is not Verdict.CERTIFIED
     path = certificate(folder, corners, False if alone else None)
     if alone:
-        lines = [json.loads(line) for line in path.read_text().splitlines()]
+        lines = certificate_lines(path)
         lines[0]["problem_sha256"] = file.sha256
         path.write_bytes(sealed(lines[:-1]))
     outcome = check_certificate(path, problem, rows)
@@ -189,9 +186,7 @@ def test_a_certificate_of_a_mesh_with_gaps_says_how_they_are_joined(
     below = box(0.5) - np.array([0.0, 0.0, 2.0])  # the arm is within the hull of both
     corners = np.concatenate([corners[1:], [[a, middle, c], [middle, b, c]], below])
     assert hold(tmp_path, corners) == "certified"
-    lines = [
-        json.loads(x) for x in (tmp_path / "c.certificate").read_text().splitlines()
-    ]
+    lines = certificate_lines(tmp_path / "c.certificate")
     moved, seams = lines[0]["joined"]["housing"]
     assert moved
     assert len(seams) == 1
@@ -290,9 +285,7 @@ def test_an_arm_far_from_an_open_mesh_is_outside_whatever_its_inside(
     tmp_path: Path,
 ) -> None:
     assert hold(tmp_path, bowl(-0.1)) == "certified"
-    lines = [
-        json.loads(x) for x in (tmp_path / "c.certificate").read_text().splitlines()
-    ]
+    lines = certificate_lines(tmp_path / "c.certificate")
     outer = lines[1]["proofs"][:2]  # of the links and the mesh
     planes = [plane for proof in outer for _, _, some in proof for plane in some]
     assert {(first, last) for first, last, *_ in planes} == {(0, 10)}
@@ -313,7 +306,7 @@ def test_two_planes_for_an_open_mesh_are_no_proof(tmp_path: Path) -> None:
     """A plane for each half proves the surface clear, not what is between."""
     problem, rows = written(tmp_path, bowl(-0.1))
     path = certificate(tmp_path, bowl(-0.1), None)
-    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    lines = certificate_lines(path)
     for proof in lines[1]["proofs"][:2]:
         for _, _, planes in proof:
             (plane,) = planes

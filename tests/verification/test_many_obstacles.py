@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
@@ -20,7 +21,7 @@ from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification import coal_clearance, robust
 from vdsm_pin.verification.clearance import least_clearances, prove_clearance
 from vdsm_pin.verification.link_clearance import link_clearance
-from vdsm_pin.verification.records import ClearanceChunk, ErrorBox, Verdict
+from vdsm_pin.verification.records import ClearanceChunk, Verdict
 
 ARM = built_in("hrm8")
 REACH = 0.3

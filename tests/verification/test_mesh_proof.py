@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
@@ -17,7 +18,7 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.proving import prove_problem
-from vdsm_pin.verification.records import ClearanceChunk, ErrorBox
+from vdsm_pin.verification.records import ClearanceChunk
 
 ARM = built_in("hrm8")
 N = ARM.n_links

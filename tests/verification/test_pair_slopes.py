@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import link_gaps, row_brackets
@@ -11,7 +12,7 @@ from vdsm_pin.manipulator import built_in
 from vdsm_pin.problem import DesiredPath, PlanningProblem
 from vdsm_pin.scene import Box, Capsule, HalfSpace, Mesh, Obstacle, Scene, Sphere
 from vdsm_pin.verification.pair_slopes import pair_slopes
-from vdsm_pin.verification.records import ErrorBox, Pair
+from vdsm_pin.verification.records import Pair
 from vdsm_pin.verification.task import all_pairs, make_task
 
 ARM = built_in("hrm8")

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
@@ -16,7 +17,6 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.hasty import HastyProof, is_certified
-from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.robust import LARGEST, STRETCH, largest_joint_error
 
 ARM = built_in("hrm8")

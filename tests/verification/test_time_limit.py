@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.io.problem_file import read_problem
@@ -27,12 +28,7 @@ from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.hasty import is_certified
-from vdsm_pin.verification.records import (
-    ClearanceChunk,
-    ErrorBox,
-    Verdict,
-    Verification,
-)
+from vdsm_pin.verification.records import ClearanceChunk, Verdict, Verification
 from vdsm_pin.verification.robust import largest_joint_error
 from vdsm_pin.verification.verify import verify
 

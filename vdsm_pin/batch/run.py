@@ -37,7 +37,7 @@ from vdsm_pin.report.html import write_index
 from vdsm_pin.report.junit import junit_text
 from vdsm_pin.report.pdf import find_browser
 from vdsm_pin.report.tables import SummaryCsv, write_summary
-from vdsm_pin.workflow import NO_PLAN, REPORT, error_box
+from vdsm_pin.workflow import NO_PLAN, REPORT
 
 SUMMARY: Final = "summary.csv"
 RUNNING: Final = "running.csv"
@@ -98,7 +98,7 @@ def run_batch(batch: Batch) -> tuple[BatchRow, ...]:
     """
     strategy(batch.strategy)
     asked = batch.proving
-    error_box(asked.joint_error_deg, asked.base_error_mm, asked.obstacle_error_mm)
+    _ = asked.errors  # refused before anything is written
     if asked.pdf:
         find_browser()
     check_output_folder(batch.folder)

@@ -13,6 +13,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.errors import (
     Infeasible,
     InvalidFile,
@@ -75,6 +76,7 @@ class Proving:
         obstacle_error_mm: Largest error of the obstacles; [mm].
         certificate: Whether each certified motion gets its certificate.
         pdf: Whether each report is printed too.
+        base_error_deg: Largest turn of the base; [deg].
     """
 
     joint_error_deg: float = 0.0
@@ -82,6 +84,17 @@ class Proving:
     obstacle_error_mm: float = 0.0
     certificate: bool = False
     pdf: bool = False
+    base_error_deg: float = 0.0
+
+    @property
+    def errors(self) -> ErrorBox:
+        """The error box of every problem."""
+        return error_box(
+            self.joint_error_deg,
+            self.base_error_mm,
+            self.obstacle_error_mm,
+            self.base_error_deg,
+        )
 
     @property
     def options(self) -> list[str]:
@@ -284,9 +297,7 @@ def _plan_and_verify(task: Task, source: ProblemFile, deadline: Deadline) -> Bat
         task.aside / TRAJECTORY,
         task.aside,
         task.command,
-        errors=error_box(
-            asked.joint_error_deg, asked.base_error_mm, asked.obstacle_error_mm
-        ),
+        errors=asked.errors,
         certificate=task.aside / CERTIFICATE if asked.certificate else None,
         pdf=task.aside / PDF if asked.pdf else None,
         deadline=deadline,

@@ -1,4 +1,4 @@
-"""Rechecks certificates in ball arithmetic: a program of its own, below 700 lines.
+"""Rechecks certificates in ball arithmetic: a program of its own, below 860 lines.
 
 Read `claims.py` first: it recomputes every claim. `motion.py` bounds how far the arm
 reaches, `solids.py` how near the obstacles come, `path.py` what the tip draws;

@@ -67,7 +67,7 @@ class Surface:
                 break
         else:
             return "the mesh is not closed"
-        if not self.gap < 0.999 * radius:
+        if self.gap and not self.gap < 0.999 * radius:
             return "its gaps are as wide as the arm"
         seen: set[float] = set()
         for triangle, sense, place in crossings(corners[whole], point):

@@ -7,21 +7,22 @@ ball or a disc. Of a half-space the point that its plane goes through is enough.
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import pairwise, product
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from flint import arb
 
 from vdsm_pin import scene
-from vdsm_pin.certificate_checker.balls import Ball, Matrix, claim, column, dot, unit
+from vdsm_pin.certificate_checker.balls import (
+    ROUNDING,
+    Ball,
+    Matrix,
+    claim,
+    column,
+    dot,
+    unit,
+)
 from vdsm_pin.certificate_checker.inside import Surface
-
-ROUNDING: Final = 2.0**-46
-"""Error of a height in doubles over the extent of the points; [-].
-
-A point is a sum of four terms and off by 28 units of 2^-53 at most, its product with a
-rounded n by seven: 35 in all, and this is 128.
-"""
 
 
 class Solid:
@@ -39,7 +40,7 @@ class Solid:
     ) -> None:
         self.name, self.points, self.radius = name, np.array(points), arb(radius)
         self.whole = True  # whether every plane so far serves all pieces
-        self.disc: tuple[Matrix, Ball] | None = None  # axis and radius of a cylinder
+        self.disc_axis, self.disc_radius = column(0, 0, 1), arb(0)  # of a cylinder
         self.normal: Matrix | None = None  # of a half-space
         self.ends: Any = None  # of a prism: its corners at both, shape (2, c, 3)
         self.extent = float(np.abs(self.points).max() + np.abs(origin).max())
@@ -48,11 +49,46 @@ class Solid:
         """Least n.x over the pieces first..last-1, for a unit n."""
         rounded = np.array([float(entry) for entry in n.entries()])
         least = (self.points[first:last].reshape(-1, 3) @ rounded).min()
-        height = arb(float(least), self.extent * ROUNDING) - self.radius
-        if self.disc is not None:
-            axis, radius = self.disc
-            height -= radius * (1 - dot(axis, n) ** 2).nonnegative_part().sqrt()
-        return height
+        height = arb(float(least), self.extent * ROUNDING)
+        return height - self.radius - self.across(n)
+
+    def across(self, n: Matrix) -> Ball:
+        """Support of a cylinder's disc about its centre, 0 of other solids."""
+        if not self.disc_radius > 0:
+            return arb(0)
+        cosine = dot(self.disc_axis, n)
+        return self.disc_radius * (1 - cosine * cosine).nonnegative_part().sqrt()
+
+    def size(self) -> Ball:
+        """Largest distance from the middle of the box around the corners, at most."""
+        points = self.points.reshape(-1, 3)
+        middle = (points.min(axis=0) + points.max(axis=0)) / 2
+        away = float(np.linalg.norm(points - middle, axis=1).max())
+        return arb(away, self.extent * ROUNDING) + self.radius + self.disc_radius
+
+    def parts(self, pieces: Any) -> "list[Solid]":
+        """The solids of one piece that a body on a link is covered by.
+
+        Args:
+            pieces: As for `cut`; of a mesh the triangles under each hull. None where
+                the whole is one piece.
+        """
+        if not isinstance(self, Mesh):
+            if pieces is not None:
+                self.cut(pieces)
+            groups = list(self.points)
+        else:
+            count = len(self.points)
+            groups = [[*range(count)]] if pieces is None else pieces
+            missing = set(range(count)) - {k for group in groups for k in group}
+            claim(not missing, f"pieces of {self.name} do not make up the whole")
+            groups = [self.points[np.array(g)].reshape(-1, 3) for g in groups]
+        found = [Solid(self.name, [group], origin=self.extent) for group in groups]
+        for k, one in enumerate(found, start=1):
+            one.name += f" part {k}" if len(found) > 1 else ""
+            one.radius, one.disc_axis = self.radius, self.disc_axis
+            one.disc_radius = self.disc_radius
+        return found
 
     def direction(self, n: Matrix) -> Matrix:
         """The exact direction that n stands for: a half-space has only one."""
@@ -124,7 +160,8 @@ def solid(obstacle: scene.Obstacle) -> Solid:
             if isinstance(obstacle, scene.Capsule):
                 found.radius = radius
             else:
-                found.disc = unit(column(*obstacle.axis.tolist())), radius
+                found.disc_axis = unit(column(*obstacle.axis.tolist()))
+                found.disc_radius = radius
         case scene.Box():
             corners = np.array([*product((-1, 1), repeat=3)]) * obstacle.half_size
             corners = obstacle.centre + corners @ obstacle.rotation.T

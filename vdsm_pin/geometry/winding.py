@@ -148,7 +148,7 @@ def locate(mesh: ClosedMesh, point: FloatArray, radius: float) -> Location:
     """
     if not mesh.closed:
         return Location(Side.UNKNOWN, f"it {mesh.why_open}")
-    if not mesh.gap < radius:
+    if mesh.gap and not mesh.gap < radius:
         return Location(Side.UNKNOWN, "its gaps are as wide as the arm")
     corners = mesh.corners
     low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, TypeAlias
+from typing import Final, TypeAlias, cast
 
 import numpy as np
 
@@ -10,12 +10,18 @@ from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.frames import Frame, radians
+from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.urdf_arm import read_urdf_arm
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.manipulator import (
     BUILT_IN,
+    FEED,
+    TOOL,
+    BodySolid,
     CableLayout,
+    Feed,
+    LinkBody,
     Manipulator,
     Tool,
     built_in,
@@ -65,6 +71,7 @@ class ArmBuilder:
             size = model.tool.length, model.tool.radius
             tool = Tool(*(float(x) for x in self.frame.metres(size)))
             lengths[-1] += tool.length
+        bodies = self._bodies(model, float(lengths.sum()))
         stroke = DEFAULT_STROKE * float(lengths.sum())
         low, high = -stroke, stroke
         if model.base_range is not None:
@@ -85,6 +92,9 @@ class ArmBuilder:
                 self._cables(model.cables, model.link_lengths, thinnest),
                 radii=radii if isinstance(model.link_radius, list) else None,
                 tool=tool,
+                feed=self._feed(model, float(radii[0])),
+                bodies=bodies,
+                ignore_pairs=tuple((a, b) for a, b in model.ignore_pairs),
             )
         except InvalidInput as error:
             raise self.document.invalid(("manipulator",), str(error)) from None
@@ -99,6 +109,35 @@ class ArmBuilder:
             problem = f"has {found} values, expected {count}, one per link"
             raise self.document.invalid(("manipulator", "link_radius"), problem)
         return self.frame.metres(model.link_radius)
+
+    def _feed(self, model: schema.ManipulatorModel, radius: float) -> Feed | None:
+        """What is behind the first joint, as thick as the first link if not stated."""
+        if model.feed is None:
+            return None
+        if model.feed.radius is not None:
+            radius = float(self.frame.metres(model.feed.radius))
+        return Feed(float(self.frame.metres(model.feed.length)), radius)
+
+    def _bodies(
+        self, model: schema.ManipulatorModel, arm_length: float
+    ) -> tuple[LinkBody, ...]:
+        """What the links carry, in their frames."""
+        at, count = ("manipulator", "bodies"), len(model.link_lengths)
+        for i, body in enumerate(model.bodies):
+            if body.link > count:
+                problem = f"is {body.link}, expected 1 to {count}"
+                raise self.document.invalid((*at, i, "link"), problem)
+            if body.name in (TOOL, FEED):
+                problem = f"is {body.name!r}, which the arm's own is called"
+                raise self.document.invalid((*at, i, "name"), problem)
+        frame = Frame(self.frame.unit, np.eye(3), np.zeros(3))
+        reader = ObstacleBuilder(
+            self.document, self.folder, frame, arm_length, self.digest, "its joint"
+        )
+        solids = cast("tuple[BodySolid, ...]", reader.build_all(model.bodies, at))
+        parts = (getattr(body, "parts", 1) for body in model.bodies)
+        links = (body.link for body in model.bodies)
+        return tuple(map(LinkBody, links, solids, parts))
 
     def _from_urdf(self, model: schema.UrdfManipulatorModel) -> Manipulator:
         """The arm of a URDF; its bytes belong to the problem as those of meshes do."""

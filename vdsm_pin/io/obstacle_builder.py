@@ -1,11 +1,11 @@
-"""Obstacles of a problem file to solids in the base frame, in metres."""
+"""Solids of a problem file, obstacles and what links carry, in metres."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import singledispatchmethod
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
@@ -46,7 +46,8 @@ class ObstacleBuilder:
         folder: Where relative mesh paths start.
         frame: The file's unit and pose.
         arm_length: For judging the size of a mesh; [m].
-        digest: Gets the bytes of the mesh files, in the order of the obstacles.
+        digest: Gets the bytes of the mesh files, in the order of the solids.
+        origin: What the frame's origin is called.
     """
 
     document: YamlDocument
@@ -54,28 +55,53 @@ class ObstacleBuilder:
     frame: Frame
     arm_length: float
     digest: Digest
+    origin: str = "the base"
 
-    def build_all(self, models: list[schema.ObstacleModel]) -> scene.Scene:
+    def build_scene(
+        self, models: Sequence[schema.ObstacleModel], bodies: Collection[str]
+    ) -> scene.Scene:
         """All obstacles, in file order.
+
+        Args:
+            models: Of the file.
+            bodies: Names that bodies of the arm have.
+
+        Raises:
+            InvalidFile: If one is not a solid, has a body's name, or two share one.
+        """
+        obstacles = self.build_all(models, ("obstacles",))
+        for i, model in enumerate(models):
+            if model.name in bodies:
+                problem = f"is {model.name!r}, which a body of the arm is called"
+                raise self.document.invalid(("obstacles", i, "name"), problem)
+        return scene.Scene(obstacles)
+
+    def build_all(
+        self, models: Sequence[Any], at: Location
+    ) -> tuple[scene.Obstacle, ...]:
+        """All solids of a list of the file, in its order.
+
+        Args:
+            models: Models of shapes.
+            at: Where the list is.
 
         Raises:
             InvalidFile: If one is not a solid, has a link's name, or two share one.
         """
-        obstacles: list[scene.Obstacle] = []
         first: dict[str, int] = {}
         for i, model in enumerate(models):
             if _LINK_NAME.fullmatch(model.name):
                 problem = f"is {model.name!r}, which is how links of the arm are named"
-                raise self.document.invalid(("obstacles", i, "name"), problem)
+                raise self.document.invalid((*at, i, "name"), problem)
             if model.name in first:
                 problem = (
-                    f"is {model.name!r}, which obstacles[{first[model.name]}] is "
+                    f"is {model.name!r}, which {at[-1]}[{first[model.name]}] is "
                     "called already; names are unique"
                 )
-                raise self.document.invalid(("obstacles", i, "name"), problem)
+                raise self.document.invalid((*at, i, "name"), problem)
             first[model.name] = i
-            obstacles.append(self._checked(model, ("obstacles", i)))
-        return scene.Scene(tuple(obstacles))
+        solids = (self._checked(model, (*at, i)) for i, model in enumerate(models))
+        return tuple(solids)
 
     def _checked(self, model: schema.ObstacleModel, at: Location) -> scene.Obstacle:
         try:
@@ -93,7 +119,8 @@ class ObstacleBuilder:
         reach = scene.reach_of(obstacle)
         if not reach <= limit:
             problem = (
-                f"{obstacle.name!r} reaches {self.frame.shown(reach)} from the base; "
+                f"{obstacle.name!r} reaches {self.frame.shown(reach)} from "
+                f"{self.origin}; "
                 f"expected at most {self.frame.shown(limit)}"
             )
             raise self.document.invalid(at, problem)

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from vdsm_pin.error_box import ErrorBox, JointErrors, ObstacleError
+from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.arm_builder import ArmBuilder
@@ -15,6 +17,7 @@ from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.scene import HalfSpace, Scene
 from vdsm_pin.tolerances import TOLERANCES
 
 
@@ -34,7 +37,8 @@ def build_problem(
         name: Name of the problem where the file gives none.
         folder: Where relative mesh paths start.
         digest: Gets the bytes of the arm's URDF, if one is named, then those of the
-            mesh files in the order of the obstacles, then those of the path's files.
+            meshes that links carry and those of the obstacles, in file order, then
+            those of the path's files.
 
     Returns:
         The problem, in the base frame; [m], [rad].
@@ -47,7 +51,8 @@ def build_problem(
     self_clearance = float(frame.metres(model.required_self_clearance))
     _check_links_apart(arm, self_clearance, frame, document)
     obstacles = ObstacleBuilder(document, folder, frame, arm.total_length, digest)
-    scene = obstacles.build_all(model.obstacles)
+    scene = obstacles.build_scene(model.obstacles, arm.body_names)
+    _check_ignored(arm, scene.names, document)
     _check_ends(model, document)
     paths = PathBuilder(document, frame, arm, folder, digest)
     postures = PostureBuilder(document, frame, arm)
@@ -63,6 +68,7 @@ def build_problem(
         max_row_change=_row_change(model),
         start=postures.start(model.start, ("start",)) if model.start else None,
         goal=postures.goal(model.goal, ("goal",)) if model.goal else None,
+        errors=_errors(model.errors, frame, (arm.n_links, scene), document),
     )
 
 
@@ -72,6 +78,48 @@ def _frame(model: schema.ProblemModel) -> tuple[Frame, FloatArray]:
     T_world_base = np.eye(4)
     T_world_base[:3, :3], T_world_base[:3, 3] = rotation, frame.metres(frame.origin)
     return frame, T_world_base
+
+
+def _errors(
+    model: schema.ErrorsModel,
+    frame: Frame,
+    known: tuple[int, Scene],
+    document: YamlDocument,
+) -> ErrorBox:
+    """The errors under which every clearance is asked for."""
+    n_links, scene = known
+    joint = model.joint_deg
+    joints: JointErrors = ()
+    if isinstance(joint, list):
+        if len(joint) != n_links:
+            problem = f"has {len(joint)} values, expected {n_links}: one per joint"
+            raise document.invalid(("errors", "joint_deg"), problem)
+        joints = tuple((float(e), float(e)) for e in np.deg2rad(joint))
+        joint = 0.0
+    kinds = {obstacle.name: obstacle for obstacle in scene.obstacles}
+    for i, one in enumerate(model.obstacles):
+        at = ("errors", "obstacles", i)
+        if one.name not in kinds:
+            problem = f"is {one.name!r}, expected one of {', '.join(kinds) or 'none'}"
+            raise document.invalid((*at, "name"), problem)
+        if one.turn_deg and isinstance(kinds[one.name], HalfSpace):
+            problem = "is of a half_space, which has no middle to turn about"
+            raise document.invalid((*at, "turn_deg"), problem)
+    return ErrorBox(
+        joint=float(np.deg2rad(joint)),
+        base=float(frame.metres(model.base)),
+        obstacle=float(frame.metres(model.obstacle)),
+        base_turn=float(np.deg2rad(model.base_deg)),
+        joints=joints,
+        obstacles=tuple(
+            ObstacleError(
+                one.name,
+                float(frame.metres(one.shift)),
+                float(np.deg2rad(one.turn_deg)),
+            )
+            for one in model.obstacles
+        ),
+    )
 
 
 def _tip_tolerance(
@@ -109,6 +157,18 @@ def _check_ends(model: schema.ProblemModel, document: YamlDocument) -> None:
         if getattr(model, name) is not None:
             problem = f"stands beside tip_path, which has its own; {advice}"
             raise document.invalid((name,), problem)
+
+
+def _check_ignored(
+    arm: Manipulator, obstacles: tuple[str, ...], document: YamlDocument
+) -> None:
+    """Pairs that are not to be judged name what there is."""
+    for i, pair in enumerate(arm.ignore_pairs):
+        try:
+            arm.check_ignored(pair, obstacles)
+        except InvalidInput as error:
+            at = ("manipulator", "ignore_pairs", i)
+            raise document.invalid(at, str(error)) from None
 
 
 def _check_links_apart(

@@ -7,6 +7,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from vdsm_pin.errors import InvalidFile
+from vdsm_pin.io import body_schema as bodies
 from vdsm_pin.io import obstacle_schema as shapes
 from vdsm_pin.io import path_schema as paths
 from vdsm_pin.io import problem_schema as schema
@@ -24,6 +25,8 @@ _MODELS: Final[Mapping[str | int, type[FileModel]]] = {
     "value": schema.ManipulatorModel,
     "cables": schema.CablesModel,
     "tool": schema.ToolModel,
+    "feed": schema.FeedModel,
+    "errors": schema.ErrorsModel,
     "base": schema.BasePoseModel,
     "tip_path": schema.TipPathModel,
     "pointing": schema.PointingModel,
@@ -44,6 +47,16 @@ _MODELS: Final[Mapping[str | int, type[FileModel]]] = {
     "voxels": shapes.VoxelsModel,
 }
 """The model that holds a field, by the step before it in pydantic's location."""
+
+_BODIES: Final[Mapping[str, type[FileModel]]] = {
+    "cylinder": bodies.CylinderBody,
+    "capsule": bodies.CapsuleBody,
+    "sphere": bodies.SphereBody,
+    "box": bodies.BoxBody,
+    "prism": bodies.PrismBody,
+    "mesh": bodies.MeshBody,
+}
+"""The same for what rides on links."""
 
 _EITHER: Final[Mapping[str | int, str]] = {
     "manipulator": "the name of a built-in arm or a mapping",
@@ -120,13 +133,19 @@ def _problem(details: ErrorDetails, at: Location) -> str:
             known = ", ".join(field.alias or name for name, field in fields)
             return f"is not a known key; known: {known}"
         case "union_tag_not_found":
-            return f"is missing; expected: one of {', '.join(_SHAPES)}"
+            return f"is missing; expected: one of {_known_shapes(loc)}"
         case "union_tag_invalid":
-            return f"is {context['tag']!r}, expected one of {', '.join(_SHAPES)}"
+            return f"is {context['tag']!r}, expected one of {_known_shapes(loc)}"
     return f"is {_shown(details['input'])}, expected {_expected(details, at)}"
 
 
+def _known_shapes(loc: tuple[str | int, ...]) -> str:
+    return ", ".join(_BODIES if "bodies" in loc else _SHAPES)
+
+
 def _model(loc: tuple[str | int, ...]) -> type[FileModel]:
+    if "bodies" in loc and str(loc[-2]) in _BODIES:
+        return _BODIES[str(loc[-2])]
     return _MODELS[loc[-2]] if len(loc) > 1 else schema.ProblemModel
 
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
+from vdsm_pin.io.body_schema import BodyModel
 from vdsm_pin.io.obstacle_schema import ObstacleModel
 from vdsm_pin.io.path_schema import PathPart
 from vdsm_pin.io.schema_types import (
@@ -83,6 +84,21 @@ class ToolModel(FileModel):
     radius: Positive = Field(description="Of the capsule [length_unit].")
 
 
+class FeedModel(FileModel):
+    """What is behind the first joint: a capsule along the rail that moves with x0."""
+
+    length: Positive = Field(
+        description="From the first joint backwards [length_unit]."
+    )
+    radius: Positive | None = Field(
+        default=None,
+        description="Of the capsule [length_unit]. Default: that of link 1.",
+    )
+
+
+NamePair: TypeAlias = Annotated[list[Name], Field(min_length=2, max_length=2)]
+
+
 class ManipulatorModel(FileModel):
     """An arm of N links on a rail along the x axis of its base."""
 
@@ -114,6 +130,19 @@ class ManipulatorModel(FileModel):
         default=None,
         description="What is mounted at the end of the last link; its end draws the "
         "path. Default: nothing.",
+    )
+    feed: FeedModel | None = Field(
+        default=None,
+        description="What pushes the arm along the rail. Default: not known, and what "
+        "is behind the first joint is not checked.",
+    )
+    bodies: list[BodyModel] = Field(
+        default=[], description="More solids that ride on the links."
+    )
+    ignore_pairs: list[NamePair] = Field(
+        default=[],
+        description="Names of two bodies, or of a body and an obstacle, that are not "
+        "held apart: `link 3`, `tool`, `feed`, and the names of bodies and obstacles.",
     )
 
 
@@ -266,6 +295,44 @@ class TipPathModel(FileModel):
     )
 
 
+class ObstacleErrorModel(FileModel):
+    """How far one obstacle may be off."""
+
+    name: Name = Field(description="Of the obstacle.")
+    shift: NotNegative = Field(
+        default=0.0,
+        description="In any direction [length_unit]; counts where it is larger than "
+        "that of all obstacles.",
+    )
+    turn_deg: NotNegative = Field(
+        default=0.0,
+        description="About any axis through the middle of the box around its corners "
+        "[deg]; not of a half_space.",
+    )
+
+
+class ErrorsModel(FileModel):
+    """How far the real motion, its base and the obstacles may be off."""
+
+    joint_deg: NotNegative | list[NotNegative] = Field(
+        default=0.0,
+        description="Of every alpha and theta, either way [deg]; a list has a value "
+        "per joint, from the base.",
+    )
+    base: NotNegative = Field(
+        default=0.0, description="Shift of the base, in any direction [length_unit]."
+    )
+    base_deg: NotNegative = Field(
+        default=0.0, description="Turn of the base about its origin [deg]."
+    )
+    obstacle: NotNegative = Field(
+        default=0.0, description="Of every obstacle's surface [length_unit]."
+    )
+    obstacles: list[ObstacleErrorModel] = Field(
+        default=[], description="Of single obstacles."
+    )
+
+
 class ProblemModel(FileModel):
     """A planning problem for a hyper-redundant manipulator."""
 
@@ -300,6 +367,10 @@ class ProblemModel(FileModel):
         default=None,
         description="Without tip_path: where the motion ends, {tip: [x, y, z]} "
         "[length_unit] or {joints: ...}. Default: anywhere.",
+    )
+    errors: ErrorsModel = Field(
+        default=ErrorsModel(),
+        description="Every clearance is asked for under them. Default: none.",
     )
     required_clearance: NotNegative = Field(
         description="Between the surfaces of arm and obstacles [length_unit]."

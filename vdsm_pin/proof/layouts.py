@@ -53,4 +53,5 @@ PLANE_NORMAL: Final = 6
 CLAIM: Final = 9
 RECORD: Final = 10
 """Layout of a written plane: interval, pair, start and end of the slice, pieces [first,
-last) counted from the obstacle's first, n (3), the clearance it proves."""
+last) counted from the obstacle's first, n (3) of any length, the clearance it
+proves."""

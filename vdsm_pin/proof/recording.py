@@ -1,5 +1,8 @@
 """The planes of a proof, written down interval by interval, in compiled code."""
 
+from math import sqrt
+from typing import Final
+
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
@@ -23,6 +26,9 @@ from vdsm_pin.proof.slices import leaf_bound, node_bound, plane_bound
 from vdsm_pin.proof.terms import CERTIFIED, Task
 from vdsm_pin.proof.workspace import Workspace
 
+LOSS: Final = 1e-5
+"""What a plane may prove less for the sake of fewer digits; [m]."""
+
 
 @compiled
 def _claim(
@@ -31,6 +37,44 @@ def _claim(
     """Clearance that one plane proves of the pieces of a node over a slice; [m]."""
     lost = task.pairs.lost[int(row[PAIR])]
     return plane_bound(task.pieces, desk.space, node, lost, n)
+
+
+@compiled
+def _shortened(
+    task: Task, desk: Workspace, row: FloatArray, node: int, n: FloatArray
+) -> float:
+    """Take the whole numbers of few digits for n that prove nearly as much.
+
+    Args:
+        task: The scene, pairs and rules.
+        desk: Its space holds the body over the slice.
+        row: The slice.
+        node: The pieces.
+        n: Of unit length; on return of any length, [-].
+
+    Returns:
+        The clearance that the plane proves; [m].
+    """
+    apart()
+    claim, needed = (
+        _claim(task, desk, row, node, n),
+        task.pairs.required[int(row[PAIR])],
+    )
+    whole, tried = np.zeros(3), np.zeros(3)
+    for digits in range(2, 7):
+        squared = 0.0
+        for c in range(3):
+            whole[c] = np.rint(n[c] * 10.0**digits)
+            squared += whole[c] * whole[c]
+        if not squared > 0.0:
+            continue
+        for c in range(3):
+            tried[c] = whole[c] / sqrt(squared)
+        found = _claim(task, desk, row, node, tried)
+        if found >= needed and found >= claim - LOSS:
+            n[:] = whole
+            return found
+    return claim
 
 
 @compiled
@@ -74,12 +118,12 @@ def _write_ranges(
         if pieces.node_range[node, 1] - pieces.node_range[node, 0] == 1:
             leaf_bound(task, space, node, lost, False, space.trial)
             n[:] = space.trial[NORMAL:NEAR]
-            claim = _claim(task, desk, row, node, n)
+            claim = _shortened(task, desk, row, node, n)
             count = _write(task, row, node, n, claim, records, count)
             continue
         bound = node_bound(pieces, space, node, lost, n)
         if bound >= needed:
-            claim = _claim(task, desk, row, node, n)
+            claim = _shortened(task, desk, row, node, n)
             count = _write(task, row, node, n, claim, records, count)
             continue
         nodes[waiting], nodes[waiting + 1] = pieces.node_right[node], node + 1
@@ -108,6 +152,7 @@ def _write_slice(
     claim = _claim(task, desk, row, root, n)
     first, last = task.pieces.node_range[root]
     if last - first == 1 or claim >= task.pairs.required[pair]:
+        claim = _shortened(task, desk, row, root, n)
         return _write(task, row, root, n, claim, records, count)
     desk.space.trial[NORMAL:NEAR] = n
     return _write_ranges(task, desk, row, records, count)

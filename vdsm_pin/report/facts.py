@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from vdsm_pin.arm_bodies import arm_bodies, self_pairs
 from vdsm_pin.cables import cable_lengths
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.records import Plan
@@ -24,6 +24,7 @@ from vdsm_pin.report.files import (
     LeftOutRow,
     MinClearance,
     MotionFacts,
+    ObstacleErrorRow,
     PlanFile,
     Point,
     ToleranceRow,
@@ -44,6 +45,7 @@ from vdsm_pin.verification.records import (
     Verdict,
     Verification,
 )
+from vdsm_pin.verification.task import ArmPairs
 
 if TYPE_CHECKING:  # whoever verifies needs no planner
     from vdsm_pin.refinement import Refinement
@@ -200,10 +202,27 @@ def nearest_to_obstacle(verification: Verification) -> int | None:
     return next(near, None)
 
 
+def _error_box(errors: ErrorBox, n_links: int) -> ErrorBoxRow:
+    """The errors in words of the JSON file."""
+    angles = errors.angles(n_links)
+    alike = bool((angles == angles.flat[0]).all())
+    single = (errors.of_obstacle(one.name) for one in errors.obstacles)
+    return ErrorBoxRow(
+        joint_error_rad=float(angles.max()),
+        joints_rad=() if alike else tuple((float(a), float(t)) for a, t in angles),
+        base_error_m=errors.base,
+        base_error_rad=errors.base_turn,
+        obstacle_error_m=errors.obstacle,
+        obstacles=tuple(
+            ObstacleErrorRow(name=one.name, shift_m=one.shift, turn_rad=one.turn)
+            for one in single
+        ),
+    )
+
+
 def left_out(problem: PlanningProblem) -> tuple[LeftOutRow, ...]:
-    """The bodies of an arm that are not held apart."""
-    arm = problem.manipulator
-    rows = self_pairs(arm, arm_bodies(arm)).left_out
+    """The bodies of an arm, and the obstacles, that are not held apart."""
+    rows = ArmPairs(problem).left_out
     return tuple(
         LeftOutRow(body=row.body, other=row.other, reason=row.reason) for row in rows
     )
@@ -349,11 +368,7 @@ def verification_file(
         coverage=finite(verification.coverage),
         path_length_m=None if path is None else path.length,
         undrawn_m=tuple((float(a), float(b)) for a, b in verification.undrawn),
-        error_box=ErrorBoxRow(
-            joint_error_rad=errors.joint,
-            base_error_m=errors.base,
-            obstacle_error_m=errors.obstacle,
-        ),
+        error_box=_error_box(errors, verification.trajectory.n_links),
         max_joint_error_rad=finite(verification.joint_error),
         refuted_joint_error_rad=finite(verification.refuted_joint_error),
         time_limit_s=finite(verification.time_limit),

@@ -136,12 +136,33 @@ class LeftOutRow(FileModel):
     reason: str = Field(description="why they are not")
 
 
+class ObstacleErrorRow(FileModel):
+    """How far one obstacle may be off."""
+
+    name: str = Field(description="its name")
+    shift_m: FiniteFloat = Field(description="in any direction")
+    turn_rad: FiniteFloat = Field(
+        description="about the middle of the box around its corners"
+    )
+
+
 class ErrorBoxRow(FileModel):
     """The errors of the real arm that the clearance proof was asked to cover."""
 
-    joint_error_rad: FiniteFloat = Field(description="of every joint angle, either way")
+    joint_error_rad: FiniteFloat = Field(
+        description="of the joint angle that may be off the most, either way"
+    )
+    joints_rad: tuple[tuple[FiniteFloat, FiniteFloat], ...] = Field(
+        default=(), description="by joint of alpha and theta, where they differ"
+    )
     base_error_m: FiniteFloat = Field(description=BASE_ERROR)
+    base_error_rad: FiniteFloat = Field(
+        default=0.0, description="turn of the base about its origin"
+    )
     obstacle_error_m: FiniteFloat = Field(description="displacement of every surface")
+    obstacles: tuple[ObstacleErrorRow, ...] = Field(
+        default=(), description="of single obstacles, where they are off by more"
+    )
 
 
 class CounterexampleRow(FileModel):

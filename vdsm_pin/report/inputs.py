@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Final
 
+from vdsm_pin.arm_bodies import convex_cover
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.scene import FromFile, Mesh
 from vdsm_pin.trajectory import Trajectory
@@ -13,7 +14,7 @@ _NAMED: Final = 3
 
 BEHIND: Final = (
     "not checked: what lies behind the base; the arm is judged from O₁ to its tip, and "
-    "whatever feeds it along the rail is no body"
+    "the problem states no `feed`"
 )
 """Where there are obstacles, one may stand in the way of the feed."""
 
@@ -45,5 +46,22 @@ def input_notes(problem: PlanningProblem, trajectory: Trajectory) -> tuple[str, 
         for note in one.notes
     )
     of_rows = (f"trajectory: {note}" for note in trajectory.notes)
-    behind = (BEHIND,) if problem.scene.obstacles else ()
-    return (*behind, *mesh_notes(problem), *of_files, *of_rows)
+    unknown = problem.scene.obstacles and not problem.manipulator.feed
+    behind = (BEHIND,) if unknown else ()
+    notes = (*behind, *_covers(problem), *mesh_notes(problem))
+    return (*notes, *of_files, *of_rows)
+
+
+def _covers(problem: PlanningProblem) -> tuple[str, ...]:
+    """What is proved clear in the place of meshes that links carry."""
+    bodies = problem.manipulator.bodies
+    meshes = [body for body in bodies if isinstance(body.solid, Mesh)]
+    return tuple(
+        f"{body.name!r} is judged by {_hulls(len(convex_cover(body)))} around its "
+        "triangles"
+        for body in meshes
+    )
+
+
+def _hulls(count: int) -> str:
+    return f"{count} convex hulls" if count > 1 else "the convex hull"

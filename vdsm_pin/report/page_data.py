@@ -13,7 +13,7 @@ from vdsm_pin.report.charts import charts, packed
 from vdsm_pin.report.facts import failing, finite
 from vdsm_pin.report.impasse import Impasse
 from vdsm_pin.report.palette import link_colours
-from vdsm_pin.report.solids import detail, surface
+from vdsm_pin.report.solids import FINE, Detail, detail, surface
 from vdsm_pin.report.thinning import (
     MOST_DRAWN,
     Thinned,
@@ -31,19 +31,6 @@ def scene_data(
     """The arm, some obstacles and the desired path; base frame, [m]."""
     arm = problem.manipulator
     extent, fine = arm.total_length, detail(len(obstacles))
-    solids = []
-    for obstacle in obstacles:
-        skin = surface(obstacle, extent, fine)
-        solids.append(
-            {
-                "name": obstacle.name,
-                "vertices": packed(skin.vertices),
-                "triangles": packed(skin.triangles, "<u4"),
-                "round": skin.round,
-                "creased": skin.creased,
-                "count": len(skin.triangles),
-            }
-        )
     return {
         "lengths": arm.link_lengths.tolist(),
         "radius": arm.link_radius,
@@ -55,8 +42,24 @@ def scene_data(
         ],
         "colours": list(link_colours(arm.n_links)),
         "pose": problem.T_world_base.ravel().tolist(),
-        "obstacles": solids,
+        "obstacles": [_solid(solid, extent, fine) for solid in obstacles],
+        "carried": [
+            {"link": link, **_solid(solid, extent, FINE)} for link, solid in arm.carried
+        ],
         "path": packed(() if problem.tip_path is None else problem.tip_path.corners),
+    }
+
+
+def _solid(solid: Obstacle, extent: float, fine: Detail) -> dict[str, Any]:
+    """Triangles to draw a solid with."""
+    skin = surface(solid, extent, fine)
+    return {
+        "name": solid.name,
+        "vertices": packed(skin.vertices),
+        "triangles": packed(skin.triangles, "<u4"),
+        "round": skin.round,
+        "creased": skin.creased,
+        "count": len(skin.triangles),
     }
 
 

@@ -107,6 +107,14 @@ def surface(obstacle: Obstacle, extent: float, fine: Detail = FINE) -> Surface:
             return _cells(obstacle.centres, turn, half, fine.triangles)
 
 
+def obj_text(solid: Obstacle) -> str:
+    """The surface as an OBJ file, corners of prisms and meshes to the last bit; [m]."""
+    skin = solid if isinstance(solid, Mesh) else surface(solid, 1.0)
+    corners = [f"v {x!r} {y!r} {z!r}" for x, y, z in skin.vertices.tolist()]
+    faces = [f"f {a} {b} {c}" for a, b, c in (skin.triangles + 1).tolist()]
+    return "\n".join([*corners, *faces]) + "\n"
+
+
 def frame_along(axis: FloatArray) -> FloatArray:
     """A right-handed frame whose third column is the axis, shape (3, 3); [-]."""
     helper = np.eye(3)[int(np.argmin(np.abs(axis)))]

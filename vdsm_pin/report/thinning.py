@@ -8,6 +8,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import Verification
+from vdsm_pin.verification.task import ArmPairs
 
 MOST_ROWS: Final = 2_000
 """Rows of a motion that a page shows at most, besides remarkable ones."""
@@ -29,8 +30,8 @@ def nearest_obstacles(verification: Verification, most: int) -> IntArray:
     count, least = len(verification.problem.scene.obstacles), verification.least
     if count <= most or least is None:
         return np.arange(min(count, most))
-    n_links = verification.problem.manipulator.n_links
-    lowers = least.lower[: count * n_links].reshape(count, n_links).min(axis=1)
+    lower = np.append(least.lower, np.inf)  # -1 is no pair
+    lowers = lower[ArmPairs(verification.problem).number].min(axis=0)
     return np.sort(np.argpartition(lowers, most)[:most])
 
 

@@ -7,6 +7,7 @@ from typing import Final, Literal
 import numpy as np
 from pydantic import Field
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
@@ -25,7 +26,7 @@ from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.clearance_check import check_clearance
 from vdsm_pin.verification.inside import arm_inside, check_inside, locate_arm
-from vdsm_pin.verification.records import ErrorBox, combine
+from vdsm_pin.verification.records import combine
 
 EXECUTED: Final = "executed.csv"
 RECORD: Final = "simulation.csv"

@@ -7,8 +7,10 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, RootModel
 Number = Annotated[int, Field(ge=0)]
 Share = Annotated[FiniteFloat, Field(ge=0.0, le=1.0)]
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+Error = Annotated[FiniteFloat, Field(ge=0.0)]
 Pair = tuple[str, str]
-Plane = tuple[Number, Number, FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat]
+Normal = FiniteFloat
+Plane = tuple[Number, Number, Normal, Normal, Normal, int | FiniteFloat]
 Slice = tuple[Share, Share, Annotated[list[Plane], Field(min_length=1)]]
 
 
@@ -21,11 +23,16 @@ class LineModel(BaseModel):
 class ErrorLimits(LineModel):
     """The errors that every clearance is proved under."""
 
-    joint_rad: FiniteFloat = Field(ge=0.0, description="of every angle, either way")
-    base_m: FiniteFloat = Field(
-        ge=0.0, description="displacement of the base, in any direction"
+    joints_rad: list[tuple[Error, Error]] = Field(
+        description="by joint of alpha and theta, either way"
     )
-    obstacle_m: FiniteFloat = Field(ge=0.0, description="of every surface")
+    base_m: Error = Field(description="displacement of the base, in any direction")
+    base_rad: Error = Field(description="turn of the base about its origin")
+    obstacle_m: Error = Field(description="of every surface")
+    obstacles: dict[str, tuple[Error, Error]] = Field(
+        description="by name of single ones, displacement [m] and turn about the "
+        "middle of the box around their corners [rad]"
+    )
 
 
 class ClaimedLimits(LineModel):
@@ -41,7 +48,7 @@ class ClaimedLimits(LineModel):
 class HeaderLine(LineModel):
     """Line 1."""
 
-    vdsm_certificate: Literal[3] = Field(default=3, description="version of the format")
+    vdsm_certificate: Literal[4] = Field(default=4, description="version of the format")
     problem_sha256: Sha256 = Field(description="problem file and the meshes it names")
     trajectory_sha256: Sha256 = Field(description="trajectory.csv")
     urdf_sha256: Sha256 = Field(description="told, not proved")
@@ -51,12 +58,14 @@ class HeaderLine(LineModel):
     errors: ErrorLimits
     n_rows: int = Field(ge=1, description="rows of the trajectory")
     pairs: list[Pair] = Field(
-        description="moving body, `link 1` and so on or `tool`, and what it is proved "
-        "clear of: an obstacle's name, or another body at rest"
+        description="moving body, `link 1` and so on, `tool`, `feed` or the name of "
+        "what a link carries, and what it is proved clear of: an obstacle's name, or "
+        "another body at rest"
     )
     pieces: dict[str, list[Number] | list[list[Number]]] = Field(
         description="numbers of a mesh's triangles, or corner numbers of a prism's, in "
-        "the order in which planes count them"
+        "the order in which planes count them; of a mesh on a link the triangles "
+        "under each of its hulls"
     )
     joined: dict[
         str,
@@ -82,7 +91,8 @@ class IntervalLine(LineModel):
     k: Number = Field(description="the interval, from 0")
     proofs: list[Annotated[list[Slice], Field(min_length=1)]] = Field(
         description="per pair its slices [from, to, planes] of the interval; a plane "
-        "is [first piece, one past the last, nx, ny, nz, clearance in m]"
+        "is [first piece, one past the last, nx, ny, nz, clearance], n of any length, "
+        "the clearance in 1e-10 m where it is a whole number, else in m"
     )
 
 

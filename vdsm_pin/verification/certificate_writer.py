@@ -4,25 +4,30 @@ The format is docs/certificate.md. Planes are found again, interval by interval,
 to the file as they come, so that memory stays bounded.
 """
 
+import gzip
 import hashlib
 import json
+import math
 from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import chain, pairwise
 from pathlib import Path
-from typing import Any, Final
+from typing import IO, Any, Final, cast
 
 import numpy as np
 
 from vdsm_pin import __version__
+from vdsm_pin.arm_bodies import triangle_groups
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.budget import Budget
-from vdsm_pin.proof.layouts import FIRST, LAST, PLANE_NORMAL, RECORD
+from vdsm_pin.proof.layouts import CLAIM, FIRST, LAST, PLANE_NORMAL, RECORD
 from vdsm_pin.proof.packed_tree import straight_motion
 from vdsm_pin.proof.recording import record
 from vdsm_pin.proof.terms import Task
@@ -41,6 +46,12 @@ from vdsm_pin.verification.inside import locate_start, unlocated
 from vdsm_pin.verification.limits import extremes
 from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.task import all_pairs, make_task
+
+LEVEL: Final = 9
+"""Of gzip; it takes a small part of the time that finding the planes does."""
+
+PER_METRE: Final = 10**10
+"""A clearance that is whole counts these parts of a metre."""
 
 CHUNK: Final = 512
 """Intervals recorded at once."""
@@ -87,9 +98,6 @@ def write_certificate(
         verdict = verification.verdict.value
         message = f"no certificate is written: the verdict is {verdict}"
         raise VerificationFailed(message)
-    if verification.errors.base_turn > 0.0:
-        message = "no certificate is written: it cannot state a turn of the base yet"
-        raise VerificationFailed(message)
     problem, trajectory = verification.problem, verification.trajectory
     if problem.tip_path is not None and problem.tip_path.pointing is not None:
         message = "no certificate is written: it cannot state `pointing` yet"
@@ -97,13 +105,11 @@ def write_certificate(
     # Of a mesh without known inside the hull is proved clear, by planes for all of it.
     hulls = unlocated(locate_start(problem, trajectory))
     scene = with_hulls(problem.scene, hulls)
-    task = make_task(
-        replace(problem, scene=scene),
-        verification.errors,
-        budget=Budget(until=deadline.end),
-    )
+    reach, budget = float(np.abs(trajectory.x0).max()), Budget(until=deadline.end)
+    asked = replace(problem, scene=scene)
+    task = make_task(asked, verification.errors, budget=budget, reach=reach)
     digest = hashlib.sha256()
-    with atomic_path(path) as temporary, temporary.open("wb") as file:
+    with atomic_path(path) as temporary, _packed(temporary) as file:
         header = _header(verification, hashes, task.pieces)
         lines = _lines(verification, task, hulls, deadline)
         for text in chain([header.model_dump_json()], lines):
@@ -112,6 +118,16 @@ def write_certificate(
             file.write(line)
         last = LastLine(end=True, sha256=digest.hexdigest())
         file.write(last.model_dump_json().encode() + b"\n")
+
+
+@contextmanager
+def _packed(path: Path) -> Iterator[IO[bytes]]:
+    """A file whose bytes are gzipped; equal content makes equal files."""
+    with (
+        path.open("wb") as file,
+        gzip.GzipFile("", "wb", LEVEL, fileobj=file, mtime=0) as packed,
+    ):
+        yield cast("IO[bytes]", packed)
 
 
 def _header(
@@ -128,7 +144,11 @@ def _header(
         required_clearance_m=problem.required_clearance,
         required_self_clearance_m=problem.required_self_clearance,
         errors=ErrorLimits(
-            joint_rad=box.joint, base_m=box.base, obstacle_m=box.obstacle
+            joints_rad=box.angles(trajectory.n_links).tolist(),
+            base_m=box.base,
+            base_rad=box.base_turn,
+            obstacle_m=box.obstacle,
+            obstacles=_single_errors(box),
         ),
         n_rows=trajectory.n_samples,
         pairs=_pairs(problem),
@@ -146,6 +166,12 @@ def _header(
     )
 
 
+def _single_errors(box: ErrorBox) -> dict[str, tuple[float, float]]:
+    """The errors of single obstacles, shift and turn."""
+    named = (box.of_obstacle(one.name) for one in box.obstacles)
+    return {one.name: (one.shift, one.turn) for one in named}
+
+
 def _pairs(problem: PlanningProblem) -> list[Pair]:
     """The moving body of each pair and what it is proved clear of."""
     return [
@@ -158,7 +184,7 @@ def _pieces(problem: PlanningProblem, pieces: PackedPieces) -> dict[str, list[An
     """The pieces of cut prisms and of meshes in the order in which planes count them.
 
     Triangles by the numbers of their corners for a prism, numbers of the file's
-    triangles for a mesh that was sorted.
+    triangles for a mesh that was sorted; of a mesh on a link those of each hull.
     """
     result: dict[str, list[Any]] = {}
     for k, obstacle in enumerate(problem.scene.obstacles):
@@ -168,6 +194,11 @@ def _pieces(problem: PlanningProblem, pieces: PackedPieces) -> dict[str, list[An
             result[obstacle.name] = [triangles[i] for i in order]
         elif (np.diff(order) != 1).any():
             result[obstacle.name] = order.tolist()
+    for body in problem.manipulator.bodies:
+        if isinstance(body.solid, Prism) and len(body.solid.convex_sections) > 1:
+            result[body.name] = _triangles(body.solid)
+        elif isinstance(body.solid, Mesh):
+            result[body.name] = [group.tolist() for group in triangle_groups(body)]
     return result
 
 
@@ -254,7 +285,8 @@ def _interval_lines(
     rows = records[order]
     for k in range(first, last):
         low, high = np.searchsorted(rows[:, 0], [k, k + 1])
-        yield json.dumps({"k": k, "proofs": _proofs(task, rows[low:high].tolist())})
+        line = {"k": k, "proofs": _proofs(task, rows[low:high].tolist())}
+        yield json.dumps(line, separators=(",", ":"))
 
 
 def _proofs(task: Task, rows: list[list[float]]) -> list[list[list[Any]]]:
@@ -263,7 +295,20 @@ def _proofs(task: Task, rows: list[list[float]]) -> list[list[list[Any]]]:
     for row in rows:
         slices = proofs[int(row[1])]
         if not slices or slices[-1][0] != row[2]:
-            slices.append([row[2], row[3], []])
-        plane = [int(row[FIRST]), int(row[LAST]), *row[PLANE_NORMAL:RECORD]]
-        slices[-1][2].append(plane)
+            slices.append([_short(row[2]), _short(row[3]), []])
+        n = [_short(x) for x in row[PLANE_NORMAL:CLAIM]]
+        lower = _counted(row[CLAIM], float(task.pairs.required[int(row[1])]))
+        slices[-1][2].append([int(row[FIRST]), int(row[LAST]), *n, lower])
     return proofs
+
+
+def _short(value: float) -> float:
+    """A whole number as such; others as they are."""
+    return int(value) if value == int(value) else value
+
+
+def _counted(lower: float, required: float) -> float:
+    """A clearance in parts of a metre, rounded down; as it is where that fails."""
+    parts = math.floor(lower * PER_METRE)
+    enough = Fraction(parts, PER_METRE) >= Fraction(required)
+    return parts if enough and parts <= lower * PER_METRE else lower

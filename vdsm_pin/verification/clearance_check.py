@@ -15,6 +15,7 @@ from vdsm_pin.verification.clearance import ClearanceProof
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import surfaces
 from vdsm_pin.verification.records import Check, Counterexample, Verdict, is_deepest
+from vdsm_pin.verification.task import ball_of
 
 
 def check_clearance(
@@ -41,9 +42,7 @@ def check_clearance(
         (~of_obstacles, "clearance between links", problem.required_self_clearance),
     ):
         if mine.any():
-            row = _row(proof, np.flatnonzero(mine), name, needed, late)
-            radius = problem.manipulator.least_radius
-            row = replace(row, deeper=is_deepest(row.worst, radius))
+            row = _row(problem, proof, np.flatnonzero(mine), (name, needed, late))
             against = [
                 found
                 for found in counterexamples
@@ -60,8 +59,12 @@ def check_clearance(
 
 
 def _row(
-    proof: ClearanceProof, mine: IntArray, name: str, needed: float, late: str
+    problem: PlanningProblem,
+    proof: ClearanceProof,
+    mine: IntArray,
+    asked: tuple[str, float, str],
 ) -> Check:
+    name, needed, late = asked
     counts = proof.counts[mine].sum(axis=0)
     verdict = Verdict.CERTIFIED
     if counts[REFUTED]:
@@ -84,13 +87,14 @@ def _row(
         unit="m",
         where=where,
         moment=float(row[AT_UPPER] + row[TIME]) if np.isfinite(row[UP]) else nan,
+        deeper=is_deepest(float(row[column]), ball_of(problem, proof.pairs[pair])),
     )
 
 
 def _first(row: Check, contact: FirstContact) -> Check:
     """The row with the beginning of what it names at its worst."""
     found = "first too close" if contact.clear_before else "first found too close"
-    pair = f"link {contact.pair.link} and {contact.pair.label}"
+    pair = f"{contact.pair.own} and {contact.pair.label}"
     moment = f"{contact.moment:.6f}".rstrip("0").rstrip(".")
     where = f"{row.where}; {found} at waypoint {moment}: {pair}"
     if contact.intervals:

@@ -36,6 +36,7 @@ from vdsm_pin.verification.coal_bodies import (
 )
 from vdsm_pin.verification.coal_log import CoalLog, rows_at
 from vdsm_pin.verification.records import Check, Verdict
+from vdsm_pin.verification.task import ArmPairs
 
 CHUNK_BOUNDS: Final = 1 << 17
 """Coarse bounds held in memory at a time: rows times links times obstacles."""
@@ -202,7 +203,7 @@ def _answers(
     log: CoalLog | None,
 ) -> Iterator[tuple[CoalDistances, FloatArray, FloatArray]]:
     """What Coal measures, when (in waypoints), and how far it is off, (m,) each."""
-    scene, n_axes = CoalScene.of(problem, deadline), robot.manipulator.axis_radii.size
+    scene, numbers = CoalScene.of(problem, deadline), ArmPairs(problem).number
     if log is not None:
         near = log.asked(of_obstacles=True)
         if near.size:
@@ -213,11 +214,13 @@ def _answers(
     for found in coal_distances(
         robot, problem, trajectory, reach, travel, deadline, scene
     ):
-        excess, pair = found.disagreement, found.obstacle * n_axes + found.link
+        excess, pair = found.disagreement, numbers[found.link, found.obstacle]
+        held = pair >= 0
         if log is not None:
-            log.keep(found.waypoint, pair, found.distance)
+            log.keep(found.waypoint[held], pair[held], found.distance[held])
         if proved is not None:
-            excess = np.maximum(excess, _below_proof(found, proved, pair))
+            below = np.where(held, _below_proof(found, proved, pair), -np.inf)
+            excess = np.maximum(excess, below)
         yield found, found.waypoint.astype(np.float64), _no_pass(excess)
 
 

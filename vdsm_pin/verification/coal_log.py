@@ -28,7 +28,7 @@ class CoalLog:
         approaches: Sequence[ClosestApproach],
         around: Sequence[str],
     ) -> None:
-        self.approaches = tuple(approaches)
+        self.pairs, self.approaches = tuple(pairs), tuple(approaches)
         self._around = tuple(around)
         names = np.array([pair.obstacle for pair in pairs])
         self._surfaces = np.flatnonzero(np.isin(names, around))

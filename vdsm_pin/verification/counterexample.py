@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, TIME
@@ -25,11 +26,10 @@ from vdsm_pin.verification.pair_slopes import pair_slopes
 from vdsm_pin.verification.records import (
     ClearanceChunk,
     Counterexample,
-    ErrorBox,
     Pair,
     is_deepest,
 )
-from vdsm_pin.verification.task import all_pairs, make_task
+from vdsm_pin.verification.task import all_pairs, ball_of, make_task
 
 PAIRS: Final = 8
 """Pairs looked at, those of the least lower bounds first."""
@@ -117,15 +117,18 @@ class Search:
 
     def _grown(self, errors: ErrorBox) -> float:
         """By how much the partner may come nearer: surface and base shift; [m]."""
-        return errors.obstacle + errors.base if self.pair.obstacle else 0.0
+        if not self.pair.obstacle:
+            return 0.0
+        # A turn of base or obstacle is left out: what is found holds without it.
+        still = errors.of_obstacle(self.pair.obstacle).shift
+        return still + errors.base
 
     def _nearest(
         self, errors: ErrorBox, moments: tuple[Moment, ...]
     ) -> tuple[Moment, FloatArray]:
         """The nearest configuration found within the box: moment and offsets."""
-        scale = np.full(self.joints.shape[1], errors.joint)
-        scale[0] = 0.0
-        scale *= INSIDE
+        angles = errors.angles(self.problem.manipulator.n_links)
+        scale = INSIDE * np.append(0.0, angles.reshape(-1))
         corners = self._first_corners()
         at = [(moment, corner) for moment in moments for corner in corners]
         q = np.array([self._joints(moment) for moment, _ in at])
@@ -214,7 +217,7 @@ class Search:
             other_point=frozen(chunks[0].other_point[0, column]),
             deeper=is_deepest(
                 upper,
-                self.problem.manipulator.radius_at(self.pair.link, self.pair.body),
+                ball_of(self.problem, self.pair),
             ),
         )
 

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.layouts import UP
@@ -14,7 +15,7 @@ from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
-from vdsm_pin.verification.records import ClearanceChunk, ErrorBox, Pair
+from vdsm_pin.verification.records import ClearanceChunk, Pair
 from vdsm_pin.verification.task import pack_scene
 
 STRETCH: Final = 64

@@ -4,6 +4,7 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.blocks import sweep
 from vdsm_pin.proof.budget import Budget
@@ -12,7 +13,6 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.proving import prove_problem
-from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.task import with_errors
 
 BEYOND: Final = 4.0 * TOLERANCES.bracket_gap
@@ -38,6 +38,7 @@ class HastyProof:
         trajectory: Trajectory,
         deadline: Deadline = NO_LIMIT,
     ) -> None:
+        self._problem = problem
         # Nobody asks for a profile: all intervals share its one bin.
         budget = Budget(profile=1, until=deadline.end)
         self._proving = prove_problem(problem, trajectory, ErrorBox(), budget=budget)
@@ -55,7 +56,7 @@ class HastyProof:
         Raises:
             OutOfTime: If the time is over.
         """
-        known, task = self._proving, with_errors(self._task, errors)
+        known, task = self._proving, with_errors(self._task, self._problem, errors)
         # Pairs that remember nothing: the answer depends on the question alone.
         forget(known.desk.planes)
         # No least clearance is asked for: whatever is proved may be culled.

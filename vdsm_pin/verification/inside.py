@@ -1,20 +1,24 @@
 """Whether the arm is inside a mesh: where its base is as the motion begins.
 
 The arm is connected and the clearance proof keeps its axis off the surface, so one
-point of one row decides for the whole motion. Where the inside of a mesh cannot be
-told, the arm is outside if it is proved to keep its clearance from the mesh's hull.
+point of one row decides for the whole motion. What links carry may be apart from them,
+and some links may not be held off the mesh: there a point of each body decides. Where
+the inside of a mesh cannot be told, the arm is outside if it is proved to keep its
+clearance from the mesh's hull.
 """
 
-from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.arm_bodies import arm_bodies
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.errors import OutOfTime
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.winding import Location, Side, locate
+from vdsm_pin.kinematics import joint_centres, link_frames
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.scene import Mesh, Scene, with_hulls
@@ -23,7 +27,7 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
-from vdsm_pin.verification.records import Check, ErrorBox, Verdict, combine
+from vdsm_pin.verification.records import Check, Verdict, combine
 
 NAME: Final = "arm outside the meshes"
 """Name of the row."""
@@ -38,14 +42,55 @@ VERDICTS: Final = {
 def locate_start(
     problem: PlanningProblem, trajectory: Trajectory
 ) -> dict[str, Location]:
-    """Where the first joint begins as seen from each mesh that may have an inside."""
-    base = np.array([trajectory.x0[0], 0.0, 0.0])
-    radius = problem.manipulator.least_radius
+    """Where the arm begins as seen from each mesh that may have an inside.
+
+    The first of the arm's points that is inside, or else unknown, speaks for all.
+    """
     return {
-        mesh.name: locate(mesh.closed_mesh, base, radius)
+        mesh.name: _worst(
+            [
+                locate(mesh.closed_mesh, point, radius)
+                for point, radius in _points(problem, trajectory, mesh.name)
+            ]
+        )
         for mesh in problem.scene.obstacles
         if isinstance(mesh, Mesh) and not mesh.is_surface
     }
+
+
+def _worst(found: Sequence[Location]) -> Location:
+    """The location that says the most against a motion; outside where there is none."""
+    order = list(VERDICTS)
+    none = Location(Side.OUTSIDE)
+    return min(found, key=lambda one: order.index(one.side), default=none)
+
+
+def _points(
+    problem: PlanningProblem, trajectory: Trajectory, mesh: str
+) -> list[tuple[FloatArray, float]]:
+    """Points at the first row, and how far from the surface they stay; [m].
+
+    O_1 for links, tool and feed where all of them are held off the mesh, otherwise the
+    middle of each that is; the middle of everything that is carried.
+    """
+    arm, row = problem.manipulator, [0]
+    joints = trajectory.x0[row], trajectory.alpha[row], trajectory.theta[row]
+    centres = joint_centres(arm, *joints)[0]
+    frames = link_frames(*joints[1:])[0]
+    points = [(centres[0], arm.least_radius)]
+    bodies = arm_bodies(arm)
+    own = [body for body in bodies if not body.carried]
+    if not any(arm.ignores(body.name, mesh) for body in own):
+        bodies = tuple(body for body in bodies if body.carried)
+    else:
+        points = []
+    for body in bodies:
+        if not arm.ignores(body.name, mesh):
+            turned = frames[body.link - 1] if body.link else np.eye(3)
+            middle = turned @ body.corners.mean(axis=0)
+            origin = centres[max(0, body.link - 1)]
+            points.append((origin + middle, body.ball + problem.required_clearance))
+    return points
 
 
 def unlocated(located: Mapping[str, Location]) -> tuple[str, ...]:
@@ -75,23 +120,21 @@ def locate_arm(
     scene = Scene(tuple(o for o in problem.scene.obstacles if o.name in doubtful))
     hulls = replace(problem, scene=with_hulls(scene, doubtful))
     proof = prove_clearance(hulls, trajectory, errors, deadline=deadline)
-    clear = _clear_of(doubtful, proof, len(arm_bodies(problem.manipulator)))
+    clear = _clear_of(doubtful, proof)
     if proof.late:
         late = f"; {OutOfTime(deadline.limit)}"
         found = {n: one._replace(reason=one.reason + late) for n, one in found.items()}
     return found | dict.fromkeys(clear, Location(Side.OUTSIDE))
 
 
-def _clear_of(
-    names: Collection[str], proof: ClearanceProof, n_bodies: int
-) -> tuple[str, ...]:
-    """Which obstacles every body of the arm is proved to keep its clearance from."""
-    proved = Counter(
+def _clear_of(names: Collection[str], proof: ClearanceProof) -> tuple[str, ...]:
+    """Which obstacles every body held off them is proved to keep its clearance from."""
+    near = {
         pair.obstacle
         for pair, counts in zip(proof.pairs, proof.counts, strict=True)
-        if counts[CERTIFIED] == proof.n_intervals
-    )
-    return tuple(name for name in names if proved[name] == n_bodies)
+        if counts[CERTIFIED] < proof.n_intervals
+    }
+    return tuple(name for name in names if name not in near)
 
 
 def arm_inside(located: Mapping[str, Location]) -> tuple[str, ...]:

@@ -43,8 +43,9 @@ def link_clearance(problem: PlanningProblem) -> Callable[[FloatArray], FloatArra
         Joint centres (n, N + 1, 3) to proved lower bounds of the distance between the
         surface of each link and the nearest obstacle, shape (n, N); negative where they
         meet (there the sign alone is meant), infinite without obstacles; [m]. The tool
-        counts as part of the last link. Pieces of an arm, of other numbers of links,
-        are taken to be as thick as its thickest part.
+        counts as part of the last link, and what links carry as if it were round about
+        their axes. Pieces of an arm, of other numbers of links, are taken to be as
+        thick as its thickest part.
     """
     obstacles = problem.scene.obstacles
     pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
@@ -56,6 +57,9 @@ def link_clearance(problem: PlanningProblem) -> Callable[[FloatArray], FloatArra
         rows = np.ascontiguousarray(centres, dtype=np.float64)
         if alike or rows.shape[1] != arm.n_links + 1:
             return link_clearances(pieces, covers, rows, arm.most_radius, pad, goal)
+        if arm.bodies:
+            gaps = link_clearances(pieces, covers, rows, 0.0, pad, goal)
+            return np.asarray(gaps - arm.reaches)
         axes = np.ascontiguousarray(arm.axes(rows))
         gaps = link_clearances(pieces, covers, axes, 0.0, pad, goal) - arm.axis_radii
         gaps[:, arm.n_links - 1] = gaps[:, arm.n_links - 1 :].min(axis=1)

@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.packed_tree import straight_motion
 from vdsm_pin.proof.proving import Proving, new_proving
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.records import ErrorBox
 from vdsm_pin.verification.task import make_task
 
 BUDGET = Budget()

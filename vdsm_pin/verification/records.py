@@ -6,6 +6,7 @@ from enum import StrEnum
 from math import inf, nan
 from typing import TypeAlias
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.notebook import Summarised, in_percent
 from vdsm_pin.problem import PlanningProblem
@@ -81,23 +82,6 @@ def is_deepest(clearance: float, link_radius: float) -> bool:
         link_radius: Distances are measured from the axis, so no depth exceeds it; [m].
     """
     return -inf < clearance <= TOLERANCES.bracket_gap - link_radius
-
-
-@dataclass(frozen=True)
-class ErrorBox:
-    """How far the real motion may stray from the nominal one.
-
-    Args:
-        joint: Largest error of every theta_i and alpha_i; [rad].
-        base: Largest displacement of the base in any direction, and so of x0; [m].
-        obstacle: Largest displacement of an obstacle surface; [m].
-        base_turn: Largest rotation of the base about its origin; [rad].
-    """
-
-    joint: float = 0.0
-    base: float = 0.0
-    obstacle: float = 0.0
-    base_turn: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

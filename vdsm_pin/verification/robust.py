@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.budget import Budget
@@ -26,8 +27,7 @@ from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.counterexample import Search, moments_of
 from vdsm_pin.verification.hasty import HastyProof, is_certified
 from vdsm_pin.verification.proving import prove_problem
-from vdsm_pin.verification.records import ErrorBox
-from vdsm_pin.verification.task import all_pairs
+from vdsm_pin.verification.task import all_pairs, obstacle_growth
 
 LARGEST: Final = float(np.deg2rad(45.0))
 """Errors beyond this are not looked at; [rad]."""
@@ -90,7 +90,7 @@ def largest_joint_error(
         bound = float(np.partition(clearances, FEW)[FEW])
         some = _without_far(problem, clearances, bound)
         largest = _largest_of_all(some, trajectory, errors, largest, deadline)
-        problem = within_reach(problem, clearances, replace(errors, joint=largest))
+        problem = within_reach(problem, clearances, errors.with_joint(largest))
     return _largest_of_all(problem, trajectory, errors, largest, deadline)
 
 
@@ -107,9 +107,12 @@ def within_reach(
         clearances: Proved of each obstacle and the nominal motion, (n_obstacles,); [m].
         errors: The box.
     """
-    lengths = problem.manipulator.link_lengths
+    arm, lengths = problem.manipulator, problem.manipulator.link_lengths
     lever = 2.0 * float(np.arange(1, lengths.size + 1) @ lengths)
-    moved = errors.joint * lever + errors.base + errors.obstacle
+    lever += 2.0 * lengths.size * arm.most_radius  # of what sticks out of the axis
+    moved = errors.joint * lever + errors.base + max(obstacle_growth(problem, errors))
+    far = float(np.abs(arm.base_range).max()) + arm.total_length + arm.most_radius
+    moved += errors.base_turn * (far + moved)
     return _without_far(problem, clearances, problem.required_clearance + moved + SPARE)
 
 
@@ -170,7 +173,7 @@ def sturdiest(
 def _holds(
     proof: HastyProof, errors: ErrorBox, first: int, last: int, joint: float
 ) -> bool:
-    return proof.holds(replace(errors, joint=joint), first, last)
+    return proof.holds(errors.with_joint(joint), first, last)
 
 
 def _shuffled(firsts: range) -> list[int]:
@@ -225,7 +228,7 @@ def refuted_joint_error(
     def near(joint: float) -> PlanningProblem:
         if clearances is None or len(clearances) <= MANY:
             return problem
-        return within_reach(problem, clearances, replace(errors, joint=joint))
+        return within_reach(problem, clearances, errors.with_joint(joint))
 
     proof = HastyProof(near(above), trajectory, deadline)
     lost = _first_lost(partial(_holds, proof, errors, joint=above), proof.n_intervals)
@@ -233,7 +236,7 @@ def refuted_joint_error(
         return nan
     weakest = trajectory.part(max(0, lost - AROUND), lost + AROUND + 2)
     for factor in FACTORS:
-        box = replace(errors, joint=factor * above)
+        box = errors.with_joint(factor * above)
         found = _smallest(near(box.joint), weakest, box, deadline)
         if found:
             return min(found)

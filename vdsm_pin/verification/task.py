@@ -1,23 +1,27 @@
 """What a clearance proof is asked: bodies and pairs, the packed scene, the rules."""
 
 import math
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 
-from vdsm_pin.arm_bodies import ArmBody, SelfPairs, arm_bodies, self_pairs
+from vdsm_pin.arm_bodies import ArmBody, LeftOut, SelfPairs, arm_bodies, self_pairs
 from vdsm_pin.arm_tree import RAIL, arm_tree, link_frame
+from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.error_box import ErrorBox as ProofBox
-from vdsm_pin.proof.packed_tree import REVOLUTE
 from vdsm_pin.proof.packing import pack_task
 from vdsm_pin.proof.packing import with_errors as with_box
-from vdsm_pin.proof.terms import OBSTACLES, WORLD, Task
+from vdsm_pin.proof.terms import WORLD, Task
+from vdsm_pin.scene import HalfSpace, corners_of
 from vdsm_pin.verification.link_clearance import arithmetic_pad
-from vdsm_pin.verification.records import ErrorBox, Pair
+from vdsm_pin.verification.records import Pair
 
 
 class ArmPairs:
@@ -40,6 +44,26 @@ class ArmPairs:
             for b, body in enumerate(self.bodies)
             if not arm.ignores(body.name, name)
         ]
+        self.ignored = tuple(
+            LeftOut(body, name, "left out by the problem file")
+            for name in names
+            for body in dict.fromkeys(body.owner for body in self.bodies)
+            if arm.ignores(body, name)
+        )
+
+    @property
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """What nobody holds apart, with a reason each."""
+        return (*self.between.left_out, *self.ignored)
+
+    @cached_property
+    def number(self) -> IntArray:
+        """The pair of each body and obstacle, -1 for none, (n_bodies, n_obstacles)."""
+        shape = len(self.bodies), len(self.problem.scene.obstacles)
+        found = np.full(shape, -1)
+        for pair, at in enumerate(self.outer):
+            found[at] = pair
+        return found
 
     @property
     def size(self) -> int:
@@ -81,6 +105,12 @@ class ArmPairs:
         )
 
 
+def ball_of(problem: PlanningProblem, pair: Pair) -> float:
+    """Radius that grows the core of a pair's own body, as deep as is measured; [m]."""
+    bodies = arm_bodies(problem.manipulator)
+    return next(body.ball for body in bodies if body.name == pair.own)
+
+
 def all_pairs(problem: PlanningProblem) -> tuple[Pair, ...]:
     """Every pair that is judged, in the order of the certificate."""
     return ArmPairs(problem).pairs
@@ -89,6 +119,29 @@ def all_pairs(problem: PlanningProblem) -> tuple[Pair, ...]:
 def pack_scene(problem: PlanningProblem) -> PackedPieces:
     """The obstacles, then the bodies of the arm in the frames of their links."""
     return problem.packed
+
+
+def obstacle_growth(problem: PlanningProblem, errors: ErrorBox) -> list[float]:
+    """How far the surface of each obstacle may be off; [m].
+
+    A turn moves a point by its angle times the distance from the obstacle's middle at
+    most, which is that of the box around its corners along the axes of the base.
+
+    Raises:
+        InvalidInput: If a half-space may be turned.
+    """
+    found = []
+    for obstacle in problem.scene.obstacles:
+        error, reach = errors.of_obstacle(obstacle.name), 0.0
+        if error.turn > 0.0:
+            if isinstance(obstacle, HalfSpace):
+                message = f"obstacle {error.name!r}: a half-space cannot be turned"
+                raise InvalidInput(message)
+            points, grown = corners_of(obstacle)
+            middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
+            reach = float(np.linalg.norm(points - middle, axis=1).max()) + grown
+        found.append(error.shift + error.turn * reach)
+    return found
 
 
 def make_task(
@@ -114,22 +167,32 @@ def make_task(
     bodies = [Body(WORLD, obstacle.pieces, obstacle.name) for obstacle in obstacles]
     bodies += [Body(link_frame(b.link), (b.piece,), b.name) for b in table.bodies]
     columns = arm.n_links + np.arange(len(bodies))
-    columns[len(obstacles) :] = [body.link - 1 for body in table.bodies]
+    # The feed counts as what link 1 is mounted on.
+    columns[len(obstacles) :] = [max(0, body.link - 1) for body in table.bodies]
     rules = (budget or Budget()).rules(arithmetic_pad(problem, pieces))
     reaches = np.full(2 * arm.n_links + 1, reach)
     tree, numbers = arm_tree(arm), table.numbers()
     task = pack_task(tree, bodies, numbers, rules, reaches, columns, pieces)
-    return with_errors(task, errors)
+    return with_errors(task, problem, errors)
 
 
-def with_errors(task: Task, errors: ErrorBox) -> Task:
-    """The same asked about another error box."""
-    tree = task.tree
-    shifts, tilts = np.zeros((2, tree.parent.size))
+def with_errors(task: Task, problem: PlanningProblem, errors: ErrorBox) -> Task:
+    """The same asked about another error box.
+
+    Args:
+        task: Of the same problem.
+        problem: Arm and scene.
+        errors: The box.
+    """
+    return with_growth(task, errors, obstacle_growth(problem, errors))
+
+
+def with_growth(task: Task, errors: ErrorBox, grown: Sequence[float]) -> Task:
+    """The same, the errors of the obstacles' surfaces given in their order; [m]."""
+    shifts, tilts = np.zeros((2, task.tree.parent.size))
     shifts[RAIL], tilts[RAIL] = errors.base, errors.base_turn
-    joints = np.where(tree.kind == REVOLUTE, errors.joint, 0.0)
     asked = task.bodies.number.max(initial=0), task.pairs.obstacle.max(initial=0)
-    surfaces = np.zeros(1 + max(asked))
-    obstacles = task.pairs.obstacle[task.pairs.group == OBSTACLES]
-    surfaces[obstacles] = errors.obstacle
+    surfaces = np.zeros(max(1 + max(asked), len(grown)))
+    surfaces[: len(grown)] = grown
+    joints = np.append(0.0, errors.angles(task.tree.parent.size // 2).reshape(-1))
     return with_box(task, ProofBox(joints, shifts, tilts, surfaces))

@@ -8,7 +8,8 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidInput, OutOfTime, VdsmError
+from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.errors import InvalidInput, OutOfTime, UnknownName, VdsmError
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.geometry.winding import Side
 from vdsm_pin.kinematics import joint_centres
@@ -20,6 +21,7 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification import (
     cable_check,
+    coal_carried,
     coal_clearance,
     coal_links,
     fk,
@@ -55,13 +57,12 @@ from vdsm_pin.verification.records import (
     ClearanceSink,
     ClosestApproach,
     Counterexample,
-    ErrorBox,
     Verdict,
     Verification,
     is_deepest,
 )
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
-from vdsm_pin.verification.task import all_pairs
+from vdsm_pin.verification.task import ArmPairs, all_pairs, ball_of
 from vdsm_pin.verification.tip import check_tip
 
 T = TypeVar("T")
@@ -91,7 +92,8 @@ def verify(
         problem: What is asked.
         trajectory: What is judged, whoever made it.
         robot: The arm in Pinocchio and Coal.
-        errors: The clearance proof covers every motion within it.
+        errors: The clearance proof covers every motion within it, and within the
+            errors of the problem.
         sinks: Receive the clearance brackets in chunks, in order.
         joint_error: Whether to find the largest joint error that is still certified.
         deadline: When to give up what is left.
@@ -107,7 +109,7 @@ def verify(
     Raises:
         InvalidInput: If the trajectory is of another arm or the errors are negative.
     """
-    box = errors or ErrorBox()
+    box = problem.errors.widened(errors or ErrorBox())
     _check_input(problem, trajectory, box)
     located = locate_arm(problem, trajectory, box, deadline)
     around, kept = arm_inside(located), _Lowers(problem, trajectory)
@@ -211,9 +213,9 @@ class _Survival:
         # Nothing is refuted by a hull, and nothing survives that may enter it.
         hulled = replace(problem, scene=with_hulls(problem.scene, hulls))
         self._with_hulls = hulled, trajectory, errors
-        n_links = problem.manipulator.n_links
-        outer = proof.best[: n_links * len(problem.scene.obstacles), LOW]
-        self._least = outer.reshape(-1, n_links).min(axis=1)
+        number = ArmPairs(problem).number
+        lower = np.append(proof.best[:, LOW], np.inf)  # -1 is no pair
+        self._least = lower[number].min(axis=0)
         near = np.array([name in hulls for name in problem.scene.names], np.bool_)
         self._least[near] = -math.inf
 
@@ -285,6 +287,12 @@ def _by_coal(
                 robot, problem, trajectory, deadline, log
             ),
         ),
+        *_guarded(
+            coal_carried.NAME,
+            lambda: coal_carried.check_coal_carried(
+                robot, problem, trajectory, proved, log, deadline
+            ),
+        ),
     )
 
 
@@ -323,19 +331,15 @@ def _check_input(
     if expected != found:
         message = f"trajectory has {found} links, the problem's arm has {expected}"
         raise InvalidInput(message)
-    bodies = [body.name for body in problem.manipulator.bodies]
-    if bodies:
-        names = ", ".join(bodies)
-        message = f"the arm carries {names}: only `prove_clearance` takes bodies so far"
+    for pair in problem.manipulator.ignore_pairs:
+        problem.manipulator.check_ignored(pair, problem.scene.names)
+    if len(errors.joints) not in (0, expected):
+        message = f"errors of {len(errors.joints)} joints, expected {expected}"
         raise InvalidInput(message)
-    if problem.manipulator.ignore_pairs:
-        message = "the arm has ignore_pairs: only `prove_clearance` takes them so far"
-        raise InvalidInput(message)
-    for name in ("joint", "base", "obstacle"):
-        value = getattr(errors, name)
-        if not 0.0 <= value < np.inf:
-            message = f"{name} error is {value}, expected 0 or more"
-            raise InvalidInput(message)
+    for one in errors.obstacles:
+        if one.name not in problem.scene.names:
+            known = problem.scene.names
+            raise UnknownName(kind="obstacle", name=one.name, known=known)
 
 
 def _guarded(
@@ -405,9 +409,7 @@ def closest_approaches(
                 station=_station(problem, trajectory, row, pair.link, mine),
                 link_point=frozen(mine),
                 other_point=frozen(theirs),
-                deeper=is_deepest(
-                    float(row[UP]), problem.manipulator.radius_at(pair.link, pair.body)
-                ),
+                deeper=is_deepest(float(row[UP]), ball_of(problem, pair)),
             )
         )
     return tuple(rows[:CLOSEST])

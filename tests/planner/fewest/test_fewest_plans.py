@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem, random_problem
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.errors import NoPlanFound, OutOfReach, OutOfTime, PathBlocked
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
@@ -22,7 +23,7 @@ from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.hasty import is_certified
 from vdsm_pin.verification.link_clearance import link_clearance
-from vdsm_pin.verification.records import ErrorBox, Verdict
+from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.verify import verify
 
 ARM = built_in("hrm8")

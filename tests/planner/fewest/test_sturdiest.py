@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem, random_problem, straight_arm
 
+from vdsm_pin.error_box import ErrorBox
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
@@ -28,7 +29,7 @@ from vdsm_pin.robot_model import load_robot
 from vdsm_pin.scene import Cylinder, Sphere
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance
-from vdsm_pin.verification.records import ErrorBox, Verdict
+from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robust import largest_joint_error
 from vdsm_pin.verification.verify import verify
 

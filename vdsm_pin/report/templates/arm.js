@@ -21,6 +21,19 @@ function phong(colour, more = {}) {
   return new MeshCat.THREE.MeshPhongMaterial(look);
 }
 
+// The triangles of a solid, its corners merged where it is round.
+function solidShape(solid) {
+  const { BufferGeometry, BufferAttribute } = MeshCat.THREE;
+  let shape = new BufferGeometry();
+  const corners = unpack(solid.vertices, Float32Array);
+  shape.setAttribute("position", new BufferAttribute(corners, 3));
+  shape.setIndex(new BufferAttribute(unpack(solid.triangles, Uint32Array), 1));
+  const indexed = shape;
+  if (!solid.round) shape = shape.toNonIndexed();
+  shape.computeVertexNormals();
+  return [shape, indexed];
+}
+
 class Arm {
   // `scene` is the page's; `more` changes the look of every part, of a ghost for example.
   constructor(scene, more = {}) {
@@ -45,12 +58,26 @@ class Arm {
     });
     const white = phong(0xffffff, { emissive: 0x555555, ...more });
     this.tip = new Mesh(new SphereGeometry(0.35 * r, 16, 12), white);
-    this.group.add(...this.links, ...this.joints, this.tip);
+    this.carried = scene.carried.map((solid) => {
+      const side = { side: MeshCat.THREE.DoubleSide };
+      const body = new Mesh(solidShape(solid)[0], phong(JOINT, { ...side, ...more }));
+      body.name = solid.name;
+      body.userData.link = solid.link; // 0 for the feed, which moves with O_1
+      body.matrixAutoUpdate = false;
+      return body;
+    });
+    this.group.add(...this.links, ...this.joints, this.tip, ...this.carried);
   }
 
-  // Put the arm where its joint centres O_1..O_{N+1} are.
-  pose(centres) {
+  // Put the arm where its joint centres O_1..O_{N+1} and its links' axes are.
+  pose(centres, frames) {
     const { Vector3 } = MeshCat.THREE;
+    for (const body of this.carried) {
+      const link = body.userData.link;
+      const [xx, xy, xz, yx, yy, yz, zx, zy, zz] = frames[link];
+      const [px, py, pz] = centres[Math.max(0, link - 1)];
+      body.matrix.set(xx, yx, zx, px, xy, yy, zy, py, xz, yz, zz, pz, 0, 0, 0, 1);
+    }
     const along = new Vector3(0, 1, 0);
     const points = centres.map((p) => new Vector3(...p));
     this.links.forEach((link, i) => {

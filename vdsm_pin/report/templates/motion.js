@@ -103,9 +103,15 @@ class Motion {
     return between(this.rows, time);
   }
 
-  // Joint centres O_1..O_{N+1} at a time: rows are joined by straight lines in joint
-  // space, as the proof has it. Each link turns by yaw alpha, then by pitch theta.
+  // Joint centres O_1..O_{N+1} at a time.
   centres(time) {
+    return this.poses(time)[0];
+  }
+
+  // The same, and the axes x, y, z of the base and of the links: rows are joined by
+  // straight lines in joint space, as the proof has it. Each link turns by yaw alpha,
+  // then by pitch theta.
+  poses(time) {
     const [k, share] = this.place(time);
     const n = this.lengths.length;
     const next = Math.min(k + 1, this.rows.length - 1);
@@ -113,6 +119,7 @@ class Motion {
       values[k * size + i] * (1 - share) + values[next * size + i] * share;
     let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = [1, 0, 0, 0, 1, 0, 0, 0, 1];
     const points = [[mix(this.x0, 0, 1), 0, 0]];
+    const frames = [[xx, xy, xz, yx, yy, yz, zx, zy, zz]];
     for (let i = 0; i < n; i++) {
       const a = mix(this.alpha, i, n);
       const t = mix(this.theta, i, n);
@@ -124,8 +131,9 @@ class Motion {
       const [px, py, pz] = points[i];
       const length = this.lengths[i];
       points.push([px + length * xx, py + length * xy, pz + length * xz]);
+      frames.push([xx, xy, xz, yx, yy, yz, zx, zy, zz]);
     }
-    return points;
+    return [points, frames];
   }
 
   // Stretches of time off the desired path, as [from, to].

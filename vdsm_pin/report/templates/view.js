@@ -65,16 +65,10 @@ class ArmView {
   }
 
   addObstacles() {
-    const { BufferGeometry, BufferAttribute, Mesh, EdgesGeometry } = this.three;
-    const { LineSegments, LineBasicMaterial, DoubleSide } = this.three;
+    const { Mesh, EdgesGeometry, LineSegments, LineBasicMaterial, DoubleSide } = this.three;
     this.obstacles = this.scene.obstacles.map((solid) => {
-      let shape = new BufferGeometry();
-      const corners = unpack(solid.vertices, Float32Array);
-      shape.setAttribute("position", new BufferAttribute(corners, 3));
-      shape.setIndex(new BufferAttribute(unpack(solid.triangles, Uint32Array), 1));
-      const edges = solid.creased ? new EdgesGeometry(shape, CREASE) : null;
-      if (!solid.round) shape = shape.toNonIndexed();
-      shape.computeVertexNormals();
+      const [shape, indexed] = solidShape(solid);
+      const edges = solid.creased ? new EdgesGeometry(indexed, CREASE) : null;
       const glass = { transparent: true, opacity: GLASS, side: DoubleSide, depthWrite: false };
       const body = new Mesh(shape, phong(GREY, glass));
       const ink = new LineBasicMaterial({ color: 0x5d6878 });
@@ -176,8 +170,9 @@ class ArmView {
   }
 
   pose(time) {
-    this.centres = this.motion.centres(time);
-    this.arm.pose(this.centres);
+    const [centres, frames] = this.motion.poses(time);
+    this.centres = centres;
+    this.arm.pose(centres, frames);
     this.tipNow = this.centres[this.centres.length - 1];
     if (this.cameras.name === "tip") this.cameras.fromTip();
     this.mark(time);

@@ -1,0 +1,95 @@
+"""How far a real motion, its base and its obstacles may be off what was asked about."""
+
+from dataclasses import dataclass, replace
+from itertools import zip_longest
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray
+
+JointErrors = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class ObstacleError:
+    """How far one obstacle may be off.
+
+    Args:
+        name: The obstacle's.
+        shift: In any direction; [m].
+        turn: About any axis through its middle; [rad].
+    """
+
+    name: str
+    shift: float = 0.0
+    turn: float = 0.0
+
+
+@dataclass(frozen=True)
+class ErrorBox:
+    """How far the real motion may stray from the nominal one.
+
+    Args:
+        joint: Error of every theta_i and alpha_i, at most; [rad].
+        base: Largest displacement of the base in any direction, and so of x0; [m].
+        obstacle: Largest displacement of an obstacle surface; [m].
+        base_turn: Largest rotation of the base about its origin; [rad].
+        joints: Errors of alpha_i and theta_i by joint, of the first joints at least;
+            where they are larger than `joint` they count; [rad].
+        obstacles: Errors of single obstacles; the larger shift counts.
+
+    Raises:
+        InvalidInput: If a value is negative or not finite.
+    """
+
+    joint: float = 0.0
+    base: float = 0.0
+    obstacle: float = 0.0
+    base_turn: float = 0.0
+    joints: JointErrors = ()
+    obstacles: tuple[ObstacleError, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse what is no error."""
+        values = [("joint", e) for pair in self.joints for e in pair]
+        values += [("obstacle", e) for o in self.obstacles for e in (o.shift, o.turn)]
+        values += [(name, getattr(self, name)) for name in PLAIN]
+        for name, value in values:
+            if not 0.0 <= value < np.inf:
+                message = (
+                    f"{name.replace('_', ' ')} error is {value}, expected 0 or more"
+                )
+                raise InvalidInput(message)
+
+    def with_joint(self, joint: float) -> "ErrorBox":
+        """The same with one error of all joint angles; [rad]."""
+        return replace(self, joint=joint, joints=())
+
+    def angles(self, n_links: int) -> FloatArray:
+        """Largest errors of alpha_i and theta_i, shape (N, 2); [rad]."""
+        errors = np.full((n_links, 2), self.joint)
+        given = np.array(self.joints[:n_links]).reshape(-1, 2)
+        errors[: len(given)] = np.maximum(errors[: len(given)], given)
+        return errors
+
+    def of_obstacle(self, name: str) -> ObstacleError:
+        """How far an obstacle may be off."""
+        mine = [one for one in self.obstacles if one.name == name]
+        shift = max([self.obstacle, *(one.shift for one in mine)])
+        return ObstacleError(name, shift, max([0.0, *(one.turn for one in mine)]))
+
+    def widened(self, other: "ErrorBox") -> "ErrorBox":
+        """The least box that has both."""
+        nothing = (0.0, 0.0)
+        both = zip_longest(self.joints, other.joints, fillvalue=nothing)
+        plain = {name: max(getattr(self, name), getattr(other, name)) for name in PLAIN}
+        return ErrorBox(
+            **plain,
+            joints=tuple((max(a[0], b[0]), max(a[1], b[1])) for a, b in both),
+            obstacles=tuple(dict.fromkeys((*self.obstacles, *other.obstacles))),
+        )
+
+
+PLAIN = ("joint", "base", "obstacle", "base_turn")
+"""The errors that are one number."""

@@ -1,0 +1,58 @@
+"""The shapes of the problem file as bodies that ride on a link."""
+
+from typing import Annotated, TypeAlias
+
+from pydantic import Field
+
+from vdsm_pin.io import obstacle_schema as shapes
+from vdsm_pin.io.schema_types import FileModel
+from vdsm_pin.manipulator import MAX_LINKS
+
+MAX_PARTS = 256
+"""Most hulls that a mesh is covered by."""
+
+
+class _OnLink(FileModel):
+    link: int = Field(
+        ge=1,
+        le=MAX_LINKS,
+        description="The link that it rides on, from 1. Its fields are in the frame of "
+        "that link: origin at its first joint, x along it.",
+    )
+
+
+class SphereBody(_OnLink, shapes.SphereModel):
+    """A ball on a link."""
+
+
+class CapsuleBody(_OnLink, shapes.CapsuleModel):
+    """A capsule on a link."""
+
+
+class CylinderBody(_OnLink, shapes.CylinderModel):
+    """A cylinder on a link."""
+
+
+class BoxBody(_OnLink, shapes.BoxModel):
+    """A cuboid on a link."""
+
+
+class PrismBody(_OnLink, shapes.PrismModel):
+    """A prism on a link."""
+
+
+class MeshBody(_OnLink, shapes.MeshModel):
+    """A mesh on a link: what is proved clear are hulls that hold all of it."""
+
+    parts: int = Field(
+        default=1,
+        ge=1,
+        le=MAX_PARTS,
+        description="Hulls of groups of its triangles that the mesh is covered by.",
+    )
+
+
+BodyModel: TypeAlias = Annotated[
+    SphereBody | CapsuleBody | CylinderBody | BoxBody | PrismBody | MeshBody,
+    Field(discriminator="shape"),
+]

@@ -1,0 +1,228 @@
+"""Coal's distances of the feed and of what the links carry, against what was proved.
+
+Poses come from Pinocchio and shapes from the problem. A mesh is proved clear by hulls
+around it, which are nearer than its triangles: there Coal can contradict the lower
+bound alone.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.manipulator import PART
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.scene import Mesh
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.coal_bodies import (
+    CoalBody,
+    CoalCloud,
+    CoalObstacle,
+    coal_bodies,
+    distance_request,
+    measure,
+)
+from vdsm_pin.verification.coal_clearance import ProvedLowers
+from vdsm_pin.verification.coal_log import CoalLog, rows_at
+from vdsm_pin.verification.records import Check, Pair, Verdict
+
+NAME: Final = "distances of feed and carried bodies by Coal against the proved ones"
+"""Name of the row."""
+
+ROWS: Final = 32
+"""Rows at which each pair is measured, evenly over the motion."""
+
+Names = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class _Rider:
+    """What rides on a link, as Coal has it.
+
+    Args:
+        link: 1 to N, 0 for the feed's frame, -1 for the base.
+        parts: In the frame of the link; a cloud is in the base's.
+    """
+
+    link: int
+    parts: CoalObstacle
+
+    def placed(self, frame: Any) -> CoalObstacle:
+        """The parts where the frame of the link is."""
+        if isinstance(self.parts, CoalCloud):
+            return self.parts
+        return tuple(CoalBody(one.geometry, frame * one.pose) for one in self.parts)
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """What Coal says of one pair of bodies at one moment.
+
+    Args:
+        names: Of the bodies.
+        moment: In waypoints.
+        distance: -inf where it is unusable; [m].
+        excess: How far it is outside of what was proved; [m].
+    """
+
+    names: Names
+    moment: float
+    distance: float
+    excess: float
+
+
+def check_coal_carried(
+    robot: RobotModel,
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    proved: ProvedLowers,
+    log: CoalLog,
+    deadline: Deadline = NO_LIMIT,
+) -> tuple[Check, ...]:
+    """Hold Coal's distances of feed and carried bodies against the proved ones.
+
+    Args:
+        robot: The arm in Pinocchio and Coal.
+        problem: The arm and the scene.
+        trajectory: What is judged.
+        proved: Proved lower bounds of the intervals.
+        log: Has the pairs and the closest approaches, and keeps every answer.
+        deadline: When to give up.
+
+    Returns:
+        One row of evidence with the largest disagreement; none without such bodies.
+
+    Raises:
+        OutOfTime: If the time is over.
+    """
+    groups = _groups(problem, log.pairs)
+    if not groups:
+        return ()
+    riders = _riders(robot, problem)
+    count, worst = 0, _Answer(("", ""), float("nan"), 0.0, -np.inf)
+    meshes = tuple(
+        b.name for b in problem.manipulator.bodies if isinstance(b.solid, Mesh)
+    )
+    for names in groups:
+        deadline.check()
+        both = riders[names[0]], riders[names[1]]
+        rows = _at_rows(robot, trajectory, both, proved, groups[names])
+        near = _at_approaches(robot, trajectory, both, log, names, meshes)
+        for answer in (*rows, *near):
+            found = _Answer(names, *answer)
+            count += 1
+            if found.excess > worst.excess:
+                worst = found
+    agreed = worst.excess <= TOLERANCES.coal_agreement
+    row = Check(
+        name=NAME,
+        verdict=Verdict.CERTIFIED if agreed else Verdict.UNDECIDED,
+        count=count,
+        worst=worst.excess,
+        limit=TOLERANCES.coal_agreement,
+        unit="m",
+        where=f"{' and '.join(worst.names)}: Coal {worst.distance * MM_PER_M:.6f} mm",
+        moment=worst.moment,
+    )
+    return (row,)
+
+
+def _groups(
+    problem: PlanningProblem, pairs: tuple[Pair, ...]
+) -> Mapping[Names, IntArray]:
+    """Numbers of the pairs of each two bodies, parts of one taken together."""
+    arm, found = problem.manipulator, dict[Names, list[int]]()
+    carried = {solid.name for _, solid in arm.carried}
+    for number, pair in enumerate(pairs):
+        names = pair.own.split(PART)[0], pair.label.split(PART)[0]
+        other = names[1] if not pair.obstacle else ""
+        if carried & {names[0], other}:
+            found.setdefault(names, []).append(number)
+    return {names: np.array(numbers) for names, numbers in found.items()}
+
+
+def _riders(robot: RobotModel, problem: PlanningProblem) -> dict[str, _Rider]:
+    """Every body and obstacle by its name."""
+    import coal
+
+    arm, found = problem.manipulator, dict[str, _Rider]()
+    for obstacle in problem.scene.obstacles:
+        found[obstacle.name] = _Rider(-1, coal_bodies(obstacle))
+    for k, name in enumerate(arm.axis_names):
+        local = robot.T_link_capsule[k]
+        pose = coal.Transform3s(local[:3, :3].copy(), local[:3, 3].copy())
+        rod = CoalBody(robot.capsules[k], pose)
+        found[name] = _Rider(min(k + 1, arm.n_links), (rod,))
+    for link, solid in arm.carried:
+        found[solid.name] = _Rider(link, coal_bodies(solid))
+    return found
+
+
+def _at_rows(
+    robot: RobotModel,
+    trajectory: Trajectory,
+    both: tuple[_Rider, _Rider],
+    proved: ProvedLowers,
+    numbers: IntArray,
+) -> Iterator[tuple[float, float, float]]:
+    """Moment, distance and excess at rows all over the motion."""
+    steps = np.linspace(0, trajectory.n_samples - 1, ROWS)
+    rows = np.unique(steps.astype(np.int64))
+    some = rows_at(trajectory, rows.astype(np.float64))
+    for row, distance in zip(rows, _distances(robot, some, both), strict=True):
+        waypoint = np.full(numbers.size, row)
+        lower = proved.at(waypoint, numbers).min()
+        yield float(row), distance, float(lower - max(distance, 0.0))
+
+
+def _at_approaches(
+    robot: RobotModel,
+    trajectory: Trajectory,
+    both: tuple[_Rider, _Rider],
+    log: CoalLog,
+    names: Names,
+    meshes: tuple[str, ...],
+) -> Iterator[tuple[float, float, float]]:
+    """The same where the two come nearest, upper bounds included."""
+    for k, near in enumerate(log.approaches):
+        if (near.pair.own, near.pair.label) != names:
+            continue
+        some = rows_at(trajectory, np.array([near.moment]))
+        distance = float(_distances(robot, some, both)[0])
+        log.keep_approaches(np.array([k]), np.array([distance]))
+        value, excess = max(distance, 0.0), near.lower - max(distance, 0.0)
+        if not set(names) & set(meshes):
+            excess = max(excess, value - max(near.upper, 0.0))
+        yield near.moment, distance, excess
+
+
+def _distances(
+    robot: RobotModel, rows: Trajectory, both: tuple[_Rider, _Rider]
+) -> FloatArray:
+    """Coal's distances at rows, shape (m,); [m]."""
+    import coal
+
+    poses = robot.link_poses(rows.x0, rows.alpha, rows.theta)
+    found, request = np.full(rows.n_samples, np.inf), distance_request()
+    still = coal.Transform3s.Identity()
+
+    def frame(link: int, row: int) -> Any:
+        if link < 0:
+            return still
+        turned = poses.rotations[row, link - 1] if link else np.eye(3)
+        return coal.Transform3s(turned, poses.origins[row, max(0, link - 1)])
+
+    for row in range(rows.n_samples):
+        mine, theirs = (frame(one.link, row) for one in both)
+        parts, own = both[1].placed(theirs), both[0].placed(mine)
+        assert not isinstance(own, CoalCloud)  # an obstacle is the other one
+        for part in own:
+            answer = measure(request, part.geometry, part.pose, parts)
+            found[row] = min(found[row], answer.distance)
+    return found
