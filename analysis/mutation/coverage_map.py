@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -10,8 +11,8 @@ from typing import Any, Final
 
 import coverage
 
-SLOW: Final = 20.0
-"""Tests that take longer are not asked; [s]."""
+SLOW: Final = 6.0
+"""Tests that take longer are ended, and not asked; [s]."""
 
 PLAIN: Final = "NUMBA_DISABLE_JIT"
 """Where it is 1, functions for machine code run as they stand, in Python."""
@@ -47,6 +48,11 @@ class CoverageMap:
         return chosen
 
 
+def _end_test(*_: object) -> None:
+    message = "is too slow to be asked"
+    raise TimeoutError(message)
+
+
 class Recorder:
     """A plugin of pytest: the test that runs is the context of what is covered."""
 
@@ -58,6 +64,12 @@ class Recorder:
         """A test begins."""
         self._running.switch_context(nodeid)
         self.seconds[nodeid] = 0.0
+        signal.signal(signal.SIGPROF, _end_test)
+        signal.setitimer(signal.ITIMER_PROF, SLOW)  # of this process's computing
+
+    def pytest_runtest_logfinish(self) -> None:
+        """A test ends."""
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
 
     def pytest_runtest_logreport(self, report: Any) -> None:
         """A part of a test is done."""
