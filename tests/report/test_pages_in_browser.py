@@ -19,7 +19,12 @@ from vdsm_pin.report.facts import batch_row, verification_file
 from vdsm_pin.report.html import write_index, write_report
 from vdsm_pin.report.picture import picture
 from vdsm_pin.report.words import OUTCOMES
-from vdsm_pin.verification.records import Check, Verdict
+from vdsm_pin.verification.records import (
+    Check,
+    Counterexample,
+    ErrorBox,
+    Verdict,
+)
 
 pytestmark = NEEDS_CHROMIUM
 
@@ -288,4 +293,50 @@ def test_an_index_of_a_thousand_problems_sorts_at_once(
     shown = page.locator("#problems tbody tr:visible").count()
     assert shown == sum(row.outcome == "refuted" for row in rows)
     watched.shot("index")
+    assert watched.errors == []
+
+
+def test_the_arm_of_a_counterexample_is_a_ghost_at_its_moment(
+    browser: Any, tmp_path: Path
+) -> None:
+    judged = made_up.verification(Verdict.REFUTED)
+    rows, arm = judged.trajectory, judged.problem.manipulator
+    joints = rows.joints[100].copy()
+    joints[1:] += 0.05
+    found = Counterexample(
+        interval=100, share=0.0, pair=judged.pairs[7], joints=joints,
+        offsets=joints - rows.joints[100], clearance=-0.01, required=0.0035,
+        link_point=np.zeros(3), other_point=np.zeros(3),
+    )  # fmt: skip
+    judged = replace(
+        judged,
+        errors=ErrorBox(joint=0.05, base=0.001),
+        counterexamples=(found,),
+        nominal_clear=True,
+    )
+    path = tmp_path / "report.html"
+    write_report(path, judged, verification_file(judged, made_up.RECORD))
+    watched = Watched(browser, path.as_uri(), viewport={"width": 800, "height": 600})
+    watched.page.wait_for_function("window.vdsm && window.vdsm.view")
+    seen = "vdsm.view.ghosts.map((one) => one.arm.group.visible)"
+    watched.page.evaluate("vdsm.motion.go(20)")
+    assert watched.page.evaluate(seen) == [False]
+    watched.page.evaluate("vdsm.motion.go(100)")
+    assert watched.page.evaluate(seen) == [True]
+    (ghost,) = watched.page.evaluate(
+        "vdsm.view.ghosts.map((one) => [one.centres, one.words])"
+    )
+    values = joints[:1], joints[None, 1::2], joints[None, 2::2]
+    np.testing.assert_allclose(ghost[0], joint_centres(arm, *values)[0], atol=1e-12)
+    assert "link 8 comes too near pillar" in ghost[1][0]
+    assert ghost[1][1:] == [
+        "errors of base and obstacles are not drawn", "the nominal motion is clear"
+    ]  # fmt: skip
+    with_ghost = pixels(watched.page)
+    watched.page.evaluate(
+        "vdsm.view.ghosts[0].arm.group.visible = false, vdsm.view.viewer.set_dirty()"
+    )
+    watched.page.wait_for_timeout(200)
+    less_green = pixels(watched.page)[:, 1] - with_ghost[:, 1]
+    assert (less_green > 0.1).sum() > 200, "no ghost is drawn"
     assert watched.errors == []

@@ -189,8 +189,26 @@ def test_the_row_says_refuted_and_the_nominal_motion_needs_no_counterexample() -
         assert row.verdict is verdict
         assert len(found.counterexamples) == count
     assert row.worst == found.counterexamples[0].clearance
-    assert "within the error box" in row.where
+    assert row.where.endswith("within the error box; the nominal motion is clear")
+    assert found.nominal_clear
     touching = replace(problem, required_clearance=0.06)
     found = verify(touching, rows, robot, errors=ErrorBox(joint=0.01))
     assert found.counterexamples == ()
     assert found.verdict is Verdict.REFUTED
+    assert not found.nominal_clear
+
+
+def test_the_nominal_motion_is_called_clear_only_where_all_of_it_is_proved() -> None:
+    """Two open sheets beside the arm have a hull: away from it, or around it."""
+    rows, robot, box = motion(2), load_robot(ARM), ErrorBox(joint=0.01)
+    low = np.array([[0.0, 1.0, -2.0], [1.0, 1.0, -2.0], [0.0, 2.0, -2.0]])
+    for other, clear in (([0.0, 0.1, -0.1], True), ([0.0, -3.0, 0.0], False)):
+        corners = np.vstack([low, low + other])
+        if not clear:
+            corners += [0.0, 0.0, 2.0]
+        sheets = Mesh("sheets", corners, np.array([[0, 1, 2], [3, 4, 5]]))
+        found = verify(problem_with(ceiling(0.05), sheets), rows, robot, errors=box)
+        assert len(found.counterexamples) == 1
+        assert found.nominal_clear is clear
+        row = next(c for c in found.checks if c.name == "clearance from obstacles")
+        assert row.where.endswith("is clear") is clear

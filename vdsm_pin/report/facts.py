@@ -378,6 +378,9 @@ def verification_file(
             counterexample_row(verification, found)
             for found in verification.counterexamples
         ),
+        nominal_clear=verification.nominal_clear
+        if verification.counterexamples
+        else None,
         motion=motion_facts(problem, verification.trajectory),
         hashes=hashes(record),
         versions=versions(),

@@ -278,6 +278,10 @@ class VerificationFile(FileModel):
         description="errors within the box that lose the clearance where it is refuted "
         "for the box alone: one against obstacles, one between links, at most"
     )
+    nominal_clear: bool | None = Field(
+        description="whether the motion without errors is proved clear; null where "
+        "there is no counterexample"
+    )
     motion: MotionFacts
     hashes: Hashes
     versions: dict[str, str] = Field(description=_VERSIONS)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.charts import charts, packed
 from vdsm_pin.report.facts import failing, finite
@@ -22,7 +23,11 @@ from vdsm_pin.report.thinning import (
 )
 from vdsm_pin.scene import Obstacle
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.records import ClosestApproach, Verification
+from vdsm_pin.verification.records import (
+    ClosestApproach,
+    Counterexample,
+    Verification,
+)
 
 
 def scene_data(
@@ -100,6 +105,19 @@ def closest_data(problem: PlanningProblem, approach: ClosestApproach) -> dict[st
     }
 
 
+def ghost_data(verification: Verification, found: Counterexample) -> dict[str, Any]:
+    """The arm of a counterexample, errors applied; base frame, [m]."""
+    joints, arm = found.joints, verification.problem.manipulator
+    centres = joint_centres(arm, joints[:1], joints[None, 1::2], joints[None, 2::2])[0]
+    pair = f"{found.pair.own} comes too near {found.pair.label}"
+    words = [f"transparent: with joint errors within the error box {pair}"]
+    if verification.errors.base > 0.0 or verification.errors.obstacle > 0.0:
+        words.append("errors of base and obstacles are not drawn")
+    if verification.nominal_clear:
+        words.append("the nominal motion is clear")
+    return {"moment": found.moment, "centres": centres.tolist(), "words": words}
+
+
 @dataclass(frozen=True)
 class PageData:
     """What a page is made of.
@@ -119,14 +137,16 @@ class PageData:
 
 def report_data(verification: Verification) -> PageData:
     """The data of a report."""
-    intervals = np.array(
-        [row.interval for row in verification.approaches], dtype=np.int64
-    )
+    lost = verification.counterexamples
+    remarkable = [row.interval for row in verification.approaches]
+    remarkable += [one.interval for one in lost]
+    intervals = np.array(remarkable, dtype=np.int64)
     shown = thinned(verification.trajectory, np.concatenate([intervals, intervals + 1]))
     plots = charts(verification, shown)
     obstacles = verification.problem.scene.obstacles
     drawn = [obstacles[k] for k in nearest_obstacles(verification, MOST_DRAWN)]
     scene = scene_data(verification.problem, drawn)
+    scene["ghosts"] = [ghost_data(verification, one) for one in lost]
     text = _embedded(
         {
             "scene": scene,

@@ -24,6 +24,8 @@ def check_clearance(
     counterexamples: tuple[Counterexample, ...],
     contacts: tuple[FirstContact, ...] = (),
     deadline: Deadline = NO_LIMIT,
+    *,
+    nominal: bool = False,
 ) -> tuple[Check, ...]:
     """One row for the obstacles, one for the links among themselves.
 
@@ -33,6 +35,7 @@ def check_clearance(
         counterexamples: Motions within it that refute what the proof left undecided.
         contacts: Where the clearance is first lost.
         deadline: When the proof had to end.
+        nominal: Whether the motion without errors is proved clear.
     """
     late = f": {OutOfTime(deadline.limit)}" if proof.late else ""
     of_obstacles = np.array([bool(pair.obstacle) for pair in proof.pairs], dtype=bool)
@@ -51,7 +54,7 @@ def check_clearance(
             for contact in contacts:
                 if bool(contact.pair.obstacle) == bool(of_obstacles[mine][0]):
                     row = _first(row, contact)
-            rows.append(_refuted(row, against[0]) if against else row)
+            rows.append(_refuted(row, against[0], nominal) if against else row)
     said = "".join(f"; {name!r} as a surface only" for name in surfaces(problem))
     if said:
         rows[0] = replace(rows[0], where=rows[0].where + said)
@@ -111,14 +114,15 @@ def _first(row: Check, contact: FirstContact) -> Check:
     )
 
 
-def _refuted(row: Check, found: Counterexample) -> Check:
+def _refuted(row: Check, found: Counterexample, nominal: bool) -> Check:
     """The row of an undecided proof that a counterexample decides."""
     pair = f"{found.pair.own} and {found.pair.label}"
+    clear = "; the nominal motion is clear" if nominal else ""
     return replace(
         row,
         verdict=Verdict.REFUTED,
         worst=found.clearance,
-        where=f"{pair}, with errors within the error box",
+        where=f"{pair}, with errors within the error box{clear}",
         moment=found.moment,
         deeper=found.deeper,
     )

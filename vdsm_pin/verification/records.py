@@ -285,6 +285,8 @@ class Verification(Summarised):
             counterexample; NaN if none was looked for or found; [rad].
         counterexamples: Motions within the error box that miss a required clearance:
             one against obstacles, one between links, at most.
+        nominal_clear: Whether, where there are any, the motion without errors is proved
+            clear.
         not_done: What the time limit left out besides checks, which have their rows;
             in words, one thing each.
         time_limit: How long all of it was allowed to take; [s].
@@ -305,6 +307,7 @@ class Verification(Summarised):
     joint_error: float
     refuted_joint_error: float = nan
     counterexamples: tuple[Counterexample, ...] = ()
+    nominal_clear: bool = False
     not_done: tuple[str, ...] = ()
     time_limit: float = float("inf")
     least: LeastClearances | None = None

@@ -43,6 +43,7 @@ from vdsm_pin.verification.enclosed import (
     enclosed_profile,
 )
 from vdsm_pin.verification.first_contact import FirstContact, TooClose, first_contacts
+from vdsm_pin.verification.hasty import is_certified
 from vdsm_pin.verification.inside import (
     arm_inside,
     check_inside,
@@ -130,6 +131,11 @@ def verify(
         lambda: find_counterexamples(problem, trajectory, box, proof, deadline),
         none,
     )
+    nominal = bool(found) and besides.take(
+        "proof of the motion without errors",
+        lambda: _is_clear(problem, trajectory, deadline),
+        False,
+    )
     nowhere: tuple[FirstContact, ...] = ()
     contacts = besides.take(
         "first contact",
@@ -158,7 +164,9 @@ def verify(
         ),
         *check_inside(located),
         *enclosed_checks(
-            check_clearance(problem, proof, found, contacts, deadline), problem, around
+            check_clearance(problem, proof, found, contacts, deadline, nominal=nominal),
+            problem,
+            around,
         ),
         *_by_coal(robot, problem, trajectory, proved, deadline, log),
         *_guarded(
@@ -190,11 +198,21 @@ def verify(
         joint_error=largest,
         refuted_joint_error=refuted,
         counterexamples=found,
+        nominal_clear=nominal,
         not_done=tuple(besides.not_done),
         time_limit=deadline.limit,
         least=enclosed_least(least_clearances(proof), proof.pairs, problem, around),
         coal=log.rows(),
     )
+
+
+def _is_clear(
+    problem: PlanningProblem, trajectory: Trajectory, deadline: Deadline
+) -> bool:
+    """Whether a motion is proved clear of everything, without errors."""
+    located = locate_arm(problem, trajectory, ErrorBox(), deadline)
+    outside = all(where.side is Side.OUTSIDE for where in located.values())
+    return outside and is_certified(problem, trajectory, ErrorBox(), deadline)
 
 
 class _Survival:

@@ -44,6 +44,7 @@ class Overlay {
     this.triad();
     this.bar();
     if (this.numbers) this.linkNumbers();
+    if (this.view.ghost) this.caption(this.view.ghost.words);
     if (this.view.due && measured(this.view.shown)) this.dimension(this.view.shown);
   }
 
@@ -122,6 +123,12 @@ class Overlay {
       const place = this.seen(middle);
       if (place) this.text(String(i + 1), ...place, this.ink, "center");
     }
+  }
+
+  // What the transparent arm is, in lines above the scale.
+  caption(lines) {
+    lines.forEach((words, k) =>
+      this.text(words, 16, this.height - 84 - 18 * (lines.length - 1 - k), this.red));
   }
 
   // The gap between the two witness points, as on a drawing.

@@ -3,6 +3,7 @@
 
 const CREASE = 32; // degrees between two faces from which on their edge is drawn
 const GLASS = 0.42; // how opaque an obstacle is that is seen through
+const GHOST = 0.5; // and an arm with errors
 const GREY = 0x8a94a6;
 const MARKED = { short: 0xe03131, kept: 0x2f8ae5 }; // the two that come near each other
 const DUE = 1.5; // waypoints around its moment during which a gap is shown
@@ -30,6 +31,7 @@ class ArmView {
     this.addPaths();
     this.arm = new Arm(scene);
     this.root.add(this.arm.group);
+    this.addGhosts();
     this.addObstacles();
     this.addFloor();
     for (const pin of scene.pins || []) this.addPin(pin);
@@ -136,6 +138,26 @@ class ArmView {
     this.root.add(this.line(rail, 0x8b93a1, 0.8));
   }
 
+  // Arms with errors that are not held, beside the nominal one.
+  addGhosts() {
+    const look = { transparent: true, opacity: GHOST, depthWrite: false };
+    this.ghosts = (this.scene.ghosts || []).map((told) => {
+      const colours = this.scene.colours.map(() => MARKED.short);
+      const arm = new Arm({ ...this.scene, colours }, look);
+      arm.pose(told.centres);
+      this.root.add(arm.group);
+      return { ...told, arm };
+    });
+  }
+
+  // The ghost of a moment, if there is one; the others are not seen.
+  showGhost(time) {
+    const near = this.ghosts.filter((one) => Math.abs(one.moment - time) < DUE);
+    near.sort((a, b) => Math.abs(a.moment - time) - Math.abs(b.moment - time));
+    this.ghost = near[0] || null;
+    for (const one of this.ghosts) one.arm.group.visible = one === this.ghost;
+  }
+
   // A ring around a place of the desired path.
   addPin(place) {
     const { Mesh, TorusGeometry, MeshBasicMaterial } = this.three;
@@ -175,6 +197,7 @@ class ArmView {
     this.arm.pose(centres, frames);
     this.tipNow = this.centres[this.centres.length - 1];
     if (this.cameras.name === "tip") this.cameras.fromTip();
+    this.showGhost(time);
     this.mark(time);
     this.viewer.set_dirty();
   }
