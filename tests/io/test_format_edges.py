@@ -1,0 +1,247 @@
+"""Formats of meshes where other programs go other ways: by quaternions and by hand."""
+
+import json
+import struct
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_mesh_formats import HERE, INPUT, dae, glb, setting, triangles_of, write
+
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.io.mesh_file import read_mesh
+from vdsm_pin.io.meshes import dae as dae_format
+from vdsm_pin.io.meshes.faces import cut_faces
+from vdsm_pin.io.obstacle_builder import unit_vector, without_repeats
+
+
+def turned(q: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Oracle: q p q* by products of quaternions, scalar last."""
+
+    def times(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        vector = a[3] * b[:3] + b[3] * a[:3] + np.cross(a[:3], b[:3])
+        return np.array([*vector, a[3] * b[3] - a[:3] @ b[:3]])
+
+    conjugate = q * [-1, -1, -1, 1]
+    return times(times(q, np.array([*point, 0.0])), conjugate)[:3]
+
+
+def made(positions: np.ndarray, faces: list[int], **node: Any) -> bytes:
+    """A GLB of one node, by hand."""
+    kinds = {"f": 5126, "h": 5122, "B": 5121}
+    kind = "f" if positions.dtype == np.float32 else positions.dtype.char
+    data = positions.tobytes() + b"\0" * (-positions.nbytes % 4)
+    order = np.array(faces, np.uint16)
+    normalized = node.pop("normalized", False)
+    stride = positions.itemsize * 3
+    document = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, **node}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "buffers": [{"byteLength": len(data) + order.nbytes}],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": positions.nbytes, "byteStride": stride},
+            {"buffer": 0, "byteOffset": len(data), "byteLength": order.nbytes},
+        ],
+        "accessors": [
+            {
+                "bufferView": 0,
+                "componentType": kinds[kind],
+                "count": len(positions),
+                "type": "VEC3",
+                "normalized": normalized,
+            },
+            {
+                "bufferView": 1,
+                "componentType": 5123,
+                "count": len(order),
+                "type": "SCALAR",
+            },
+        ],
+    }
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    body = data + order.tobytes()
+    body += b"\0" * (-len(body) % 4)
+    chunks = struct.pack("<I", len(text)) + b"JSON" + text
+    chunks += struct.pack("<I", len(body)) + b"BIN\0" + body
+    return b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks
+
+
+CORNERS = np.array([[1, 2, 3], [4, -5, 6], [-7, 8, 9]], np.float32)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_node_of_glb_turns_by_its_quaternion(seed: int, tmp_path: Path) -> None:
+    rng = np.random.default_rng(seed)
+    q, scale, shift = rng.normal(size=4), rng.uniform(0.5, 2, 3), rng.normal(size=3)
+    node = {"rotation": (3.0 * q).tolist(), "scale": scale.tolist()}
+    content = made(CORNERS, [0, 1, 2], **node, translation=shift.tolist())
+    q /= np.linalg.norm(q)
+    expected = [turned(q, scale * p) + shift for p in CORNERS.astype(float)]
+    (found,) = triangles_of(content, tmp_path)
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("key", ["translation", "scale", "rotation", "matrix"])
+def test_what_a_node_of_glb_does_not_state_changes_nothing(
+    key: str, tmp_path: Path
+) -> None:
+    values: dict[str, list[float]] = {
+        "translation": [1.0, 2.0, 3.0],
+        "scale": [2.0, 3.0, 4.0],
+        "rotation": [0.0, 0.0, 1.0, 0.0],  # half a turn about z
+        "matrix": [2.0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 4, 0, 1, 2, 3, 1],  # by columns
+    }
+    (found,) = triangles_of(made(CORNERS, [0, 1, 2], **{key: values[key]}), tmp_path)
+    expected = {
+        "translation": CORNERS + np.array([1, 2, 3]),
+        "scale": CORNERS * [2, 3, 4],
+        "rotation": CORNERS * [-1, -1, 1],
+        "matrix": CORNERS * [2, 3, 4] + [1, 2, 3],
+    }[key]
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_indices_of_glb_beyond_whole_triangles_are_left(tmp_path: Path) -> None:
+    for count in (3, 4, 5):
+        found = triangles_of(made(CORNERS, [0, 1, 2, 2, 1][:count]), tmp_path)
+        np.testing.assert_array_equal(found, [CORNERS])
+
+
+def test_whole_numbers_of_glb_are_shares_where_they_are_said_to_be(
+    tmp_path: Path,
+) -> None:
+    shorts = np.array([[32767, 0, -32767], [-32768, 16384, 1], [5, 6, 7]], np.int16)
+    for normalized, expected in (
+        (True, np.maximum(shorts / 32767.0, -1.0)),
+        (False, shorts.astype(float)),
+    ):
+        content = made(shorts, [0, 1, 2], normalized=normalized)
+        (found,) = triangles_of(content, tmp_path)
+        np.testing.assert_allclose(found, expected, rtol=1e-15)
+    bytes_ = np.array([[255, 0, 51], [1, 2, 3], [9, 8, 7]], np.uint8)
+    (found,) = triangles_of(made(bytes_, [0, 1, 2], normalized=True), tmp_path)
+    np.testing.assert_allclose(found, bytes_ / 255.0, rtol=1e-15)
+    content = made(CORNERS, [0, 1, 2], normalized=True)
+    np.testing.assert_array_equal(triangles_of(content, tmp_path), [CORNERS])
+
+
+def test_a_chunk_of_glb_that_promises_more_than_there_is(tmp_path: Path) -> None:
+    content = bytearray(made(CORNERS, [0, 1, 2]))
+    size = int.from_bytes(content[12:16], "little")
+    at = 20 + size
+    there = int.from_bytes(content[at : at + 4], "little")
+    content[at : at + 4] = (there + 1).to_bytes(4, "little")
+    with pytest.raises(InvalidFile, match=f"a chunk promises {there + 1} bytes, fewer"):
+        read_mesh(write(tmp_path, "a.glb", bytes(content)))
+    other = made(CORNERS, [0, 1, 2])  # an unknown chunk behind the others is no matter
+    more = struct.pack("<I", 4) + b"MORE" + b"1234"
+    longer = other[:8] + struct.pack("<I", len(other) + len(more)) + other[12:] + more
+    np.testing.assert_array_equal(triangles_of(longer, tmp_path), [CORNERS])
+
+
+def test_glb_by_hand_and_by_trimesh_are_read_alike(tmp_path: Path) -> None:
+    ours = triangles_of(glb(setting("asset", "generator", "hand")), tmp_path)
+    assert len(ours) == 12
+
+
+@pytest.mark.parametrize(
+    ("faces", "count"),
+    [
+        ("<vcount>2 3 0 1</vcount><p>0 1 0 1 2 3</p>", 1),
+        ("<vcount>3</vcount><p>0 1 2</p>", 1),
+    ],
+)
+def test_faces_of_dae_with_too_few_corners_are_left_out(
+    faces: str, count: int, tmp_path: Path
+) -> None:
+    root = f"<polylist>{INPUT}{faces}</polylist>"
+    mesh = read_mesh(write(tmp_path, "a.dae", dae(HERE, root=root)))
+    assert len(mesh.triangles) == count
+
+
+@pytest.mark.parametrize("stride", [1, 2, 5, 64])
+def test_corners_of_dae_have_as_many_numbers_as_inputs(
+    stride: int, tmp_path: Path
+) -> None:
+    more = "".join(
+        f'<input semantic="TEXCOORD" source="#s" offset="{k}"/>'
+        for k in range(1, stride)
+    )
+    numbers = " ".join(
+        " ".join([str(v), *["7"] * (stride - 1)]) for v in (0, 1, 2, 0, 2, 3)
+    )
+    root = f'<triangles count="2">{INPUT}{more}<p>{numbers}</p></triangles>'
+    mesh = read_mesh(write(tmp_path, "a.dae", dae(HERE, root=root)))
+    np.testing.assert_array_equal(
+        mesh.vertices[mesh.triangles][0], [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    )
+    assert len(mesh.triangles) == 2
+
+
+def test_a_dae_is_as_large_as_it_may_be(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = write(tmp_path, "a.dae", dae(HERE))
+    monkeypatch.setattr(dae_format, "MAX_BYTES", file.stat().st_size)
+    assert len(read_mesh(file).triangles) == 4
+    monkeypatch.setattr(dae_format, "MAX_BYTES", file.stat().st_size - 1)
+    with pytest.raises(InvalidFile, match="is larger than"):
+        read_mesh(file)
+
+
+def test_a_note_of_dae_counts_the_parts_that_have_it(tmp_path: Path) -> None:
+    lines = f"<lines>{INPUT}<p>0 1</p></lines>"
+    triangles = f'<triangles count="1">{INPUT}<p>0 1 2</p></triangles>'
+    mesh = read_mesh(
+        write(tmp_path, "a.dae", dae(HERE, root=triangles + lines + lines))
+    )
+    assert mesh.notes == ("lines and points left out: 2",)
+
+
+@pytest.mark.parametrize("n", [4, 5, 7, 12])
+def test_a_concave_face_is_cut_into_all_of_itself(n: int) -> None:
+    """Oracle: the shoelace formula; every triangle has the sense of the face."""
+    rng = np.random.default_rng(n)
+    turn = np.sort(rng.uniform(0, 2 * np.pi, n))
+    turn = np.linspace(0, 2 * np.pi, n, endpoint=False)
+    radius = np.where(np.arange(n) % 2 == 0, 1.0, 0.35)
+    flat = np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1)
+    points = np.column_stack([flat, np.zeros(n)])
+    cut = cut_faces(points, np.arange(n), np.array([n]))
+    assert len(cut.triangles) == n - 2
+    corners = flat[cut.triangles]
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    areas = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    ring = [*flat.tolist(), flat[0].tolist()]
+    whole = 0.5 * sum(p[0] * q[1] - p[1] * q[0] for p, q in pairwise(ring))
+    assert (areas > 0.0).all()
+    assert areas.sum() == pytest.approx(whole, rel=1e-12)
+
+
+@pytest.mark.parametrize("bad", [0.0, np.inf, np.nan])
+def test_a_direction_needs_a_length(bad: float) -> None:
+    assert unit_vector(np.array([bad, 0.0, 0.0])) is None
+    assert unit_vector(np.array([1e-300, 0.0, 0.0])) is not None
+    found = unit_vector(np.array([1e300, -1e300, 0.0]))
+    assert found is not None
+    np.testing.assert_allclose(found, np.array([1, -1, 0]) / np.sqrt(2.0), rtol=1e-15)
+
+
+def test_repeats_are_left_out_and_the_last_of_a_closed_line() -> None:
+    a, b, c = [0.0, 0.0], [1.0, 0.0], [1.0, 1.0]
+    for points, closed, kept in (
+        ([a, b, b, c], False, [a, b, c]),
+        ([a, b, c, a], False, [a, b, c, a]),
+        ([a, b, c, a], True, [a, b, c]),
+        ([a, a], True, [a]),
+        ([a], True, [a]),
+        ([a, b, a], True, [a, b]),
+    ):
+        found = without_repeats(np.array(points), closed=closed)
+        assert found.tolist() == kept
