@@ -245,3 +245,22 @@ def test_repeats_are_left_out_and_the_last_of_a_closed_line() -> None:
     ):
         found = without_repeats(np.array(points), closed=closed)
         assert found.tolist() == kept
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary_little_endian"])
+@pytest.mark.parametrize(
+    ("doubled", "said"),
+    [
+        ("property float y", r"line 6: has the property 'y' twice"),
+        ("element vertex 3", r"line 6: has the element 'vertex' twice"),
+    ],
+)
+def test_a_name_that_a_ply_has_twice_is_refused(
+    encoding: str, doubled: str, said: str, tmp_path: Path
+) -> None:
+    """Which of the two is meant nobody can know."""
+    head = ["ply", f"format {encoding} 1.0", "element vertex 3"]
+    head += ["property float x", "property float y", doubled, "property float z"]
+    head += ["element face 1", "property list uchar int vertex_indices", "end_header"]
+    with pytest.raises(InvalidFile, match=said):
+        read_mesh(write(tmp_path, "a.ply", "\n".join(head) + "\n" + "0 " * 60))

@@ -144,6 +144,12 @@ def _header(stream: MeshStream) -> _Header:
                 pass
             case ["format", name, _] if name in _FORMATS:
                 order = _FORMATS[name]
+            case ["element", name, _] if name in elements:
+                problem = f"has the element {name[:60]!r} twice"
+                raise stream.invalid(problem, line=number)
+            case ["property", *_, name] if name in (one.name for one in latest or ()):
+                problem = f"has the property {name[:60]!r} twice"
+                raise stream.invalid(problem, line=number)
             case ["element", name, count] if count.isdecimal() and len(count) < 12:
                 stream.check_room(int(count))
                 elements[name] = _Element(name, int(count))
