@@ -22,7 +22,7 @@ from paper_table import touching_error
 
 from benchmarks.hrm1000.families import FAMILIES
 from benchmarks.hrm1000.generate import VERSION, generate
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem

@@ -50,7 +50,7 @@ from oracles.tree_queries import clearances, make_query, random_box, wrong_poses
 
 from vdsm_pin.arm_bodies import arm_bodies
 from vdsm_pin.arm_tree import arm_tree, link_frame
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.problem import DesiredPath, PlanningProblem

@@ -21,7 +21,7 @@ import coal
 import numpy as np
 
 from benchmarks.common import surroundings, timed
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import Manipulator, built_in

@@ -20,7 +20,7 @@ import numpy as np
 from benchmarks.certify import ARM, NEAR, beside, certify_growth, problem_of, sway
 from benchmarks.common import MILLI, Results, command, timed
 from vdsm_pin.cables import angles_from_cables, cable_lengths
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.kinematics import joint_angles, joint_centres

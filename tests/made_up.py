@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.manipulator import built_in
 from vdsm_pin.problem import DesiredPath, PlanningProblem
 from vdsm_pin.report.run_record import RunRecord

@@ -17,7 +17,7 @@ from numba.core import event
 from problem_files import NEAR, write_problem
 
 from vdsm_pin.cables import angles_from_cables, cable_lengths
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory

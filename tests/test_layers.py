@@ -23,7 +23,7 @@ LAYERS = {
     "startup": 0,
     "text": 0,
     "notebook": 1,
-    "error_box": 1.5,
+    "error_boxes": 1.5,
     "geometry": 1,
     "proof": 1.5,
     "scene": 2,

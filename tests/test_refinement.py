@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 import vdsm_pin.refinement as refinement
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import Infeasible, InsideUnknown, NoPlanFound
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.fewest.strategy import plan_fewest

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
         write_report,
         write_trajectory,
     )
-    from vdsm_pin.error_box import ErrorBox, ObstacleError
+    from vdsm_pin.error_boxes import ErrorBox, ObstacleError
     from vdsm_pin.errors import Infeasible, InvalidInput, VdsmError
     from vdsm_pin.manipulator import (
         CableLayout,
@@ -85,7 +85,7 @@ __all__ = [
 ]
 
 _HOMES: Final = {
-    "error_box": ("ErrorBox", "ObstacleError"),
+    "error_boxes": ("ErrorBox", "ObstacleError"),
     "errors": ("Infeasible", "InvalidInput", "VdsmError"),
     "manipulator": (
         *("CableLayout", "Feed", "LinkBody", "Manipulator", "Tool", "built_in"),

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io import problem_file, trajectory_file
 from vdsm_pin.io.atomic import atomic_path

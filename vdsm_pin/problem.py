@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, frozen, running_sums
 from vdsm_pin.manipulator import Manipulator

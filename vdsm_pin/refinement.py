@@ -13,7 +13,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.goals import with_ends, with_path

@@ -10,7 +10,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import Infeasible, InvalidFile, OutOfTime
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file

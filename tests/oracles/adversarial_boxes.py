@@ -26,7 +26,7 @@ from oracles.adversarial import (
     make_link_batch,
 )
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.geometry.row_bounds import link_gaps, row_brackets
 

@@ -17,7 +17,7 @@ from oracles.certificate_oracle import sealed, sha256
 from vdsm_pin import scene
 from vdsm_pin.arm_bodies import arm_bodies, convex_cover, self_pairs
 from vdsm_pin.certificate_checker import check_certificate
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io.problem_file import read_problem

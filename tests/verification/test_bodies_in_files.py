@@ -19,7 +19,7 @@ from oracles.certificate_oracle import sealed, sha256
 
 from vdsm_pin.arm_bodies import ArmBody, arm_bodies
 from vdsm_pin.certificate_checker import Outcome, check_certificate
-from vdsm_pin.error_box import ErrorBox, ObstacleError
+from vdsm_pin.error_boxes import ErrorBox, ObstacleError
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import Hull

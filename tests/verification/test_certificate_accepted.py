@@ -11,7 +11,7 @@ from oracles.certificate_mutations import forged
 from oracles.certificate_oracle import sha256
 
 from vdsm_pin.certificate_checker import check_certificate
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory

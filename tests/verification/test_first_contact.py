@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
 from vdsm_pin.problem import PlanningProblem

@@ -21,7 +21,7 @@ from oracles.closed_solids import (
 )
 
 from vdsm_pin.certificate_checker import check_certificate, main
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import InsideUnknown, InvalidFile, StartInside
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import ProblemFile, read_problem

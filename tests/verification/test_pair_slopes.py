@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import link_gaps, row_brackets

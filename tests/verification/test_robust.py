@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.io.problem_file import read_problem

@@ -13,7 +13,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import (
     Infeasible,
     InvalidFile,

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vdsm_pin.error_box import ErrorBox, JointErrors, ObstacleError
+from vdsm_pin.error_boxes import ErrorBox, JointErrors, ObstacleError
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io import problem_schema as schema

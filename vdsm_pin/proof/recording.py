@@ -8,6 +8,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import apart, borrowed, clock, compiled
 from vdsm_pin.geometry.kernels import NEAR, NORMAL
+from vdsm_pin.geometry.pieces import HALF_SPACE
 from vdsm_pin.proof.layouts import (
     CLAIM,
     END,
@@ -60,6 +61,8 @@ def _shortened(
         _claim(task, desk, row, node, n),
         task.pairs.required[int(row[PAIR])],
     )
+    if task.pieces.kind[task.pieces.node_range[node, 0]] == HALF_SPACE:
+        return claim  # its direction is not to be changed
     whole, tried = np.zeros(3), np.zeros(3)
     for digits in range(2, 7):
         squared = 0.0

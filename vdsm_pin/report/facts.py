@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from vdsm_pin.cables import cable_lengths
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.records import Plan

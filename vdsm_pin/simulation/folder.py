@@ -7,7 +7,7 @@ from typing import Final, Literal
 import numpy as np
 from pydantic import Field
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory

@@ -20,7 +20,7 @@ import numpy as np
 
 from vdsm_pin import __version__
 from vdsm_pin.arm_bodies import triangle_groups
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.pieces import PackedPieces

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem import PlanningProblem

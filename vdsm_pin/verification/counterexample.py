@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, TIME

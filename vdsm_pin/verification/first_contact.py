@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.layouts import UP

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.budget import Budget

@@ -6,7 +6,7 @@ from enum import StrEnum
 from math import inf, nan
 from typing import TypeAlias
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.notebook import Summarised, in_percent
 from vdsm_pin.problem import PlanningProblem

@@ -8,7 +8,7 @@ import numpy as np
 
 from vdsm_pin.arm_bodies import ArmBody, LeftOut, SelfPairs, arm_bodies, self_pairs
 from vdsm_pin.arm_tree import RAIL, arm_tree, link_frame
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.geometry.pieces import PackedPieces

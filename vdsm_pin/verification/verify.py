@@ -8,7 +8,7 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import InvalidInput, OutOfTime, UnknownName, VdsmError
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.geometry.winding import Side

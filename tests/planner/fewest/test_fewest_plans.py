@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem, random_problem
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import NoPlanFound, OutOfReach, OutOfTime, PathBlocked
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem

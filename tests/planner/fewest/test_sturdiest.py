@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem, random_problem, straight_arm
 
-from vdsm_pin.error_box import ErrorBox
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
