@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
@@ -86,9 +87,11 @@ def motion_data(
     }
 
 
-def closest_data(problem: PlanningProblem, approach: ClosestApproach) -> dict[str, Any]:
+def closest_data(
+    verification: Verification, approach: ClosestApproach
+) -> dict[str, Any]:
     """Where and when one closest approach happens; base frame, [m]."""
-    pair = approach.pair
+    problem, pair = verification.problem, approach.pair
     needed = (
         problem.required_clearance if pair.obstacle else problem.required_self_clearance
     )
@@ -100,6 +103,8 @@ def closest_data(problem: PlanningProblem, approach: ClosestApproach) -> dict[st
         "upper": finite(approach.upper),
         "short": bool(approach.upper < needed),
         "deeper": approach.deeper,
+        # The exact motion is drawn, also where a box of errors is judged.
+        "nominal": verification.errors != ErrorBox(),
         "linkPoint": _point(approach.link_point),
         "otherPoint": _point(approach.other_point),
     }
@@ -152,8 +157,7 @@ def report_data(verification: Verification) -> PageData:
             "scene": scene,
             "motion": motion_data(verification.problem, verification.trajectory, shown),
             "closest": [
-                closest_data(verification.problem, row)
-                for row in verification.approaches
+                closest_data(verification, row) for row in verification.approaches
             ],
             "marks": [
                 asdict(one) for one in failing(verification) if one.moment is not None

@@ -3,6 +3,7 @@
 
 const BAR = 110; // pixels, about
 const ARROW = 9;
+const CROWD = 17; // pixels between two numbers, at least
 const NARROW_GAP = 44; // pixels; below, the arrows of a dimension stand outside
 const FONT = '600 13px system-ui, "DejaVu Sans", sans-serif';
 const AXES = [["x", "#c92a2a"], ["y", "#2b8a3e"], ["z", "#1864ab"]];
@@ -118,10 +119,13 @@ class Overlay {
 
   linkNumbers() {
     const { centres } = this.view;
+    let before = [-Infinity, 0];
     for (let i = 0; i + 1 < centres.length; i++) {
       const middle = centres[i].map((value, k) => (value + centres[i + 1][k]) / 2);
       const place = this.seen(middle);
-      if (place) this.text(String(i + 1), ...place, this.ink, "center");
+      if (!place || Math.hypot(place[0] - before[0], place[1] - before[1]) < CROWD) continue;
+      before = place;
+      this.text(String(i + 1), ...place, this.ink, "center");
     }
   }
 
@@ -132,7 +136,7 @@ class Overlay {
   }
 
   // The gap between the two witness points, as on a drawing.
-  dimension({ linkPoint, otherPoint, upper, deeper, short }) {
+  dimension({ linkPoint, otherPoint, upper, deeper, short, nominal }) {
     const colour = short ? this.red : this.blue;
     const [a, b] = [this.seen(linkPoint), this.seen(otherPoint)];
     if (!a || !b) return;
@@ -148,7 +152,7 @@ class Overlay {
       const tick = [-8 * way[1], 8 * way[0]];
       this.line(colour, 2, [p[0] - tick[0], p[1] - tick[1]], [p[0] + tick[0], p[1] + tick[1]]);
     }
-    const words = lengthText(upper) + (deeper ? " or deeper" : "");
+    const words = lengthText(upper) + (deeper ? " or deeper" : "") + (nominal ? " without errors" : "");
     const middle = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2];
     const aside = along[0] >= 0 ? [along[1], -along[0]] : [-along[1], along[0]];
     this.pen.font = FONT;
