@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from oracles.certificate_cases import certificate_lines
 
 import vdsm_pin as vp
 from vdsm_pin import api
@@ -160,14 +161,18 @@ def test_the_papers_joint_error_touches(
     assert 1e3 * worst == pytest.approx(depth_mm, abs=0.1)
 
 
-def test_no_certificate_of_errors_that_it_cannot_state(tmp_path: Path) -> None:
+def test_a_certificate_states_a_turn_of_the_base(tmp_path: Path) -> None:
     problem = vp.read_problem("paper/free")
     motion = vp.plan(problem, "paper").trajectory
     result = vp.verify(problem, motion, errors=vp.ErrorBox(base_turn=1e-4))
     assert result.verdict is vp.Verdict.CERTIFIED
     vp.write_trajectory(tmp_path / "t.csv", motion)
-    with pytest.raises(VerificationFailed, match="turn of the base"):
-        vp.write_certificate(result, tmp_path / "c", tmp_path / "t.csv")
+    vp.write_certificate(result, tmp_path / "c", tmp_path / "t.csv")
+    assert certificate_lines(tmp_path / "c")[0]["errors"]["base_rad"] == 1e-4
+    assert problem.source is not None
+    source = problem.source.path
+    found = check_certificate(tmp_path / "c", source, tmp_path / "t.csv")
+    assert found.accepted, found.reason
 
 
 @pytest.mark.parametrize("scene", ["obs1", "obs3"])
