@@ -7,6 +7,7 @@ came; whatever is not a status of the command line ends this process with a trac
 """
 
 import contextlib
+import gzip
 import hashlib
 import io
 import json
@@ -38,12 +39,12 @@ def sealed(lines: list[Any]) -> bytes:
     """A certificate with a last line that fits."""
     body = b"".join(json.dumps(line).encode() + b"\n" for line in lines)
     last = {"end": True, "sha256": hashlib.sha256(body).hexdigest()}
-    return body + json.dumps(last).encode() + b"\n"
+    return gzip.compress(body + json.dumps(last).encode() + b"\n")
 
 
 def forged(content: bytes, rng: np.random.Generator) -> bytes:
     """A certificate with one value changed, sealed again."""
-    lines = [json.loads(line) for line in content.splitlines()[:-1]]
+    lines = [json.loads(line) for line in gzip.decompress(content).splitlines()[:-1]]
     value = ODD[rng.integers(len(ODD))]
     if rng.uniform() < 0.5:
         lines[0][str(rng.choice(sorted(lines[0])))] = value
@@ -89,7 +90,7 @@ def status(words: list[str]) -> int:
     assert code in (0, 1, 2), (words, code)
     assert all(line.isprintable() for line in said.splitlines()), said[:LONGEST]
     assert len(said) < LONGEST, said[:LONGEST]
-    assert code != 2 or err.getvalue().count("\n") == 1, said
+    assert code != 2 or err.getvalue().startswith("vdsm: "), said
     return int(str(code))
 
 

@@ -46,7 +46,7 @@ FAR = np.array([60.0, 79.0, 0.0])  # 99.2 m away
             Capsule("a", 0.0 * FAR, UP, 99.0, 1.1),
         ),
         (Cylinder("a", FAR, UP, 9.0, 0.3), Cylinder("a", FAR, UP, 15.0, 0.3)),
-        (Box("a", FAR, EYE, np.full(3, 0.45)), Box("a", FAR, EYE, np.full(3, 0.47))),
+        (Box("a", FAR, EYE, np.full(3, 0.45)), Box("a", FAR, EYE, np.full(3, 0.9))),
         (
             Prism("a", FAR, EYE, np.array([[0, 0], [0.1, 0], [0, 0.1]]), (0.0, 11.0)),
             Prism("a", FAR, EYE, np.array([[0, 0], [0.1, 0], [0, 0.1]]), (-14.0, 0.0)),

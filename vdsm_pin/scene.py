@@ -421,14 +421,18 @@ def reach_of(obstacle: Obstacle | ConvexCover) -> float:
 
     Not below that of its own points; of a half-space that of the stated point alone.
     """
-    if isinstance(obstacle, ConvexCover):
-        (hull,) = obstacle.pieces
-        points, grown = hull.points, hull.radius
-    elif isinstance(obstacle, Voxels):
+    if not isinstance(obstacle, Obstacle):  # a hull, or pieces of any origin
+        hulls = [piece for piece in obstacle.pieces if isinstance(piece, Hull)]
+        return max((_reach_of_hull(hull) for hull in hulls), default=0.0)
+    if isinstance(obstacle, Voxels):
         points, grown = obstacle.centres, math.hypot(*obstacle.half_size.tolist())
     else:
         points, grown = corners_of(obstacle)
     return float(np.linalg.norm(points, axis=1).max()) + grown
+
+
+def _reach_of_hull(hull: Hull) -> float:
+    return float(np.linalg.norm(hull.points, axis=1).max()) + hull.radius
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,8 @@ def test_every_strategy_refuses_a_blocked_start_in_the_same_words() -> None:
     assert "straight arm" in str(refusals[0])
 
 
-@pytest.mark.parametrize("name", STRATEGIES)
+# An arm that follows its leader has no way round the corner of this path.
+@pytest.mark.parametrize("name", [n for n in STRATEGIES if n != "follow-the-leader"])
 def test_a_start_with_a_hair_more_than_required_is_taken(name: str) -> None:
     task = starting(0.0036)
     plan = strategy(name)(task, link_clearance(task), 0.0)
