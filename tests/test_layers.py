@@ -51,12 +51,13 @@ LAYERS = {
     "conversion": 13,
     "explanation": 13,
     "batch": 13,
+    "robots": 13,
     "certificate_checker": 13,
     "api": 14,
     "cli": 14,
 }
 ROBOTICS = {"pinocchio", "coal", "yourdfpy", "meshcat", "hppfcl"}
-ROBOTICS_ALLOWED = {"robot_model", "verification", "visualization", "cli"}
+ROBOTICS_ALLOWED = {"robot_model", "verification", "visualization", "robots", "cli"}
 
 MODULES = sorted(PACKAGE.rglob("*.py"))
 CHECKER = PACKAGE / "certificate_checker"

@@ -112,7 +112,9 @@ def convex_cover(body: LinkBody) -> tuple[Hull | FlatCylinder, ...]:
     if isinstance(body.solid, Mesh):
         corners = body.solid.vertices[body.solid.triangles]
         groups = triangle_groups(body)
-        return tuple(Hull(_outer(corners[group].reshape(-1, 3))) for group in groups)
+        return tuple(
+            Hull(outer_points(corners[group].reshape(-1, 3))) for group in groups
+        )
     return tuple(_bounded(piece) for piece in body.solid.pieces)
 
 
@@ -129,7 +131,7 @@ def triangle_groups(body: LinkBody) -> tuple[IntArray, ...]:
     return tuple(np.array_split(order, min(body.parts, len(order))))
 
 
-def _outer(points: FloatArray) -> FloatArray:
+def outer_points(points: FloatArray) -> FloatArray:
     """Some of the points, with the same hull; those surely inside are left out."""
     points = np.unique(points, axis=0)
     if len(points) <= DIRECTIONS // 4:

@@ -7,7 +7,7 @@ import os
 import shlex
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Final, Literal, NoReturn
@@ -144,18 +144,38 @@ def plan(
     raise typer.Exit(PASSED if outcome(file.verdict).passed else NOT_PASSED)
 
 
+def _refuse_beside(what: str, options: Mapping[str, object]) -> None:
+    """Refuse options that mean nothing beside another one.
+
+    Raises:
+        InvalidInput: If one is given.
+    """
+    for name, value in options.items():
+        if value:
+            message = f"{name} has no meaning with {what}"
+            raise InvalidInput(message)
+
+
 @app.command(
     epilog=_examples(
         "vdsm verify paper/obs1 --trajectory out/obs1/trajectory.csv --out out/obs1",
         "vdsm verify mine.yaml --trajectory mine.csv --out out/mine "
         "--certificate mine.certificate",
+        "vdsm verify --urdf ur5.urdf --srdf ur5.srdf --scene scene.yaml "
+        "--trajectory plan.csv --required-clearance-mm 5 --out out/ur5",
     )
 )
 def verify(
     context: typer.Context,
-    problem: Problem,
     trajectory: Trajectory,
     out: OutFolder,
+    problem: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[PROBLEM]",
+            help="A built-in name or a problem file; none with --urdf.",
+        ),
+    ] = None,
     joint_error_deg: JointError = 0.0,
     base_error_mm: BaseError = 0.0,
     base_error_deg: BaseTurn = 0.0,
@@ -176,12 +196,88 @@ def verify(
     ] = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
+    urdf: Annotated[
+        Path | None, typer.Option(help="Any robot, in place of a problem.")
+    ] = None,
+    srdf: Annotated[
+        Path | None, typer.Option(help="Its links that need not be held apart.")
+    ] = None,
+    scene: Annotated[
+        Path | None, typer.Option(help="Its obstacles: ours or a PlanningScene.")
+    ] = None,
+    package_dir: Annotated[
+        list[Path] | None, typer.Option(help="Where package:// is looked for.")
+    ] = None,
+    lock: Annotated[
+        list[str] | None,
+        typer.Option(metavar="JOINT=VALUE", help="A joint that stands still [rad, m]."),
+    ] = None,
+    required_clearance_mm: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="With --urdf: from obstacles [mm]; 0 by default."),
+    ] = None,
+    required_self_clearance_mm: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="With --urdf: between links [mm]; 0 by default."),
+    ] = None,
 ) -> None:
     """Verify a trajectory of any planner.
 
     Writes report.html, verification.json, clearance.csv, link_angles.csv, centres.csv
-    and cables.csv.
+    and cables.csv; of a robot by --urdf verification.json alone.
     """
+    of_robot = {
+        "--srdf": srdf,
+        "--scene": scene,
+        "--package-dir": package_dir,
+        "--lock": lock,
+        "--required-clearance-mm": required_clearance_mm,
+        "--required-self-clearance-mm": required_self_clearance_mm,
+    }
+    if urdf is not None:
+        of_arm = {
+            "PROBLEM": problem,
+            "--joint-error-deg": joint_error_deg,
+            "--base-error-mm": base_error_mm,
+            "--obstacle-error-mm": obstacle_error_mm,
+            "--certificate": certificate,
+            "--pdf": pdf,
+            "--all-pairs": all_pairs,
+        }
+        _refuse_beside("--urdf", of_arm)
+        from vdsm_pin.robots.folder import (
+            RobotOrder,
+            show_robot,
+            verify_robot_to_folder,
+        )
+        from vdsm_pin.units import MM_PER_M
+
+        deadline = Deadline.after(time_limit)
+        with enforced(deadline):
+            found = verify_robot_to_folder(
+                RobotOrder(
+                    urdf=urdf,
+                    trajectory=trajectory,
+                    folder=out,
+                    command=context.obj,
+                    srdf=srdf,
+                    scene=scene,
+                    package_dirs=tuple(package_dir or ()),
+                    lock=tuple(lock or ()),
+                    required=(required_clearance_mm or 0.0) / MM_PER_M,
+                    required_self=(required_self_clearance_mm or 0.0) / MM_PER_M,
+                    deadline=deadline,
+                )
+            )
+        if as_json:
+            typer.echo((out / "verification.json").read_text("utf-8"), nl=False)
+        elif not quiet:
+            show_robot(found, out)
+        raise typer.Exit(PASSED if found.verdict == "certified" else NOT_PASSED)
+    _refuse_beside("a problem", of_robot)
+    if problem is None:
+        message = "expected a PROBLEM, or --urdf for any other robot"
+        raise InvalidInput(message)
     from vdsm_pin.io.problem_file import read_problem
     from vdsm_pin.report.run_record import now
     from vdsm_pin.report.terminal import show_verification

@@ -25,11 +25,12 @@ SIZES: Final = {
 """Shapes every reader takes, with the count of numbers in each of their sizes."""
 
 
-def validate_urdf(text: str) -> None:
+def validate_urdf(text: str, *, geometry_only: bool = False) -> None:
     """Refuse a URDF document with any defect that a reader might let pass.
 
     Args:
         text: The document.
+        geometry_only: Whether masses do not matter and meshes are taken.
 
     Raises:
         InvalidInput: If the text is not XML; a name is missing or used twice; a joint
@@ -45,12 +46,12 @@ def validate_urdf(text: str) -> None:
     if robot.tag != "robot":
         message = f"URDF's root element is <{robot.tag}>, expected <robot>"
         raise InvalidInput(message)
-    for problem in _problems(robot):
+    for problem in _problems(robot, geometry_only):
         message = f"URDF: {problem}"
         raise InvalidInput(message)
 
 
-def _problems(robot: ET.Element) -> Iterator[str]:
+def _problems(robot: ET.Element, geometry_only: bool) -> Iterator[str]:
     for kind in ("link", "joint"):
         names = Counter(element.get("name", "") for element in robot.findall(kind))
         for name, count in names.items():
@@ -62,7 +63,7 @@ def _problems(robot: ET.Element) -> Iterator[str]:
         yield from _joint_problems(joint)
     yield from _tree_problems(robot)
     for link in robot.findall("link"):
-        yield from _link_problems(link)
+        yield from _link_problems(link, geometry_only)
 
 
 def _tree_problems(robot: ET.Element) -> Iterator[str]:
@@ -116,15 +117,16 @@ def _joint_problems(joint: ET.Element) -> Iterator[str]:
             yield f"{where}: limit {name} is {text!r}, expected 0 or more"
 
 
-def _link_problems(link: ET.Element) -> Iterator[str]:
+def _link_problems(link: ET.Element, geometry_only: bool) -> Iterator[str]:
     where = f"link {link.get('name', '')!r}"
     inertial = link.find("inertial")
-    if inertial is not None:
+    if inertial is not None and not geometry_only:
         yield from _origin_problems(inertial, where)
         yield from _inertia_problems(inertial, where)
     for shape in link.findall("visual") + link.findall("collision"):
         yield from _origin_problems(shape, where)
-        yield from _shape_problems(shape, where)
+        if not (geometry_only and shape.find("geometry/mesh") is not None):
+            yield from _shape_problems(shape, where)
 
 
 def _inertia_problems(inertial: ET.Element, where: str) -> Iterator[str]:

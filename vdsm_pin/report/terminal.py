@@ -65,7 +65,7 @@ def show_verification(
     if sys.stdout.isatty():
         _rich_checks(file)
     else:
-        _plain_checks(file.checks)
+        plain_checks(file.checks)
     if file.path_length_m is not None:
         more = ((term("coverage"), percent(file.coverage)), *more)
     if file.max_joint_error_rad is not None:
@@ -105,7 +105,8 @@ def _cells(check: CheckRow) -> tuple[str, str, str, str, str]:
     )
 
 
-def _plain_checks(checks: tuple[CheckRow, ...]) -> None:
+def plain_checks(checks: tuple[CheckRow, ...]) -> None:
+    """Print checks in columns."""
     titles = ("check", "worst", "limit", "count", "verdict")
     rows = [titles, *(_cells(check) for check in checks)]
     widths = [max(len(row[i]) for row in rows) for i in range(len(titles))]

@@ -157,10 +157,10 @@ def _bodies(coal: Any, obstacle: Obstacle) -> CoalObstacle:
             return (_placed(coal, coal.Sphere(obstacle.radius), obstacle.centre),)
         case Capsule():
             body = coal.Capsule(obstacle.radius, 2.0 * obstacle.half_length)
-            return (_placed(coal, body, obstacle.centre, _turn_z_to(obstacle.axis)),)
+            return (_placed(coal, body, obstacle.centre, turn_z_to(obstacle.axis)),)
         case Cylinder():
             body = coal.Cylinder(obstacle.radius, 2.0 * obstacle.half_length)
-            return (_placed(coal, body, obstacle.centre, _turn_z_to(obstacle.axis)),)
+            return (_placed(coal, body, obstacle.centre, turn_z_to(obstacle.axis)),)
         case Box():
             body = coal.Box(2.0 * obstacle.half_size)
             return (_placed(coal, body, obstacle.centre, obstacle.rotation),)
@@ -192,7 +192,7 @@ def _placed(
     return CoalBody(geometry, coal.Transform3s(np.array(rotation), np.array(p)))
 
 
-def _turn_z_to(axis: FloatArray) -> FloatArray:
+def turn_z_to(axis: FloatArray) -> FloatArray:
     """A rotation whose third column is the axis, shape (3, 3); [-]."""
     start = np.eye(3)[int(np.argmin(np.abs(axis)))]
     x = np.cross(start, axis)

@@ -1,0 +1,263 @@
+"""Robots from URDF, scenes and trajectories: closed forms, Pinocchio, bad files."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vdsm_pin.cli import main
+from vdsm_pin.errors import InvalidFile, VdsmError
+from vdsm_pin.robots.judgement import verify_robot
+from vdsm_pin.robots.model import Robot
+from vdsm_pin.robots.scene_files import read_scene
+from vdsm_pin.robots.second_opinion import pose_difference
+from vdsm_pin.robots.trajectory_files import read_path
+from vdsm_pin.robots.urdf import read_robot
+from vdsm_pin.scene import Cylinder, HalfSpace
+from vdsm_pin.verification.records import Verdict
+
+URDF = """<robot name="two">
+  <link name="base"><collision>
+    <geometry><box size="0.2 0.2 0.1"/></geometry></collision></link>
+  <link name="arm"><collision><origin xyz="1 0 0"/>
+    <geometry><sphere radius="0.1"/></geometry></collision></link>
+  <link name="hand"><collision><origin xyz="0 0 0.3" rpy="0.3 0 0"/>
+    <geometry><cylinder radius="0.05" length="0.2"/></geometry></collision></link>
+  <link name="finger"/>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="arm"/>
+    <origin xyz="0 0 0.5"/><axis xyz="0 0 2"/>
+    <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+  <joint name="slide" type="prismatic"><parent link="arm"/><child link="hand"/>
+    <origin xyz="1 0 0" rpy="0.1 0.2 0.3"/><axis xyz="0 1 0"/>
+    <limit lower="-0.1" upper="0.4" effort="1" velocity="1"/></joint>
+  <joint name="follow" type="revolute"><parent link="hand"/><child link="finger"/>
+    <axis xyz="1 1 0"/><mimic joint="slide" multiplier="2" offset="0.1"/>
+    <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+</robot>
+"""
+SCENE = """length_unit: mm
+obstacles:
+  - {name: ball, shape: sphere, center: [0, 1300, 500], radius: 50}
+"""
+ROWS = "turn_rad,slide_m\n0,0\n3,0\n"
+MOVEIT = """world:
+  collision_objects:
+    - id: can
+      primitives: [{type: cylinder, dimensions: [0.2, 0.05]}]
+      primitive_poses:
+        - {position: [0, 0, 3], orientation: [0, 0.70710678, 0, 0.70710678]}
+    - id: floor
+      planes: [{coef: [0, 0, 2, 1]}]
+      plane_poses: [{position: {x: 0, y: 0, z: -1}}]
+"""
+
+
+def write(folder: Path, name: str, text: str) -> Path:
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Robot:
+    return read_robot(write(tmp_path, "two.urdf", URDF))
+
+
+def test_poses_are_pinocchios(robot: Robot) -> None:
+    q = np.random.default_rng(0).uniform(-3.0, 3.0, (50, 2))
+    assert [joint.name for joint in robot.joints] == ["turn", "slide"]
+    assert pose_difference(robot, q).max() < 1e-12
+    other = Robot(**{**vars(robot), "text": URDF.replace("0 0 0.5", "0 0 0.6")})
+    assert pose_difference(other, q).min() == pytest.approx(0.1)
+
+
+def test_the_least_clearance_is_the_closed_form(tmp_path: Path, robot: Robot) -> None:
+    # The arm's ball runs on a circle of 1 m, the other stands 1.3 m away: 150 mm left.
+    scene = read_scene(write(tmp_path, "s.yaml", SCENE), 1.0)
+    path = read_path(write(tmp_path, "t.csv", ROWS), robot)
+    found = verify_robot(robot, scene, path, 0.149)
+    assert found.verdict is Verdict.CERTIFIED, found.checks
+    (pair,) = [p for p in found.pairs if (p.link, p.other) == ("arm", "ball")]
+    assert pair.lower <= 0.15 <= pair.upper
+    assert pair.upper - pair.lower < 0.02 * 0.15
+    assert pair.moment == pytest.approx(np.pi / 6.0, abs=0.05)
+    lost = verify_robot(robot, scene, path, 0.151)
+    assert lost.verdict is Verdict.REFUTED
+    np.testing.assert_allclose(
+        np.linalg.norm(pair.link_point - pair.other_point), pair.upper, atol=1e-6
+    )
+
+
+def test_what_meets_is_refuted_though_nothing_is_required(
+    tmp_path: Path, robot: Robot
+) -> None:
+    text = (
+        "length_unit: m\nobstacles:\n  - {name: crate, shape: box, center: [X, 0, 0], "
+    )
+    for x, verdict in ((0.15, Verdict.REFUTED), (0.31, Verdict.CERTIFIED)):
+        scene = write(
+            tmp_path, "s.yaml", text.replace("X", str(x)) + "size: [0.2, 1, 0.05]}"
+        )
+        rows = read_path(write(tmp_path, "t.csv", ROWS), robot)
+        found = verify_robot(robot, read_scene(scene, 1.0), rows, 0.0)
+        of_base = [p for p in found.pairs if p.link == "base" and p.is_obstacle]
+        assert [p.verdict for p in of_base] == [verdict]
+
+
+def test_limits_are_checked_at_and_between_waypoints(
+    tmp_path: Path, robot: Robot
+) -> None:
+    scene = read_scene(write(tmp_path, "s.yaml", SCENE), 1.0)
+    past = read_path(
+        write(tmp_path, "t.csv", "turn_deg,slide_mm\n0,0\n90,401\n"), robot
+    )
+    found = verify_robot(robot, scene, past, 0.0)
+    refuted = [c.name for c in found.checks if c.verdict is Verdict.REFUTED]
+    assert refuted == ["joint 'slide' in its limits"]
+    message = {
+        "joint_names": ["slide", "turn"],
+        "points": [
+            {"positions": [0.39, 0], "velocities": [1, 0], "time_from_start": 0},
+            {
+                "positions": [0.39, 1],
+                "velocities": [-1, 0],
+                "time_from_start": {"sec": 1, "nanosec": 0},
+            },
+        ],
+    }
+    smooth = read_path(write(tmp_path, "t.json", json.dumps(message)), robot)
+    assert smooth.degree == 3
+    assert smooth.knots.tolist() == [[0.0, 0.39], [1.0, 0.39]]
+    found = verify_robot(robot, scene, smooth, 0.0)
+    assert found.verdict is not Verdict.CERTIFIED
+
+
+def test_planning_scenes_are_read_as_they_stand(tmp_path: Path) -> None:
+    can, floor = read_scene(write(tmp_path, "m.yaml", MOVEIT), 1.0).obstacles
+    assert isinstance(can, Cylinder)
+    np.testing.assert_allclose(np.abs(can.axis), [1, 0, 0], atol=1e-8)
+    assert isinstance(floor, HalfSpace)
+    assert floor.normal @ floor.point == pytest.approx(-1.5)
+
+
+def test_pairs_follow_the_srdf(tmp_path: Path) -> None:
+    urdf = write(tmp_path, "two.urdf", URDF)
+    assert [one.reason for one in read_robot(urdf).left_out] == [
+        "neighbours, joined by one joint",
+        "neighbours, joined by one joint",
+    ]
+    entry = '<disable_collisions link1="arm" link2="base" reason="Adjacent"/>'
+    srdf = write(tmp_path, "two.srdf", f"<robot>{entry}</robot>")
+    robot = read_robot(urdf, srdf)
+    assert len(robot.held) == 2
+    assert robot.left_out[0].reason == "left out by the SRDF: Adjacent"
+    write(tmp_path, "two.srdf", f"<robot>{entry.replace('arm', 'leg')}</robot>")
+    with pytest.raises(InvalidFile, match="'leg', which is no link"):
+        read_robot(urdf, srdf)
+
+
+BAD = [
+    ("<limit lower", "<limit upper='-5' lower", "not XML"),
+    ('lower="-3" upper="3"', 'lower="3" upper="-3"', "is above upper limit"),
+    ('<child link="arm"/>', '<child link="leg"/>', "'leg' does not exist"),
+    ('<parent link="base"/>', '<parent link="finger"/>', "ancestor: a loop"),
+    ("</robot>", '<link name="more"/></robot>', "expected one root link, found 2"),
+    ('<link name="finger"/>', '<link name="f"/>', "'finger' does not exist"),
+    ('type="prismatic"', 'type="floating"', "type 'floating', expected one of"),
+    ('joint="slide"', 'joint="follow"', "which is no joint or mimics it"),
+    ('multiplier="2"', 'multiplier="x"', "expected a finite number"),
+    ('<sphere radius="0.1"/>', '<mesh filename="a.stl"/>', "is not found"),
+    ('<axis xyz="0 0 2"/>', '<axis xyz="0 0 0"/>', "is no direction"),
+    ("<collision>", "<nothing>", "not XML"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "expected"), BAD)
+def test_odd_robots_are_refused_in_a_sentence(
+    tmp_path: Path, old: str, new: str, expected: str
+) -> None:
+    path = write(tmp_path, "bad.urdf", URDF.replace(old, new, 1))
+    with pytest.raises(InvalidFile) as caught:
+        read_robot(path)
+    assert expected in str(caught.value)
+
+
+ODD_ROWS = {
+    "turn_rad\n0\n": "no column for joint 'slide', expected slide_m",
+    "turn_m,slide_m\n0,0\n": "expected _rad or _deg for this joint",
+    "turn_rad,slide_m\n90,0\n": "is it in degrees?",
+    "turn_deg,slide_m\n0,0\n1.57,0\n": "look like radians",
+    "turn_rad,slide_m\n0,x\n": "expected a number",
+    "turn_rad,slide_m\n": "has no row",
+}
+
+
+@pytest.mark.parametrize("text", ODD_ROWS)
+def test_odd_trajectories_are_refused(tmp_path: Path, robot: Robot, text: str) -> None:
+    with pytest.raises(InvalidFile) as caught:
+        read_path(write(tmp_path, "t.csv", text), robot)
+    assert ODD_ROWS[text] in str(caught.value)
+
+
+def mutated(text: str, rng: np.random.Generator) -> str:
+    data = bytearray(text.encode())
+    for _ in range(int(rng.integers(1, 4))):
+        data[int(rng.integers(len(data)))] = int(rng.integers(32, 127))
+    return bytes(data[: int(rng.integers(len(data) // 2, len(data) + 1))]).decode()
+
+
+def test_damaged_files_never_end_in_a_traceback(tmp_path: Path, robot: Robot) -> None:
+    rng = np.random.default_rng(1)
+    message = json.dumps(
+        {
+            "joint_trajectory": {
+                "joint_names": ["turn", "slide"],
+                "points": [{"positions": [0, 0.1], "time_from_start": {"sec": 1}}],
+            }
+        }
+    )
+    readers: list[tuple[str, str, Callable[[Path], object]]] = [
+        ("a.urdf", URDF, read_robot),
+        ("s.yaml", SCENE, lambda path: read_scene(path, 1.0)),
+        ("m.yaml", MOVEIT, lambda path: read_scene(path, 1.0)),
+        ("t.csv", ROWS, lambda path: read_path(path, robot)),
+        ("t.json", message, lambda path: read_path(path, robot)),
+    ]
+    refused = 0
+    for name, text, reader in readers:
+        for _ in range(150):
+            try:
+                reader(write(tmp_path, name, mutated(text, rng)))
+            except VdsmError as error:
+                refused += 1
+                assert len(str(error).splitlines()) == 1
+    assert refused > 200
+
+
+def run(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as ended:
+        main([str(argument) for argument in arguments])
+    return int(str(ended.value.code))
+
+
+def test_the_command_ends_with_the_verdict(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    urdf = write(tmp_path, "two.urdf", URDF)
+    scene, rows = write(tmp_path, "s.yaml", SCENE), write(tmp_path, "t.csv", ROWS)
+    asked = ("verify", "--urdf", urdf, "--scene", scene, "--trajectory", rows)
+    out = tmp_path / "out"
+    assert run(*asked, "--out", out, "--required-clearance-mm", 149) == 0
+    assert "certified  two" in capsys.readouterr().out
+    file = json.loads((out / "verification.json").read_text())
+    assert file["verdict"] == "certified"
+    assert file["pairs"][0]["other"] == "ball"
+    assert run(*asked, "--out", out, "--required-clearance-mm", 151) == 1
+    assert run(*asked, "--out", out, "--lock", "elbow=1") == 2
+    assert "has no joint 'elbow' to lock" in capsys.readouterr().err
+    assert run("verify", "paper/obs1", *asked[1:], "--out", out) == 2
+    assert "PROBLEM has no meaning with --urdf" in capsys.readouterr().err
+    assert run("verify", "--trajectory", rows, "--out", out) == 2
+    assert run("verify", "paper/obs1", "--lock", "a=1", *asked[5:], "--out", out) == 2

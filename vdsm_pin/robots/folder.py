@@ -1,0 +1,163 @@
+"""The judgement of a robot's trajectory on a terminal and in a folder."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import typer
+
+from vdsm_pin import __version__
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.report.facts import check_row
+from vdsm_pin.report.folder import check_kept, check_output_folder, staged
+from vdsm_pin.report.terminal import plain_checks, show_facts
+from vdsm_pin.report.words import outcome
+from vdsm_pin.robots.judgement import JudgedPair, RobotVerification, verify_robot
+from vdsm_pin.robots.model import Robot
+from vdsm_pin.robots.scene_files import read_scene
+from vdsm_pin.robots.trajectory_files import read_path
+from vdsm_pin.robots.urdf import read_robot
+from vdsm_pin.scene import Scene
+from vdsm_pin.text import printable
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.units import MM_PER_M
+
+FILE: Final = "verification.json"
+NEAREST: Final = 5
+"""Pairs that the terminal tells."""
+
+
+@dataclass(frozen=True)
+class RobotOrder:
+    """What to verify.
+
+    Args:
+        urdf: The robot.
+        trajectory: Its motion.
+        folder: Where the result goes.
+        command: The exact command line.
+        srdf: Pairs that are not held apart; None: neighbours are not.
+        scene: The obstacles; None for none.
+        package_dirs: Where `package://` is looked for.
+        lock: NAME=VALUE of joints that stand still; [rad] or [m].
+        required: Least clearance from obstacles; [m].
+        required_self: Least clearance between links; [m].
+        deadline: When to stop.
+    """
+
+    urdf: Path
+    trajectory: Path
+    folder: Path
+    command: str
+    srdf: Path | None = None
+    scene: Path | None = None
+    package_dirs: tuple[Path, ...] = ()
+    lock: tuple[str, ...] = ()
+    required: float = 0.0
+    required_self: float = 0.0
+    deadline: Deadline = NO_LIMIT
+
+
+def verify_robot_to_folder(order: RobotOrder) -> RobotVerification:
+    """Verify a robot's trajectory and write verification.json.
+
+    Raises:
+        InvalidInput: If a file is bad or the folder cannot be written.
+    """
+    inputs = [order.urdf, order.trajectory, *filter(None, (order.srdf, order.scene))]
+    check_output_folder(order.folder)
+    check_kept([order.folder / FILE], inputs)
+    robot = read_robot(order.urdf, order.srdf, order.package_dirs, _locks(order.lock))
+    scene = Scene() if order.scene is None else read_scene(order.scene, _size(robot))
+    path = read_path(order.trajectory, robot)
+    found = verify_robot(
+        robot, scene, path, order.required, order.required_self, order.deadline
+    )
+    content = {
+        "vdsm_robot_verification": 1,
+        "vdsm_pin": __version__,
+        "command": order.command,
+        "sha256": {str(file): sha256_of_file(file) for file in inputs},
+        **_facts(found, order),
+    }
+    text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
+    with staged(order.folder) as aside:
+        (aside / FILE).write_text(text + "\n", encoding="utf-8")
+    return found
+
+
+def _locks(words: tuple[str, ...]) -> dict[str, float]:
+    found = {}
+    for word in words:
+        name, _, value = word.partition("=")
+        try:
+            found[name] = float(value)
+        except ValueError:
+            found[name] = np.nan
+        if not name or not np.isfinite(found[name]):
+            message = f"--lock is {word!r}, expected JOINT=VALUE in radians or metres"
+            raise InvalidInput(message)
+    return found
+
+
+def _size(robot: Robot) -> float:
+    """How far the robot reaches at most, roughly; [m]."""
+    shifts = [np.linalg.norm(joint.placement[:3, 3]) for joint in robot.tree.joints]
+    return float(sum(shifts)) or 1.0
+
+
+def _facts(found: RobotVerification, order: RobotOrder) -> dict[str, Any]:
+    robot, path = found.robot, found.path
+    return {
+        "verdict": found.verdict.value,
+        "robot": robot.name,
+        "joints": [joint.name for joint in robot.joints],
+        "waypoints": len(path.knots),
+        "interpolation": {1: "linear", 3: "cubic", 5: "quintic"}[path.degree],
+        "bodies": "hulls of meshes; boxes, cylinders and spheres as they are",
+        "required_clearance_m": order.required,
+        "required_self_clearance_m": order.required_self,
+        "checks": [check_row(check).model_dump(mode="json") for check in found.checks],
+        "pairs": [_pair(pair) for pair in _nearest_first(found)],
+        "left_out": [[one.one, one.other, one.reason] for one in robot.left_out],
+    }
+
+
+def _nearest_first(found: RobotVerification) -> list[JudgedPair]:
+    return sorted(found.pairs, key=lambda pair: (pair.upper, pair.lower))
+
+
+def _pair(pair: JudgedPair) -> dict[str, Any]:
+    seen = bool(np.isfinite(pair.upper))
+    return {
+        "link": pair.link,
+        "other": pair.other,
+        "obstacle": pair.is_obstacle,
+        "verdict": pair.verdict.value,
+        "lower_m": pair.lower if np.isfinite(pair.lower) else None,
+        "upper_m": pair.upper if seen else None,
+        "waypoint": pair.moment if seen else None,
+        "link_point_m": pair.link_point.tolist() if seen else None,
+        "other_point_m": pair.other_point.tolist() if seen else None,
+    }
+
+
+def show_robot(found: RobotVerification, folder: Path) -> None:
+    """Print verdict, checks and the nearest pairs."""
+    known = outcome(found.verdict)
+    typer.echo(f"{known.mark} {known.word}  {printable(found.robot.name)}")
+    plain_checks(tuple(check_row(check) for check in found.checks))
+    near = [
+        (
+            f"{pair.link} and {pair.other}",
+            f"proved {pair.lower * MM_PER_M:.3f} to {pair.upper * MM_PER_M:.3f} mm "
+            f"at waypoint {pair.moment:.4f}, {pair.verdict.value}",
+        )
+        for pair in _nearest_first(found)[:NEAREST]
+        if np.isfinite(pair.upper)
+    ]
+    left = f"{len(found.robot.left_out)} pairs of links, listed with reasons"
+    show_facts(*near, ("not held apart", left), ("file", str(folder / FILE)))

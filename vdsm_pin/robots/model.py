@@ -1,0 +1,69 @@
+"""A robot of any kind: a tree of joints and the solids of its links."""
+
+from dataclasses import dataclass
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.proof.bodies import Body
+from vdsm_pin.proof.tree import Tree
+
+
+@dataclass(frozen=True)
+class RobotJoint:
+    """A joint that a trajectory moves.
+
+    Args:
+        name: As in the URDF.
+        lower: Least value, -inf where there is no limit; [rad] or [m].
+        upper: Largest value.
+        turns: Whether its values are angles.
+    """
+
+    name: str
+    lower: float
+    upper: float
+    turns: bool
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Two links that are not held apart.
+
+    Args:
+        one: Name of a link.
+        other: Name of another.
+        reason: Why.
+    """
+
+    one: str
+    other: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A robot as it is judged.
+
+    Args:
+        name: As in the URDF.
+        text: The URDF, for Pinocchio to read by itself.
+        tree: The joints; column c of q is `joints[c]`.
+        joints: Those that a trajectory moves.
+        frames: The frame of each link by name.
+        bodies: The links that have collision solids.
+        held: Numbers of two bodies that are held apart, each.
+        left_out: Pairs of links with solids that are not.
+    """
+
+    name: str
+    text: str
+    tree: Tree
+    joints: tuple[RobotJoint, ...]
+    frames: dict[str, int]
+    bodies: tuple[Body, ...]
+    held: tuple[tuple[int, int], ...]
+    left_out: tuple[LeftOut, ...]
+
+    def poses(self, q: FloatArray) -> dict[str, FloatArray]:
+        """T_world_link of every link at rows of q, shape (n_rows, 4, 4); [m]."""
+        poses = self.tree.poses(q)
+        return {name: poses[:, frame] for name, frame in self.frames.items()}

@@ -1,0 +1,219 @@
+"""Scenes for robots: obstacles as in a problem file, or a PlanningScene of MoveIt."""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal
+
+import numpy as np
+from pydantic import Field, ValidationError
+
+from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.frames import Frame
+from vdsm_pin.io.obstacle_builder import ObstacleBuilder
+from vdsm_pin.io.obstacle_schema import ObstacleModel
+from vdsm_pin.io.problem_errors import first_error
+from vdsm_pin.io.schema_types import FileModel
+from vdsm_pin.io.source import read_text
+from vdsm_pin.io.yaml_reader import Location, YamlDocument, read_yaml
+from vdsm_pin.scene import Box, Cylinder, HalfSpace, Mesh, Obstacle, Scene, Sphere
+
+MAX_BYTES: Final = 32 << 20
+UNIT_NORM: Final = 1e-3
+"""How far a quaternion's length may be from 1; [-]."""
+
+
+class SceneModel(FileModel):
+    """Obstacles in the robot's base frame."""
+
+    length_unit: Literal["mm", "m"] = Field(
+        description="Unit of every length in this file."
+    )
+    obstacles: list[ObstacleModel] = Field(description="Solids to avoid.")
+
+
+def read_scene(path: Path, robot_size: float) -> Scene:
+    """The obstacles of a scene file, in the robot's base frame.
+
+    Args:
+        path: A YAML file: `length_unit` and `obstacles` as in a problem file, or a
+            PlanningScene as MoveIt writes it.
+        robot_size: For judging the size of a mesh; [m].
+
+    Raises:
+        InvalidFile: If the file breaks its contract, or has what is not judged: meshes
+            with an inside, attached objects.
+    """
+    document = read_yaml(read_text(path, limit=MAX_BYTES), file=path)
+    if isinstance(document.data, dict) and "world" in document.data:
+        scene = _moveit(document)
+    else:
+        scene = _ours(document, path, robot_size)
+    for k, obstacle in enumerate(scene.obstacles):
+        if isinstance(obstacle, Mesh) and not obstacle.is_surface:
+            problem = (
+                f"{obstacle.name!r} may have an inside, which is not judged for robots "
+                "yet; expected solid: false, where its surface is all that is meant"
+            )
+            raise document.invalid(("obstacles", k, "solid"), problem)
+    return scene
+
+
+def _ours(document: YamlDocument, path: Path, robot_size: float) -> Scene:
+    try:
+        model = SceneModel.model_validate(document.data)
+    except ValidationError as error:
+        raise first_error(error, document) from None
+    frame = Frame(model.length_unit, np.eye(3), np.zeros(3))
+    digest = hashlib.sha256()
+    builder = ObstacleBuilder(document, path.parent, frame, robot_size, digest)
+    return Scene(builder.build_all(model.obstacles, ("obstacles",)))
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A value of the file, and where it stands."""
+
+    document: YamlDocument
+    at: Location
+    value: Any
+
+    def __getitem__(self, key: str | int) -> "_Place":
+        if isinstance(key, str) and not isinstance(self.value, dict):
+            problem = "is no mapping"
+            raise self.invalid(problem)
+        try:
+            return _Place(self.document, (*self.at, key), self.value[key])
+        except (KeyError, IndexError, TypeError):
+            problem = f"has no {key!r}"
+            raise self.invalid(problem) from None
+
+    def get(self, key: str, default: Any) -> "_Place":
+        has = isinstance(self.value, dict) and self.value.get(key) is not None
+        return self[key] if has else _Place(self.document, self.at, default)
+
+    def items(self) -> list["_Place"]:
+        if not isinstance(self.value, list):
+            problem = "is no list"
+            raise self.invalid(problem)
+        return [self[k] for k in range(len(self.value))]
+
+    def numbers(self, count: int) -> FloatArray:
+        values = self.value
+        good = isinstance(values, list) and len(values) >= count
+        good = good and all(type(v) in (int, float) for v in values)
+        if not good or len(values) > count or not np.isfinite(values).all():
+            problem = f"is {str(values)[:60]}, expected {count} numbers"
+            raise self.invalid(problem)
+        return np.array(values, dtype=np.float64)
+
+    def invalid(self, problem: str) -> InvalidFile:
+        return self.document.invalid(self.at, problem)
+
+
+def _moveit(document: YamlDocument) -> Scene:
+    """The collision objects of a PlanningScene, all solids of one as one obstacle each.
+
+    Its allowed collision matrix is not read: the SRDF says which links may touch.
+    """
+    whole = _Place(document, (), document.data)
+    attached = whole.get("robot_state", {}).get("attached_collision_objects", [])
+    if attached.value:
+        problem = "has attached objects, which are not judged yet"
+        raise attached.invalid(problem)
+    if whole["world"].get("octomap", {}).get("octomap", {}).get("data", []).value:
+        problem = "has an octomap, which is not read"
+        raise whole["world"].invalid(problem)
+    found: list[Obstacle] = []
+    for thing in whole["world"].get("collision_objects", []).items():
+        found += _solids(thing)
+    try:
+        return Scene(tuple(found))
+    except InvalidInput as error:
+        raise whole["world"].invalid(str(error)) from None
+
+
+def _solids(thing: _Place) -> list[Obstacle]:
+    name = thing["id"].value
+    if not isinstance(name, str) or not name:
+        problem = "is no name"
+        raise thing["id"].invalid(problem)
+    if thing.get("meshes", []).value:
+        problem = f"{name!r} has meshes, which are not read from a PlanningScene yet"
+        raise thing.invalid(problem)
+    base, found = _pose(thing.get("pose", {})), list[Obstacle]()
+    shapes = thing.get("primitives", []).items()
+    poses = thing.get("primitive_poses", []).items()
+    planes, at = thing.get("planes", []).items(), thing.get("plane_poses", []).items()
+    if len(shapes) != len(poses) or len(planes) != len(at):
+        problem = f"{name!r} has not one pose for each of its shapes"
+        raise thing.invalid(problem)
+    count = len(shapes) + len(planes)
+    if not count:
+        problem = f"{name!r} has no shape"
+        raise thing.invalid(problem)
+    names = [name if count == 1 else f"{name}/{k}" for k in range(1, count + 1)]
+    for shape, pose in zip(shapes, poses, strict=True):
+        found.append(_primitive(shape, names[len(found)], base @ _pose(pose)))
+    for plane, pose in zip(planes, at, strict=True):
+        found.append(_plane(plane, names[len(found)], base @ _pose(pose)))
+    return found
+
+
+def _primitive(shape: _Place, name: str, placement: FloatArray) -> Obstacle:
+    kinds = {1: "box", 2: "sphere", 3: "cylinder"}
+    kind = shape["type"].value
+    kind = kinds.get(kind, kind) if not isinstance(kind, bool) else kind
+    turn, centre = placement[:3, :3], placement[:3, 3]
+    sizes = shape["dimensions"]
+    try:
+        match kind:
+            case "box":
+                return Box(name, centre, turn, sizes.numbers(3) / 2.0)
+            case "sphere":
+                return Sphere(name, centre, float(sizes.numbers(1)[0]))
+            case "cylinder":
+                height, radius = sizes.numbers(2)
+                axis = turn[:, 2]
+                return Cylinder(name, centre, axis, float(height) / 2.0, float(radius))
+    except InvalidFile:
+        raise
+    except InvalidInput as error:
+        raise shape.invalid(str(error)) from None
+    problem = f"is {kind!r}, expected {', '.join(kinds.values())}"
+    raise shape["type"].invalid(problem)
+
+
+def _plane(plane: _Place, name: str, placement: FloatArray) -> Obstacle:
+    """What lies below a x + b y + c z + d = 0."""
+    a, b, c, d = plane["coef"].numbers(4)
+    length = float(np.linalg.norm((a, b, c)))
+    if not length > 0.0:
+        problem = "has no direction"
+        raise plane.invalid(problem)
+    normal = placement[:3, :3] @ (np.array([a, b, c]) / length)
+    foot = placement[:3, 3] - d / length * normal
+    return HalfSpace(name, foot, normal)
+
+
+def _pose(pose: _Place) -> FloatArray:
+    """T_world_object, shape (4, 4): position, quaternion x y z w, listed or named."""
+    placement = np.eye(4)
+    placement[:3, 3] = _named(pose.get("position", [0, 0, 0]), "xyz")
+    quaternion = _named(pose.get("orientation", [0, 0, 0, 1]), "xyzw")
+    length = float(np.linalg.norm(quaternion))
+    if not abs(length - 1.0) <= UNIT_NORM:
+        problem = f"has an orientation of length {length:g}, expected 1"
+        raise pose.invalid(problem)
+    x, y, z, w = quaternion / length
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    placement[:3, :3] += 2.0 * (w * cross + cross @ cross)
+    return placement
+
+
+def _named(place: _Place, keys: str) -> FloatArray:
+    if not isinstance(place.value, dict):
+        return place.numbers(len(keys))
+    values = [place[key].value for key in keys]
+    return _Place(place.document, place.at, values).numbers(len(keys))
