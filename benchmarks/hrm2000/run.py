@@ -73,7 +73,7 @@ def save(base: Path, outcomes: list[Outcome], limit: float, jobs: int) -> None:
     ordered = sorted(outcomes, key=lambda o: (o.method, o.family, o.number))
     data = {"settings": settings, "outcomes": [asdict(o) for o in ordered]}
     base.parent.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(data, indent=1) + "\n"
+    text = json.dumps(data, separators=(",", ":")) + "\n"
     base.with_suffix(".json").write_text(text, encoding="utf-8")
     page = document(ordered, settings)
     base.with_suffix(".md").write_text(page, encoding="utf-8")
