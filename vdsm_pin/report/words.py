@@ -95,8 +95,8 @@ OUTCOMES: Final[Mapping[str, Outcome]] = MappingProxyType(
 """Every outcome of a check, a verification or a problem of a batch."""
 
 
-BASE_ERROR: Final = "shift of the base in any direction, no turn of it"
-"""What the error of the base covers, and what it does not."""
+BASE_ERROR: Final = "shift of the base in any direction"
+"""What the length of the base's error is; its turn is another number."""
 
 
 def outcome(word: str) -> Outcome:

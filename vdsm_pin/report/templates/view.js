@@ -100,9 +100,10 @@ class ArmView {
     for (let i = 0; i < flat.length; i += 3) corners.push(new Vector3(...flat.slice(i, i + 3)));
     this.desired = new Group();
     const ink = new MeshBasicMaterial({ color: 0xd9480f });
+    const thin = 0.11 * this.scene.radius;
     for (let i = 0; i + 1 < corners.length && corners.length < 400; i++) {
       const side = corners[i + 1].clone().sub(corners[i]);
-      const rod = new Mesh(new CylinderGeometry(0.007, 0.007, side.length(), 8), ink);
+      const rod = new Mesh(new CylinderGeometry(thin, thin, side.length(), 8), ink);
       rod.position.copy(corners[i]).addScaledVector(side, 0.5);
       rod.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), side.normalize());
       this.desired.add(rod);
