@@ -49,7 +49,7 @@ tip_path:
 required_clearance: 3
 """)
 problem = vp.read_problem("nozzle.yaml")
-plan = vp.plan(problem, time_limit=60.0)
+plan = vp.plan(problem, time_limit=300.0)
 result = vp.verify(problem, plan.trajectory)
 print(result)
 assert result.verdict is vp.Verdict.CERTIFIED

@@ -11,7 +11,7 @@ if not Path("vessel").exists():
     new_project(Path("vessel"), "port")  # as `vdsm new vessel --from port`
 problem = vp.read_problem("vessel/problem.yaml")
 
-plan = vp.plan(problem, time_limit=60.0)
+plan = vp.plan(problem, time_limit=300.0)
 motion = plan.trajectory
 bent = (np.hypot(motion.alpha, motion.theta) > np.radians(0.05)).sum(axis=1)
 print(plan)
