@@ -239,6 +239,7 @@ def verify(
             "PROBLEM": problem,
             "--joint-error-deg": joint_error_deg,
             "--base-error-mm": base_error_mm,
+            "--base-error-deg": base_error_deg,
             "--obstacle-error-mm": obstacle_error_mm,
             "--certificate": certificate,
             "--pdf": pdf,

@@ -261,3 +261,16 @@ def test_the_command_ends_with_the_verdict(
     assert "PROBLEM has no meaning with --urdf" in capsys.readouterr().err
     assert run("verify", "--trajectory", rows, "--out", out) == 2
     assert run("verify", "paper/obs1", "--lock", "a=1", *asked[5:], "--out", out) == 2
+
+
+OF_ARM = ("joint-error-deg", "base-error-mm", "base-error-deg", "obstacle-error-mm")
+
+
+@pytest.mark.parametrize("option", OF_ARM)
+def test_an_error_that_is_not_covered_is_refused(
+    tmp_path: Path, option: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    urdf, rows = write(tmp_path, "two.urdf", URDF), write(tmp_path, "t.csv", ROWS)
+    asked = ("verify", "--urdf", urdf, "--trajectory", rows, "--out", tmp_path / "out")
+    assert run(*asked, f"--{option}", 5) == 2
+    assert f"--{option} has no meaning with --urdf" in capsys.readouterr().err

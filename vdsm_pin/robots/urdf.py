@@ -264,7 +264,8 @@ def _mesh_points(reader: _Reader, link: str, shape: ET.Element) -> FloatArray:
         word = shape.get("scale")
         problem = f"link {link!r}: scale is {word!r}, expected 3 numbers that are not 0"
         raise reader.invalid(problem)
-    points: FloatArray = mesh.vertices * scale
+    metres = 1.0 if mesh.unit is None else mesh.unit  # COLLADA states its own
+    points: FloatArray = metres * mesh.vertices * scale
     size = float(np.ptp(points, axis=0).max())
     if not size <= LARGEST_LINK:
         problem = (
