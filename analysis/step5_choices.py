@@ -14,8 +14,8 @@ import shapely
 from paper_figures.runs import Runs
 from result_files import output_folder, write_table
 
+from vdsm_pin.app.explanation.cross import DIRECTIONS, leave
 from vdsm_pin.errors import Infeasible
-from vdsm_pin.explanation.cross import DIRECTIONS, leave
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.paper import side_rules

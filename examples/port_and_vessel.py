@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import vdsm_pin as vp
-from vdsm_pin.new_project import new_project
+from vdsm_pin.app.new_project import new_project
 
 if not Path("vessel").exists():
     new_project(Path("vessel"), "port")  # as `vdsm new vessel --from port`

@@ -337,7 +337,7 @@ def test_a_search_in_vain_tells_how_far_it_came_and_how_long_it_took(
         message = "drew 100.000 mm of 400.000 mm"
         raise NoPlanFound(message)
 
-    monkeypatch.setattr("vdsm_pin.workflow.plan_to_folder", in_vain)
+    monkeypatch.setattr("vdsm_pin.app.workflow.plan_to_folder", in_vain)
     file = write_problem(tmp_path / "near.yaml", NEAR)
     with pytest.raises(SystemExit) as ended:
         main(["plan", str(file), "--out", str(tmp_path / "out")])

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from vdsm_pin import doctor, kept
+from vdsm_pin import kept
+from vdsm_pin.app import doctor
+from vdsm_pin.app.doctor import Finding, examine
 from vdsm_pin.cli import main
-from vdsm_pin.doctor import Finding, examine
 
 ROOT = Path(__file__).parents[1]
 

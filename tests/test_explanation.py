@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from lxml import etree
 
+from vdsm_pin.app.explanation.canvas import Canvas
+from vdsm_pin.app.explanation.cross import DIRECTIONS, crosses
+from vdsm_pin.app.explanation.folder import explain_to_folder
 from vdsm_pin.errors import InvalidInput, NoPlanFound
-from vdsm_pin.explanation.canvas import Canvas
-from vdsm_pin.explanation.cross import DIRECTIONS, crosses
-from vdsm_pin.explanation.folder import explain_to_folder
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.planner.paper.along_rail import AlongRail

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from vdsm_pin.app.new_project import KINDS, TEMPLATES, new_project
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.new_project import KINDS, TEMPLATES, new_project
 
 
 @pytest.mark.parametrize("kind", KINDS)

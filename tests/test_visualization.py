@@ -18,12 +18,12 @@ import made_up
 import numpy as np
 import pytest
 
+from vdsm_pin.app.visualization import ViewServer, page, write_page
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.problem_file import built_in_text, read_problem
 from vdsm_pin.io.trajectory_file import write_trajectory
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.report.postures import at_start
-from vdsm_pin.visualization import ViewServer, page, write_page
 
 TETRAHEDRON = """v 0 0 900
 v 0 90 900

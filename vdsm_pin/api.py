@@ -100,7 +100,7 @@ def error_box(
         >>> error_box(base_mm=2.0).base
         0.002
     """
-    from vdsm_pin.workflow import error_box as from_typed
+    from vdsm_pin.app.workflow import error_box as from_typed
 
     return from_typed(joint_deg, base_mm, obstacle_mm, base_deg)
 

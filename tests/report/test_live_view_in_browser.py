@@ -7,8 +7,8 @@ from typing import Any
 import made_up
 from watched_pages import NEEDS_CHROMIUM, Watched, pixels
 
+from vdsm_pin.app.visualization import ViewServer
 from vdsm_pin.io.trajectory_file import write_trajectory
-from vdsm_pin.visualization import ViewServer
 
 pytestmark = NEEDS_CHROMIUM
 

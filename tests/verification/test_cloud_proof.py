@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from problem_files import NEAR
 
+from vdsm_pin.app.workflow import VerifyOrder, plan_to_folder, verify_to_folder
 from vdsm_pin.certificate_checker import main as check_certificate
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
@@ -21,7 +22,6 @@ from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_clearance import check_coal
 from vdsm_pin.verification.records import ErrorBox, Verdict
-from vdsm_pin.workflow import VerifyOrder, plan_to_folder, verify_to_folder
 
 ARM = built_in("hrm8")
 TURN = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])

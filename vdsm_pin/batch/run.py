@@ -11,6 +11,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Final
 
+from vdsm_pin.app.workflow import NO_PLAN, REPORT
 from vdsm_pin.batch.pool import Ended, run_tasks
 from vdsm_pin.batch.progress import Progress
 from vdsm_pin.batch.task import (
@@ -37,7 +38,6 @@ from vdsm_pin.report.html import write_index
 from vdsm_pin.report.junit import junit_text
 from vdsm_pin.report.pdf import find_browser
 from vdsm_pin.report.tables import SummaryCsv, write_summary
-from vdsm_pin.workflow import NO_PLAN, REPORT
 
 SUMMARY: Final = "summary.csv"
 RUNNING: Final = "running.csv"

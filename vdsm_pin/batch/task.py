@@ -13,6 +13,16 @@ from typing import Final
 
 from pydantic import ValidationError
 
+from vdsm_pin.app.workflow import (
+    JUDGED,
+    NO_PLAN,
+    PLANNED,
+    TRAJECTORY,
+    VerifyOrder,
+    error_box,
+    plan_to_folder,
+    verify_to_folder,
+)
 from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import (
     Infeasible,
@@ -32,16 +42,6 @@ from vdsm_pin.report.words import TIME_LIMIT, outcome
 from vdsm_pin.text import printable
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.records import Verdict
-from vdsm_pin.workflow import (
-    JUDGED,
-    NO_PLAN,
-    PLANNED,
-    TRAJECTORY,
-    VerifyOrder,
-    error_box,
-    plan_to_folder,
-    verify_to_folder,
-)
 
 MANIFEST: Final = "manifest.json"
 TIMING: Final = "timing.json"

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.explanation.canvas import round_step
+from vdsm_pin.app.explanation.canvas import round_step
 from vdsm_pin.geometry.arrays import FloatArray
 
 WIDTH, HEIGHT = 760.0, 220.0

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from vdsm_pin.app.explanation import pictures
+from vdsm_pin.app.explanation.cross import NAMES, Cross, crosses
+from vdsm_pin.app.explanation.parts import Moment, Part, Table, at, deg, mm, name, table
 from vdsm_pin.cables import cable_lengths
-from vdsm_pin.explanation import pictures
-from vdsm_pin.explanation.cross import NAMES, Cross, crosses
-from vdsm_pin.explanation.parts import Moment, Part, Table, at, deg, mm, name, table
 from vdsm_pin.kinematics import link_angles, position_angles
 from vdsm_pin.planner.feasibility import curled_reach, straight_reach
 from vdsm_pin.planner.paper.across_rail import AcrossRail

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from vdsm_pin.explanation.canvas import Canvas
-from vdsm_pin.explanation.cross import Cross
-from vdsm_pin.explanation.parts import Moment, name
+from vdsm_pin.app.explanation.canvas import Canvas
+from vdsm_pin.app.explanation.cross import Cross
+from vdsm_pin.app.explanation.parts import Moment, name
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.paper.danger_region import DangerRegion

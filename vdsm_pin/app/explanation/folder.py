@@ -5,9 +5,9 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.app.explanation import steps
+from vdsm_pin.app.explanation.parts import Moment, Part, mm, table
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.explanation import steps
-from vdsm_pin.explanation.parts import Moment, Part, mm, table
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.paper.steps import PaperSteps

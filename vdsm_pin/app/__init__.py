@@ -1,0 +1,1 @@
+"""What commands do, from files to folders."""

@@ -1,0 +1,90 @@
+"""The `vdsm` command: arguments, exit codes and nothing else.
+
+One module a command, or a few that belong together. They import what they work with
+inside the commands, so that `vdsm --help` answers at once.
+"""
+
+import shlex
+import sys
+from collections.abc import Sequence
+from typing import Annotated, NoReturn
+
+import typer
+
+from vdsm_pin.cli import (
+    batch,
+    certificate,
+    convert,
+    diff,
+    explain,
+    formats,
+    plan,
+    simulate,
+    start,
+    verify,
+    view,
+)
+from vdsm_pin.cli.ending import BAD_INPUT, fail, nobody_reads
+from vdsm_pin.cli.options import NOT_PASSED, PASSED
+from vdsm_pin.errors import InvalidInput, VdsmError
+from vdsm_pin.startup import live_briefly
+from vdsm_pin.text import show_everything
+
+app = typer.Typer(
+    rich_markup_mode=None,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Plan motions of hyper-redundant arms and prove that they are collision-free.",
+    epilog="Exit status: 0 certified; 1 incomplete, refuted, undecided or infeasible; "
+    "2 bad input.",
+)
+for module in (plan, verify, batch, view, start, formats, certificate):
+    app.add_typer(module.commands)
+for module in (simulate, explain, convert, diff):
+    app.add_typer(module.commands)
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        from vdsm_pin import __version__
+
+        typer.echo(f"vdsm {__version__}")
+        raise typer.Exit(PASSED)
+
+
+@app.callback()
+def vdsm(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", is_eager=True, callback=_show_version, help="Say it and end."
+        ),
+    ] = False,
+) -> None:
+    """Plan motions of hyper-redundant arms and prove that they are collision-free."""
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run the command; every error raised on purpose becomes one message."""
+    live_briefly()
+    show_everything()
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        try:
+            app(given, prog_name="vdsm", obj=shlex.join(["vdsm", *given]))
+        finally:
+            sys.stdout.flush()  # here a closed pipe is heard, later it is not
+    except SystemExit as ended:
+        if isinstance(ended.__context__, BrokenPipeError):  # as typer says it
+            nobody_reads()
+        raise
+    except InvalidInput as error:
+        fail(error, BAD_INPUT)
+    except VdsmError as error:
+        fail(error, NOT_PASSED)
+    except BrokenPipeError:
+        nobody_reads()
+    except OSError as error:
+        fail(error, BAD_INPUT)
+    sys.exit(PASSED)

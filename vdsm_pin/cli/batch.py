@@ -1,0 +1,111 @@
+"""`vdsm batch`."""
+
+from typing import Annotated, Literal
+
+import typer
+
+from vdsm_pin.cli.ending import INTERRUPTED, fail
+from vdsm_pin.cli.options import (
+    NOT_PASSED,
+    PASSED,
+    AsJson,
+    BaseError,
+    BaseTurn,
+    JointError,
+    ObstacleError,
+    OutFolder,
+    Quiet,
+    Strategy,
+    TimeLimit,
+    examples,
+    family,
+)
+from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
+
+commands = family()
+
+
+@commands.command(
+    epilog=examples(
+        "vdsm batch --out out/demo",
+        "vdsm batch problems/*.yaml --out out/night --jobs 8 --time-limit 60 --resume",
+    ),
+)
+def batch(
+    out: OutFolder,
+    problems: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="PROBLEM",
+            help="Built-in names, problem files or folders of them; the built-in "
+            "problems if there is none.",
+        ),
+    ] = None,
+    strategy: Strategy = DEFAULT_STRATEGY,
+    jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Skip what is finished and intact.")
+    ] = False,
+    time_limit: TimeLimit = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="A Dask scheduler, as tcp://host:8786; no --jobs."
+        ),
+    ] = None,
+    keep: Annotated[
+        Literal["all", "failed", "none"],
+        typer.Option(help="Whose files stay; every problem keeps its row."),
+    ] = "all",
+    joint_error_deg: JointError = 0.0,
+    base_error_mm: BaseError = 0.0,
+    base_error_deg: BaseTurn = 0.0,
+    obstacle_error_mm: ObstacleError = 0.0,
+    certificate: Annotated[
+        bool, typer.Option("--certificate", help="Write a proof of each to its folder.")
+    ] = False,
+    pdf: Annotated[
+        bool, typer.Option("--pdf", help="Print each report to its folder too.")
+    ] = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """Plan and verify many problems.
+
+    Each gets a folder with its report; summary.csv, junit.xml and index.html show all.
+    """
+    import json
+
+    from vdsm_pin.batch.run import Batch, Interrupted, run_batch
+    from vdsm_pin.batch.task import Proving
+    from vdsm_pin.report.words import outcome
+
+    asked = Batch(
+        problems=tuple(problems or ()),
+        folder=out,
+        strategy=strategy,
+        jobs=jobs,
+        resume=resume,
+        time_limit=time_limit,
+        scheduler=scheduler,
+        keep=keep,
+        proving=Proving(
+            joint_error_deg=joint_error_deg,
+            base_error_mm=base_error_mm,
+            obstacle_error_mm=obstacle_error_mm,
+            certificate=certificate,
+            pdf=pdf,
+            base_error_deg=base_error_deg,
+        ),
+        quiet=quiet or as_json,
+    )
+    try:
+        rows = run_batch(asked)
+    except Interrupted as error:
+        fail(error, INTERRUPTED)
+    passed = sum(outcome(row.outcome).passed for row in rows)
+    if as_json:
+        typer.echo(json.dumps([row.model_dump() for row in rows], indent=2))
+    elif not quiet:
+        typer.echo(f"{passed} of {len(rows)} certified; see {out / 'index.html'}")
+    raise typer.Exit(PASSED if passed == len(rows) else NOT_PASSED)

@@ -1,0 +1,35 @@
+"""`vdsm check-certificate`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vdsm_pin.cli.options import Problem, examples, family
+
+commands = family()
+
+
+@commands.command(
+    "check-certificate",
+    epilog=examples("vdsm check-certificate mine.certificate mine.yaml mine.csv"),
+)
+def check_certificate(
+    certificate: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="What vdsm verify --certificate wrote."),
+    ],
+    problem: Problem,
+    trajectory: Annotated[
+        Path,
+        typer.Argument(metavar="TRAJECTORY", help="The trajectory.csv it is about."),
+    ],
+) -> None:
+    """Recheck a certificate.
+
+    The checker is a second program that shares only the reading of files with the
+    verifier.
+    """
+    from vdsm_pin.certificate_checker import main as check
+
+    raise typer.Exit(check([str(certificate), problem, str(trajectory)]))

@@ -1,0 +1,34 @@
+"""How the command ends: exit codes, and errors as messages."""
+
+import os
+import sys
+from typing import Final, NoReturn
+
+import typer
+
+from vdsm_pin.text import printable
+
+BAD_INPUT: Final = 2
+INTERRUPTED: Final = 130
+PIPE_CLOSED: Final = 141
+"""As a shell reports whoever is ended by SIGPIPE; all files are written by then."""
+
+MOST_TOLD: Final = 20
+"""Errors of a file that are told besides the first."""
+
+
+def fail(error: Exception, status: int) -> NoReturn:
+    """Say what went wrong, and end."""
+    others = getattr(error, "others", ())
+    for one in (error, *others[:MOST_TOLD]):
+        typer.echo(printable(f"vdsm: {one}"), err=True)
+    if len(others) > MOST_TOLD:
+        typer.echo(f"vdsm: and {len(others) - MOST_TOLD} more", err=True)
+    sys.exit(status)
+
+
+def nobody_reads() -> NoReturn:
+    """End because the reader of our output has gone, which is no verdict."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, sys.stdout.fileno())  # for what Python flushes at its end
+    sys.exit(PIPE_CLOSED)

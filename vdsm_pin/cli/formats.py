@@ -1,0 +1,64 @@
+"""What other programs read: `vdsm schema`, `vdsm urdf`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vdsm_pin.cli.options import examples, family
+
+commands = family()
+
+
+@commands.command(epilog=examples("vdsm schema verification"))
+def schema(
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="problem, certificate, verification, plan, manifest or timing."
+        ),
+    ] = "problem",
+) -> None:
+    """Print the JSON Schema of a file, or of each line of a certificate."""
+    from vdsm_pin.report.files import schema, schema_text
+
+    typer.echo(schema_text(schema(name)), nl=False)
+
+
+@commands.command(
+    epilog=examples(
+        "vdsm urdf hrm8 --out hrm8.urdf", "vdsm urdf mine.yaml --out a.urdf"
+    )
+)
+def urdf(
+    name: Annotated[
+        str,
+        typer.Argument(metavar="ARM", help="A built-in arm, or a problem for its arm."),
+    ],
+    out: Annotated[Path, typer.Option("--out", help="The URDF file.")],
+) -> None:
+    """Write the URDF of an arm."""
+    from vdsm_pin.io.atomic import atomic_path
+    from vdsm_pin.io.problem_file import built_in_names, read_problem
+    from vdsm_pin.manipulator import BUILT_IN, built_in
+    from vdsm_pin.report.folder import check_output_file
+    from vdsm_pin.report.solids import obj_text
+    from vdsm_pin.urdf_writer import mesh_names, urdf_text
+
+    known = name in BUILT_IN or name in built_in_names() or Path(name).exists()
+    if not known:
+        built_in(name)  # which says what arms there are
+    arm = BUILT_IN.get(name) or read_problem(name).problem.manipulator
+    text = urdf_text(arm)
+    check_output_file(out)
+    shapes = {solid.name: solid for _, solid in arm.carried}
+    files = {
+        out.with_name(file): obj_text(shapes[body])
+        for body, file in mesh_names(arm).items()
+    }
+    for file in files:
+        check_output_file(file)
+    for file, content in {**files, out: text}.items():
+        with atomic_path(file) as path:
+            path.write_text(content, encoding="utf-8")
+    typer.echo(f"wrote {', '.join(map(str, (out, *files)))}")

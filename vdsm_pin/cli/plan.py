@@ -1,0 +1,70 @@
+"""`vdsm plan`."""
+
+import time
+from contextlib import nullcontext
+
+import typer
+
+from vdsm_pin.cli.options import (
+    NOT_PASSED,
+    PASSED,
+    AsJson,
+    OutFolder,
+    PlanningTime,
+    Problem,
+    Quiet,
+    Strategy,
+    examples,
+    family,
+)
+from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
+from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
+from vdsm_pin.time_limit import Deadline, enforced
+
+commands = family()
+
+
+@commands.command(epilog=examples("vdsm plan paper/obs1 --out out/obs1"))
+def plan(
+    context: typer.Context,
+    problem: Problem,
+    out: OutFolder,
+    strategy: Strategy = DEFAULT_STRATEGY,
+    time_limit: PlanningTime = 60.0,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """Plan a motion.
+
+    Writes trajectory.csv, centres.csv, cables.csv, plan.json and report.html, or
+    no_plan.html where there is no plan. A plan that draws less of the path than
+    required is written, is called incomplete, and ends with status 1.
+    """
+    from vdsm_pin.app.workflow import NO_PLAN, plan_to_folder
+    from vdsm_pin.io.problem_file import read_problem
+    from vdsm_pin.progress import shown
+    from vdsm_pin.report.terminal import show_plan
+    from vdsm_pin.report.words import outcome
+
+    deadline, begin = Deadline.after(time_limit), time.monotonic()
+    page = f"see {out / NO_PLAN}"
+    try:
+        with enforced(deadline):
+            source = read_problem(problem)
+            with nullcontext() if quiet else shown():
+                file = plan_to_folder(source, strategy, out, context.obj, deadline)
+    except OutOfTime as error:  # which tells its time itself
+        error.args = (f"no plan found: {error}; {page}",)
+        raise
+    except NoPlanFound as error:
+        spent = time.monotonic() - begin
+        error.args = (f"no plan found: {error}; searched for {spent:.1f} s; {page}",)
+        raise
+    except Infeasible as error:
+        error.args = (f"{error}; {page}",)
+        raise
+    if as_json:
+        typer.echo(file.text(), nl=False)
+    elif not quiet:
+        show_plan(file, out)
+    raise typer.Exit(PASSED if outcome(file.verdict).passed else NOT_PASSED)

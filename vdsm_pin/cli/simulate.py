@@ -1,0 +1,51 @@
+"""`vdsm simulate`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vdsm_pin.cli.options import (
+    NOT_PASSED,
+    PASSED,
+    OutFolder,
+    Problem,
+    Trajectory,
+    examples,
+    family,
+)
+
+commands = family()
+
+
+@commands.command(
+    epilog=examples(
+        "vdsm simulate paper/obs3 --trajectory out/obs3/trajectory.csv --out out/loop"
+    )
+)
+def simulate(
+    problem: Problem,
+    trajectory: Trajectory,
+    out: OutFolder,
+    settings: Annotated[
+        Path | None,
+        typer.Option(help="A YAML file of masses, cables, motors, gains, kicks."),
+    ] = None,
+) -> None:
+    """Run a plan in closed loop: elastic cables, motors, encoders, PID.
+
+    Needs MuJoCo (extra `simulation`). Writes executed.csv, simulation.csv,
+    simulation.json and simulation.html. Status 1 where the executed motion is not
+    proved clear.
+    """
+    from vdsm_pin.io.problem_file import read_problem
+    from vdsm_pin.simulation.folder import SimulationOrder, simulate_to_folder
+    from vdsm_pin.simulation.settings import Settings, read_settings
+    from vdsm_pin.simulation.terminal import show_simulation
+
+    assumed = Settings() if settings is None else read_settings(settings)
+    order = SimulationOrder(read_problem(problem), trajectory, out, assumed)
+    file = simulate_to_folder(order)
+    show_simulation(file, out)
+    passed = file.executed.verdict == "certified"
+    raise typer.Exit(PASSED if passed else NOT_PASSED)

@@ -1,0 +1,64 @@
+"""What a beginner asks first: `vdsm problems`, `vdsm new`, `vdsm doctor`."""
+
+import shlex
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vdsm_pin.cli.options import NOT_PASSED, PASSED, examples, family
+from vdsm_pin.text import printable
+
+commands = family()
+
+
+@commands.command(
+    epilog=examples(
+        "vdsm problems",
+        "vdsm problems --show paper/obs1 > mine.yaml",
+    ),
+)
+def problems(
+    show: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Print this problem's file.")
+    ] = None,
+) -> None:
+    """List the built-in problems, or print one."""
+    from vdsm_pin.io.problem_file import built_in_names, built_in_text
+
+    names = "\n".join(built_in_names()) + "\n"
+    typer.echo(names if show is None else built_in_text(show), nl=False)
+
+
+@commands.command(epilog=examples("vdsm new mine", "vdsm new vessel --from port"))
+def new(
+    folder: Annotated[
+        Path, typer.Argument(metavar="NAME", help="Folder to make; names the problem.")
+    ],
+    kind: Annotated[
+        str, typer.Option("--from", help="snake, port or paper.")
+    ] = "snake",
+) -> None:
+    """Make a folder with a problem to start from."""
+    from vdsm_pin.app.new_project import new_project
+
+    files = new_project(folder, kind)
+    typer.echo(f"made {folder} with {', '.join(files)}; next:")
+    typer.echo(f"  vdsm plan {shlex.quote(str(folder / 'problem.yaml'))} --out out")
+
+
+@commands.command(epilog=examples("vdsm doctor"))
+def doctor() -> None:
+    """Say what this installation can do, what it lacks and how to get it.
+
+    Exit status 1 if planning or verification lacks something.
+    """
+    from vdsm_pin.app.doctor import examine
+
+    findings = examine()
+    for one in findings:
+        sign = "✓" if one.works else "✗" if one.needed else "–"
+        remedy = f"; {one.remedy}" if one.remedy else ""
+        typer.echo(printable(f"{sign} {one.what:<14} {one.found}{remedy}"))
+    lacking = any(one.needed and not one.works for one in findings)
+    raise typer.Exit(NOT_PASSED if lacking else PASSED)
