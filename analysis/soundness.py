@@ -155,7 +155,7 @@ def verdicts(batch: Batch, errors: ErrorBox = NOMINAL) -> Any:
     )
     bodies = [*obstacles, *moving]
     task = pack_task(tree, bodies, table, rules, path.reach, pieces=pieces)
-    task = with_growth(task, errors, [errors.obstacle] * len(obstacles))
+    task = with_growth(task, errors, arm.n_links, [errors.obstacle] * len(obstacles))
     # No obstacle is named as such, so that none is settled by its box.
     proving = new_proving(task, path.packed(), 1, 0, BUDGET)
     proving.sweep(0, 1)

@@ -6,7 +6,7 @@ one hull per triangle plus, where they close (`geometry/closed_meshes.py`), an i
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, TypeAlias, cast
 
@@ -22,10 +22,12 @@ from vdsm_pin.geometry.convex import (
     Hulls,
     Piece,
 )
+from vdsm_pin.proof.tree import Kind, Tree
 from vdsm_pin.tolerances import TOLERANCES
 
 if TYPE_CHECKING:  # it brings compiled code, for which readers need not wait
     from vdsm_pin.geometry.pieces import PackedPieces
+    from vdsm_pin.proof.paths import Path
 
 BOX_CORNERS: Final = frozen(
     [[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]
@@ -413,7 +415,73 @@ class Voxels:
 FromFile: TypeAlias = Mesh | PointCloud | Voxels
 """Obstacles that stand in files of their own."""
 
-Obstacle: TypeAlias = Sphere | Capsule | Cylinder | Box | Prism | HalfSpace | FromFile
+Solid: TypeAlias = Sphere | Capsule | Cylinder | Box | Prism | HalfSpace | FromFile
+
+
+@dataclass(frozen=True, eq=False)
+class Carrier:
+    """Joints that carry obstacles about as time goes by.
+
+    Args:
+        tree: The joints, hung on the base's frame.
+        path: How they move, with times; at rest before and after.
+    """
+
+    tree: Tree
+    path: "Path"
+
+    def poses(self, times: FloatArray) -> FloatArray:
+        """T_base_frame of all frames at some times (m,), (m, n_frames, 4, 4); [m]."""
+        return self.tree.poses(self.path.at(times))
+
+    @cached_property
+    def reach(self) -> float:
+        """No frame is ever farther from the base's origin than this; [m]."""
+        far, most = 0.0, self.path.reach
+        for joint in self.tree.joints:
+            far += float(np.linalg.norm(np.asarray(joint.placement)[:3, 3]))
+            if joint.kind is Kind.PRISMATIC:
+                moved = 0.0 if joint.column is None else float(most[joint.column])
+                far += abs(joint.offset) + abs(joint.ratio) * moved
+        return far
+
+
+@dataclass(frozen=True)
+class Moving:
+    """A solid that moves.
+
+    Args:
+        solid: In the frame that carries it.
+        carrier: What does; several solids may share one.
+        frame: Which of its frames, from 1.
+    """
+
+    solid: "Solid | ConvexCover"
+    carrier: Carrier
+    frame: int
+
+    @property
+    def name(self) -> str:
+        """The solid's."""
+        return self.solid.name
+
+    @property
+    def pieces(self) -> Sequence[Piece]:
+        """The convex pieces, in the frame that carries them."""
+        return self.solid.pieces
+
+    def poses(self, times: FloatArray) -> FloatArray:
+        """T_base_solid at some times (m,), shape (m, 4, 4); [m]."""
+        return np.asarray(self.carrier.poses(times)[:, self.frame])
+
+
+Obstacle: TypeAlias = Solid | Moving
+
+
+def solid_of(obstacle: Obstacle) -> Solid:
+    """The solid that an obstacle is, in its own frame where it moves."""
+    found = obstacle.solid if isinstance(obstacle, Moving) else obstacle
+    return cast("Solid", found)
 
 
 def reach_of(obstacle: Obstacle | ConvexCover) -> float:
@@ -421,7 +489,9 @@ def reach_of(obstacle: Obstacle | ConvexCover) -> float:
 
     Not below that of its own points; of a half-space that of the stated point alone.
     """
-    if not isinstance(obstacle, Obstacle):  # a hull, or pieces of any origin
+    if isinstance(obstacle, Moving):
+        return reach_of(obstacle.solid) + obstacle.carrier.reach
+    if not isinstance(obstacle, Solid):  # a hull, or pieces of any origin
         hulls = [piece for piece in obstacle.pieces if isinstance(piece, Hull)]
         return max((_reach_of_hull(hull) for hull in hulls), default=0.0)
     if isinstance(obstacle, Voxels):
@@ -469,8 +539,24 @@ class Scene:
         """Names in file order."""
         return tuple(obstacle.name for obstacle in self.obstacles)
 
+    @property
+    def moving(self) -> tuple[Moving, ...]:
+        """The obstacles that move, in file order."""
+        return tuple(one for one in self.obstacles if isinstance(one, Moving))
 
-def corners_of(solid: Obstacle) -> tuple[FloatArray, float]:
+    @property
+    def at_rest(self) -> "Scene":
+        """The obstacles that do not."""
+        still = (one for one in self.obstacles if not isinstance(one, Moving))
+        return Scene(tuple(still)) if self.moving else self
+
+    @property
+    def carriers(self) -> tuple[Carrier, ...]:
+        """What carries them, each once."""
+        return tuple(dict.fromkeys(one.carrier for one in self.moving))
+
+
+def corners_of(solid: Solid) -> tuple[FloatArray, float]:
     """Points, shape (n, 3), whose hull grown by a radius holds a solid; [m].
 
     Of a half-space the point that it is given by.
@@ -507,10 +593,15 @@ def with_hulls(scene: Scene, names: Collection[str]) -> Scene:
         scene: All obstacles.
         names: Of meshes.
     """
-    obstacles: list[Obstacle | ConvexCover] = [
-        one.hull if isinstance(one, Mesh) and one.name in names else one
-        for one in scene.obstacles
-    ]
+    obstacles: list[Obstacle | ConvexCover] = []
+    for one in scene.obstacles:
+        solid = solid_of(one)
+        if not isinstance(solid, Mesh) or one.name not in names:
+            obstacles.append(one)
+        elif isinstance(one, Moving):
+            obstacles.append(replace(one, solid=solid.hull))
+        else:
+            obstacles.append(solid.hull)
     return Scene(tuple(cast("list[Obstacle]", obstacles)))
 
 

@@ -1,12 +1,14 @@
-"""A trajectory: rows of joint values, joined by straight lines in joint space."""
+"""A trajectory: rows of joint values, joined by straight lines or by smooth pieces."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
+from vdsm_pin.geometry import bernstein
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, frozen
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
@@ -27,10 +29,15 @@ class Trajectory(Summarised):
         alpha: Yaw angles, shape (n_samples, N); [rad].
         theta: Pitch angles, shape (n_samples, N); [rad].
         notes: What its file had besides, one phrase each.
+        times: Of the rows, rising, shape (n_samples,); [s]. None where not known.
+        rates: Velocities of `joints`, shape (n_samples, 1 + 2N): cubic pieces join the
+            rows; None for straight lines; [m/s], [rad/s].
+        changes: Accelerations of `joints`, the same shape: the pieces are quintic;
+            [m/s^2], [rad/s^2].
 
     Raises:
-        InvalidInput: If shapes disagree, a value is not finite, a path_m goes beyond
-            `TOLERANCES.path_extent`, or there is no row.
+        InvalidInput: If shapes disagree, a value is not finite, times do not rise, a
+            path_m goes beyond `TOLERANCES.path_extent`, or there is no row.
     """
 
     on_path: BoolArray
@@ -39,6 +46,9 @@ class Trajectory(Summarised):
     alpha: FloatArray
     theta: FloatArray
     notes: tuple[str, ...] = ()
+    times: FloatArray | None = None
+    rates: FloatArray | None = None
+    changes: FloatArray | None = None
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check their shapes."""
@@ -64,6 +74,36 @@ class Trajectory(Summarised):
                 raise InvalidInput(message)
         if not (np.abs(self.path_m) <= TOLERANCES.path_extent).all():
             message = f"trajectory has a path_m beyond {TOLERANCES.path_extent:g} m"
+            raise InvalidInput(message)
+        self._check_motion()
+
+    def _check_motion(self) -> None:
+        """Freeze and check what is known of the motion between the rows.
+
+        Raises:
+            InvalidInput: If it does not fit the rows.
+        """
+        n, width = self.n_samples, 1 + 2 * self.n_links
+        shapes = {"times": (n,), "rates": (n, width), "changes": (n, width)}
+        for name, shape in shapes.items():
+            if (given := getattr(self, name)) is None:
+                continue
+            values = frozen(given)
+            object.__setattr__(self, name, values)
+            if values.shape != shape or not np.isfinite(values).all():
+                message = (
+                    f"trajectory has {name} of shape {values.shape}, expected {shape}, "
+                    "all of them finite"
+                )
+                raise InvalidInput(message)
+        if self.times is not None and not (np.diff(self.times) > 0.0).all():
+            message = "trajectory has times that do not rise from row to row"
+            raise InvalidInput(message)
+        if self.rates is not None and self.times is None:
+            message = "trajectory has velocities but no times"
+            raise InvalidInput(message)
+        if self.changes is not None and self.rates is None:
+            message = "trajectory has accelerations but no velocities"
             raise InvalidInput(message)
 
     @property
@@ -96,6 +136,33 @@ class Trajectory(Summarised):
             ("largest angle", f"{largest:.3f} deg"),
         )
 
+    @property
+    def is_smooth(self) -> bool:
+        """Whether smooth pieces join the rows, not straight lines."""
+        return self.rates is not None and self.n_samples > 1
+
+    @cached_property
+    def inner(self) -> FloatArray:
+        """Control points of `joints` between two rows, of straight lines none.
+
+        Shape (n_samples - 1, degree - 1, 1 + 2N); [m], [rad].
+        """
+        if self.rates is None or self.times is None or self.n_samples == 1:
+            return frozen(np.zeros((0, 0, 1 + 2 * self.n_links)))
+        rows, more = self.joints, self.changes
+        return frozen(bernstein.hermite(rows, self.rates, more, self.times))
+
+    @property
+    def controls(self) -> FloatArray:
+        """Control points of every piece, (n_samples - 1, degree + 1, 1 + 2N)."""
+        return self._pieces(np.arange(self.n_samples - 1))
+
+    def _pieces(self, k: IntArray) -> FloatArray:
+        """The same of some pieces, shape (m,)."""
+        rows, inner = self.joints, self.inner
+        between = inner[k] if self.is_smooth else np.zeros((k.size, 0, rows.shape[1]))
+        return np.concatenate([rows[k, None], between, rows[k + 1, None]], axis=1)
+
     def part(self, first: int, last: int) -> "Trajectory":
         """The rows from `first` up to `last`, or to the end where there are fewer."""
         rows = slice(first, last)
@@ -105,4 +172,83 @@ class Trajectory(Summarised):
             self.x0[rows],
             self.alpha[rows],
             self.theta[rows],
+            times=None if self.times is None else self.times[rows],
+            rates=None if self.rates is None else self.rates[rows],
+            changes=None if self.changes is None else self.changes[rows],
         )
+
+    def joints_at(self, moments: FloatArray) -> FloatArray:
+        """Joint values at moments in waypoints, shape (m,): (m, 1 + 2N)."""
+        before = np.minimum(moments.astype(np.int64), self.n_samples - 1)
+        after = np.minimum(before + 1, self.n_samples - 1)
+        share, rows = moments - before, self.joints
+        if not self.is_smooth:
+            steps = rows[after] - rows[before]
+            return np.asarray(rows[before] + share[:, None] * steps)
+        found, within = rows[before], share > 0.0
+        pieces = self._pieces(before[within])
+        found[within] = bernstein.value(pieces, share[within])
+        return found
+
+    def times_at(self, moments: FloatArray) -> FloatArray | None:
+        """Times of moments in waypoints, shape (m,); [s]. None where not known."""
+        if self.times is None:
+            return None
+        return np.interp(moments, np.arange(self.n_samples), self.times)
+
+    def at(self, moments: FloatArray) -> "Trajectory":
+        """Rows at moments in waypoints, in any order, without times, shape (m,)."""
+        before = np.minimum(moments.astype(np.int64), self.n_samples - 1)
+        joints = self.joints_at(moments)
+        return _of_joints(joints, self.on_path[before], self.path_m[before])
+
+    def within(self, interval: int, low: float, high: float) -> "Trajectory":
+        """A part of one interval as a motion of two rows; its tip draws nothing.
+
+        Of a single row the row itself.
+        """
+        if self.n_samples == 1:
+            return self
+        ends, none = interval + np.array([low, high]), np.zeros(2)
+        return self._through(ends, none.astype(bool), none)
+
+    def refined(self, parts: int) -> "Trajectory":
+        """The same smooth motion with every piece cut into so many equal ones."""
+        if not self.is_smooth:
+            return self
+        steps, share = np.divmod(np.arange((self.n_samples - 1) * parts + 1), parts)
+        after = np.minimum(steps + 1, self.n_samples - 1)
+        # A row in between is on the path where both its neighbours are.
+        on_path = self.on_path[steps] & (self.on_path[after] | (share == 0))
+        share = share / parts
+        way = self.path_m[after] - self.path_m[steps]
+        return self._through(steps + share, on_path, self.path_m[steps] + share * way)
+
+    def _through(
+        self, moments: FloatArray, on_path: BoolArray, path_m: FloatArray
+    ) -> "Trajectory":
+        """The same motion with rows at rising moments in waypoints."""
+        joints, times = self.joints_at(moments), self.times_at(moments)
+        if not self.is_smooth or self.times is None:
+            return _of_joints(joints, on_path, path_m, times)
+        k = np.minimum(moments.astype(np.int64), self.n_samples - 2)
+        step, share = np.diff(self.times)[k, None], moments - k
+        once = bernstein.derivative(self._pieces(k))
+        rates, changes = bernstein.value(once, share) / step, None
+        if self.changes is not None:
+            twice = bernstein.derivative(once)
+            changes = bernstein.value(twice, share) / step**2
+        return replace(
+            _of_joints(joints, on_path, path_m, times), rates=rates, changes=changes
+        )
+
+
+def _of_joints(
+    joints: FloatArray,
+    on_path: BoolArray,
+    path_m: FloatArray,
+    times: FloatArray | None = None,
+) -> Trajectory:
+    """A trajectory from its rows of joint values, shape (n, 1 + 2N)."""
+    x0, alpha, theta = joints[:, 0], joints[:, 1::2], joints[:, 2::2]
+    return Trajectory(on_path, path_m, x0, alpha, theta, times=times)

@@ -22,7 +22,7 @@ EXAMPLE, ARM, ENDS, CURVES = re.findall(
 def test_the_example_is_read_with_all_shapes(tmp_path: Path) -> None:
     (tmp_path / "p.yaml").write_text(EXAMPLE)
     problem = read_problem(tmp_path / "p.yaml").problem
-    assert len(problem.scene.obstacles) == 6
+    assert len(problem.scene.obstacles) == 7
     assert problem.manipulator.name == "hrm8"
 
 

@@ -86,7 +86,8 @@ def test_the_hierarchy_is_not_walked_for_every_row() -> None:
     """Ten times the rows of one motion: the walks do not multiply with them."""
     walks = []
     for n_rows in (200, 2000):
-        proving = prove_problem(problem_of(tunnel(0.55)), swaying(n_rows), ErrorBox())
+        proof = prove_problem(problem_of(tunnel(0.55)), swaying(n_rows), ErrorBox())
+        proving = proof.proving
         proving.sweep(0, proving.n_intervals)
         walks.append(int(proving.results.tally[RENEWED]))
     assert walks[1] < 2 * walks[0]

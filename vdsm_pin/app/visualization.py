@@ -14,7 +14,7 @@ from threading import Lock
 from typing import Final
 from urllib.parse import parse_qs, urlsplit
 
-from vdsm_pin.errors import InvalidInput, VdsmError
+from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
 from vdsm_pin.io.atomic import write_text
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
@@ -22,6 +22,7 @@ from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.folder import check_kept, check_output_file
 from vdsm_pin.report.html import message_page, view_page
 from vdsm_pin.report.postures import at_start
+from vdsm_pin.verification.moving import untimed
 
 HOST: Final = "127.0.0.1"
 _LONGEST_WAIT: Final = 20.0  # seconds a page waits for one answer
@@ -36,7 +37,10 @@ def page(problem: PlanningProblem, trajectory: Path | None, live: str = "") -> s
     """
     if trajectory is None:
         return view_page(problem, at_start(problem), live)
-    return view_page(problem, read_trajectory(trajectory, problem.manipulator), live)
+    motion = read_trajectory(trajectory, problem.manipulator)
+    if why := untimed(problem.scene, motion):
+        raise InvalidFile(file=trajectory, where="line 1", problem=why)
+    return view_page(problem, motion, live)
 
 
 def write_page(path: Path, problem: str, trajectory: Path | None) -> None:

@@ -14,7 +14,11 @@ from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import Infeasible, InvalidFile, OutOfTime
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
-from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
+from vdsm_pin.io.trajectory_file import (
+    Interpolation,
+    read_trajectory,
+    write_trajectory,
+)
 from vdsm_pin.report.facts import plan_file, verification_file
 from vdsm_pin.report.files import PlanFile, VerificationFile
 from vdsm_pin.report.folder import (
@@ -35,6 +39,7 @@ from vdsm_pin.robot_model import RobotModel, load_robot
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.coal_clearance import reach_of
+from vdsm_pin.verification.moving import untimed
 from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.task import all_pairs
 from vdsm_pin.verification.verify import verify
@@ -71,6 +76,7 @@ class VerifyOrder:
         pdf: Where the report on paper goes; None for none.
         deadline: When to give up what is left; it is then undecided.
         date: When, for the report; None where files shall not tell.
+        interpolation: What joins the rows of the trajectory file.
         all_pairs: Whether clearance.csv has every pair at every interval, not the near
             ones and the least of each alone.
     """
@@ -85,6 +91,7 @@ class VerifyOrder:
     deadline: Deadline = NO_LIMIT
     all_pairs: bool = False
     date: str | None = None
+    interpolation: Interpolation = "linear"
 
 
 @dataclass(frozen=True)
@@ -208,7 +215,11 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
     _check_outputs(order)
     problem = order.source.problem
     robot = load_robot(problem.manipulator)
-    trajectory = read_trajectory(order.trajectory, problem.manipulator)
+    trajectory = read_trajectory(
+        order.trajectory, problem.manipulator, order.interpolation
+    )
+    if why := untimed(problem.scene, trajectory):
+        raise InvalidFile(file=order.trajectory, where="line 1", problem=why)
     record = _record(order, robot)
     with staged(order.folder) as aside:
         pairs = all_pairs(problem)
@@ -269,8 +280,14 @@ def _certify(order: VerifyOrder, verification: Verification, record: RunRecord) 
     if verification.verdict is not Verdict.CERTIFIED:
         return "no proof"
     # Imported by those who ask for one: its schema takes a while to build.
-    from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
+    from vdsm_pin.verification.certificate_writer import (
+        Hashes,
+        unstated,
+        write_certificate,
+    )
 
+    if why := unstated(verification.problem, verification.trajectory):
+        return why
     hashes = Hashes(
         problem=record.problem_sha256,
         trajectory=record.trajectory_sha256,

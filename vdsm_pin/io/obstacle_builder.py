@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import singledispatchmethod
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -17,6 +17,8 @@ from vdsm_pin.io.clouds import RawCloud, read_cloud
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.mesh_size import MeshSize
+from vdsm_pin.io.motion_builder import FLOATING, rigid_carrier
+from vdsm_pin.io.motion_schema import MotionModel, MovableModel
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
 from vdsm_pin.tolerances import TOLERANCES
@@ -58,7 +60,7 @@ class ObstacleBuilder:
     origin: str = "the base"
 
     def build_scene(
-        self, models: Sequence[schema.ObstacleModel], bodies: Collection[str]
+        self, models: Sequence[MovableModel], bodies: Collection[str]
     ) -> scene.Scene:
         """All obstacles, in file order.
 
@@ -103,15 +105,26 @@ class ObstacleBuilder:
         solids = (self._checked(model, (*at, i)) for i, model in enumerate(models))
         return tuple(solids)
 
-    def _checked(self, model: schema.ObstacleModel, at: Location) -> scene.Obstacle:
+    def _checked(self, model: Any, at: Location) -> scene.Obstacle:
+        motion: MotionModel | None = getattr(model, "motion", None)
         try:
-            obstacle: scene.Obstacle = self.build(model, at)
+            if motion is None:
+                obstacle: scene.Obstacle = self.build(model, at)
+            else:
+                obstacle = self._moving(model, motion, at)
         except InvalidFile:
             raise
         except InvalidInput as error:
             raise self.document.invalid(at, str(error)) from None
         self._check_extent(obstacle, at)
         return obstacle
+
+    def _moving(self, model: Any, motion: MotionModel, at: Location) -> scene.Moving:
+        """An obstacle in its own frame, and what carries it."""
+        own = Frame(self.frame.unit, np.eye(3), np.zeros(3))
+        solid = replace(self, frame=own).build(model, at)
+        path = rigid_carrier(motion, self.frame, self.document, (*at, "motion"))
+        return scene.Moving(solid, path, FLOATING)
 
     def _check_extent(self, obstacle: scene.Obstacle, at: Location) -> None:
         """Distances are exact to a stated bound only within a stated extent."""
@@ -126,29 +139,29 @@ class ObstacleBuilder:
             raise self.document.invalid(at, problem)
 
     @singledispatchmethod
-    def build(self, model: object, at: Location) -> scene.Obstacle:
-        """One obstacle."""
+    def build(self, model: object, at: Location) -> scene.Solid:
+        """One obstacle, in the frame of the base."""
         raise NotImplementedError(type(model))
 
     @build.register
-    def _(self, model: schema.SphereModel, at: Location) -> scene.Obstacle:
+    def _(self, model: schema.SphereModel, at: Location) -> scene.Solid:
         radius = float(self.frame.metres(model.radius))
         return scene.Sphere(model.name, self.frame.point(model.center), radius)
 
     @build.register
-    def _(self, model: schema.CylinderModel, at: Location) -> scene.Obstacle:
+    def _(self, model: schema.CylinderModel, at: Location) -> scene.Solid:
         return self._round(scene.Cylinder, model, at)
 
     @build.register
-    def _(self, model: schema.CapsuleModel, at: Location) -> scene.Obstacle:
+    def _(self, model: schema.CapsuleModel, at: Location) -> scene.Solid:
         return self._round(scene.Capsule, model, at)
 
     def _round(
         self,
-        make: Callable[..., scene.Obstacle],
+        make: Callable[..., scene.Solid],
         model: schema.CylinderModel | schema.CapsuleModel,
         at: Location,
-    ) -> scene.Obstacle:
+    ) -> scene.Solid:
         if isinstance(model.axis, str):
             vector = np.eye(3)[AXES[model.axis]]
         else:
@@ -162,13 +175,13 @@ class ObstacleBuilder:
         )
 
     @build.register
-    def _(self, model: schema.BoxModel, at: Location) -> scene.Obstacle:
+    def _(self, model: schema.BoxModel, at: Location) -> scene.Solid:
         centre, half_size = self.frame.point(model.center), np.array(model.size) / 2.0
         rotation = self.frame.orientation(model.rpy_deg)
         return scene.Box(model.name, centre, rotation, self.frame.metres(half_size))
 
     @build.register
-    def _(self, model: schema.PrismModel, at: Location) -> scene.Obstacle:
+    def _(self, model: schema.PrismModel, at: Location) -> scene.Solid:
         if not model.from_ < model.to:
             problem = f"is {model.to:g}, expected above from = {model.from_:g}"
             raise self.document.invalid((*at, "to"), problem)
@@ -202,14 +215,14 @@ class ObstacleBuilder:
             raise self.document.invalid(at, problem)
 
     @build.register
-    def _(self, model: schema.HalfSpaceModel, at: Location) -> scene.Obstacle:
+    def _(self, model: schema.HalfSpaceModel, at: Location) -> scene.Solid:
         unit = self._unit(model.normal, (*at, "normal"))
         normal = self.frame.direction(unit)
         foot = self.frame.height(model.point, model.normal) * normal
         return scene.HalfSpace(model.name, foot, normal)
 
     @build.register
-    def _(self, model: schema.MeshModel, at: Location) -> scene.Obstacle:
+    def _(self, model: schema.MeshModel, at: Location) -> scene.Solid:
         mesh = self._read(read_mesh, model, at)
         size = MeshSize.of(mesh.vertices, model, self.frame, mesh.unit)
         found = scene.Mesh(
@@ -226,7 +239,7 @@ class ObstacleBuilder:
         return found
 
     @build.register
-    def _(self, model: schema.PointsModel, at: Location) -> scene.Obstacle:
+    def _(self, model: schema.PointsModel, at: Location) -> scene.Solid:
         cloud = self._read(read_cloud, model, at)
         if cloud.grid:
             problem = f"{model.file!r} is a grid of cells; expected points, or "
@@ -241,7 +254,7 @@ class ObstacleBuilder:
         )
 
     @build.register
-    def _(self, model: schema.VoxelsModel, at: Location) -> scene.Obstacle:
+    def _(self, model: schema.VoxelsModel, at: Location) -> scene.Solid:
         cloud = self._read(read_cloud, model, at)
         points, edges = cloud.points, np.array(model.size)
         stray = [

@@ -17,7 +17,7 @@ from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scene import HalfSpace, Scene
+from vdsm_pin.scene import HalfSpace, Scene, solid_of
 from vdsm_pin.tolerances import TOLERANCES
 
 
@@ -96,7 +96,7 @@ def _errors(
             raise document.invalid(("errors", "joint_deg"), problem)
         joints = tuple((float(e), float(e)) for e in np.deg2rad(joint))
         joint = 0.0
-    kinds = {obstacle.name: obstacle for obstacle in scene.obstacles}
+    kinds = {one.name: solid_of(one) for one in scene.obstacles}
     for i, one in enumerate(model.obstacles):
         at = ("errors", "obstacles", i)
         if one.name not in kinds:

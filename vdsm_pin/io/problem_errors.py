@@ -8,7 +8,7 @@ from pydantic_core import ErrorDetails
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io import body_schema as bodies
-from vdsm_pin.io import obstacle_schema as shapes
+from vdsm_pin.io import motion_schema as movables
 from vdsm_pin.io import path_schema as paths
 from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.schema_types import NAME_PATTERN, FileModel
@@ -36,15 +36,16 @@ _MODELS: Final[Mapping[str | int, type[FileModel]]] = {
     "file": paths.FilePart,
     "joints": schema.JointsModel,
     "goal": schema.GoalModel,
-    "cylinder": shapes.CylinderModel,
-    "capsule": shapes.CapsuleModel,
-    "sphere": shapes.SphereModel,
-    "box": shapes.BoxModel,
-    "prism": shapes.PrismModel,
-    "half_space": shapes.HalfSpaceModel,
-    "mesh": shapes.MeshModel,
-    "points": shapes.PointsModel,
-    "voxels": shapes.VoxelsModel,
+    "motion": movables.MotionModel,
+    "cylinder": movables.CylinderObstacle,
+    "capsule": movables.CapsuleObstacle,
+    "sphere": movables.SphereObstacle,
+    "box": movables.BoxObstacle,
+    "prism": movables.PrismObstacle,
+    "half_space": movables.HalfSpaceObstacle,
+    "mesh": movables.MeshObstacle,
+    "points": movables.PointsObstacle,
+    "voxels": movables.VoxelsObstacle,
 }
 """The model that holds a field, by the step before it in pydantic's location."""
 

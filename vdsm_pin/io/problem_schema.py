@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from vdsm_pin.io.body_schema import BodyModel
-from vdsm_pin.io.obstacle_schema import ObstacleModel
+from vdsm_pin.io.motion_schema import MovableModel
 from vdsm_pin.io.path_schema import PathPart
 from vdsm_pin.io.schema_types import (
     FileModel,
@@ -352,7 +352,7 @@ class ProblemModel(FileModel):
         default=BasePoseModel(),
         description="Where the rail is. Default: at the origin.",
     )
-    obstacles: list[ObstacleModel] = Field(default=[], description="Solids to avoid.")
+    obstacles: list[MovableModel] = Field(default=[], description="Solids to avoid.")
     tip_path: TipPathModel | None = Field(
         default=None,
         description="What the tip shall draw. Default: nothing; then clearance, "

@@ -61,8 +61,10 @@ class Table:
         file: The file, for messages.
         text: Its text, from the start.
         columns: Names of the columns that are wanted.
+        optional: Of those that are wanted where they are there.
 
     Attributes:
+        columns: Names of the columns read, those wanted first.
         ignored: Names of the other columns.
         open_ended: Whether the last line that was read has no line end.
 
@@ -70,8 +72,14 @@ class Table:
         InvalidFile: If the file is empty or a column is missing or there twice.
     """
 
-    def __init__(self, file: Path, text: TextIO, columns: Sequence[str]) -> None:
-        self._file, self._text, self._columns = file, text, tuple(columns)
+    def __init__(
+        self,
+        file: Path,
+        text: TextIO,
+        columns: Sequence[str],
+        optional: Sequence[str] = (),
+    ) -> None:
+        self._file, self._text = file, text
         self.open_ended = False
         self._decimal = ""  # the sign of the first number that has one
         line = text.readline(MAX_LINE)
@@ -83,19 +91,21 @@ class Table:
             key=lambda found: len(set(found[1]) & set(columns)),
         )
         self._width = len(names)
-        self.ignored = tuple(name for name in names if name not in columns)
+        more = (name for name in optional if name in names)
+        self.columns = (*columns, *more)
+        self.ignored = tuple(name for name in names if name not in self.columns)
         self._places = self._found(names)
 
     def _found(self, names: list[str]) -> list[int]:
         head = Row(self._file, 1, not self.open_ended)
-        for name in self._columns:
+        for name in self.columns:
             if names.count(name) > 1:
                 problem = f"has the column {name!r} {names.count(name)} times"
                 raise head.invalid(problem)
             if name not in names:
                 problem = f"has no column {name!r}{self._instead(name)}"
                 raise head.invalid(problem)
-        return [names.index(name) for name in self._columns]
+        return [names.index(name) for name in self.columns]
 
     def _instead(self, name: str) -> str:
         """What stands there that may be meant."""
@@ -177,7 +187,7 @@ class Table:
         row = Row(self._file, number, line.endswith("\n"))
         words = _split(line, self._between)
         values = []
-        for name, place in zip(self._columns, self._places, strict=True):
+        for name, place in zip(self.columns, self._places, strict=True):
             if place < len(words):
                 values.append(self._number(words[place], name, row))
         if len(words) != self._width:

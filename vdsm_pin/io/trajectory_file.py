@@ -2,6 +2,9 @@
 
     waypoint,on_path,path_m,x0_m,alpha1_rad,theta1_rad,..,alphaN_rad,thetaN_rad
 
+Besides there may be `time_s` and, for each joint, `x0_velocity_m_s`,
+`alpha1_velocity_rad_s`, .., `x0_acceleration_m_s2`, `alpha1_acceleration_rad_s2`, ..
+
 Numbers are the shortest decimals that read back as the same double. Every line that is
 written ends in a line end; a last one that lacks it, as some programs write it, is read
 and named in a note.
@@ -11,7 +14,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, TextIO
+from typing import Final, Literal, TextIO, TypeAlias
 
 import numpy as np
 import pydantic_core
@@ -25,6 +28,11 @@ from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import MAX_ROWS, Trajectory
 
+Interpolation: TypeAlias = Literal["linear", "cubic", "quintic", "auto"]
+"""What joins the rows: straight lines; cubic pieces, by their velocities; quintic ones,
+by their accelerations too; or whichever the file has columns for."""
+
+TIME: Final = "time_s"
 _FIXED: Final = ("waypoint", "on_path", "path_m", "x0_m")
 _JOINT: Final = re.compile(r"(alpha|theta)[0-9]+_rad")
 
@@ -33,6 +41,15 @@ def column_names(n_links: int) -> tuple[str, ...]:
     """The header of a trajectory of an arm of N links."""
     pairs = ((f"alpha{i}_rad", f"theta{i}_rad") for i in range(1, n_links + 1))
     return _FIXED + tuple(name for pair in pairs for name in pair)
+
+
+def rate_names(n_links: int, order: int) -> tuple[str, ...]:
+    """Names of the velocities (order 1) or accelerations (2) of all joints."""
+    what, power = ("velocity", "s") if order == 1 else ("acceleration", "s2")
+    angles = [
+        name for i in range(1, n_links + 1) for name in (f"alpha{i}", f"theta{i}")
+    ]
+    return (f"x0_{what}_m_{power}", *(f"{name}_{what}_rad_{power}" for name in angles))
 
 
 def write_trajectory(path: str | Path, trajectory: Trajectory) -> None:
@@ -46,15 +63,26 @@ def write_trajectory(path: str | Path, trajectory: Trajectory) -> None:
         InvalidFile: If the file cannot be written.
     """
     with atomic_path(path) as temporary, temporary.open("wb") as stream:
-        stream.write(",".join(column_names(trajectory.n_links)).encode() + b"\n")
+        names = column_names(trajectory.n_links) + _further_names(trajectory)
+        stream.write(",".join(names).encode() + b"\n")
         for first in range(0, trajectory.n_samples, CHUNK_ROWS):
             stream.write(_rows_text(trajectory, first))
+
+
+def _further_names(trajectory: Trajectory) -> tuple[str, ...]:
+    """Columns beyond those that every trajectory has."""
+    names: tuple[str, ...] = () if trajectory.times is None else (TIME,)
+    for order, values in enumerate((trajectory.rates, trajectory.changes), start=1):
+        names += () if values is None else rate_names(trajectory.n_links, order)
+    return names
 
 
 def _rows_text(trajectory: Trajectory, first: int) -> bytes:
     part = slice(first, first + CHUNK_ROWS)
     angles = np.stack([trajectory.alpha[part], trajectory.theta[part]], axis=2)
     columns = [trajectory.path_m[part], trajectory.x0[part], *_flat(angles).T]
+    for values in (trajectory.times, trajectory.rates, trajectory.changes):
+        columns += [] if values is None else list(np.atleast_2d(values[part].T))
     # As JSON: the same digits as repr at a quarter of the time.
     text = pydantic_core.to_json(np.column_stack(columns).tolist())
     rows = text[2:-2].split(b"],[")
@@ -69,12 +97,17 @@ def _flat(angles: FloatArray) -> FloatArray:
     return angles.reshape(len(angles), -1)
 
 
-def read_trajectory(path: str | Path, manipulator: Manipulator) -> Trajectory:
+def read_trajectory(
+    path: str | Path,
+    manipulator: Manipulator,
+    interpolation: Interpolation = "linear",
+) -> Trajectory:
     """Read a trajectory of any origin.
 
     Args:
         path: The CSV file.
         manipulator: The arm that it is for; fixes the columns.
+        interpolation: What joins the rows.
 
     Returns:
         The trajectory; numbers as in the file to the last bit. Its notes name the
@@ -83,27 +116,39 @@ def read_trajectory(path: str | Path, manipulator: Manipulator) -> Trajectory:
     Raises:
         InvalidFile: If a column is missing, a row is cut short or has a word where a
             number is meant, a number is not finite, `waypoint` does not rise by whole
-            numbers, `on_path` is neither 0 nor 1, or an angle or a length is so large
-            that its unit must be wrong. Names line and column.
+            numbers, nor `time_s`, `on_path` is neither 0 nor 1, or an angle or a length
+            is so large that its unit must be wrong. Names line and column.
     """
     file = Path(path)
     check_is_file(file)
     try:
         with open_text(file) as text:
-            return _read(file, text, manipulator)
+            return _read(file, text, manipulator, interpolation)
     except OSError as error:
         reason = error.strerror or str(error)
         raise InvalidFile(file=path, problem=f"cannot be read: {reason}") from None
 
 
-def _read(file: Path, text: TextIO, arm: Manipulator) -> Trajectory:
+def _read(
+    file: Path, text: TextIO, arm: Manipulator, interpolation: Interpolation
+) -> Trajectory:
     columns = column_names(arm.n_links)
-    table = Table(file, text, columns)
+    rates, changes = (rate_names(arm.n_links, order) for order in (1, 2))
+    more = {"linear": (), "cubic": rates}.get(interpolation, (*rates, *changes))
+    table = Table(file, text, columns, (TIME, *more))
     _check_arm(file, table.ignored, arm)
+    found = table.columns
+    smooth = _smooth_columns(file, found, (rates, changes), interpolation)
     tables: list[FloatArray] = []
-    count, previous = 0, -1.0
+    count, previous, before = 0, -1.0, -np.inf
     for rows in table.rows():
-        _check_values(_Rows(file, columns, rows, count), previous)
+        some = _Rows(file, found, rows, count)
+        _check_values(some, previous)
+        if TIME in found:
+            times = rows[:, found.index(TIME)]
+            rises = np.diff(times, prepend=before) > 0.0
+            some.check(rises, found.index(TIME), "a time above that of the row before")
+            before = float(times[-1])
         count, previous = count + len(rows), float(rows[-1, 0])
         if count > MAX_ROWS:
             raise InvalidFile(file=file, problem=f"has more than {MAX_ROWS} rows")
@@ -114,14 +159,56 @@ def _read(file: Path, text: TextIO, arm: Manipulator) -> Trajectory:
     notes = notes if table.ignored else []
     if table.open_ended:
         notes.append("the last row has no line end; its last number is read as it is")
+    whole = np.concatenate(tables)
+    tables.clear()
+    n, first = len(columns), [found.index(names[0]) for names in smooth]
+    further = [whole[:, k : k + n - 3] for k in first] + [None, None]
     return Trajectory(
-        np.concatenate([rows[:, 1] != 0.0 for rows in tables]),
-        np.concatenate([rows[:, 2] for rows in tables]),
-        np.concatenate([rows[:, 3] for rows in tables]),
-        np.concatenate([rows[:, 4::2] for rows in tables]),
-        np.concatenate([rows[:, 5::2] for rows in tables]),
+        whole[:, 1] != 0.0,
+        whole[:, 2],
+        whole[:, 3],
+        whole[:, 4:n:2],
+        whole[:, 5:n:2],
         tuple(notes),
+        times=whole[:, found.index(TIME)] if TIME in found else None,
+        rates=further[0],
+        changes=further[1],
     )
+
+
+def _smooth_columns(
+    file: Path,
+    found: Sequence[str],
+    wanted: tuple[tuple[str, ...], tuple[str, ...]],
+    interpolation: Interpolation,
+) -> list[tuple[str, ...]]:
+    """Names of the velocities and accelerations that are read, as far as they are.
+
+    Args:
+        file: The file.
+        found: Columns that it has.
+        wanted: Names of velocities and of accelerations.
+        interpolation: What joins the rows.
+
+    Raises:
+        InvalidFile: If there are some of a kind, not all, or what they need is missing.
+    """
+    most = {"linear": 0, "cubic": 1}.get(interpolation, 2)
+    read = [names for names in wanted[:most] if set(names) & set(found)]
+    if interpolation != "auto":
+        read = list(wanted[:most])
+    needed = list(wanted[: 1 + (wanted[1] in read)]) if read else []
+    names = [name for group in needed for name in group]
+    missing = [
+        name for name in (*names, *([TIME] if read else [])) if name not in found
+    ]
+    if not missing:
+        return needed
+    problem = f"has no column {missing[0]!r}, which smooth pieces between the rows need"
+    if interpolation == "auto":
+        problem += f" beside {next(n for n in names if n in found)!r}"
+    problem += "; --interpolation linear judges straight lines"
+    raise InvalidFile(file=file, where="line 1", problem=problem)
 
 
 def _check_arm(file: Path, ignored: Sequence[str], arm: Manipulator) -> None:
@@ -163,5 +250,10 @@ def _check_values(rows: _Rows, previous: float) -> None:
     metres = f"metres, at most {reach:g} either way; is it in millimetres?"
     rows.check(np.abs(x0) <= reach, 3, metres)
     radians = "radians, at most pi either way; is it in degrees?"
-    for column in range(len(_FIXED), len(rows.columns)):
+    for column in _angles(rows.columns):
         rows.check(np.abs(rows.table[:, column]) <= np.pi, column, radians)
+
+
+def _angles(columns: Sequence[str]) -> list[int]:
+    """Numbers of the columns of joint angles."""
+    return [k for k, name in enumerate(columns) if _JOINT.fullmatch(name)]

@@ -5,11 +5,11 @@ union of their knots.
 """
 
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.bernstein import hermite, part, raised, value
 from vdsm_pin.proof.packed_tree import Motion
 
 
@@ -80,6 +80,30 @@ class Path:
             most = np.maximum(most, np.abs(self.inner).max(axis=(0, 1)))
         return np.asarray(most)
 
+    @property
+    def own_times(self) -> FloatArray:
+        """Times of the knots, shape (n_rows,); [s].
+
+        Raises:
+            ValueError: If it has none.
+        """
+        if self.times is None:
+            message = "paths that move at once need times"
+            raise ValueError(message)
+        return self.times
+
+    def at(self, times: FloatArray) -> FloatArray:
+        """Rows of q at some times (m,), at rest outside of its own, (m, n_columns)."""
+        own, times = self.own_times, np.asarray(times, dtype=np.float64)
+        if len(own) == 1:
+            return np.repeat(self.knots, len(times), axis=0)
+        inside = np.clip(times, own[0], own[-1])
+        k = np.clip(np.searchsorted(own, inside, side="right") - 1, 0, len(own) - 2)
+        share = (inside - own[k]) / (own[k + 1] - own[k])
+        found = value(self.controls[k], share)
+        found[share == 1.0] = self.knots[k[share == 1.0] + 1]
+        return found
+
     def packed(self) -> Motion:
         """The same for compiled code."""
         return Motion(self.knots, self.inner)
@@ -101,49 +125,25 @@ def _rising(times: FloatArray, n_rows: int) -> FloatArray:
     return found
 
 
-def _raised(controls: FloatArray, degree: int) -> FloatArray:
-    """The same polynomials by control points of a higher degree."""
-    while controls.shape[1] <= degree:
-        n = controls.shape[1]
-        share = (np.arange(1, n) / n)[:, None]
-        between = share * controls[:, :-1] + (1.0 - share) * controls[:, 1:]
-        controls = np.concatenate([controls[:, :1], between, controls[:, -1:]], axis=1)
-    return controls
-
-
-def _part(controls: FloatArray, start: float, end: float) -> FloatArray:
-    """Control points of a piece, shape (degree + 1, n), over a part of [0, 1]."""
-    points = controls.copy()
-    degree = len(points) - 1
-    for level in range(degree):
-        points[level + 1 :] = points[level:-1] + end * np.diff(points[level:], axis=0)
-    share = start / end
-    for level in range(degree, 0, -1):
-        points[:level] += share * (points[1 : level + 1] - points[:level])
-    return points
-
-
 def _resampled(path: Path, times: FloatArray, degree: int) -> FloatArray:
     """Control points of a path between given times, at rest outside of its own."""
-    assert path.times is not None
-    own, pieces = path.times, _raised(path.controls, degree)
-    found = np.zeros((len(times) - 1, degree + 1, path.knots.shape[1]))
-    after = np.searchsorted(own, times[:-1], side="right")
-    for k, (start, end) in enumerate(pairwise(times)):
-        at = after[k] - 1
-        if at < 0 or at >= len(own) - 1:
-            found[k] = path.knots[min(max(at, 0), len(own) - 1)]
-            continue
-        if own[at] == start and own[at + 1] == end:
-            found[k] = pieces[at]
-            continue
-        step = own[at + 1] - own[at]
-        shares = (start - own[at]) / step, min(1.0, (end - own[at]) / step)
-        found[k] = _part(pieces[at], *shares)
+    own, pieces = path.own_times, raised(path.controls, degree)
+    at = np.searchsorted(own, times[:-1], side="right") - 1
+    inside = (at >= 0) & (at < len(own) - 1)
+    rest = path.knots[np.clip(at, 0, len(own) - 1)]
+    found = np.repeat(rest[:, None], degree + 1, axis=1)
+    if not inside.any():
+        return found
+    k, start, end = at[inside], times[:-1][inside], times[1:][inside]
+    found[inside] = pieces[k]
+    cut = (own[k] != start) | (own[k + 1] != end)
+    step = own[k + 1] - own[k]
+    low, high = (start - own[k]) / step, np.minimum(1.0, (end - own[k]) / step)
+    found[np.flatnonzero(inside)[cut]] = part(pieces[k[cut]], low[cut], high[cut])
     return found
 
 
-def together(*paths: Path) -> Path:
+def together(*paths: Path, within: tuple[float, float] | None = None) -> Path:
     """One path of several that move at once: their columns side by side.
 
     It has the knots of all. Each rests before its first knot and after its last. Knots
@@ -151,25 +151,22 @@ def together(*paths: Path) -> Path:
 
     Args:
         paths: Each with times.
+        within: When the whole begins and ends; where not given, with the first knot and
+            the last; [s].
 
     Raises:
         ValueError: If one has no times.
     """
-    if any(path.times is None for path in paths):
-        message = "paths that move at once need times"
-        raise ValueError(message)
-    own = [path.times for path in paths if path.times is not None]
-    times = np.unique(np.concatenate(own))
+    times = np.unique(np.concatenate([path.own_times for path in paths]))
+    if within is not None:
+        inside = times[(times > within[0]) & (times < within[1])]
+        times = np.unique(np.concatenate([within[:1], inside, within[1:]]))
+    if len(times) == 1:
+        return Path(np.hstack([path.at(times) for path in paths]), times=times)
     degree = max(path.degree for path in paths)
     controls = np.concatenate([_resampled(p, times, degree) for p in paths], axis=2)
-    last = controls[-1:, -1] if len(times) > 1 else _first_row(paths)
-    knots = np.concatenate([controls[:, 0], last])
+    knots = np.concatenate([controls[:, 0], controls[-1:, -1]])
     return Path(knots, controls[:, 1:-1], times)
-
-
-def _first_row(paths: tuple[Path, ...]) -> FloatArray:
-    """The first rows side by side, shape (1, n_columns)."""
-    return np.concatenate([path.knots[:1] for path in paths], axis=1)
 
 
 def cubic_path(q: FloatArray, rates: FloatArray, times: FloatArray) -> Path:
@@ -180,10 +177,8 @@ def cubic_path(q: FloatArray, rates: FloatArray, times: FloatArray) -> Path:
         rates: Their rates, the same shape; per [s].
         times: Of the knots, rising, shape (n_rows,); [s].
     """
-    q, rates, step = _checked(q, rates, times)
-    before, after = step * rates[:-1] / 3.0, step * rates[1:] / 3.0
-    inner = np.stack([q[:-1] + before, q[1:] - after], axis=1)
-    return Path(q, inner, times)
+    q, rates = _checked(q, rates, times)
+    return Path(q, hermite(q, rates, None, times), times)
 
 
 def quintic_path(
@@ -197,26 +192,18 @@ def quintic_path(
         changes: Their accelerations, the same shape; per [s^2].
         times: Of the knots, rising, shape (n_rows,); [s].
     """
-    q, rates, step = _checked(q, rates, times)
+    q, rates = _checked(q, rates, times)
     changes = np.asarray(changes, dtype=np.float64)
     if changes.shape != q.shape:
         message = f"accelerations have shape {changes.shape}, expected {q.shape}"
         raise ValueError(message)
-    before, after = step * rates[:-1] / 5.0, step * rates[1:] / 5.0
-    bend, bend_after = step**2 * changes[:-1] / 20.0, step**2 * changes[1:] / 20.0
-    inner = [
-        q[:-1] + before,
-        q[:-1] + 2.0 * before + bend,
-        q[1:] - 2.0 * after + bend_after,
-        q[1:] - after,
-    ]
-    return Path(q, np.stack(inner, axis=1), times)
+    return Path(q, hermite(q, rates, changes, times), times)
 
 
 def _checked(
     q: FloatArray, rates: FloatArray, times: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Arrays of the same shape, and the durations, shape (n_rows - 1, 1).
+) -> tuple[FloatArray, FloatArray]:
+    """Arrays of the same shape.
 
     Raises:
         ValueError: If shapes disagree or times do not rise.
@@ -225,4 +212,5 @@ def _checked(
     if rates.shape != q.shape:
         message = f"rates have shape {rates.shape}, expected {q.shape}"
         raise ValueError(message)
-    return q, rates, np.diff(_rising(times, len(q)))[:, None]
+    _rising(times, len(q))
+    return q, rates

@@ -115,8 +115,16 @@ def in_file_frame(verification: Verification, point: FloatArray) -> Point | None
     return float(moved[0]), float(moved[1]), float(moved[2])
 
 
-def check_row(check: Check) -> CheckRow:
-    """One check as its row."""
+def time_at(verification: Verification, moment: float) -> float | None:
+    """When a moment in waypoints is, where the trajectory tells; [s]."""
+    if not math.isfinite(moment):
+        return None
+    times = verification.trajectory.times_at(np.array([moment]))
+    return None if times is None else float(times[0])
+
+
+def check_row(check: Check, time: float | None = None) -> CheckRow:
+    """One check as its row, with the time of its moment where that is known; [s]."""
     return CheckRow(
         name=check.name,
         verdict=check.verdict.value,
@@ -125,6 +133,7 @@ def check_row(check: Check) -> CheckRow:
         limit=finite(check.limit),
         unit=check.unit,
         moment=finite(check.moment),
+        time_s=time,
         first_moment=finite(check.first),
         last_moment=finite(check.last),
         too_close_intervals=check.too_close or None,
@@ -139,6 +148,7 @@ def closest_row(verification: Verification, approach: ClosestApproach) -> Closes
     return ClosestRow(
         interval=approach.interval,
         moment=approach.moment,
+        time_s=time_at(verification, approach.moment),
         link=approach.pair.link,
         body=approach.pair.body or None,
         obstacle=approach.pair.obstacle or None,
@@ -252,6 +262,7 @@ def min_clearance(verification: Verification) -> MinClearance | None:
         lower_m=finite(verification.min_clearance),
         upper_m=finite(row.upper),
         moment=row.moment,
+        time_s=time_at(verification, row.moment),
         link=row.pair.link,
         body=row.pair.body or None,
         obstacle=row.pair.obstacle,
@@ -279,7 +290,8 @@ def reason(verification: Verification) -> str:
         found = f'there is no evidence for "{check_title(first.name)}"'
     elif not math.isnan(first.limit):
         found += f" against a limit of {quantity(first.limit, first.unit)}"
-    at = place(finite(first.moment), "" if first.name == INSIDE else first.where)
+    where = "" if first.name == INSIDE else first.where
+    at = place(finite(first.moment), where, time_at(verification, first.moment))
     if at:
         found += f" ({at})"
     share = f"{len(bad)} of {len(verification.checks)} checks"
@@ -359,7 +371,10 @@ def verification_file(
         reason=reason(verification),
         assumed_sizes=assumed_sizes(problem),
         notes=input_notes(problem, verification.trajectory),
-        checks=tuple(check_row(check) for check in verification.checks),
+        checks=tuple(
+            check_row(check, time_at(verification, check.moment))
+            for check in verification.checks
+        ),
         min_clearance=min_clearance(verification),
         required_clearance_m=problem.required_clearance,
         closest=tuple(

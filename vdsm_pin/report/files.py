@@ -27,6 +27,7 @@ OutcomeWord = Literal[
 
 
 _MOMENT: Final = "in waypoints, 12.25 is a quarter of the way from 12 to 13"
+_TIME: Final = "when that is [s]; null where the trajectory has no times"
 _LINK: Final = "links count from 1 at the base"
 _FRAME: Final = "in the frame of the problem file"
 _DEEPER: Final = (
@@ -70,6 +71,7 @@ class CheckRow(FileModel):
     limit: FiniteFloat | None = Field(description="its limit; null: there is none")
     unit: str = Field(description="m, rad, share (of a whole, 0 to 1) or - (a number)")
     moment: FiniteFloat | None = Field(description=_MOMENT)
+    time_s: FiniteFloat | None = Field(default=None, description=_TIME)
     first_moment: FiniteFloat | None = Field(
         default=None,
         description="when a clearance is first lost; null where it is not, or was not "
@@ -99,6 +101,7 @@ class ClosestRow(FileModel):
         description="the bracket holds from waypoint `interval` to the next one"
     )
     moment: FiniteFloat = Field(description=f"when upper_m was found; {_MOMENT}")
+    time_s: FiniteFloat | None = Field(default=None, description=_TIME)
     link: int = Field(description=_LINK)
     body: str | None = Field(description="`tool` where it is that; null for the link")
     obstacle: str | None = Field(description="its name; null in a pair of links")
@@ -121,6 +124,7 @@ class MinClearance(FileModel):
     lower_m: FiniteFloat | None = Field(description="proved lower bound")
     upper_m: FiniteFloat | None = Field(description="proved upper bound")
     moment: FiniteFloat = Field(description=f"when upper_m was found; {_MOMENT}")
+    time_s: FiniteFloat | None = Field(default=None, description=_TIME)
     link: int = Field(description=_LINK)
     body: str | None = Field(description="`tool` where it is that; null for the link")
     obstacle: str = Field(description="name of the obstacle")

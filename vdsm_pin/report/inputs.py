@@ -5,7 +5,7 @@ from typing import Final
 
 from vdsm_pin.arm_bodies import convex_cover
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scene import FromFile, Mesh
+from vdsm_pin.scene import FromFile, Mesh, solid_of
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.inside import mesh_notes
 
@@ -23,7 +23,7 @@ def assumed_sizes(problem: PlanningProblem) -> tuple[str, ...]:
     """The obstacles whose unit nobody states, with the size they were taken to have."""
     return tuple(
         f"{one.name!r} is {one.assumed_size}"
-        for one in problem.scene.obstacles
+        for one in map(solid_of, problem.scene.obstacles)
         if isinstance(one, FromFile) and one.assumed_size
     )
 
@@ -39,7 +39,8 @@ def assumption(sizes: Sequence[str]) -> str:
 
 def input_notes(problem: PlanningProblem, trajectory: Trajectory) -> tuple[str, ...]:
     """What the readers have to say and what is behind the base, a sentence each."""
-    files = (one for one in problem.scene.obstacles if isinstance(one, FromFile))
+    solids = map(solid_of, problem.scene.obstacles)
+    files = (one for one in solids if isinstance(one, FromFile))
     of_files = (
         f"{'mesh' if isinstance(one, Mesh) else 'cloud'} {one.name!r}: {note}"
         for one in files

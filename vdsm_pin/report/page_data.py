@@ -14,6 +14,7 @@ from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.charts import charts, packed
 from vdsm_pin.report.facts import failing, finite
 from vdsm_pin.report.impasse import Impasse
+from vdsm_pin.report.moves import moves
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import FINE, Detail, detail, surface
 from vdsm_pin.report.thinning import (
@@ -22,7 +23,7 @@ from vdsm_pin.report.thinning import (
     nearest_obstacles,
     thinned,
 )
-from vdsm_pin.scene import Obstacle
+from vdsm_pin.scene import Obstacle, Solid, solid_of
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import (
     ClosestApproach,
@@ -32,9 +33,12 @@ from vdsm_pin.verification.records import (
 
 
 def scene_data(
-    problem: PlanningProblem, obstacles: Sequence[Obstacle]
+    problem: PlanningProblem, obstacles: Sequence[Obstacle], trajectory: Trajectory
 ) -> dict[str, Any]:
-    """The arm, some obstacles and the desired path; base frame, [m]."""
+    """The arm, some obstacles and the desired path; base frame, [m].
+
+    What moves is in its own frame, which stands where `moves` says.
+    """
     arm = problem.manipulator
     extent, fine = arm.total_length, detail(len(obstacles))
     return {
@@ -48,7 +52,10 @@ def scene_data(
         ],
         "colours": list(link_colours(arm.n_links)),
         "pose": problem.T_world_base.ravel().tolist(),
-        "obstacles": [_solid(solid, extent, fine) for solid in obstacles],
+        "obstacles": [
+            {**_solid(solid_of(one), extent, fine), **moves(one, trajectory)}
+            for one in obstacles
+        ],
         "carried": [
             {"link": link, **_solid(solid, extent, FINE)} for link, solid in arm.carried
         ],
@@ -56,7 +63,7 @@ def scene_data(
     }
 
 
-def _solid(solid: Obstacle, extent: float, fine: Detail) -> dict[str, Any]:
+def _solid(solid: Solid, extent: float, fine: Detail) -> dict[str, Any]:
     """Triangles to draw a solid with."""
     skin = surface(solid, extent, fine)
     return {
@@ -75,8 +82,10 @@ def motion_data(
     """The joint values of the rows shown; the page computes the poses from them."""
     rows = shown.rows
     on_path = () if problem.tip_path is None else trajectory.on_path[rows]
+    times = {} if trajectory.times is None else {"times": trajectory.times[rows]}
     return {
         "nSamples": trajectory.n_samples,
+        **{name: packed(values, "<f8") for name, values in times.items()},
         "complete": shown.complete,
         "rows": packed(rows, "<i4"),
         "onPath": packed(on_path, "u1"),
@@ -150,7 +159,7 @@ def report_data(verification: Verification) -> PageData:
     plots = charts(verification, shown)
     obstacles = verification.problem.scene.obstacles
     drawn = [obstacles[k] for k in nearest_obstacles(verification, MOST_DRAWN)]
-    scene = scene_data(verification.problem, drawn)
+    scene = scene_data(verification.problem, drawn, verification.trajectory)
     scene["ghosts"] = [ghost_data(verification, one) for one in lost]
     text = _embedded(
         {
@@ -174,7 +183,9 @@ def view_data(problem: PlanningProblem, trajectory: Trajectory) -> str:
     shown = thinned(trajectory, np.zeros(0, dtype=np.int64))
     return _embedded(
         {
-            "scene": scene_data(problem, problem.scene.obstacles[:MOST_DRAWN]),
+            "scene": scene_data(
+                problem, problem.scene.obstacles[:MOST_DRAWN], trajectory
+            ),
             "motion": motion_data(problem, trajectory, shown),
             "closest": [],
             "marks": [],
@@ -203,7 +214,7 @@ def impasse_data(problem: PlanningProblem, place: Impasse) -> str:
     shown = thinned(place.arm, np.zeros(0, dtype=np.int64))
     return _embedded(
         {
-            "scene": scene_data(problem, drawn) | {"pins": pins},
+            "scene": scene_data(problem, drawn, place.arm) | {"pins": pins},
             "motion": motion_data(problem, place.arm, shown),
             "closest": [near],
             "marks": [],

@@ -7,10 +7,11 @@ from shapely import MultiPoint, Polygon
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.report.moves import start_pose
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import surface
 from vdsm_pin.report.thinning import MOST_DRAWN, nearest_obstacles
-from vdsm_pin.scene import HalfSpace
+from vdsm_pin.scene import HalfSpace, solid_of
 from vdsm_pin.verification.records import Verification
 
 _WIDTH, _HEIGHT = 240.0, 160.0
@@ -65,10 +66,12 @@ def _outlines(verification: Verification) -> list[FloatArray]:
     found = []
     obstacles = verification.problem.scene.obstacles
     for k in nearest_obstacles(verification, MOST_DRAWN):
-        obstacle = obstacles[k]
-        if isinstance(obstacle, HalfSpace):
+        solid = solid_of(obstacles[k])
+        if isinstance(solid, HalfSpace):
             continue  # covers all or nothing of a flat picture
-        hull = MultiPoint(_view(surface(obstacle, 1.0).vertices)).convex_hull
+        pose = start_pose(obstacles[k], verification.trajectory)
+        corners = surface(solid, 1.0).vertices @ pose[:3, :3].T + pose[:3, 3]
+        hull = MultiPoint(_view(corners)).convex_hull
         if isinstance(hull, Polygon):
             found.append(np.asarray(hull.exterior.coords)[:-1])
     return found

@@ -7,7 +7,7 @@ from typing import Final
 
 from vdsm_pin.io.source import BLOCK
 from vdsm_pin.problem import PlanningProblem, ProblemSource
-from vdsm_pin.scene import Mesh, Obstacle
+from vdsm_pin.scene import Mesh, Moving, Obstacle, solid_of
 
 MOST_LISTED: Final = 200
 """Obstacles that a page lists."""
@@ -21,7 +21,7 @@ class SceneRow:
 
     Args:
         name: As the problem file has it.
-        shape: Its kind, such as "half space".
+        shape: Its kind, such as "half space" or "box, moving".
         file: The file of its own that it was read from; empty for none.
         triangles: Of a mesh; None for other shapes.
         inside: Whether it has one: "solid", "surface only", "not known".
@@ -47,13 +47,15 @@ def scene_rows(problem: PlanningProblem) -> tuple[SceneRow, ...]:
 
 
 def _row(obstacle: Obstacle, file: Path | None, digests: dict[Path, str]) -> SceneRow:
-    kind = type(obstacle).__name__
+    solid = solid_of(obstacle)
+    kind = type(solid).__name__
     shape = "".join(f" {c.lower()}" if c.isupper() else c for c in kind).strip()
+    shape += ", moving" if isinstance(obstacle, Moving) else ""
     triangles, inside = None, "solid"
-    if isinstance(obstacle, Mesh):
-        triangles = len(obstacle.triangles)
-        inside = "solid" if obstacle.has_inside else "not known"
-        inside = "surface only" if obstacle.is_surface else inside
+    if isinstance(solid, Mesh):
+        triangles = len(solid.triangles)
+        inside = "solid" if solid.has_inside else "not known"
+        inside = "surface only" if solid.is_surface else inside
     digest = digests.get(file, CHANGED) if file else ""
     return SceneRow(
         obstacle.name, shape, file.name if file else "", triangles, inside, digest

@@ -13,9 +13,9 @@ from vdsm_pin.scene import (
     Cylinder,
     HalfSpace,
     Mesh,
-    Obstacle,
     PointCloud,
     Prism,
+    Solid,
     Sphere,
     Voxels,
 )
@@ -61,7 +61,7 @@ class Surface:
     """Triangles with their corners.
 
     Args:
-        vertices: Shape (n, 3), base frame; [m].
+        vertices: Shape (n, 3), in the solid's frame; [m].
         triangles: Vertex indices, counter-clockwise from outside, shape (m, 3).
         round: Whether shared corners are to be shaded smoothly.
         creased: Whether it has edges to be drawn.
@@ -73,7 +73,7 @@ class Surface:
     creased: bool = True
 
 
-def surface(obstacle: Obstacle, extent: float, fine: Detail = FINE) -> Surface:
+def surface(obstacle: Solid, extent: float, fine: Detail = FINE) -> Surface:
     """The surface of an obstacle.
 
     Args:
@@ -107,7 +107,7 @@ def surface(obstacle: Obstacle, extent: float, fine: Detail = FINE) -> Surface:
             return _cells(obstacle.centres, turn, half, fine.triangles)
 
 
-def obj_text(solid: Obstacle) -> str:
+def obj_text(solid: Solid) -> str:
     """The surface as an OBJ file, corners of prisms and meshes to the last bit; [m]."""
     skin = solid if isinstance(solid, Mesh) else surface(solid, 1.0)
     corners = [f"v {x!r} {y!r} {z!r}" for x, y, z in skin.vertices.tolist()]

@@ -181,18 +181,21 @@ def term(key: str) -> str:
     return TERMS[key]
 
 
-def moment_text(moment: float | None) -> str:
-    """A moment of the motion: "waypoint 193" or, between two, "waypoint 193.25"."""
+def moment_text(moment: float | None, time: float | None = None) -> str:
+    """A moment of the motion: "waypoint 193" or, between two, "waypoint 193.25".
+
+    Its time stands behind it where that is known; [s].
+    """
     if moment is None:
         return ""
-    return f"waypoint {round(moment, _MOMENT_DIGITS):.{_MOMENT_DIGITS}f}".rstrip(
-        "0"
-    ).rstrip(".")
+    text = f"waypoint {round(moment, _MOMENT_DIGITS):.{_MOMENT_DIGITS}f}"
+    told = "" if time is None else f" ({time:.3f} s)"
+    return text.rstrip("0").rstrip(".") + told
 
 
-def place(moment: float | None, where: str) -> str:
+def place(moment: float | None, where: str, time: float | None = None) -> str:
     """When and where something happens, in words; empty if neither is known."""
-    return ", ".join(part for part in (moment_text(moment), where) if part)
+    return ", ".join(part for part in (moment_text(moment, time), where) if part)
 
 
 def check_title(name: str) -> str:

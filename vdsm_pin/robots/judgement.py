@@ -17,7 +17,7 @@ from vdsm_pin.proof.terms import CERTIFIED, REFUTED, WORLD
 from vdsm_pin.robots.contacts import common_ball, in_world
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.second_opinion import coal_parts, placed, pose_difference
-from vdsm_pin.scene import Scene
+from vdsm_pin.scene import Scene, solid_of
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M
@@ -288,7 +288,7 @@ class _Coal:
     def __init__(self, robot: Robot, scene: Scene) -> None:
         self._robot, self._scene, self._n = robot, scene, len(robot.bodies)
         self._links = [coal_parts(body.pieces) for body in robot.bodies]
-        self._things = [coal_bodies(obstacle) for obstacle in scene.obstacles]
+        self._things = [coal_bodies(solid_of(one)) for one in scene.obstacles]
 
     def pieces(self, pair: Pair, q: FloatArray) -> tuple[list[Piece], list[Piece]]:
         """Of both bodies at a row of q, in the world's frame."""

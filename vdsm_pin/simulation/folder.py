@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
@@ -101,6 +102,13 @@ def simulate_to_folder(order: SimulationOrder) -> SimulationFile:
     """
     check_output_folder(order.folder)
     problem = order.source.problem
+    if problem.scene.moving:
+        name = problem.scene.moving[0].name
+        message = (
+            f"obstacle {name!r} moves: the closed loop runs in a time of its own, so "
+            "nothing could be said of its clearance"
+        )
+        raise InvalidInput(message)
     planned = read_trajectory(order.trajectory, problem.manipulator)
     found = simulate(problem.manipulator, planned, order.settings)
     file = summary(

@@ -35,6 +35,7 @@ from vdsm_pin.proof.workspace import new_workspace
 from vdsm_pin.scene import Mesh, Prism, with_hulls
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.certificate_file import (
     ClaimedLimits,
     ErrorLimits,
@@ -99,13 +100,13 @@ def write_certificate(
         message = f"no certificate is written: the verdict is {verdict}"
         raise VerificationFailed(message)
     problem, trajectory = verification.problem, verification.trajectory
-    if problem.tip_path is not None and problem.tip_path.pointing is not None:
-        message = "no certificate is written: it cannot state `pointing` yet"
+    if why := unstated(problem, trajectory):
+        message = f"no certificate is written: {why}"
         raise VerificationFailed(message)
     # Of a mesh without known inside the hull is proved clear, by planes for all of it.
     hulls = unlocated(locate_start(problem, trajectory))
     scene = with_hulls(problem.scene, hulls)
-    reach, budget = float(np.abs(trajectory.x0).max()), Budget(until=deadline.end)
+    reach, budget = np.abs(trajectory.joints).max(axis=0), Budget(until=deadline.end)
     asked = replace(problem, scene=scene)
     task = make_task(asked, verification.errors, budget=budget, reach=reach)
     digest = hashlib.sha256()
@@ -118,6 +119,18 @@ def write_certificate(
             file.write(line)
         last = LastLine(end=True, sha256=digest.hexdigest())
         file.write(last.model_dump_json().encode() + b"\n")
+
+
+def unstated(problem: PlanningProblem, trajectory: Trajectory) -> str:
+    """What a certificate cannot state yet of a motion, in words; empty for nothing."""
+    if problem.tip_path is not None and problem.tip_path.pointing is not None:
+        return "it cannot state `pointing` yet"
+    if problem.scene.moving:
+        name = problem.scene.moving[0].name
+        return f"it cannot state yet that an obstacle moves, as {name!r} does"
+    if trajectory.is_smooth:
+        return "it cannot state yet that smooth pieces join the rows"
+    return ""
 
 
 @contextmanager

@@ -7,6 +7,7 @@ clearance is subdivided further until its bracket is narrow.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -26,7 +27,7 @@ from vdsm_pin.proof.layouts import (
     TIME,
     UP,
 )
-from vdsm_pin.proof.proving import Proving, dense_rows, room_for
+from vdsm_pin.proof.proving import dense_rows, room_for
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.terms import (
@@ -39,7 +40,8 @@ from vdsm_pin.proof.terms import (
 from vdsm_pin.scene import Scene
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
-from vdsm_pin.verification.proving import prove_problem
+from vdsm_pin.verification.moving import Knots
+from vdsm_pin.verification.proving import ProblemProof, prove_problem
 from vdsm_pin.verification.records import (
     ClearanceChunk,
     ClearanceProfile,
@@ -62,7 +64,8 @@ class ClearanceProof:
 
     Args:
         pairs: Every pair.
-        counts: Intervals certified, refuted and undecided, shape (n_pairs, 3).
+        counts: Intervals certified, refuted and undecided, shape (n_pairs, 3); knots of
+            what carries obstacles end intervals too.
         best: Least bounds of each pair, as `proof.layouts` lays them out,
             shape (n_pairs, BEST); [m].
         profile: Brackets along the motion.
@@ -83,13 +86,15 @@ class ClearanceProof:
 
 
 def _chunk(
-    proving: Proving, first: int, count: int, least: FloatArray, pairs: IntArray
+    proof: ProblemProof, first: int, last: int, least: FloatArray, pairs: IntArray
 ) -> ClearanceChunk:
-    dense = proving.results.dense
+    """The brackets of intervals of the trajectory, from `first` to below `last`."""
+    proving, knots = proof.proving, proof.knots
+    dense, count = proving.results.dense, int(knots.first[last] - knots.first[first])
     own, other = dense.own[:count], dense.other[:count]
     # In a pair of links the sweep moves the second one against the first.
     swapped = (proving.task.pairs.group == LINKS)[None, :, None]
-    return ClearanceChunk(
+    chunk = ClearanceChunk(
         first_interval=first,
         # No interval is worse than what narrowing proved of all of them.
         lower=frozen(np.maximum(dense.lower[:count], least)),
@@ -100,12 +105,42 @@ def _chunk(
         other_point=frozen(np.where(swapped, own, other)),
         pairs=pairs,
     )
+    return chunk if knots.are_rows else _merged(chunk, knots, last)
 
 
-def _profile(problem: PlanningProblem, results: Results) -> ClearanceProfile:
+def _merged(chunk: ClearanceChunk, knots: Knots, last: int) -> ClearanceChunk:
+    """A chunk of intervals of the joint path as one of those of the trajectory."""
+    starts = knots.first[chunk.first_interval : last]
+    inner, begins = starts[0] + np.arange(len(chunk.lower)), starts - starts[0]
+    least = np.minimum.reduceat(chunk.upper, begins)
+    groups = np.repeat(np.arange(len(starts)), np.diff(np.append(begins, len(inner))))
+    # The last of those that are least, of which there is one at least.
+    numbers = np.arange(len(inner))[:, None]
+    at = np.maximum.reduceat(np.where(chunk.upper == least[groups], numbers, 0), begins)
+    columns = np.arange(at.shape[1])
+    time = [knots.share(inner[a], chunk.time[a, columns]) for a in at]
+    rank = np.array([0, 2, 1])  # refuted, then undecided, then certified
+    worst = np.maximum.reduceat(rank[chunk.verdict], begins)
+    return replace(
+        chunk,
+        lower=frozen(np.minimum.reduceat(chunk.lower, begins)),
+        upper=frozen(least),
+        time=frozen(np.array(time).reshape(at.shape)),
+        verdict=frozen(rank[worst], np.int64),
+        link_point=frozen(chunk.link_point[at, columns]),
+        other_point=frozen(chunk.other_point[at, columns]),
+    )
+
+
+def _profile(
+    problem: PlanningProblem, results: Results, knots: Knots
+) -> ClearanceProfile:
     n_links, profile = problem.manipulator.n_links, results.profile
-    profile.setflags(write=False)
     first = np.arange(profile.shape[2]) * results.stride
+    if not knots.are_rows:
+        first, begins = np.unique(knots.interval(first), return_index=True)
+        profile = np.minimum.reduceat(profile, begins, axis=2)
+    profile.setflags(write=False)
     return ClearanceProfile(
         link_lower=profile[0, :n_links].T,
         link_upper=profile[1, :n_links].T,
@@ -140,17 +175,17 @@ def prove_clearance(
         The proof, its least brackets narrowed unless the time ended before.
     """
     budget = Budget(until=deadline.end)
-    proving = prove_problem(problem, trajectory, errors, pieces, budget)
-    late, results, sent = not proving.run(), proving.results, 0
+    proof = prove_problem(problem, trajectory, errors, pieces, budget)
+    late, results, sent = not proof.proving.run(), proof.proving.results, 0
     if sinks:
-        sent = _send(problem, trajectory, errors, proving, sinks, reach)
+        sent = _send(problem, trajectory, errors, proof, sinks, reach)
     return ClearanceProof(
         pairs=all_pairs(problem),
         counts=frozen(results.counts, np.int64),
-        best=frozen(results.best),
-        profile=_profile(problem, results),
+        best=frozen(proof.best),
+        profile=_profile(problem, results, proof.knots),
         slices=int(results.tally[SLICES]),
-        n_intervals=proving.n_intervals,
+        n_intervals=len(proof.knots.first) - 1,
         late=late,
         sent=sent,
     )
@@ -160,7 +195,7 @@ def _send(
     problem: PlanningProblem,
     trajectory: Trajectory,
     errors: ErrorBox,
-    proving: Proving,
+    proof: ProblemProof,
     sinks: Sequence[ClearanceSink],
     reach: float,
 ) -> int:
@@ -169,6 +204,7 @@ def _send(
     Returns:
         Number of intervals sent.
     """
+    proving = proof.proving
     known, obstacles = proving.results, problem.scene.obstacles
     outer, obstacle = proving.task.pairs.group == OBSTACLES, proving.task.pairs.obstacle
     # numpy.unique imports numpy.ma, for which every process would wait.
@@ -178,9 +214,12 @@ def _send(
         scene = Scene(tuple(obstacles[k] for k in near))
         near_problem = replace(problem, scene=scene)
         budget = proving.budget
-        proving = prove_problem(near_problem, trajectory, errors, budget=budget)
+        proof = prove_problem(near_problem, trajectory, errors, budget=budget)
+        proving = proof.proving
     length = CHUNK_VALUES // max(1, pairs.size) // BLOCK * BLOCK
     length = min(CHUNK, proving.n_intervals, max(BLOCK, length))
+    steps = _steps(proof.knots.first, length)
+    length = max(int(np.diff(proof.knots.first[steps]).max()), 1)
     results = proving.results._replace(
         best=known.best[pairs],
         counts=np.zeros((pairs.size, 3), np.int64),
@@ -190,15 +229,30 @@ def _send(
         tally=np.zeros(TALLY, np.int64),
         dense=dense_rows(length, pairs.size),
     )
-    again = replace(proving, results=results)
-    for first in range(0, proving.n_intervals, length):
-        last = min(first + length, proving.n_intervals)
-        if not again.sweep(first, last):
-            return first
-        chunk = _chunk(again, first, last - first, known.best[pairs, LOW], pairs)
+    again = replace(proof, proving=replace(proving, results=results))
+    for begin, end in pairwise(steps):
+        first, last = (int(proof.knots.first[k]) for k in (begin, end))
+        if not again.proving.sweep(first, last):
+            return begin
+        chunk = _chunk(again, begin, end, known.best[pairs, LOW], pairs)
         for sink in sinks:
             sink(chunk)
-    return proving.n_intervals
+    return steps[-1]
+
+
+def _steps(first: IntArray, length: int) -> list[int]:
+    """Numbers of intervals of a trajectory between which chunks end.
+
+    Args:
+        first: As `Knots` has it.
+        length: Most intervals of the joint path in a chunk, unless one interval of the
+            trajectory alone has more.
+    """
+    steps, last = [0], len(first) - 1
+    while steps[-1] < last:
+        reach = int(np.searchsorted(first, first[steps[-1]] + length, side="right"))
+        steps.append(min(last, max(reach - 1, steps[-1] + 1)))
+    return steps
 
 
 def least_clearances(proof: ClearanceProof) -> LeastClearances:

@@ -23,9 +23,9 @@ from vdsm_pin.scene import (
     Cylinder,
     HalfSpace,
     Mesh,
-    Obstacle,
     PointCloud,
     Prism,
+    Solid,
     Sphere,
     Voxels,
 )
@@ -129,11 +129,11 @@ LARGEST: Final = float(np.finfo(np.float64).max)
 """Coal's way to say that it has no answer, with a minus sign."""
 
 
-def coal_bodies(obstacle: Obstacle) -> CoalObstacle:
-    """The Coal geometry of an obstacle, in the base frame.
+def coal_bodies(obstacle: Solid) -> CoalObstacle:
+    """The Coal geometry of a solid, in its own frame: the base's where it rests.
 
     Args:
-        obstacle: Any obstacle of a scene.
+        obstacle: Any solid of a scene.
 
     Returns:
         One body; for a prism over a non-convex polygon one per convex section, for
@@ -151,7 +151,7 @@ def coal_bodies(obstacle: Obstacle) -> CoalObstacle:
         raise VerificationFailed(message) from error
 
 
-def _bodies(coal: Any, obstacle: Obstacle) -> CoalObstacle:
+def _bodies(coal: Any, obstacle: Solid) -> CoalObstacle:
     match obstacle:
         case Sphere():
             return (_placed(coal, coal.Sphere(obstacle.radius), obstacle.centre),)

@@ -1,4 +1,4 @@
-"""Coal's distances of the feed and of what the links carry, against what was proved.
+"""Coal's distances of feed, carried bodies and moving obstacles, against the proof.
 
 Poses come from Pinocchio and shapes from the problem. A mesh is proved clear by hulls
 around it, which are nearer than its triangles: there Coal can contradict the lower
@@ -15,7 +15,7 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.manipulator import PART
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import RobotModel
-from vdsm_pin.scene import Mesh
+from vdsm_pin.scene import Mesh, Moving, solid_of
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
@@ -29,10 +29,10 @@ from vdsm_pin.verification.coal_bodies import (
     measure,
 )
 from vdsm_pin.verification.coal_clearance import ProvedLowers
-from vdsm_pin.verification.coal_log import CoalLog, rows_at
+from vdsm_pin.verification.coal_log import CoalLog
 from vdsm_pin.verification.records import Check, Pair, Verdict
 
-NAME: Final = "distances of feed and carried bodies by Coal against the proved ones"
+NAME: Final = "distances of feed, carried and moving bodies by Coal against the proof"
 """Name of the row."""
 
 ROWS: Final = 32
@@ -43,21 +43,17 @@ Names = tuple[str, str]
 
 @dataclass(frozen=True)
 class _Rider:
-    """What rides on a link, as Coal has it.
+    """What rides on a link or moves by itself, as Coal has it.
 
     Args:
         link: 1 to N, 0 for the feed's frame, -1 for the base.
-        parts: In the frame of the link; a cloud is in the base's.
+        parts: In the frame of the link, or of what moves.
+        moving: The obstacle that it is, if it moves.
     """
 
     link: int
     parts: CoalObstacle
-
-    def placed(self, frame: Any) -> CoalObstacle:
-        """The parts where the frame of the link is."""
-        if isinstance(self.parts, CoalCloud):
-            return self.parts
-        return tuple(CoalBody(one.geometry, frame * one.pose) for one in self.parts)
+    moving: Moving | None = None
 
 
 @dataclass(frozen=True)
@@ -85,7 +81,7 @@ def check_coal_carried(
     log: CoalLog,
     deadline: Deadline = NO_LIMIT,
 ) -> tuple[Check, ...]:
-    """Hold Coal's distances of feed and carried bodies against the proved ones.
+    """Hold Coal's distances of feed, carried and moving bodies against the proof.
 
     Args:
         robot: The arm in Pinocchio and Coal.
@@ -139,10 +135,11 @@ def _groups(
     """Numbers of the pairs of each two bodies, parts of one taken together."""
     arm, found = problem.manipulator, dict[Names, list[int]]()
     carried = {solid.name for _, solid in arm.carried}
+    moving = {one.name for one in problem.scene.moving}
     for number, pair in enumerate(pairs):
         names = pair.own.split(PART)[0], pair.label.split(PART)[0]
         other = names[1] if not pair.obstacle else ""
-        if carried & {names[0], other}:
+        if carried & {names[0], other} or pair.obstacle in moving:
             found.setdefault(names, []).append(number)
     return {names: np.array(numbers) for names, numbers in found.items()}
 
@@ -153,7 +150,9 @@ def _riders(robot: RobotModel, problem: PlanningProblem) -> dict[str, _Rider]:
 
     arm, found = problem.manipulator, dict[str, _Rider]()
     for obstacle in problem.scene.obstacles:
-        found[obstacle.name] = _Rider(-1, coal_bodies(obstacle))
+        moving = obstacle if isinstance(obstacle, Moving) else None
+        parts = coal_bodies(solid_of(obstacle))
+        found[obstacle.name] = _Rider(-1, parts, moving)
     for k, name in enumerate(arm.axis_names):
         local = robot.T_link_capsule[k]
         pose = coal.Transform3s(local[:3, :3].copy(), local[:3, 3].copy())
@@ -174,8 +173,8 @@ def _at_rows(
     """Moment, distance and excess at rows all over the motion."""
     steps = np.linspace(0, trajectory.n_samples - 1, ROWS)
     rows = np.unique(steps.astype(np.int64))
-    some = rows_at(trajectory, rows.astype(np.float64))
-    for row, distance in zip(rows, _distances(robot, some, both), strict=True):
+    found = _distances(robot, trajectory, both, rows.astype(np.float64))
+    for row, distance in zip(rows, found, strict=True):
         waypoint = np.full(numbers.size, row)
         lower = proved.at(waypoint, numbers).min()
         yield float(row), distance, float(lower - max(distance, 0.0))
@@ -193,8 +192,8 @@ def _at_approaches(
     for k, near in enumerate(log.approaches):
         if (near.pair.own, near.pair.label) != names:
             continue
-        some = rows_at(trajectory, np.array([near.moment]))
-        distance = float(_distances(robot, some, both)[0])
+        moments = np.array([near.moment])
+        distance = float(_distances(robot, trajectory, both, moments)[0])
         log.keep_approaches(np.array([k]), np.array([distance]))
         value, excess = max(distance, 0.0), near.lower - max(distance, 0.0)
         if not set(names) & set(meshes):
@@ -203,26 +202,43 @@ def _at_approaches(
 
 
 def _distances(
-    robot: RobotModel, rows: Trajectory, both: tuple[_Rider, _Rider]
+    robot: RobotModel,
+    trajectory: Trajectory,
+    both: tuple[_Rider, _Rider],
+    moments: FloatArray,
 ) -> FloatArray:
-    """Coal's distances at rows, shape (m,); [m]."""
-    import coal
-
-    poses = robot.link_poses(rows.x0, rows.alpha, rows.theta)
-    found, request = np.full(rows.n_samples, np.inf), distance_request()
-    still = coal.Transform3s.Identity()
-
-    def frame(link: int, row: int) -> Any:
-        if link < 0:
-            return still
-        turned = poses.rotations[row, link - 1] if link else np.eye(3)
-        return coal.Transform3s(turned, poses.origins[row, max(0, link - 1)])
-
-    for row in range(rows.n_samples):
-        mine, theirs = (frame(one.link, row) for one in both)
-        parts, own = both[1].placed(theirs), both[0].placed(mine)
-        assert not isinstance(own, CoalCloud)  # an obstacle is the other one
+    """Coal's distances at moments in waypoints, shape (m,); [m]."""
+    found, request = np.full(moments.size, np.inf), distance_request()
+    mine, theirs = (_frames(robot, trajectory, one, moments) for one in both)
+    own = both[0].parts
+    assert not isinstance(own, CoalCloud)  # an obstacle is the other one
+    for row, (frame, other) in enumerate(zip(mine, theirs, strict=True)):
+        # The other one rests: a cloud has no pose.
+        seen = other.inverse() * frame
         for part in own:
-            answer = measure(request, part.geometry, part.pose, parts)
+            pose = seen * part.pose
+            answer = measure(request, part.geometry, pose, both[1].parts)
             found[row] = min(found[row], answer.distance)
     return found
+
+
+def _frames(
+    robot: RobotModel, trajectory: Trajectory, rider: _Rider, moments: FloatArray
+) -> list[Any]:
+    """Coal's poses of what carries a rider, at moments in waypoints."""
+    import coal
+
+    if rider.moving is not None:
+        times = trajectory.times_at(moments)
+        assert times is not None  # whoever judges beside what moves has them
+        poses = rider.moving.poses(times)
+        return [coal.Transform3s(p[:3, :3].copy(), p[:3, 3].copy()) for p in poses]
+    if rider.link < 0:
+        return [coal.Transform3s.Identity()] * moments.size
+    rows = trajectory.at(moments)
+    found = robot.link_poses(rows.x0, rows.alpha, rows.theta)
+    origins = found.origins[:, max(0, rider.link - 1)]
+    turned = found.rotations[:, rider.link - 1]
+    if not rider.link:
+        turned = np.tile(np.eye(3), (moments.size, 1, 1))
+    return [coal.Transform3s(R, p) for R, p in zip(turned, origins, strict=True)]

@@ -12,7 +12,7 @@ does a row add any at which the arm has hardly moved since the row before.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -23,7 +23,7 @@ from vdsm_pin.geometry.row_bounds import coarse_bounds, row_brackets
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import LinkPoses, RobotModel
-from vdsm_pin.scene import Obstacle
+from vdsm_pin.scene import Moving, Solid, solid_of
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
@@ -34,7 +34,7 @@ from vdsm_pin.verification.coal_bodies import (
     distance_request,
     measure,
 )
-from vdsm_pin.verification.coal_log import CoalLog, rows_at
+from vdsm_pin.verification.coal_log import CoalLog
 from vdsm_pin.verification.records import Check, Verdict
 from vdsm_pin.verification.task import ArmPairs
 
@@ -100,14 +100,15 @@ class CoalScene:
 
     @classmethod
     def of(cls, problem: PlanningProblem, deadline: Deadline) -> "CoalScene":
-        """The obstacles of a problem.
+        """The obstacles of a problem, none of which moves.
 
         Raises:
             OutOfTime: If the time is over.
         """
         obstacles = problem.scene.obstacles
         pieces = first_groups(problem.packed, len(obstacles))
-        return cls(pieces, tuple(_bodies_of(one, deadline) for one in obstacles))
+        bodies = (_bodies_of(solid_of(one), deadline) for one in obstacles)
+        return cls(pieces, tuple(bodies))
 
 
 @dataclass(frozen=True)
@@ -145,7 +146,7 @@ def check_coal(
     deadline: Deadline = NO_LIMIT,
     log: CoalLog | None = None,
 ) -> tuple[Check, ...]:
-    """Hold Coal's distances to the obstacles against the proved brackets.
+    """Hold Coal's distances to the obstacles at rest against the proved brackets.
 
     Args:
         robot: The arm in Pinocchio and Coal.
@@ -162,7 +163,7 @@ def check_coal(
     Raises:
         OutOfTime: If the time is over.
     """
-    scene, names = problem.scene, problem.manipulator.axis_names
+    scene, names = problem.scene.at_rest, problem.manipulator.axis_names
     if not scene.obstacles:
         return ()
     count, worst, where, moment = 0, -np.inf, "", float("nan")
@@ -203,9 +204,13 @@ def _answers(
     log: CoalLog | None,
 ) -> Iterator[tuple[CoalDistances, FloatArray, FloatArray]]:
     """What Coal measures, when (in waypoints), and how far it is off, (m,) each."""
-    scene, numbers = CoalScene.of(problem, deadline), ArmPairs(problem).number
+    still = np.array([not isinstance(o, Moving) for o in problem.scene.obstacles])
+    numbers = ArmPairs(problem).number[:, still]
+    if not still.all():
+        problem = replace(problem, scene=problem.scene.at_rest)
+    scene = CoalScene.of(problem, deadline)
     if log is not None:
-        near = log.asked(of_obstacles=True)
+        near = log.asked(problem.scene.names)
         if near.size:
             found, moments = _at_approaches(robot, problem, trajectory, scene, log)
             log.keep_approaches(near, found.distance)
@@ -240,14 +245,14 @@ def _at_approaches(
 
     Their brackets are those of the configurations at these moments.
     """
-    near = [log.approaches[k] for k in log.asked(of_obstacles=True)]
+    near = [log.approaches[k] for k in log.asked(problem.scene.names)]
     moments = np.array([one.moment for one in near])
     bodies, names = problem.manipulator.axis_names, problem.scene.names
     pairs = [
         (k, bodies.index(one.pair.own), names.index(one.pair.obstacle))
         for k, one in enumerate(near)
     ]
-    rows = rows_at(trajectory, moments)
+    rows = trajectory.at(moments)
     return _measured(robot, rows, scene, np.array(pairs)), moments
 
 
@@ -325,7 +330,7 @@ def coal_distances(
             yield _measured(robot, trajectory, scene, some)
 
 
-def _bodies_of(obstacle: Obstacle, deadline: Deadline) -> CoalObstacle:
+def _bodies_of(obstacle: Solid, deadline: Deadline) -> CoalObstacle:
     deadline.check()
     return coal_bodies(obstacle)
 

@@ -21,7 +21,7 @@ from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.coal_bodies import CoalBody, distance_request, measure
 from vdsm_pin.verification.coal_clearance import capsule_transforms, in_turns
-from vdsm_pin.verification.coal_log import CoalLog, rows_at
+from vdsm_pin.verification.coal_log import BETWEEN_LINKS, CoalLog
 from vdsm_pin.verification.records import Check, Verdict
 from vdsm_pin.verification.task import ArmPairs
 
@@ -124,7 +124,7 @@ def _answers(
 ) -> Iterator[tuple[LinkDistances, FloatArray]]:
     """What Coal measures, and when, in waypoints, shape (m,)."""
     if log is not None:
-        near = log.asked(of_obstacles=False)
+        near = log.asked(BETWEEN_LINKS)
         if near.size:
             found, moments = _at_approaches(robot, trajectory, log)
             log.keep_approaches(near, found.distance)
@@ -154,7 +154,7 @@ def _at_approaches(
 ) -> tuple[LinkDistances, FloatArray]:
     """Distances at the closest approaches of links, and their moments, (m,)."""
     arm = robot.manipulator
-    near = [log.approaches[k] for k in log.asked(of_obstacles=False)]
+    near = [log.approaches[k] for k in log.asked(BETWEEN_LINKS)]
     moments, names = np.array([one.moment for one in near]), arm.axis_names
     pairs = np.array(
         [
@@ -162,7 +162,7 @@ def _at_approaches(
             for k, one in enumerate(near)
         ]
     )
-    rows = rows_at(trajectory, moments)
+    rows = trajectory.at(moments)
     centres = joint_centres(arm, rows.x0, rows.alpha, rows.theta)
     gaps = link_gaps(np.ascontiguousarray(arm.axes(centres)), arm.axis_radii)
     return _measured(robot, rows, pairs, gaps[tuple(pairs.T)]), moments

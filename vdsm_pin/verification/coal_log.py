@@ -1,15 +1,18 @@
 """What Coal is asked besides its rows, and all that it answers."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.manipulator import TOOL
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.coal_rows import CoalRows
 from vdsm_pin.verification.records import ClosestApproach, Pair
+
+BETWEEN_LINKS: Final = frozenset({""})
+"""The partners of pairs without an obstacle."""
 
 
 class CoalLog:
@@ -40,13 +43,13 @@ class CoalLog:
         wanted = ~np.isin(pair, self._surfaces)
         self._parts.append((waypoint[wanted], pair[wanted], usable[wanted]))
 
-    def asked(self, of_obstacles: bool) -> IntArray:
-        """Numbers of the approaches to obstacles, or else between links."""
+    def asked(self, partners: Collection[str]) -> IntArray:
+        """Numbers of the approaches to some obstacles, or to none: between links."""
         return np.array(
             [
                 k
                 for k, near in enumerate(self.approaches)
-                if bool(near.pair.obstacle) == of_obstacles
+                if near.pair.obstacle in partners
                 and near.pair.obstacle not in self._around
                 and {near.pair.body, near.pair.other_body} <= {"", TOOL}
             ],
@@ -70,22 +73,3 @@ class CoalLog:
         return CoalRows(
             frozen(waypoint, np.int64), frozen(pair, np.int64), frozen(distance)
         )
-
-
-def rows_at(trajectory: Trajectory, moments: FloatArray) -> Trajectory:
-    """The motion at some moments, in waypoints, shape (m,)."""
-    before = np.minimum(moments.astype(np.int64), trajectory.n_samples - 1)
-    after = np.minimum(before + 1, trajectory.n_samples - 1)
-    share = moments - before
-
-    def between(rows: FloatArray) -> FloatArray:
-        part = share.reshape(-1, *[1] * (rows.ndim - 1))
-        return np.asarray(rows[before] + part * (rows[after] - rows[before]))
-
-    return Trajectory(
-        trajectory.on_path[before],
-        trajectory.path_m[before],
-        between(trajectory.x0),
-        between(trajectory.alpha),
-        between(trajectory.theta),
-    )

@@ -22,6 +22,7 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
+from vdsm_pin.verification.moving import whole_rows
 from vdsm_pin.verification.pair_slopes import pair_slopes
 from vdsm_pin.verification.records import (
     ClearanceChunk,
@@ -78,7 +79,7 @@ class Search:
     ) -> None:
         mine = [o for o in problem.scene.obstacles if o.name == pair.obstacle]
         self.problem = replace(problem, scene=Scene(tuple(mine)))
-        self.pair, self.joints = pair, trajectory.joints
+        self.pair, self.trajectory = pair, trajectory
         self.required = problem.required_self_clearance
         if pair.obstacle:
             self.required = problem.required_clearance
@@ -128,8 +129,9 @@ class Search:
     ) -> tuple[Moment, FloatArray]:
         """The nearest configuration found within the box: moment and offsets."""
         angles = errors.angles(self.problem.manipulator.n_links)
-        scale = INSIDE * np.append(0.0, angles.reshape(-1))
         corners = self._first_corners()
+        scale = np.zeros(corners.shape[1])  # 0 of what carries obstacles
+        scale[1 : 1 + angles.size] = INSIDE * angles.reshape(-1)
         at = [(moment, corner) for moment in moments for corner in corners]
         q = np.array([self._joints(moment) for moment, _ in at])
         moved = self._walk(q, np.array([corner for _, corner in at]) * scale, scale)
@@ -138,33 +140,35 @@ class Search:
         return moment, self._walk(self._joints(moment)[None], offset[None], scale)[0]
 
     def _joints(self, moment: Moment) -> FloatArray:
-        """Nominal joint values, shape (1 + 2N,)."""
+        """Nominal values of all columns, shape (n_columns,)."""
         return np.asarray(self._between(moment.interval, np.array([moment.share]))[0])
 
     def _between(self, interval: int, shares: FloatArray) -> FloatArray:
-        """Nominal joint values at shares (m,) of an interval, shape (m, 1 + 2N)."""
-        rows = self.joints[interval : interval + 2]
-        return np.asarray(rows[0] + shares[:, None] * (rows[-1] - rows[0]))
+        """The same at shares (m,) of an interval, shape (m, n_columns)."""
+        # The last row begins no interval.
+        last = max(0, self.trajectory.n_samples - 2)
+        moments = np.minimum(interval, last) + shares
+        return whole_rows(self.problem, self.trajectory, moments)
 
     def _first_corners(self) -> FloatArray:
         """Corners to start from: none, and every alpha or theta to one side."""
-        corners = np.zeros((5, self.joints.shape[1]))
+        corners = np.zeros((5, self.task.tree.column.max() + 1))
         corners[1, 1::2], corners[2, 1::2] = 1.0, -1.0
         corners[3, 2::2], corners[4, 2::2] = 1.0, -1.0
         return corners
 
     def _gaps(self, q: FloatArray) -> FloatArray:
-        """Clearance of the pair in many configurations (m, 1 + 2N), shape (m,); [m]."""
+        """Clearance of the pair at rows (m, n_columns) of q, shape (m,); [m]."""
         return self._slopes(q)[0]
 
     def _slopes(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The same, and how it changes with every joint, shape (m, 1 + 2N)."""
+        """The same, and how it changes with every joint, shape (m, n_columns)."""
         return pair_slopes(self.task, self.number, np.ascontiguousarray(q))
 
     def _walk(
         self, q: FloatArray, offsets: FloatArray, scale: FloatArray
     ) -> FloatArray:
-        """Offsets (m, 1 + 2N) at which the slopes lead nowhere else within the box."""
+        """Offsets (m, n_columns) from which slopes lead nowhere else within the box."""
         flat = TOLERANCES.flat_slope
         least, slopes = self._slopes(q + offsets)
         for _ in range(STEPS):
@@ -191,13 +195,21 @@ class Search:
         self, errors: ErrorBox, moment: Moment, offset: FloatArray
     ) -> Counterexample | None:
         """What the clearance proof says of one configuration."""
-        q, grown = self._joints(moment) + offset, self._grown(errors)
+        nominal, grown = self._joints(moment), self._grown(errors)
+        width = 1 + 2 * self.problem.manipulator.n_links
+        q, offset = (nominal + offset)[:width], offset[:width]
         problem = replace(
             self.problem,
             required_clearance=self.problem.required_clearance + grown,
         )
+        when = np.array([moment.interval + moment.share])
         row = Trajectory(
-            np.zeros(1, bool), np.zeros(1), q[:1], q[None, 1::2], q[None, 2::2]
+            np.zeros(1, bool),
+            np.zeros(1),
+            q[:1],
+            q[None, 1::2],
+            q[None, 2::2],
+            times=self.trajectory.times_at(when),
         )
         chunks: list[ClearanceChunk] = []
         proof = prove_clearance(problem, row, ErrorBox(), [chunks.append])

@@ -146,7 +146,7 @@ class _Search:
         pair, low, high = self._pair, 0.0, 1.0
         for _ in range(HALVINGS):
             share = (low + high) / 2.0
-            if self._refuted(self._within(first, low, share), mine):
+            if self._refuted(self.trajectory.within(first, low, share), mine):
                 pair, high = self._pair, share
             else:
                 clear &= self._clear
@@ -164,7 +164,7 @@ class _Search:
         last, low, high = int(intervals[-1]), 0.0, 1.0
         for _ in range(HALVINGS):
             share = (low + high) / 2.0
-            if self._refuted(self._within(last, share, 1.0), mine):
+            if self._refuted(self.trajectory.within(last, share, 1.0), mine):
                 low = share
             else:
                 high = share
@@ -190,13 +190,3 @@ class _Search:
     def _rows(self, first: int, last: int) -> Trajectory:
         """The intervals from `first` to below `last`."""
         return self.trajectory.part(first, last + 1)
-
-    def _within(self, interval: int, low: float, high: float) -> Trajectory:
-        """A part of one interval, as an interval of its own."""
-        ends = self._rows(interval, interval + 1)
-        share = np.array([low, high])[:, None]
-        joints = ends.joints[0] + share * (ends.joints[-1] - ends.joints[0])
-        none = np.zeros(2)
-        return Trajectory(
-            none.astype(bool), none, joints[:, 0], joints[:, 1::2], joints[:, 2::2]
-        )

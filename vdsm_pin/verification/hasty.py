@@ -41,12 +41,13 @@ class HastyProof:
         self._problem = problem
         # Nobody asks for a profile: all intervals share its one bin.
         budget = Budget(profile=1, until=deadline.end)
-        self._proving = prove_problem(problem, trajectory, ErrorBox(), budget=budget)
+        proof = prove_problem(problem, trajectory, ErrorBox(), budget=budget)
+        self._proving, self._first = proof.proving, proof.knots.first.tolist()
         self._deadline = deadline
         task = self._proving.task
         pairs = task.pairs._replace(required=task.pairs.required + BEYOND)
         self._task = task._replace(pairs=pairs)
-        self.n_intervals = self._proving.n_intervals
+        self.n_intervals = len(self._first) - 1
 
     def holds(self, errors: ErrorBox, first: int, last: int) -> bool:
         """Whether every interval from `first` to below `last` is proved.
@@ -62,7 +63,7 @@ class HastyProof:
         # No least clearance is asked for: whatever is proved may be culled.
         known.results.limit[:] = -np.inf
         args = task, known.motion, known.desk, known.results, known.broad
-        proved = bool(sweep(*args, (first, last), True))
+        proved = bool(sweep(*args, (self._first[first], self._first[last]), True))
         self._deadline.check()
         return proved
 

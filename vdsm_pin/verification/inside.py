@@ -1,10 +1,10 @@
 """Whether the arm is inside a mesh: where its base is as the motion begins.
 
 The arm is connected and the clearance proof keeps its axis off the surface, so one
-point of one row decides for the whole motion. What links carry may be apart from them,
-and some links may not be held off the mesh: there a point of each body decides. Where
-the inside of a mesh cannot be told, the arm is outside if it is proved to keep its
-clearance from the mesh's hull.
+point of one row decides for the whole motion, also where the mesh moves. What links
+carry may be apart from them, and some links may not be held off the mesh: there a point
+of each body decides. Where the inside of a mesh cannot be told, the arm is outside if
+it is proved to keep its clearance from the mesh's hull.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -21,7 +21,7 @@ from vdsm_pin.geometry.winding import Location, Side, locate
 from vdsm_pin.kinematics import joint_centres, link_frames
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.terms import CERTIFIED
-from vdsm_pin.scene import Mesh, Scene, with_hulls
+from vdsm_pin.scene import Mesh, Moving, Scene, solid_of, with_hulls
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
@@ -53,7 +53,7 @@ def locate_start(
                 for point, radius in _points(problem, trajectory, mesh.name)
             ]
         )
-        for mesh in problem.scene.obstacles
+        for mesh in map(solid_of, problem.scene.obstacles)
         if isinstance(mesh, Mesh) and not mesh.is_surface
     }
 
@@ -68,7 +68,7 @@ def _worst(found: Sequence[Location]) -> Location:
 def _points(
     problem: PlanningProblem, trajectory: Trajectory, mesh: str
 ) -> list[tuple[FloatArray, float]]:
-    """Points at the first row, and how far from the surface they stay; [m].
+    """Points at the first row in a mesh's frame, and how far off it they stay; [m].
 
     O_1 for links, tool and feed where all of them are held off the mesh, otherwise the
     middle of each that is; the middle of everything that is carried.
@@ -90,7 +90,18 @@ def _points(
             middle = turned @ body.corners.mean(axis=0)
             origin = centres[max(0, body.link - 1)]
             points.append((origin + middle, body.ball + problem.required_clearance))
-    return points
+    pose = _pose_at_start(problem, trajectory, mesh)
+    return [((p - pose[:3, 3]) @ pose[:3, :3], off) for p, off in points]
+
+
+def _pose_at_start(
+    problem: PlanningProblem, trajectory: Trajectory, name: str
+) -> FloatArray:
+    """T_base_obstacle at the first row, shape (4, 4); [m]."""
+    one = next(one for one in problem.scene.obstacles if one.name == name)
+    if not isinstance(one, Moving) or trajectory.times is None:
+        return np.eye(4)
+    return np.asarray(one.poses(trajectory.times[:1])[0])
 
 
 def unlocated(located: Mapping[str, Location]) -> tuple[str, ...]:
@@ -132,7 +143,7 @@ def _clear_of(names: Collection[str], proof: ClearanceProof) -> tuple[str, ...]:
     near = {
         pair.obstacle
         for pair, counts in zip(proof.pairs, proof.counts, strict=True)
-        if counts[CERTIFIED] < proof.n_intervals
+        if counts[CERTIFIED] < counts.sum()
     }
     return tuple(name for name in names if name not in near)
 
@@ -176,7 +187,7 @@ def check_inside(located: Mapping[str, Location]) -> tuple[Check, ...]:
 
 def surfaces(problem: PlanningProblem) -> tuple[str, ...]:
     """Names of the meshes of which only the surface is meant."""
-    meshes = (o for o in problem.scene.obstacles if isinstance(o, Mesh))
+    meshes = (s for s in map(solid_of, problem.scene.obstacles) if isinstance(s, Mesh))
     return tuple(mesh.name for mesh in meshes if mesh.is_surface)
 
 
@@ -190,7 +201,7 @@ def mesh_notes(problem: PlanningProblem) -> tuple[str, ...]:
         f"{name!r} is a surface only, as the problem says: it has no inside"
         for name in surfaces(problem)
     ]
-    for mesh in problem.scene.obstacles:
+    for mesh in map(solid_of, problem.scene.obstacles):
         if isinstance(mesh, Mesh) and not mesh.is_surface:
             gap, closed = mesh.closed_mesh.gap, mesh.closed_mesh.closed
             if closed and gap > TOLERANCES.mesh_flat * mesh.closed_mesh.size:

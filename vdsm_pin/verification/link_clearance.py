@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.links import link_clearances
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
@@ -46,7 +47,17 @@ def link_clearance(problem: PlanningProblem) -> Callable[[FloatArray], FloatArra
         counts as part of the last link, and what links carry as if it were round about
         their axes. Pieces of an arm, of other numbers of links, are taken to be as
         thick as its thickest part.
+
+    Raises:
+        InvalidInput: If an obstacle moves: nothing of time is known here.
     """
+    if problem.scene.moving:
+        name = problem.scene.moving[0].name
+        message = (
+            f"obstacle {name!r} moves: no motion is planned beside it; vdsm verify "
+            "judges a given one"
+        )
+        raise InvalidInput(message)
     obstacles = problem.scene.obstacles
     pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
     covers, pad = covers_of(obstacles, pieces), arithmetic_pad(problem, pieces)

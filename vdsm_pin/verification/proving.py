@@ -1,17 +1,36 @@
 """A clearance proof of a problem and a trajectory, ready to work."""
 
-import numpy as np
+from dataclasses import dataclass
 
 from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.budget import Budget
-from vdsm_pin.proof.packed_tree import straight_motion
 from vdsm_pin.proof.proving import Proving, new_proving
 from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.moving import Knots, whole_motion
 from vdsm_pin.verification.task import make_task
 
 BUDGET = Budget()
+
+
+@dataclass(frozen=True)
+class ProblemProof:
+    """A proof at work, and where its intervals lie in the trajectory.
+
+    Args:
+        proving: Numbers the intervals of the joint path.
+        knots: Those of the trajectory.
+    """
+
+    proving: Proving
+    knots: Knots
+
+    @property
+    def best(self) -> FloatArray:
+        """Least bounds of each pair, told in intervals of the trajectory."""
+        return self.knots.told(self.proving.results.best)
 
 
 def prove_problem(
@@ -20,7 +39,7 @@ def prove_problem(
     errors: ErrorBox,
     pieces: PackedPieces | None = None,
     budget: Budget = BUDGET,
-) -> Proving:
+) -> ProblemProof:
     """Everything ready, nothing judged.
 
     Args:
@@ -30,9 +49,8 @@ def prove_problem(
         pieces: `pack_scene(problem)`, where it is known already.
         budget: Sizes and when to stop.
     """
-    reach = float(np.abs(trajectory.x0).max())
+    motion, reach, knots = whole_motion(problem, trajectory)
     task = make_task(problem, errors, pieces, budget, reach)
     n_obstacles = len(problem.scene.obstacles)
     columns = problem.manipulator.n_links + n_obstacles
-    motion = straight_motion(trajectory.joints)
-    return new_proving(task, motion, columns, n_obstacles, budget)
+    return ProblemProof(new_proving(task, motion, columns, n_obstacles, budget), knots)

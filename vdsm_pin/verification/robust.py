@@ -268,9 +268,9 @@ def _smallest(
 ) -> list[float]:
     """Joint errors of counterexamples of pairs that a few slices leave undecided."""
     budget = Budget(slices=LOOKS, profile=1, until=deadline.end)
-    proving = prove_problem(problem, trajectory, errors, budget=budget)
-    proving.sweep(0, proving.n_intervals)
-    best, counts = proving.results.best, proving.results.counts
+    proof = prove_problem(problem, trajectory, errors, budget=budget)
+    proof.proving.sweep(0, proof.proving.n_intervals)
+    best, counts = proof.best, proof.proving.results.counts
     among = np.flatnonzero(counts[:, UNDECIDED] > 0)
     nearest = among[np.argsort(best[among, LOW], kind="stable")][:SOUGHT]
     pairs = all_pairs(problem)

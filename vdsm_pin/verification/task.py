@@ -1,16 +1,15 @@
 """What a clearance proof is asked: bodies and pairs, the packed scene, the rules."""
 
-import math
 from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 
 from vdsm_pin.arm_bodies import ArmBody, LeftOut, SelfPairs, arm_bodies, self_pairs
-from vdsm_pin.arm_tree import RAIL, arm_tree, link_frame
+from vdsm_pin.arm_tree import RAIL, link_frame
 from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.bodies import Body, PairTable
@@ -18,9 +17,10 @@ from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.error_box import ErrorBox as ProofBox
 from vdsm_pin.proof.packing import pack_task
 from vdsm_pin.proof.packing import with_errors as with_box
-from vdsm_pin.proof.terms import WORLD, Task
-from vdsm_pin.scene import HalfSpace, corners_of
+from vdsm_pin.proof.terms import Task
+from vdsm_pin.scene import HalfSpace, corners_of, solid_of
 from vdsm_pin.verification.link_clearance import arithmetic_pad
+from vdsm_pin.verification.moving import obstacle_frames, whole_tree
 from vdsm_pin.verification.records import Pair
 
 
@@ -134,10 +134,11 @@ def obstacle_growth(problem: PlanningProblem, errors: ErrorBox) -> list[float]:
     for obstacle in problem.scene.obstacles:
         error, reach = errors.of_obstacle(obstacle.name), 0.0
         if error.turn > 0.0:
-            if isinstance(obstacle, HalfSpace):
+            solid = solid_of(obstacle)
+            if isinstance(solid, HalfSpace):
                 message = f"obstacle {error.name!r}: a half-space cannot be turned"
                 raise InvalidInput(message)
-            points, grown = corners_of(obstacle)
+            points, grown = corners_of(solid)
             middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
             reach = float(np.linalg.norm(points - middle, axis=1).max()) + grown
         found.append(error.shift + error.turn * reach)
@@ -149,7 +150,7 @@ def make_task(
     errors: ErrorBox,
     pieces: PackedPieces | None = None,
     budget: Budget | None = None,
-    reach: float = math.inf,
+    reach: FloatArray | None = None,
 ) -> Task:
     """What the kernels need to know of a problem.
 
@@ -158,21 +159,21 @@ def make_task(
         errors: What the proof covers.
         pieces: `pack_scene(problem)`, where it is known already.
         budget: Sizes and when to stop.
-        reach: How large x0 gets; where the base may turn, nothing is proved of a motion
-            of which that is not known; [m].
+        reach: How large each column of the whole tree gets, shape (n_columns,); where
+            the base may turn, nothing is proved of a motion of which that is not known.
     """
     table, arm = ArmPairs(problem), problem.manipulator
     obstacles = problem.scene.obstacles
     pieces = pieces or pack_scene(problem)
-    bodies = [Body(WORLD, obstacle.pieces, obstacle.name) for obstacle in obstacles]
+    frames = zip(obstacles, obstacle_frames(problem), strict=True)
+    bodies = [Body(frame, one.pieces, one.name) for one, frame in frames]
     bodies += [Body(link_frame(b.link), (b.piece,), b.name) for b in table.bodies]
     columns = arm.n_links + np.arange(len(bodies))
     # The feed counts as what link 1 is mounted on.
     columns[len(obstacles) :] = [max(0, body.link - 1) for body in table.bodies]
     rules = (budget or Budget()).rules(arithmetic_pad(problem, pieces))
-    reaches = np.full(2 * arm.n_links + 1, reach)
-    tree, numbers = arm_tree(arm), table.numbers()
-    task = pack_task(tree, bodies, numbers, rules, reaches, columns, pieces)
+    tree, numbers = whole_tree(problem), table.numbers()
+    task = pack_task(tree, bodies, numbers, rules, reach, columns, pieces)
     return with_errors(task, problem, errors)
 
 
@@ -184,15 +185,23 @@ def with_errors(task: Task, problem: PlanningProblem, errors: ErrorBox) -> Task:
         problem: Arm and scene.
         errors: The box.
     """
-    return with_growth(task, errors, obstacle_growth(problem, errors))
+    return with_growth(
+        task,
+        errors,
+        problem.manipulator.n_links,
+        obstacle_growth(problem, errors),
+    )
 
 
-def with_growth(task: Task, errors: ErrorBox, grown: Sequence[float]) -> Task:
+def with_growth(
+    task: Task, errors: ErrorBox, n_links: int, grown: Sequence[float]
+) -> Task:
     """The same, the errors of the obstacles' surfaces given in their order; [m]."""
     shifts, tilts = np.zeros((2, task.tree.parent.size))
     shifts[RAIL], tilts[RAIL] = errors.base, errors.base_turn
     asked = task.bodies.number.max(initial=0), task.pairs.obstacle.max(initial=0)
     surfaces = np.zeros(max(1 + max(asked), len(grown)))
     surfaces[: len(grown)] = grown
-    joints = np.append(0.0, errors.angles(task.tree.parent.size // 2).reshape(-1))
+    joints = np.zeros(task.tree.parent.size)
+    joints[1 : 1 + 2 * n_links] = errors.angles(n_links).reshape(-1)
     return with_box(task, ProofBox(joints, shifts, tilts, surfaces))

@@ -52,6 +52,7 @@ from vdsm_pin.verification.inside import (
     unlocated,
 )
 from vdsm_pin.verification.limits import check_limits
+from vdsm_pin.verification.moving import check_timed
 from vdsm_pin.verification.records import (
     Check,
     ClearanceChunk,
@@ -349,6 +350,7 @@ def _check_input(
     if expected != found:
         message = f"trajectory has {found} links, the problem's arm has {expected}"
         raise InvalidInput(message)
+    check_timed(problem.scene, trajectory)
     for pair in problem.manipulator.ignore_pairs:
         problem.manipulator.check_ignored(pair, problem.scene.names)
     if len(errors.joints) not in (0, expected):
@@ -379,10 +381,8 @@ def _station(
     point: FloatArray,
 ) -> float:
     """Arc length along a link's axis of the place below its witness; [m]."""
-    k, t = int(row[AT_UPPER]), float(row[TIME])
-    after = min(k + 1, trajectory.n_samples - 1)
-    values = (trajectory.x0, trajectory.alpha, trajectory.theta)
-    now = [np.array([rows[k] + t * (rows[after] - rows[k])]) for rows in values]
+    joints = trajectory.joints_at(row[[AT_UPPER]] + row[TIME])
+    now = joints[:, 0], joints[:, 1::2], joints[:, 2::2]
     centres = joint_centres(problem.manipulator, *now)[0]
     length = float(problem.manipulator.link_lengths[link - 1])
     axis = (centres[link] - centres[link - 1]) / length

@@ -13,7 +13,7 @@ from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import surface
-from vdsm_pin.scene import HalfSpace
+from vdsm_pin.scene import HalfSpace, solid_of
 
 VIEWS = {"y": (1, 2), "side": (0, 2), "top": (0, 1)}
 
@@ -27,7 +27,7 @@ def outline(region: DangerRegion) -> FloatArray:
 def shadows(moment: Moment, view: Sequence[int]) -> list[FloatArray]:
     """Outlines of the obstacles in a view, half-spaces left out; [m]."""
     found = []
-    for obstacle in moment.plan.problem.scene.obstacles:
+    for obstacle in map(solid_of, moment.plan.problem.scene.obstacles):
         if isinstance(obstacle, HalfSpace):
             continue
         corners = surface(obstacle, 1.0).vertices[:, list(view)]

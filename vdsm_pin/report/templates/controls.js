@@ -40,7 +40,8 @@ function bindReadout(motion, slider, clearances) {
     const where = motion.onPath[k]
       ? `, at ${(motion.pathM[k] * 1000).toFixed(0)} mm of the path`
       : ", off the path";
-    const text = `waypoint ${time.toFixed(1)} of ${motion.end}${motion.onPath.length ? where : ""}`;
+    const when = motion.timeText(time);
+    const text = `waypoint ${time.toFixed(1)} of ${motion.end}${when}${motion.onPath.length ? where : ""}`;
     const near = clearances ? clearances.at(time) : { text: "", short: false };
     moment.textContent = text;
     clearance.textContent = near.text;

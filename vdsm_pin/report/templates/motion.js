@@ -29,6 +29,7 @@ class Motion {
     this.x0 = unpack(data.x0, Float32Array);
     this.alpha = unpack(data.alpha, Float32Array);
     this.theta = unpack(data.theta, Float32Array);
+    this.times = data.times ? unpack(data.times, Float64Array) : null; // of the rows [s]
     this.lengths = lengths;
     this.end = this.rows[this.rows.length - 1];
     this.time = 0;
@@ -101,6 +102,14 @@ class Motion {
   // Index of the row shown at or before a time, and how far it is to the next.
   place(time) {
     return between(this.rows, time);
+  }
+
+  // When a moment is, in words; nothing where nobody knows.
+  timeText(time) {
+    if (!this.times) return "";
+    const [k, share] = this.place(time);
+    const next = Math.min(k + 1, this.times.length - 1);
+    return `, ${(this.times[k] * (1 - share) + this.times[next] * share).toFixed(3)} s`;
   }
 
   // Joint centres O_1..O_{N+1} at a time.

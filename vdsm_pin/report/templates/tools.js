@@ -28,6 +28,7 @@ class Section {
   // Cut at `place` metres along an axis; the half beyond it stays, or the other one.
   cut(axis, place, beyond) {
     const { Vector3, Matrix4 } = MeshCat.THREE;
+    this.asked = [axis, place, beyond];
     const normal = new Vector3().setComponent(axis, beyond ? 1 : -1);
     this.plane.setComponents(normal.x, normal.y, normal.z, beyond ? -place : place);
     const inBase = this.plane.clone().applyMatrix4(new Matrix4().copy(this.view.root.matrix).invert());
@@ -35,11 +36,17 @@ class Section {
     this.apply([this.plane]);
     const points = [];
     for (const body of this.view.obstacles)
-      if (body.visible) crossings(body.geometry, inBase, points);
+      if (body.visible) crossings(body, inBase, points);
     this.outline.geometry.dispose();
     this.outline.geometry = new MeshCat.THREE.BufferGeometry().setFromPoints(points);
     this.outline.visible = true;
     this.view.viewer.set_dirty();
+  }
+
+  // Cut again where something has moved.
+  follow() {
+    const moved = this.view.obstacles.some((body) => body.moves);
+    if (this.outline.visible && moved) this.cut(...this.asked);
   }
 
   off() {
@@ -60,9 +67,10 @@ class Section {
   }
 }
 
-// Where a plane crosses the triangles of a shape: pairs of points, added to `points`.
-function crossings(shape, plane, points) {
-  const { Vector3 } = MeshCat.THREE;
+// Where a plane crosses the triangles of a body: pairs of points, added to `points`.
+function crossings({ geometry: shape, matrix }, plane, points) {
+  const { Vector3, Matrix4 } = MeshCat.THREE;
+  plane = plane.clone().applyMatrix4(new Matrix4().copy(matrix).invert());
   const place = shape.getAttribute("position");
   const index = shape.getIndex();
   const count = index ? index.count : place.count;
@@ -76,7 +84,7 @@ function crossings(shape, plane, points) {
       const j = (i + 1) % 3;
       if (heights[i] < 0 === heights[j] < 0) continue;
       const share = heights[i] / (heights[i] - heights[j]);
-      points.push(corners[i].clone().lerp(corners[j], share));
+      points.push(corners[i].clone().lerp(corners[j], share).applyMatrix4(matrix));
     }
   }
 }

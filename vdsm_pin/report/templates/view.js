@@ -75,9 +75,11 @@ class ArmView {
       const body = new Mesh(shape, phong(GREY, glass));
       const ink = new LineBasicMaterial({ color: 0x5d6878 });
       if (edges) body.add(new LineSegments(edges, ink));
+      if (solid.moves) body.moves = new Moves(solid.moves);
       this.root.add(body);
       return body;
     });
+    this.moveObstacles(this.motion.time);
     this.stretchBox();
   }
 
@@ -86,11 +88,16 @@ class ArmView {
     const { Box3, Vector3 } = this.three;
     const reach = this.box.getSize(new Vector3());
     const near = this.box.clone().expandByScalar(0.12 * Math.max(reach.x, reach.y, reach.z));
-    for (const { geometry } of this.obstacles) {
+    for (const { geometry, matrix } of this.obstacles) {
       geometry.computeBoundingBox();
-      const part = new Box3().copy(geometry.boundingBox).intersect(near);
+      const part = new Box3().copy(geometry.boundingBox).applyMatrix4(matrix).intersect(near);
       if (!part.isEmpty()) this.box.union(part);
     }
+  }
+
+  // Obstacles that move stand where they are at a moment.
+  moveObstacles(time) {
+    for (const body of this.obstacles) if (body.moves) body.moves.place(body, time);
   }
 
   addPaths() {
@@ -196,6 +203,8 @@ class ArmView {
     const [centres, frames] = this.motion.poses(time);
     this.centres = centres;
     this.arm.pose(centres, frames);
+    this.moveObstacles(time);
+    this.section.follow();
     this.tipNow = this.centres[this.centres.length - 1];
     if (this.cameras.name === "tip") this.cameras.fromTip();
     this.showGhost(time);
@@ -250,6 +259,27 @@ class ArmView {
     for (const layer of [drawn, this.overlay.sheet])
       pen.drawImage(layer, 0, 0, sheet.width, sheet.height);
     return sheet.toDataURL("image/png");
+  }
+}
+
+// Poses of an obstacle at moments, and all that lie between.
+class Moves {
+  constructor({ moments, places, turns }) {
+    const { Vector3, Quaternion } = MeshCat.THREE;
+    this.moments = unpack(moments, Float64Array);
+    const [place, turn] = [places, turns].map((text) => unpack(text, Float32Array));
+    const numbers = [...this.moments.keys()];
+    this.places = numbers.map((k) => new Vector3().fromArray(place, 3 * k));
+    this.turns = numbers.map((k) => new Quaternion().fromArray(turn, 4 * k));
+  }
+
+  place(body, time) {
+    const last = this.moments.length - 1;
+    const [k, share] = between(this.moments, Math.min(time, this.moments[last]));
+    const after = Math.min(k + 1, last);
+    body.position.copy(this.places[k]).lerp(this.places[after], share);
+    body.quaternion.copy(this.turns[k]).slerp(this.turns[after], share);
+    body.updateMatrix();
   }
 }
 

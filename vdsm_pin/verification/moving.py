@@ -1,0 +1,145 @@
+"""What moves besides the arm: one tree and one path of arm, obstacles and other arms.
+
+The rows of a trajectory and the knots of what carries obstacles are joined in time.
+Every interval of the trajectory is one or more intervals of the joint path; results
+are told in the trajectory's own intervals.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdsm_pin.arm_tree import arm_tree
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, TIME
+from vdsm_pin.proof.packed_tree import Motion
+from vdsm_pin.proof.paths import Path, together
+from vdsm_pin.proof.terms import WORLD
+from vdsm_pin.proof.tree import Tree
+from vdsm_pin.scene import Moving, Scene
+from vdsm_pin.trajectory import Trajectory
+
+
+def whole_tree(problem: PlanningProblem) -> Tree:
+    """The arm's joints first, then those that carry obstacles."""
+    tree = arm_tree(problem.manipulator)
+    for carrier in problem.scene.carriers:
+        tree = tree.joined(carrier.tree)
+    return tree
+
+
+def obstacle_frames(problem: PlanningProblem) -> list[int]:
+    """The frame of the whole tree in which each obstacle rests."""
+    first, before = {}, len(arm_tree(problem.manipulator).joints)
+    for carrier in problem.scene.carriers:
+        first[carrier] = before
+        before += len(carrier.tree.joints)
+    return [
+        first[one.carrier] + one.frame if isinstance(one, Moving) else WORLD
+        for one in problem.scene.obstacles
+    ]
+
+
+def untimed(scene: Scene, trajectory: Trajectory) -> str:
+    """Why a motion cannot be judged beside what moves; empty where it can."""
+    if trajectory.times is not None or not scene.moving:
+        return ""
+    name = scene.moving[0].name
+    return f"has no column 'time_s', but obstacle {name!r} moves: rows need their times"
+
+
+def check_timed(scene: Scene, trajectory: Trajectory) -> None:
+    """Refuse a motion without times beside what moves.
+
+    Raises:
+        InvalidInput: If it has none.
+    """
+    if why := untimed(scene, trajectory):
+        message = f"trajectory {why}"
+        raise InvalidInput(message)
+
+
+@dataclass(frozen=True)
+class Knots:
+    """Where the intervals of a joint path lie in those of a trajectory.
+
+    Args:
+        moment: Of each knot, in waypoints, shape (n_knots,).
+        first: Number of the first interval within each one of the trajectory, and
+            after the last that of all, shape (n_intervals + 1,).
+    """
+
+    moment: FloatArray
+    first: IntArray
+
+    @classmethod
+    def of(cls, trajectory: Trajectory, times: FloatArray | None) -> "Knots":
+        """The knots of a path over a trajectory; its rows where there are no times."""
+        rows = np.arange(float(trajectory.n_samples))
+        if times is None or trajectory.times is None or len(rows) == 1:
+            return cls(rows, np.arange(max(2, len(rows))))
+        first = np.searchsorted(times, trajectory.times)
+        return cls(np.interp(times, trajectory.times, rows), first)
+
+    @property
+    def are_rows(self) -> bool:
+        """Whether there are none but the rows."""
+        return int(self.first[-1]) == len(self.first) - 1
+
+    def interval(self, inner: IntArray) -> IntArray:
+        """Of the trajectory, that intervals of the path lie in."""
+        return np.asarray(np.searchsorted(self.first, inner, side="right") - 1)
+
+    def share(self, inner: IntArray, share: FloatArray) -> FloatArray:
+        """A share of intervals of the path as one of the trajectory's; [-]."""
+        after = np.minimum(inner + 1, len(self.moment) - 1)
+        step = self.moment[after] - self.moment[inner]
+        found = self.moment[inner] + share * step - self.interval(inner)
+        return np.minimum(np.maximum(found, 0.0), 1.0)
+
+    def told(self, best: FloatArray) -> FloatArray:
+        """Best rows of pairs (`proof.layouts`) in intervals of the trajectory."""
+        if self.are_rows:
+            return best
+        found, inner = best.copy(), best[:, AT_UPPER].astype(np.int64)
+        found[:, TIME] = self.share(inner, best[:, TIME])
+        found[:, AT_UPPER] = self.interval(inner)
+        found[:, AT_LOWER] = self.interval(best[:, AT_LOWER].astype(np.int64))
+        return found
+
+
+def whole_motion(
+    problem: PlanningProblem, trajectory: Trajectory
+) -> tuple[Motion, FloatArray, Knots]:
+    """How all columns of the whole tree move, from the first row to the last.
+
+    Returns:
+        The motion, how large each column gets, shape (n_columns,), and its knots.
+
+    Raises:
+        InvalidInput: If something moves beside rows without times.
+    """
+    check_timed(problem.scene, trajectory)
+    path, carriers = _arm_path(trajectory), problem.scene.carriers
+    if not carriers:
+        return path.packed(), path.reach, Knots.of(trajectory, None)
+    ends = float(path.own_times[0]), float(path.own_times[-1])
+    path = together(path, *(one.path for one in carriers), within=ends)
+    return path.packed(), path.reach, Knots.of(trajectory, path.times)
+
+
+def _arm_path(trajectory: Trajectory) -> Path:
+    return Path(trajectory.joints, trajectory.inner, trajectory.times)
+
+
+def whole_rows(
+    problem: PlanningProblem, trajectory: Trajectory, moments: FloatArray
+) -> FloatArray:
+    """Rows of all columns at moments in waypoints, shape (m,): (m, n_columns)."""
+    rows, times = trajectory.joints_at(moments), trajectory.times_at(moments)
+    if times is None:
+        return rows
+    carried = (carrier.path.at(times) for carrier in problem.scene.carriers)
+    return np.hstack([rows, *carried])
