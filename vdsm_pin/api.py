@@ -9,6 +9,7 @@
 """
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -215,7 +216,7 @@ def write_certificate(
     if source is None:
         message = "a certificate is bound to a problem file; this problem has none"
         raise InvalidInput(message)
-    if not _same(read_trajectory(trajectory, problem), result.trajectory):
+    if not _same(read_trajectory(trajectory, problem, "linear"), result.trajectory):
         message = f"{trajectory}: is another motion than the verified one"
         raise InvalidInput(message)
     check_kept([Path(path)], [*source.files, Path(trajectory)])
@@ -234,12 +235,19 @@ def _same(one: Trajectory, other: Trajectory) -> bool:
     )
 
 
-def read_trajectory(path: str | Path, problem: PlanningProblem) -> Trajectory:
+def read_trajectory(
+    path: str | Path,
+    problem: PlanningProblem,
+    interpolation: Literal["linear", "cubic", "quintic", "auto"] = "auto",
+) -> Trajectory:
     """The trajectory of a CSV file (docs/files.md).
 
     Args:
         path: The file.
         problem: Whose arm moves.
+        interpolation: What joins the rows: straight lines, cubic pieces by the file's
+            velocities, quintic ones by its accelerations too, or what it has columns
+            for.
 
     Raises:
         InvalidFile: If the file breaks its contract or is of another arm.
@@ -250,7 +258,7 @@ def read_trajectory(path: str | Path, problem: PlanningProblem) -> Trajectory:
         >>> read_trajectory("out/api/t.csv", problem).n_links
         8
     """
-    return trajectory_file.read_trajectory(path, problem.manipulator)
+    return trajectory_file.read_trajectory(path, problem.manipulator, interpolation)
 
 
 def write_trajectory(path: str | Path, trajectory: Trajectory) -> None:

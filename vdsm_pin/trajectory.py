@@ -155,9 +155,9 @@ class Trajectory(Summarised):
     @property
     def controls(self) -> FloatArray:
         """Control points of every piece, (n_samples - 1, degree + 1, 1 + 2N)."""
-        return self._pieces(np.arange(self.n_samples - 1))
+        return self.pieces(np.arange(self.n_samples - 1))
 
-    def _pieces(self, k: IntArray) -> FloatArray:
+    def pieces(self, k: IntArray) -> FloatArray:
         """The same of some pieces, shape (m,)."""
         rows, inner = self.joints, self.inner
         between = inner[k] if self.is_smooth else np.zeros((k.size, 0, rows.shape[1]))
@@ -186,7 +186,7 @@ class Trajectory(Summarised):
             steps = rows[after] - rows[before]
             return np.asarray(rows[before] + share[:, None] * steps)
         found, within = rows[before], share > 0.0
-        pieces = self._pieces(before[within])
+        pieces = self.pieces(before[within])
         found[within] = bernstein.value(pieces, share[within])
         return found
 
@@ -233,7 +233,7 @@ class Trajectory(Summarised):
             return _of_joints(joints, on_path, path_m, times)
         k = np.minimum(moments.astype(np.int64), self.n_samples - 2)
         step, share = np.diff(self.times)[k, None], moments - k
-        once = bernstein.derivative(self._pieces(k))
+        once = bernstein.derivative(self.pieces(k))
         rates, changes = bernstein.value(once, share) / step, None
         if self.changes is not None:
             twice = bernstein.derivative(once)

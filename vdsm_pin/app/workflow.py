@@ -91,7 +91,7 @@ class VerifyOrder:
     deadline: Deadline = NO_LIMIT
     all_pairs: bool = False
     date: str | None = None
-    interpolation: Interpolation = "linear"
+    interpolation: Interpolation = "auto"
 
 
 @dataclass(frozen=True)

@@ -105,7 +105,7 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
     """
     check_is_file(certificate)
     source = read_problem(problem)
-    rows = read_trajectory(trajectory, source.problem.manipulator)
+    rows = read_trajectory(trajectory, source.problem.manipulator, "linear")
     sha256, reason = sha256_of_file(trajectory), ""
     hashes = {"problem_sha256": source.sha256, "trajectory_sha256": sha256}
     if source.problem.scene.moving:

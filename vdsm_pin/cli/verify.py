@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from vdsm_pin.robots.folder import RobotOrder
 
 commands = family()
+
+Interpolation = Literal["auto", "linear", "cubic", "quintic"]
 
 
 class Said(NamedTuple):
@@ -76,6 +78,13 @@ def verify(
             "--all-pairs", help="Every pair at every interval in clearance.csv."
         ),
     ] = False,
+    interpolation: Annotated[
+        Interpolation,
+        typer.Option(
+            help="What joins waypoints: straight lines, or smooth pieces by the "
+            "velocities (cubic) and accelerations (quintic) of the trajectory."
+        ),
+    ] = "auto",
     quiet: Quiet = False,
     as_json: AsJson = False,
     urdf: Annotated[
@@ -125,6 +134,7 @@ def verify(
         "--certificate": certificate,
         "--pdf": pdf,
         "--all-pairs": all_pairs,
+        "--interpolation": interpolation != "auto",
     }
     said = Said(quiet, as_json)
     deadline = Deadline.after(time_limit)
@@ -170,6 +180,7 @@ def verify(
             deadline=deadline,
             all_pairs=all_pairs,
             date=now(),
+            interpolation=interpolation,
         )
     raise typer.Exit(PASSED if _arm_passes(arm, said) else NOT_PASSED)
 

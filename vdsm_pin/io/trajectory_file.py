@@ -100,7 +100,7 @@ def _flat(angles: FloatArray) -> FloatArray:
 def read_trajectory(
     path: str | Path,
     manipulator: Manipulator,
-    interpolation: Interpolation = "linear",
+    interpolation: Interpolation = "auto",
 ) -> Trajectory:
     """Read a trajectory of any origin.
 

@@ -1,6 +1,6 @@
 """What was assumed, left out or odd in the files that a verdict is about."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from vdsm_pin.arm_bodies import convex_cover
@@ -47,10 +47,35 @@ def input_notes(problem: PlanningProblem, trajectory: Trajectory) -> tuple[str, 
         for note in one.notes
     )
     of_rows = (f"trajectory: {note}" for note in trajectory.notes)
+    of_time = (*_pieces(trajectory), *_longer(problem, trajectory))
     unknown = problem.scene.obstacles and not problem.manipulator.feed
     behind = (BEHIND,) if unknown else ()
     notes = (*behind, *_covers(problem), *mesh_notes(problem))
-    return (*notes, *of_files, *of_rows)
+    return (*notes, *of_time, *of_files, *of_rows)
+
+
+def _pieces(trajectory: Trajectory) -> tuple[str, ...]:
+    """What joins the rows, where it is not straight lines."""
+    if not trajectory.is_smooth:
+        return ()
+    kind = "cubic" if trajectory.changes is None else "quintic"
+    more = "" if trajectory.changes is None else " and accelerations"
+    text = f"{kind} pieces join the waypoints, by their velocities{more}: the curve is "
+    return (text + "judged, not its chords",)
+
+
+def _longer(problem: PlanningProblem, trajectory: Trajectory) -> Iterator[str]:
+    """Obstacles that move on while the arm's motion is over, or has not begun."""
+    if trajectory.times is None:
+        return
+    begin, end = trajectory.times[0], trajectory.times[-1]
+    for one in problem.scene.moving:
+        own = one.carrier.path.own_times
+        if own[0] < begin or own[-1] > end:
+            yield (
+                f"{one.name!r} moves from {own[0]:g} s to {own[-1]:g} s; judged is the "
+                f"time of the trajectory, {begin:g} s to {end:g} s"
+            )
 
 
 def _covers(problem: PlanningProblem) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -30,6 +30,9 @@ from vdsm_pin.verification.records import (
     Counterexample,
     Verification,
 )
+
+_MOST_BETWEEN: Final = 4_000
+"""Rows that a smooth motion is drawn with, where it has not more itself."""
 
 
 def scene_data(
@@ -86,6 +89,7 @@ def motion_data(
     return {
         "nSamples": trajectory.n_samples,
         **{name: packed(values, "<f8") for name, values in times.items()},
+        **({"smooth": _smooth(trajectory)} if trajectory.is_smooth else {}),
         "complete": shown.complete,
         "rows": packed(rows, "<i4"),
         "onPath": packed(on_path, "u1"),
@@ -93,6 +97,19 @@ def motion_data(
         "x0": packed(trajectory.x0[rows]),
         "alpha": packed(trajectory.alpha[rows]),
         "theta": packed(trajectory.theta[rows]),
+    }
+
+
+def _smooth(trajectory: Trajectory) -> dict[str, Any]:
+    """Joint values between the rows of a smooth motion, for the picture alone."""
+    count = trajectory.n_samples - 1
+    parts = max(1, min(32, _MOST_BETWEEN // count))
+    fine = trajectory.refined(parts)
+    return {
+        "moments": packed(np.arange(fine.n_samples) / parts, "<f8"),
+        "x0": packed(fine.x0),
+        "alpha": packed(fine.alpha),
+        "theta": packed(fine.theta),
     }
 
 

@@ -109,7 +109,7 @@ def simulate_to_folder(order: SimulationOrder) -> SimulationFile:
             "nothing could be said of its clearance"
         )
         raise InvalidInput(message)
-    planned = read_trajectory(order.trajectory, problem.manipulator)
+    planned = read_trajectory(order.trajectory, problem.manipulator, "linear")
     found = simulate(problem.manipulator, planned, order.settings)
     file = summary(
         problem, planned, found, order.settings, sha256_of_file(order.trajectory)

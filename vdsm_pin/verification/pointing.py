@@ -1,6 +1,7 @@
 """The last link's axis against its cone, at every instant on the path.
 
-Between two rows joints move linearly. The axis turns no faster than all joints before
+Between two rows joints move by a polynomial, and never faster than the largest control
+point of its derivative says. The axis turns no faster than all joints before
 it together, and the cone's axis no faster than the tip or the station moves. So the
 angle between the two is at most the mean of the angles at both ends of a slice and half
 of what both turn in it. Slices are halved until that is within the cone.
@@ -12,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.geometry import bernstein
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.pointing import angles_between
@@ -67,15 +69,21 @@ class _Motion:
         after: IntArray,
     ) -> None:
         self.arm, self.path = problem.manipulator, problem.path
-        self.begin, joints = trajectory.joints[first], trajectory.joints
-        self.change = joints[after] - self.begin
+        moves = after > first
+        self.pieces = np.repeat(trajectory.joints[first, None], 2, axis=1)
+        if moves.any():
+            pieces = trajectory.pieces(first[moves])
+            shape = len(first), pieces.shape[1], pieces.shape[2]
+            self.pieces = np.broadcast_to(self.pieces[:, :1], shape).copy()
+            self.pieces[moves] = pieces
+        rates = np.abs(bernstein.derivative(self.pieces)).max(axis=1)
         self.station = wrapped(self.path, trajectory.path_m)[first]
         steps = np.append(runs(self.path, trajectory.path_m), 0.0)
         self.run = np.where(after > first, steps[first], 0.0)
-        turns = np.abs(self.change[:, 1::2]) + np.abs(self.change[:, 2::2])
+        turns = rates[:, 1::2] + rates[:, 2::2]
         self.turning = turns.sum(axis=1)
         levers = self.arm.total_length - self.arm.stations[:-1]
-        self.speed = np.abs(self.change[:, 0]) + turns @ levers
+        self.speed = rates[:, 0] + turns @ levers
         self.swerve = self._steepest() * np.abs(self.run)
 
     def _steepest(self) -> float:
@@ -92,7 +100,7 @@ class _Motion:
         self, interval: IntArray, share: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Angles to the aims, NaN where one has no length, and the aims' lengths."""
-        rows = self.begin[interval] + share[:, None] * self.change[interval]
+        rows = bernstein.value(self.pieces[interval], share)
         centres = joint_centres(self.arm, rows[:, 0], rows[:, 1::2], rows[:, 2::2])
         station = self.station[interval] + share * self.run[interval]
         aims = self.path.aims(centres[:, -1], wrapped(self.path, station))
@@ -131,7 +139,7 @@ class _Motion:
 
     def whole(self) -> _Slices:
         """Every interval as one slice."""
-        number = np.arange(len(self.begin))
+        number = np.arange(len(self.pieces))
         none, all_ = np.zeros(len(number)), np.ones(len(number))
         begin, end = self.seen(number, none), self.seen(number, all_)
         return _Slices(number, none, all_, begin[0], end[0], begin[1], end[1])

@@ -29,6 +29,7 @@ class Motion {
     this.x0 = unpack(data.x0, Float32Array);
     this.alpha = unpack(data.alpha, Float32Array);
     this.theta = unpack(data.theta, Float32Array);
+    this.drawn = this.smooth(data.smooth) || this.asRows();
     this.times = data.times ? unpack(data.times, Float64Array) : null; // of the rows [s]
     this.lengths = lengths;
     this.end = this.rows[this.rows.length - 1];
@@ -39,6 +40,19 @@ class Motion {
     this.listeners = [];
     this.scales = { waypoint: this.rows, travel: this.travel() };
     this.scale = this.scales.waypoint;
+  }
+
+  // What is drawn where straight lines join the rows.
+  asRows() {
+    return { moments: this.rows, x0: this.x0, alpha: this.alpha, theta: this.theta };
+  }
+
+  // Joint values between the rows where smooth pieces join them.
+  smooth(data) {
+    if (!data) return null;
+    const [x0, alpha, theta] = [data.x0, data.alpha, data.theta].map((text) =>
+      unpack(text, Float32Array));
+    return { moments: unpack(data.moments, Float64Array), x0, alpha, theta };
   }
 
   // How far the tip has come at each row, detours included; [mm].
@@ -118,20 +132,21 @@ class Motion {
   }
 
   // The same, and the axes x, y, z of the base and of the links: rows are joined by
-  // straight lines in joint space, as the proof has it. Each link turns by yaw alpha,
-  // then by pitch theta.
+  // straight lines in joint space, as the proof has it, or by smooth pieces drawn as
+  // short ones. Each link turns by yaw alpha, then by pitch theta.
   poses(time) {
-    const [k, share] = this.place(time);
+    const { moments, x0, alpha, theta } = this.drawn;
+    const [k, share] = between(moments, time);
     const n = this.lengths.length;
-    const next = Math.min(k + 1, this.rows.length - 1);
+    const next = Math.min(k + 1, moments.length - 1);
     const mix = (values, i, size) =>
       values[k * size + i] * (1 - share) + values[next * size + i] * share;
     let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = [1, 0, 0, 0, 1, 0, 0, 0, 1];
-    const points = [[mix(this.x0, 0, 1), 0, 0]];
+    const points = [[mix(x0, 0, 1), 0, 0]];
     const frames = [[xx, xy, xz, yx, yy, yz, zx, zy, zz]];
     for (let i = 0; i < n; i++) {
-      const a = mix(this.alpha, i, n);
-      const t = mix(this.theta, i, n);
+      const a = mix(alpha, i, n);
+      const t = mix(theta, i, n);
       const [ca, sa, ct, st] = [Math.cos(a), Math.sin(a), Math.cos(t), Math.sin(t)];
       const [ux, uy, uz] = [ca * xx + sa * yx, ca * xy + sa * yy, ca * xz + sa * yz];
       [yx, yy, yz] = [ca * yx - sa * xx, ca * yy - sa * xy, ca * yz - sa * xz];

@@ -121,8 +121,8 @@ class ArmView {
 
     const tracks = this.scene.lengths.map(() => []);
     tracks.push([]);
-    for (const row of this.motion.rows)
-      this.motion.centres(row).forEach((point, j) => tracks[j].push(point));
+    for (const moment of this.motion.drawn.moments)
+      this.motion.centres(moment).forEach((point, j) => tracks[j].push(point));
     tracks.flat().forEach((point) => this.box.expandByPoint(new Vector3(...point)));
     this.box.expandByScalar(this.scene.radius);
     const colours = ["#7a7f87", ...this.scene.colours];
