@@ -8,6 +8,7 @@ import json
 import math
 import os
 import re
+import shutil
 import subprocess
 import sys
 import time
@@ -16,6 +17,7 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+import typer
 from problem_files import BEHIND_A_WALL, NEAR, OUT_OF_REACH, write_problem
 
 from vdsm_pin.batch.run import Batch, run_batch
@@ -24,9 +26,7 @@ from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.planner.strategies import STRATEGIES, strategy
 from vdsm_pin.report.files import SCHEMA_NAMES, schema
 
-COMMANDS = [
-    command.name or command.callback.__name__ for command in app.registered_commands
-]
+COMMANDS = list(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
 
 
 @dataclass
@@ -80,6 +80,7 @@ def one_message(ran: Ran) -> str:
 
 
 def test_help_is_quick_and_every_command_shows_an_example(vdsm: Shell) -> None:
+    assert {"plan", "verify", "check-certificate"} < set(COMMANDS)
     assert vdsm("--help").status == 0
     for command in COMMANDS:
         ran = vdsm(command, "--help")
@@ -597,7 +598,45 @@ def test_a_batch_can_be_proved_under_errors_with_certificates(
     assert "(kept)" in vdsm(*more).out
     assert vdsm(*more, "--quiet").out == ""
     lost = vdsm(*words, "--obstacle-error-mm", "900", "--json")
-    assert (lost.status, json.loads(lost.out)[0]["outcome"]) == (1, "refuted")
+    assert (lost.status, json.loads(lost.out)[0]["outcome"]) == (1, "infeasible")
+
+
+def test_errors_hold_for_plan_verify_and_batch_alike(
+    vdsm: Shell, tmp_path: Path
+) -> None:
+    """Stated in the file or asked for at the command, a plan is made for them."""
+    beside = NEAR.replace("[2000, 900, 0]", "[2000, 330, 0]")
+    plain = write_problem(tmp_path / "near.yaml", beside)
+    asking = beside + "errors: {joint_deg: 0.2}\n"
+    stated = write_problem(tmp_path / "stated.yaml", asking)
+    out = tmp_path / "out"
+    words = ["--out", out]
+    ran = vdsm("plan", plain, *words)
+    assert "under errors" not in ran.out
+    motion = tmp_path / "exact.csv"
+    shutil.copy(out / "trajectory.csv", motion)
+    nominal = motion.read_bytes()
+    asked = "--joint-error-deg", "0.2"
+    judged = ["--trajectory", motion, "--out", tmp_path / "judged"]
+    assert vdsm("verify", stated, *judged).status == 1
+    assert vdsm("verify", plain, *judged, *asked).status == 1
+
+    rows = []
+    for problem, more in ((plain, asked), (stated, ())):
+        ran = vdsm("plan", problem, *words, *more)
+        assert ran.status == 0, ran.err
+        assert re.search(r"under errors up to +±0.200° of every joint angle", ran.out)
+        rows.append((out / "trajectory.csv").read_bytes())
+        ran = vdsm("batch", problem, "--out", tmp_path / "batch", *more)
+        assert (ran.status, "1 of 1 certified" in ran.out) == (0, True), ran.out
+        (path,) = (tmp_path / "batch").glob("*/trajectory.csv")
+        rows.append(path.read_bytes())
+        shutil.rmtree(tmp_path / "batch")
+        shutil.copy(out / "trajectory.csv", motion)
+        assert vdsm("verify", stated, *judged).status == 0
+        assert vdsm("verify", plain, *judged, *asked).status == 0
+    assert len(set(rows)) == 1
+    assert rows[0] != nominal
 
 
 def test_a_shell_can_be_taught_to_complete(vdsm: Shell) -> None:

@@ -62,6 +62,21 @@ def test_missing_clearance_between_waypoints_is_added_to_the_margin(
     assert result.rounds[-1].clearance >= problem.required_clearance
 
 
+def test_margins_reach_beyond_what_a_plan_keeps_unasked() -> None:
+    """Errors take what it kept, so that a margin within that asks for nothing."""
+    problem = read_problem("paper/obs1").problem
+    problem = replace(problem, errors=ErrorBox(joint=np.deg2rad(0.1)))
+    robot = load_robot(problem.manipulator)
+    result = refinement.plan_and_verify(problem, "fewest", robot)
+    assert result.verification.verdict is Verdict.CERTIFIED
+    assert result.verification.errors == problem.errors
+    ended = result.rounds[0]
+    assert ended.adjustments
+    for one in ended.adjustments:
+        assert one.margin > problem.required_clearance - one.distance
+    assert len(result.rounds) <= 3
+
+
 def test_a_plan_that_cannot_be_certified_is_not_handed_out(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

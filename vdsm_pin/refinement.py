@@ -201,7 +201,7 @@ def _by_coal(
     return tuple(
         _adjustment(
             problem, margins, float(one.waypoint), one.link, one.obstacle,
-            ("Coal", one.distance),
+            ("Coal", one.distance, one.distance),
         )
         for one in coal_missing(robot, problem, plan.trajectory, deadline)
     )  # fmt: skip
@@ -216,7 +216,7 @@ def _by_proof(
     return tuple(
         _adjustment(
             problem, margins, near.moment, near.pair.link,
-            names.index(near.pair.obstacle), ("proof", near.lower),
+            names.index(near.pair.obstacle), ("proof", near.lower, near.coal),
         )
         for near in verification.approaches
         if near.pair.obstacle and near.lower < problem.required_clearance
@@ -229,12 +229,25 @@ def _adjustment(
     moment: float,
     link: int,
     obstacle: int,
-    found: tuple[Literal["Coal", "proof"], float],
+    found: tuple[Literal["Coal", "proof"], float, float],
 ) -> Adjustment:
-    measured_by, distance = found
+    """The margin that is missing.
+
+    Args:
+        problem: Its required clearance.
+        margins: As they were, shape (N, n_obstacles); [m].
+        moment: When it is missed, in waypoints.
+        link: 1 to N.
+        obstacle: Its index.
+        found: By whom; the clearance, under errors where the problem has some; and
+            what Coal measures without them, NaN where it is not known; [m].
+    """
+    measured_by, distance, nominal = found
     missing = problem.required_clearance - distance
     more = OVERSHOOT * missing + TOLERANCES.planned_clearance
-    margin = float(margins[link - 1, obstacle]) + more
+    # What errors take, the plan may have kept already without being asked.
+    kept = np.fmax(margins[link - 1, obstacle], nominal - problem.required_clearance)
+    margin = float(kept) + more
     name = problem.scene.names[obstacle]
     return Adjustment(moment, link, name, measured_by, distance, margin)
 

@@ -4,7 +4,7 @@ Nothing is judged here: problems are read, planned, verified and written down.
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -71,7 +71,6 @@ class VerifyOrder:
         trajectory: The trajectory file.
         folder: Where the results go.
         command: The exact command line, for the report.
-        errors: The error box the proof shall cover.
         certificate: Where the certificate of a certified motion goes; None for none.
         pdf: Where the report on paper goes; None for none.
         deadline: When to give up what is left; it is then undecided.
@@ -85,7 +84,6 @@ class VerifyOrder:
     trajectory: Path
     folder: Path
     command: str
-    errors: ErrorBox = field(default_factory=ErrorBox)
     certificate: Path | None = None
     pdf: Path | None = None
     deadline: Deadline = NO_LIMIT
@@ -229,7 +227,6 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
                 problem,
                 trajectory,
                 robot,
-                errors=order.errors,
                 sinks=(clearance,),
                 joint_error=True,
                 deadline=order.deadline,

@@ -288,16 +288,16 @@ def _hash(problem: str) -> str:
 
 
 def _plan_and_verify(task: Task, source: ProblemFile, deadline: Deadline) -> BatchRow:
+    asked = task.proving
+    source = source.under(asked.errors)
     plan = plan_to_folder(
         source, task.strategy, task.aside, task.command, deadline, report=False
     )
-    asked = task.proving
     order = VerifyOrder(
         source,
         task.aside / TRAJECTORY,
         task.aside,
         task.command,
-        errors=asked.errors,
         certificate=task.aside / CERTIFICATE if asked.certificate else None,
         pdf=task.aside / PDF if asked.pdf else None,
         deadline=deadline,

@@ -9,6 +9,10 @@ from vdsm_pin.cli.options import (
     NOT_PASSED,
     PASSED,
     AsJson,
+    BaseError,
+    BaseTurn,
+    JointError,
+    ObstacleError,
     OutFolder,
     PlanningTime,
     Problem,
@@ -24,12 +28,21 @@ from vdsm_pin.time_limit import Deadline, enforced
 commands = family()
 
 
-@commands.command(epilog=examples("vdsm plan paper/obs1 --out out/obs1"))
+@commands.command(
+    epilog=examples(
+        "vdsm plan paper/obs1 --out out/obs1",
+        "vdsm plan paper/obs1 --joint-error-deg 0.1 --out out/sturdy",
+    )
+)
 def plan(
     context: typer.Context,
     problem: Problem,
     out: OutFolder,
     strategy: Strategy = DEFAULT_STRATEGY,
+    joint_error_deg: JointError = 0.0,
+    base_error_mm: BaseError = 0.0,
+    base_error_deg: BaseTurn = 0.0,
+    obstacle_error_mm: ObstacleError = 0.0,
     time_limit: PlanningTime = 60.0,
     quiet: Quiet = False,
     as_json: AsJson = False,
@@ -38,19 +51,23 @@ def plan(
 
     Writes trajectory.csv, centres.csv, cables.csv, plan.json and report.html, or
     no_plan.html where there is no plan. A plan that draws less of the path than
-    required is written, is called incomplete, and ends with status 1.
+    required is written, is called incomplete, and ends with status 1. Errors are added
+    to those of the problem file; the plan keeps its clearances under them.
     """
-    from vdsm_pin.app.workflow import NO_PLAN, plan_to_folder
+    from vdsm_pin.app.workflow import NO_PLAN, error_box, plan_to_folder
     from vdsm_pin.io.problem_file import read_problem
     from vdsm_pin.progress import shown
     from vdsm_pin.report.terminal import show_plan
     from vdsm_pin.report.words import outcome
 
+    errors = error_box(
+        joint_error_deg, base_error_mm, obstacle_error_mm, base_error_deg
+    )
     deadline, begin = Deadline.after(time_limit), time.monotonic()
     page = f"see {out / NO_PLAN}"
     try:
         with enforced(deadline):
-            source = read_problem(problem)
+            source = read_problem(problem).under(errors)
             with nullcontext() if quiet else shown():
                 file = plan_to_folder(source, strategy, out, context.obj, deadline)
     except OutOfTime as error:  # which tells its time itself

@@ -170,11 +170,10 @@ def verify(
     )
     with enforced(deadline):
         arm = VerifyOrder(
-            source=read_problem(problem),
+            source=read_problem(problem).under(errors),
             trajectory=trajectory,
             folder=out,
             command=context.obj,
-            errors=errors,
             certificate=certificate,
             pdf=pdf,
             deadline=deadline,

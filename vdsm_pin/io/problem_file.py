@@ -1,12 +1,13 @@
 """Problem files by path or built-in name: the only reader of the YAML contract."""
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from pydantic import ValidationError
 
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import InvalidFile, UnknownName
 from vdsm_pin.io.obstacle_schema import FromFileModel
 from vdsm_pin.io.path_schema import FilePart
@@ -35,6 +36,11 @@ class ProblemFile:
 
     problem: PlanningProblem
     source: ProblemSource
+
+    def under(self, errors: ErrorBox) -> "ProblemFile":
+        """The same, its clearances asked for under more errors than the file states."""
+        widened = self.problem.errors.widened(errors)
+        return replace(self, problem=replace(self.problem, errors=widened))
 
     @property
     def path(self) -> Path:

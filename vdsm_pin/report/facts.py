@@ -439,6 +439,7 @@ def plan_file(refinement: "Refinement", record: RunRecord) -> PlanFile:
         centres_error_m=next(
             (finite(c.worst) for c in verification.checks if c.name == PLANNED), None
         ),
+        error_box=_error_box(verification.errors, plan.trajectory.n_links),
         coverage=finite(verification.coverage),
         motion=motion_facts(plan.problem, plan.trajectory),
         hashes=hashes(record),

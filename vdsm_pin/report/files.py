@@ -154,16 +154,19 @@ class ErrorBoxRow(FileModel):
     """The errors of the real arm that the clearance proof was asked to cover."""
 
     joint_error_rad: FiniteFloat = Field(
-        description="of the joint angle that may be off the most, either way"
+        default=0.0,
+        description="of the joint angle that may be off the most, either way",
     )
     joints_rad: tuple[tuple[FiniteFloat, FiniteFloat], ...] = Field(
         default=(), description="by joint of alpha and theta, where they differ"
     )
-    base_error_m: FiniteFloat = Field(description=BASE_ERROR)
+    base_error_m: FiniteFloat = Field(default=0.0, description=BASE_ERROR)
     base_error_rad: FiniteFloat = Field(
         default=0.0, description="turn of the base about its origin"
     )
-    obstacle_error_m: FiniteFloat = Field(description="displacement of every surface")
+    obstacle_error_m: FiniteFloat = Field(
+        default=0.0, description="displacement of every surface"
+    )
     obstacles: tuple[ObstacleErrorRow, ...] = Field(
         default=(), description="of single obstacles, where they are off by more"
     )
@@ -333,6 +336,9 @@ class PlanFile(FileModel):
     centres_error_m: FiniteFloat | None = Field(
         default=None,
         description="largest distance of a planned joint centre from Pinocchio's",
+    )
+    error_box: ErrorBoxRow = Field(
+        default=ErrorBoxRow(), description="errors that the plan was made for"
     )
     coverage: FiniteFloat | None = Field(description=_COVERAGE)
     motion: MotionFacts

@@ -24,12 +24,12 @@ from vdsm_pin.report.run_record import PlanRun, machine, versions
 from vdsm_pin.report.scene_rows import scene_rows
 from vdsm_pin.report.thinning import MOST_DRAWN
 from vdsm_pin.report.words import (
-    BASE_ERROR,
     MISSING,
     OUTCOMES,
     TIME_LIMIT,
     check_title,
     depth,
+    errors,
     limit,
     lost,
     measured,
@@ -84,6 +84,7 @@ def _environment() -> jinja2.Environment:
         "depth": depth,
         "limit": limit,
         "percent": percent,
+        "errors": errors,
         "title_of": check_title,
         "outcome": outcome,
         "point": _point,
@@ -99,7 +100,6 @@ def _environment() -> jinja2.Environment:
         "asset": _asset,
         "meshcat": _meshcat,
         "outcomes": OUTCOMES,
-        "base_error": BASE_ERROR,
         "vdsm_version": __version__,
     }
     return environment

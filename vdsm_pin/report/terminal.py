@@ -10,6 +10,7 @@ from vdsm_pin.report.inputs import assumption
 from vdsm_pin.report.words import (
     check_title,
     depth,
+    errors,
     limit,
     lost,
     measured,
@@ -44,6 +45,7 @@ def show_plan(file: PlanFile, folder: Path) -> None:
             f"{mean}{motion.changed_angles_max} at most",
         ),
         ("base travel", " to ".join(ends)),
+        *_under(file),
         *(("not drawn", stretch) for stretch in file.undrawn),
         *(("note", note) for note in file.notes),
         ("report", str(folder / "report.html")),
@@ -66,13 +68,14 @@ def show_verification(
         _rich_checks(file)
     else:
         plain_checks(file.checks)
+    more = (*_under(file), *more)
     if file.path_length_m is not None:
         more = ((term("coverage"), percent(file.coverage)), *more)
     if file.max_joint_error_rad is not None:
-        error = survived(file.max_joint_error_rad)
+        margin = survived(file.max_joint_error_rad)
         if file.refuted_joint_error_rad is not None:
-            error += f", lost at {lost(file.refuted_joint_error_rad)}"
-        more = ((term("max_joint_error_rad"), error), *more)
+            margin += f", lost at {lost(file.refuted_joint_error_rad)}"
+        more = ((term("max_joint_error_rad"), margin), *more)
     undone = (("not done", what) for what in file.not_done)
     notes = (("note", note) for note in file.notes)
     show_facts(*undone, *more, *notes, ("report", str(folder / "report.html")))
@@ -83,6 +86,12 @@ def show_facts(*rows: tuple[str, str]) -> None:
     width = max(len(name) for name, _ in rows)
     for name, value in rows:
         typer.echo(f"  {name:<{width}}  {printable(value)}")
+
+
+def _under(file: PlanFile | VerificationFile) -> tuple[tuple[str, str], ...]:
+    """The errors under which clearances are kept, if there are any."""
+    words = errors(file.error_box)
+    return (("under errors up to", words),) if words else ()
 
 
 def _headline(file: PlanFile | VerificationFile, subject: str) -> str:

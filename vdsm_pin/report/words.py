@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from vdsm_pin.units import MM_PER_M
 
@@ -13,6 +13,9 @@ MISSING: Final = "not available"
 
 TIME_LIMIT: Final = "time-limit"
 """The outcome of what the time limit ended."""
+
+if TYPE_CHECKING:
+    from vdsm_pin.report.files import ErrorBoxRow
 
 _SMALLEST_FIXED: Final = 1e-3  # below this, three decimals would print 0.000
 _LARGE: Final = 1e3  # from here on, a tenth is fine enough
@@ -161,6 +164,28 @@ def _joint_error(error: float | None, whole: Callable[[float], int]) -> str:
         return MISSING
     scale = 10.0**_ERROR_DIGITS
     return f"±{whole(math.degrees(error) * scale) / scale:.{_ERROR_DIGITS}f}°"
+
+
+def errors(box: "ErrorBoxRow") -> str:
+    """An error box: what may be off and by how much; empty if nothing may."""
+    parts = []
+    if box.joints_rad:
+        each = ("/".join(quantity(e, "rad") for e in pair) for pair in box.joints_rad)
+        parts.append(f"±{', ±'.join(each)} of α/θ of joints 1 to {len(box.joints_rad)}")
+    elif box.joint_error_rad:
+        parts.append(f"±{quantity(box.joint_error_rad, 'rad')} of every joint angle")
+    for value, unit, what in (
+        (box.base_error_m, "m", f"({BASE_ERROR})"),
+        (box.base_error_rad, "rad", "(turn of the base)"),
+        (box.obstacle_error_m, "m", "of every obstacle"),
+    ):
+        parts += [f"{quantity(value, unit)} {what}"] if value else []
+    for one in box.obstacles:
+        parts.append(
+            f"{quantity(one.shift_m, 'm')} and {quantity(one.turn_rad, 'rad')} "
+            f"of {one.name}"
+        )
+    return ", ".join(parts)
 
 
 def limit(value: float | None, unit: str) -> str:
