@@ -19,6 +19,7 @@ from vdsm_pin.io.trajectory_file import (
     read_trajectory,
     write_trajectory,
 )
+from vdsm_pin.progress import step
 from vdsm_pin.report.facts import plan_file, verification_file
 from vdsm_pin.report.files import PlanFile, VerificationFile
 from vdsm_pin.report.folder import (
@@ -233,6 +234,7 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
                 reach=reach,
             )
             clearance.write(verification)
+        step("writing the results")
         write_link_angles(aside / LINK_ANGLES, verification)
         write_centres(aside / CENTRES, problem, trajectory)
         write_cables(aside / CABLES, problem, trajectory)

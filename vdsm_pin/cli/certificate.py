@@ -31,5 +31,9 @@ def check_certificate(
     verifier.
     """
     from vdsm_pin.certificate_checker import main as check
+    from vdsm_pin.progress import shown, step
 
-    raise typer.Exit(check([str(certificate), problem, str(trajectory)]))
+    with shown(lines=False):
+        step("recomputing every claim")
+        status = check([str(certificate), problem, str(trajectory)])
+    raise typer.Exit(status)

@@ -68,7 +68,7 @@ def plan(
     try:
         with enforced(deadline):
             source = read_problem(problem).under(errors)
-            with nullcontext() if quiet else shown():
+            with nullcontext() if quiet or as_json else shown(limit=time_limit):
                 file = plan_to_folder(source, strategy, out, context.obj, deadline)
     except OutOfTime as error:  # which tells its time itself
         error.args = (f"no plan found: {error}; {page}",)

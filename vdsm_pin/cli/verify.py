@@ -1,6 +1,7 @@
 """`vdsm verify`: of an arm by a problem, of any other robot by its URDF."""
 
 from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
@@ -38,6 +39,12 @@ class Said(NamedTuple):
 
     quiet: bool
     as_json: bool
+
+    def progress(self) -> AbstractContextManager[None]:
+        """A bar, where somebody looks at it."""
+        from vdsm_pin.progress import shown
+
+        return nullcontext() if self.quiet or self.as_json else shown(lines=False)
 
 
 @commands.command(
@@ -202,7 +209,7 @@ def _arm_passes(order: "VerifyOrder", said: Said) -> bool:
     from vdsm_pin.report.terminal import show_verification
     from vdsm_pin.report.words import outcome
 
-    with enforced(order.deadline):
+    with enforced(order.deadline), said.progress():
         verified = verify_to_folder(order)
     written: list[tuple[str, str]] = []
     if order.certificate is not None:
@@ -223,7 +230,7 @@ def _robot_passes(order: "RobotOrder", said: Said) -> bool:
     """Verify the motion of a robot, and say what was found."""
     from vdsm_pin.robots.folder import FILE, show_robot, verify_robot_to_folder
 
-    with enforced(order.deadline):
+    with enforced(order.deadline), said.progress():
         found = verify_robot_to_folder(order)
     if said.as_json:
         typer.echo((order.folder / FILE).read_text("utf-8"), nl=False)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import IO, Any, Final, Protocol, cast
 
 from vdsm_pin.errors import InvalidFile
+from vdsm_pin.progress import watched
 
 BLOCK: Final = 1 << 20
 """Bytes read at one time."""
@@ -203,7 +204,9 @@ def _unpacked(path: Path) -> Iterator[IO[bytes]]:
     with path.open("rb") as raw:
         packed = raw.read(len(GZIPPED)) == GZIPPED
         raw.seek(0)
-        yield cast("IO[bytes]", gzip.GzipFile(fileobj=raw)) if packed else raw
+        size = max(1, path.stat().st_size)
+        with watched(lambda: raw.tell() / size if not raw.closed else 1.0):
+            yield cast("IO[bytes]", gzip.GzipFile(fileobj=raw)) if packed else raw
 
 
 def sha256_of_file(path: Path) -> str:

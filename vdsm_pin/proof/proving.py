@@ -99,6 +99,14 @@ class Proving:
         """Intervals of the motion; one row counts as an interval without motion."""
         return max(1, len(self.motion.knots) - 1)
 
+    @property
+    def share(self) -> float:
+        """How much is judged, 0 to 1; may be asked while it is."""
+        settled = self.broad.settled[self.broad.number >= 0].sum()
+        judged = float(self.results.counts.sum() + settled)
+        total = self.results.counts.shape[0] * self.n_intervals
+        return judged / float(max(1, total))
+
     def sweep(self, first: int, last: int) -> bool:
         """Judge some intervals; whether there was time for all."""
         span = first, last

@@ -16,6 +16,7 @@ from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.progress import step, watched
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import (
     AT_UPPER,
@@ -176,7 +177,10 @@ def prove_clearance(
     """
     budget = Budget(until=deadline.end)
     proof = prove_problem(problem, trajectory, errors, pieces, budget)
-    late, results, sent = not proof.proving.run(), proof.proving.results, 0
+    step("proving the clearance of %d pairs", len(proof.best))
+    with watched(lambda: proof.proving.share):
+        late = not proof.proving.run()
+    results, sent = proof.proving.results, 0
     if sinks:
         sent = _send(problem, trajectory, errors, proof, sinks, reach)
     return ClearanceProof(
@@ -230,13 +234,15 @@ def _send(
         dense=dense_rows(length, pairs.size),
     )
     again = replace(proof, proving=replace(proving, results=results))
-    for begin, end in pairwise(steps):
-        first, last = (int(proof.knots.first[k]) for k in (begin, end))
-        if not again.proving.sweep(first, last):
-            return begin
-        chunk = _chunk(again, begin, end, known.best[pairs, LOW], pairs)
-        for sink in sinks:
-            sink(chunk)
+    step("clearances of every interval")
+    with watched(lambda: again.proving.share):
+        for begin, end in pairwise(steps):
+            first, last = (int(proof.knots.first[k]) for k in (begin, end))
+            if not again.proving.sweep(first, last):
+                return begin
+            chunk = _chunk(again, begin, end, known.best[pairs, LOW], pairs)
+            for sink in sinks:
+                sink(chunk)
     return steps[-1]
 
 

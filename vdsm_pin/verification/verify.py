@@ -14,6 +14,7 @@ from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.geometry.winding import Side
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.progress import step
 from vdsm_pin.proof.layouts import AT_UPPER, LOW, OTHER, OWN, TIME, UP
 from vdsm_pin.robot_model import RobotModel
 from vdsm_pin.scene import with_hulls
@@ -256,6 +257,7 @@ class _Besides:
 
     def take(self, name: str, run: Callable[[], T], otherwise: T) -> T:
         """A result, and a note where there is none in time."""
+        step("%s", name)
         try:
             return run()
         except OutOfTime as error:
@@ -366,6 +368,7 @@ def _guarded(
     name: str, run: Callable[[], Check | tuple[Check, ...]]
 ) -> tuple[Check, ...]:
     """A check's rows; one undecided row where it could not be carried out."""
+    step("%s", name)
     try:
         rows = run()
     except (VdsmError, ArithmeticError) as error:
