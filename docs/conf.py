@@ -44,7 +44,9 @@ autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
 
-nitpick_ignore_regex = [("py:.*", r"(numpy|typing|pathlib|vdsm_pin)\..*|[A-Z]\w*")]
+nitpick_ignore_regex = [
+    ("py:.*", r"(numpy|typing|pathlib|collections|vdsm_pin)\..*|[A-Z]\w*")
+]
 """Names of types that have no page here."""
 
 html_theme = "furo"

@@ -18,7 +18,7 @@ for scene in ("paper/obs1", "paper/obs3"):
 
 # A budget: half of that for the joints leaves room for base and obstacles.
 error, problem, motion = best
-box = vp.error_box(joint_deg=0.5 * error, base_mm=1.0, obstacle_mm=1.0)
+box = vp.ErrorBox(joint_deg=0.5 * error, base_mm=1.0, obstacle_mm=1.0)
 result = vp.verify(problem, motion, errors=box)
 print(f"±{0.5 * error:.3f} deg, base 1 mm, obstacles 1 mm:", result.verdict.value)
 assert result.verdict is vp.Verdict.CERTIFIED

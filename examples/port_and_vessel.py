@@ -18,7 +18,7 @@ print(plan)
 print("bent joints on the seam: at most", bent[motion.on_path].max())
 
 # The vessel may stand 1 mm off in any direction.
-result = vp.verify(problem, motion, errors=vp.error_box(obstacle_mm=1.0))
+result = vp.verify(problem, motion, errors=vp.ErrorBox(obstacle_mm=1.0))
 print(result)
 assert result.verdict is vp.Verdict.CERTIFIED
 vp.write_trajectory("vessel.csv", motion)

@@ -155,7 +155,7 @@ def test_the_papers_joint_error_touches(
     """The table of docs/paper.md: every joint off by 0.3 deg, in the worst case."""
     problem = vp.read_problem(f"paper/{scene}")
     plan = vp.plan(problem, strategy)
-    result = vp.verify(problem, plan.trajectory, errors=vp.error_box(joint_deg=0.3))
+    result = vp.verify(problem, plan.trajectory, errors=vp.ErrorBox(joint_deg=0.3))
     assert result.verdict is vp.Verdict.REFUTED
     worst = min(found.clearance for found in result.counterexamples)
     assert 1e3 * worst == pytest.approx(depth_mm, abs=0.1)
@@ -164,7 +164,7 @@ def test_the_papers_joint_error_touches(
 def test_a_certificate_states_a_turn_of_the_base(tmp_path: Path) -> None:
     problem = vp.read_problem("paper/free")
     motion = vp.plan(problem, "paper").trajectory
-    result = vp.verify(problem, motion, errors=vp.ErrorBox(base_turn=1e-4))
+    result = vp.verify(problem, motion, errors=vp.ErrorBox(base_deg=np.rad2deg(1e-4)))
     assert result.verdict is vp.Verdict.CERTIFIED
     vp.write_trajectory(tmp_path / "t.csv", motion)
     vp.write_certificate(result, tmp_path / "c", tmp_path / "t.csv")

@@ -4,7 +4,7 @@
 
     problem = vp.read_problem("paper/obs1")
     plan = vp.plan(problem, strategy="fewest")
-    result = vp.verify(problem, plan.trajectory, errors=vp.error_box(base_mm=0.1))
+    result = vp.verify(problem, plan.trajectory, errors=vp.ErrorBox(base_mm=0.1))
     vp.write_report(result, "report.html")
 
 Names are imported when they are first used: importing the package costs nothing.
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from vdsm_pin.api import (
-        error_box,
+        ErrorBox,
         plan,
         read_problem,
         read_trajectory,
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
         write_report,
         write_trajectory,
     )
-    from vdsm_pin.error_boxes import ErrorBox, ObstacleError
     from vdsm_pin.errors import Infeasible, InvalidInput, VdsmError
     from vdsm_pin.manipulator import (
         CableLayout,
@@ -64,7 +63,6 @@ __all__ = [
     "LinkBody",
     "Manipulator",
     "Mesh",
-    "ObstacleError",
     "Prism",
     "Problem",
     "Scene",
@@ -74,7 +72,6 @@ __all__ = [
     "VdsmError",
     "Verdict",
     "built_in",
-    "error_box",
     "plan",
     "read_problem",
     "read_trajectory",
@@ -85,7 +82,6 @@ __all__ = [
 ]
 
 _HOMES: Final = {
-    "error_boxes": ("ErrorBox", "ObstacleError"),
     "errors": ("Infeasible", "InvalidInput", "VdsmError"),
     "manipulator": (
         *("CableLayout", "Feed", "LinkBody", "Manipulator", "Tool", "built_in"),

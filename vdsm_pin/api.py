@@ -8,12 +8,15 @@
 'certified'
 """
 
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.error_boxes import NOTHING
+from vdsm_pin.error_boxes import ErrorBox as Box
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io import problem_file, trajectory_file
 from vdsm_pin.io.atomic import atomic_path
@@ -82,35 +85,49 @@ def plan(
     return plan_and_verify(problem, strategy, robot, deadline=deadline).plan
 
 
-def error_box(
-    *,
-    joint_deg: float = 0.0,
-    base_mm: float = 0.0,
-    obstacle_mm: float = 0.0,
-    base_deg: float = 0.0,
-) -> ErrorBox:
+class ErrorBox(Box):
     """How far the real motion may stray from the nominal one.
 
     Args:
-        joint_deg: Largest error of every joint angle; [deg].
+        joint_deg: Largest error of every joint angle, or one for each joint from the
+            base; [deg].
         base_mm: Largest displacement of the base in any direction; [mm].
-        obstacle_mm: Largest displacement of an obstacle's surface; [mm].
         base_deg: Largest turn of the base about its origin; [deg].
+        obstacle_mm: Largest displacement of an obstacle's surface; [mm].
+        obstacles_mm: That of single obstacles by their names; [mm].
+        obstacles_deg: Their largest turns, about their middles; [deg].
+
+    Raises:
+        InvalidInput: If a value is negative or not finite.
 
     Example:
-        >>> error_box(base_mm=2.0).base
+        >>> ErrorBox(base_mm=2.0).base
         0.002
+        >>> ErrorBox(obstacles_mm={"crate": 5.0}).of_obstacle("crate").shift
+        0.005
     """
-    from vdsm_pin.app.workflow import error_box as from_typed
 
-    return from_typed(joint_deg, base_mm, obstacle_mm, base_deg)
+    def __init__(
+        self,
+        *,
+        joint_deg: float | Sequence[float] = 0.0,
+        base_mm: float = 0.0,
+        base_deg: float = 0.0,
+        obstacle_mm: float = 0.0,
+        obstacles_mm: Mapping[str, float] = NOTHING,
+        obstacles_deg: Mapping[str, float] = NOTHING,
+    ) -> None:
+        """The box in radians and metres."""
+        parts = obstacle_mm, base_deg, obstacles_mm, obstacles_deg
+        box = Box.typed(joint_deg, base_mm, *parts)
+        super().__init__(*(getattr(box, one.name) for one in fields(Box)))
 
 
 def verify(
     problem: PlanningProblem,
     trajectory: Trajectory,
     *,
-    errors: ErrorBox | None = None,
+    errors: Box | None = None,
     joint_error: bool = False,
     time_limit: float | None = None,
 ) -> Verification:
@@ -118,7 +135,8 @@ def verify(
 
     Args:
         problem: What is asked.
-        trajectory: Rows of joint values, joined by straight lines in joint space.
+        trajectory: Rows of joint values, joined by straight lines in joint space, or
+            by smooth pieces where it has velocities.
         errors: The clearance is proved for every motion within it, and within the
             errors that the problem states.
         joint_error: Whether to look for the largest joint error that is certified.
@@ -133,7 +151,7 @@ def verify(
     Example:
         >>> problem = read_problem("paper/obs1")
         >>> made = plan(problem)
-        >>> result = verify(problem, made.trajectory, errors=error_box(base_mm=0.1))
+        >>> result = verify(problem, made.trajectory, errors=ErrorBox(base_mm=0.1))
         >>> result.verdict.value, result.min_clearance > 0.010
         ('certified', True)
         >>> result.closest(1)[0].pair.obstacle

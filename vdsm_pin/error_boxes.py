@@ -1,14 +1,21 @@
 """How far a real motion, its base and its obstacles may be off what was asked about."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
+from types import MappingProxyType
+from typing import Final
 
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.units import MM_PER_M
 
 JointErrors = tuple[tuple[float, float], ...]
+
+NOTHING: Final[Mapping[str, float]] = MappingProxyType({})
+"""No obstacle by name."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +68,48 @@ class ErrorBox:
                     f"{name.replace('_', ' ')} error is {value}, expected 0 or more"
                 )
                 raise InvalidInput(message)
+
+    @classmethod
+    def typed(
+        cls,
+        joint_deg: float | Sequence[float] = 0.0,
+        base_mm: float = 0.0,
+        obstacle_mm: float = 0.0,
+        base_deg: float = 0.0,
+        obstacles_mm: Mapping[str, float] = NOTHING,
+        obstacles_deg: Mapping[str, float] = NOTHING,
+    ) -> "ErrorBox":
+        """The box from degrees and millimetres, as people state them.
+
+        Args:
+            joint_deg: Of every angle, or one for each joint from the base; [deg].
+            base_mm: As `base`; [mm].
+            obstacle_mm: As `obstacle`; [mm].
+            base_deg: As `base_turn`; [deg].
+            obstacles_mm: Shifts of single obstacles by their names; [mm].
+            obstacles_deg: Their turns; [deg].
+
+        Raises:
+            InvalidInput: If a value is negative or not finite.
+        """
+        one = isinstance(joint_deg, (int, float))
+        each = () if one else np.deg2rad(np.asarray(joint_deg)).tolist()
+        names = dict.fromkeys((*obstacles_mm, *obstacles_deg))
+        return ErrorBox(
+            joint=float(np.deg2rad(joint_deg)) if one else 0.0,
+            base=base_mm / MM_PER_M,
+            obstacle=obstacle_mm / MM_PER_M,
+            base_turn=float(np.deg2rad(base_deg)),
+            joints=tuple((error, error) for error in each),
+            obstacles=tuple(
+                ObstacleError(
+                    name,
+                    obstacles_mm.get(name, 0.0) / MM_PER_M,
+                    float(np.deg2rad(obstacles_deg.get(name, 0.0))),
+                )
+                for name in names
+            ),
+        )
 
     def with_joint(self, joint: float) -> "ErrorBox":
         """The same with one error of all joint angles; [rad]."""

@@ -10,11 +10,13 @@ from problem_texts import edited
 from vdsm_pin.cables import cable_lengths
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.io.trajectory_file import write_trajectory
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in, paper_hole_angles
+from vdsm_pin.trajectory import Trajectory
 
 PAGE = Path(__file__).parents[2] / "docs" / "files.md"
-EXAMPLE, ARM, ENDS, CURVES = re.findall(
+EXAMPLE, OTHERS, ARM, ENDS, CURVES = re.findall(
     r"```yaml\n(.*?)```", PAGE.read_text(), re.DOTALL
 )
 
@@ -26,6 +28,17 @@ def test_the_example_is_read_with_all_shapes(tmp_path: Path) -> None:
     assert problem.manipulator.name == "hrm8"
 
 
+def test_the_second_arm_shown_is_read(tmp_path: Path) -> None:
+    none = np.zeros(2)
+    angles, times = np.zeros((2, 2, 8)), np.array([0.0, 1.0])
+    mate = Trajectory(none > 0, none, none, *angles, times=times)
+    write_trajectory(tmp_path / "mate.csv", mate)
+    (tmp_path / "p.yaml").write_text(edited(EXAMPLE, ("others",)) + OTHERS)
+    moving = read_problem(tmp_path / "p.yaml").problem.scene.moving
+    names = [one.name for one in moving]
+    assert names == ["door", *(f"mate: link {k}" for k in range(1, 9))]
+
+
 def test_the_defaults_shown_are_the_defaults(tmp_path: Path) -> None:
     (tmp_path / "full.yaml").write_text(EXAMPLE)
     text = EXAMPLE
@@ -33,6 +46,7 @@ def test_the_defaults_shown_are_the_defaults(tmp_path: Path) -> None:
         *(("tip_path", key) for key in ("closed", "spacing", "approach", "retreat")),
         *(("tip_path", key) for key in ("blocked", "required_coverage", "order")),
         ("base",),
+        ("others",),
         ("errors",),
         ("required_self_clearance",),
         ("tip_tolerance",),

@@ -10,7 +10,6 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import Infeasible, InvalidFile, OutOfTime
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
@@ -38,7 +37,6 @@ from vdsm_pin.report.tables import (
 )
 from vdsm_pin.robot_model import RobotModel, load_robot
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.coal_clearance import reach_of
 from vdsm_pin.verification.moving import untimed
 from vdsm_pin.verification.records import Verdict, Verification
@@ -106,18 +104,6 @@ class Verified:
     file: VerificationFile
     records: Verification
     no_certificate: str = ""
-
-
-def error_box(
-    joint_deg: float, base_mm: float, obstacle_mm: float, base_deg: float = 0.0
-) -> ErrorBox:
-    """The error box from what a user types."""
-    return ErrorBox(
-        joint=math.radians(joint_deg),
-        base=base_mm / MM_PER_M,
-        obstacle=obstacle_mm / MM_PER_M,
-        base_turn=math.radians(base_deg),
-    )
 
 
 def plan_to_folder(

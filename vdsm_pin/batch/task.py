@@ -19,7 +19,6 @@ from vdsm_pin.app.workflow import (
     PLANNED,
     TRAJECTORY,
     VerifyOrder,
-    error_box,
     plan_to_folder,
     verify_to_folder,
 )
@@ -89,7 +88,7 @@ class Proving:
     @property
     def errors(self) -> ErrorBox:
         """The error box of every problem."""
-        return error_box(
+        return ErrorBox.typed(
             self.joint_error_deg,
             self.base_error_mm,
             self.obstacle_error_mm,

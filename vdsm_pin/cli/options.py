@@ -1,11 +1,18 @@
 """What commands share: arguments and options, exit codes, help pages."""
 
+import math
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from vdsm_pin.errors import InvalidInput
 from vdsm_pin.planner.strategies import STRATEGIES
+
+if TYPE_CHECKING:
+    from vdsm_pin.error_boxes import ErrorBox
 
 PASSED: Final = 0
 NOT_PASSED: Final = 1
@@ -31,6 +38,29 @@ ObstacleError = Annotated[
     float, typer.Option(min=0.0, help="Largest error of the obstacles [mm].")
 ]
 
+JointErrors = Annotated[
+    str,
+    typer.Option(
+        metavar="DEG[,DEG..]",
+        help="Largest error of every joint angle, or one for each joint from the base "
+        "[deg].",
+    ),
+]
+ObstacleErrors = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="[NAME=]MM",
+        help="Largest error of the obstacles, or of one; again for another [mm].",
+    ),
+]
+ObstacleTurns = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME=DEG",
+        help="Largest turn of an obstacle about its middle; again for another [deg].",
+    ),
+]
+
 PlanningTime = Annotated[
     float, typer.Option(min=0.001, help="Time limit in seconds; inf for none.")
 ]
@@ -54,3 +84,53 @@ def family() -> typer.Typer:
 def examples(*lines: str) -> str:
     """Examples for a help page; the first line keeps click from joining them."""
     return "\n".join(["\b", "Examples:", *(f"  {line}" for line in lines)])
+
+
+def errors_of(
+    joint_deg: str,
+    base_mm: float,
+    base_deg: float,
+    obstacles_mm: Sequence[str] | None,
+    obstacles_deg: Sequence[str] | None,
+) -> "ErrorBox":
+    """The error box that a user types.
+
+    Raises:
+        InvalidInput: If one is no number, or negative, or has no name and needs one.
+    """
+    from vdsm_pin.error_boxes import ErrorBox
+
+    joints = [_number("--joint-error-deg", word) for word in joint_deg.split(",")]
+    shifts = _by_name("--obstacle-error-mm", obstacles_mm or ())
+    turns = _by_name("--obstacle-error-deg", obstacles_deg or ())
+    if "" in turns:
+        message = "--obstacle-error-deg needs the obstacle's name, NAME=DEG"
+        raise InvalidInput(message)
+    return ErrorBox.typed(
+        joints if len(joints) > 1 else joints[0],
+        base_mm,
+        shifts.pop("", 0.0),
+        base_deg,
+        shifts,
+        turns,
+    )
+
+
+def _by_name(option: str, words: Sequence[str]) -> dict[str, float]:
+    """Numbers by the names before them; an empty name where there is none."""
+    found = {}
+    for word in words:
+        name, _, number = word.rpartition("=")
+        if name in found:
+            message = f"{option} is given twice for {name or 'all obstacles'}"
+            raise InvalidInput(message)
+        found[name] = _number(option, number)
+    return found
+
+
+def _number(option: str, word: str) -> float:
+    with suppress(ValueError):
+        if 0.0 <= (value := float(word)) < math.inf:
+            return value
+    message = f"{option} is {word!r}, expected a number, 0 or more"
+    raise InvalidInput(message)

@@ -11,13 +11,15 @@ from vdsm_pin.cli.options import (
     AsJson,
     BaseError,
     BaseTurn,
-    JointError,
-    ObstacleError,
+    JointErrors,
+    ObstacleErrors,
+    ObstacleTurns,
     OutFolder,
     PlanningTime,
     Problem,
     Quiet,
     Strategy,
+    errors_of,
     examples,
     family,
 )
@@ -39,10 +41,11 @@ def plan(
     problem: Problem,
     out: OutFolder,
     strategy: Strategy = DEFAULT_STRATEGY,
-    joint_error_deg: JointError = 0.0,
+    joint_error_deg: JointErrors = "0",
     base_error_mm: BaseError = 0.0,
     base_error_deg: BaseTurn = 0.0,
-    obstacle_error_mm: ObstacleError = 0.0,
+    obstacle_error_mm: ObstacleErrors = None,
+    obstacle_error_deg: ObstacleTurns = None,
     time_limit: PlanningTime = 60.0,
     quiet: Quiet = False,
     as_json: AsJson = False,
@@ -54,14 +57,18 @@ def plan(
     required is written, is called incomplete, and ends with status 1. Errors are added
     to those of the problem file; the plan keeps its clearances under them.
     """
-    from vdsm_pin.app.workflow import NO_PLAN, error_box, plan_to_folder
+    from vdsm_pin.app.workflow import NO_PLAN, plan_to_folder
     from vdsm_pin.io.problem_file import read_problem
     from vdsm_pin.progress import shown
     from vdsm_pin.report.terminal import show_plan
     from vdsm_pin.report.words import outcome
 
-    errors = error_box(
-        joint_error_deg, base_error_mm, obstacle_error_mm, base_error_deg
+    errors = errors_of(
+        joint_error_deg,
+        base_error_mm,
+        base_error_deg,
+        obstacle_error_mm,
+        obstacle_error_deg,
     )
     deadline, begin = Deadline.after(time_limit), time.monotonic()
     page = f"see {out / NO_PLAN}"

@@ -13,12 +13,14 @@ from vdsm_pin.cli.options import (
     AsJson,
     BaseError,
     BaseTurn,
-    JointError,
-    ObstacleError,
+    JointErrors,
+    ObstacleErrors,
+    ObstacleTurns,
     OutFolder,
     Quiet,
     TimeLimit,
     Trajectory,
+    errors_of,
     examples,
     family,
 )
@@ -67,10 +69,11 @@ def verify(
             help="A built-in name or a problem file; none with --urdf.",
         ),
     ] = None,
-    joint_error_deg: JointError = 0.0,
+    joint_error_deg: JointErrors = "0",
     base_error_mm: BaseError = 0.0,
     base_error_deg: BaseTurn = 0.0,
-    obstacle_error_mm: ObstacleError = 0.0,
+    obstacle_error_mm: ObstacleErrors = None,
+    obstacle_error_deg: ObstacleTurns = None,
     certificate: Annotated[
         Path | None, typer.Option(help="Write the proof to this file.")
     ] = None,
@@ -134,10 +137,11 @@ def verify(
     }
     of_arm = {
         "PROBLEM": problem,
-        "--joint-error-deg": joint_error_deg,
+        "--joint-error-deg": joint_error_deg != "0",
         "--base-error-mm": base_error_mm,
         "--base-error-deg": base_error_deg,
         "--obstacle-error-mm": obstacle_error_mm,
+        "--obstacle-error-deg": obstacle_error_deg,
         "--certificate": certificate,
         "--pdf": pdf,
         "--all-pairs": all_pairs,
@@ -168,12 +172,16 @@ def verify(
     if problem is None:
         message = "expected a PROBLEM, or --urdf for any other robot"
         raise InvalidInput(message)
-    from vdsm_pin.app.workflow import VerifyOrder, error_box
+    from vdsm_pin.app.workflow import VerifyOrder
     from vdsm_pin.io.problem_file import read_problem
     from vdsm_pin.report.run_record import now
 
-    errors = error_box(
-        joint_error_deg, base_error_mm, obstacle_error_mm, base_error_deg
+    errors = errors_of(
+        joint_error_deg,
+        base_error_mm,
+        base_error_deg,
+        obstacle_error_mm,
+        obstacle_error_deg,
     )
     with enforced(deadline):
         arm = VerifyOrder(

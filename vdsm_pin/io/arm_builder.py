@@ -13,7 +13,7 @@ from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.urdf_arm import read_urdf_arm
-from vdsm_pin.io.yaml_reader import YamlDocument
+from vdsm_pin.io.yaml_reader import Location, YamlDocument
 from vdsm_pin.manipulator import (
     BUILT_IN,
     FEED,
@@ -45,12 +45,21 @@ ArmModel: TypeAlias = str | schema.ManipulatorModel | schema.UrdfManipulatorMode
 
 @dataclass(frozen=True)
 class ArmBuilder:
-    """Converts the arm."""
+    """Converts an arm.
+
+    Args:
+        document: The file, for messages.
+        frame: Its unit and base.
+        folder: Where relative paths start.
+        digest: Gets the bytes of the files that the arm names.
+        at: Where the arm stands in the file.
+    """
 
     document: YamlDocument
     frame: Frame
     folder: Path
     digest: Digest
+    at: Location = ("manipulator",)
 
     def build(self, model: ArmModel) -> Manipulator:
         """The arm by name, by its numbers, or from a URDF.
@@ -61,7 +70,7 @@ class ArmBuilder:
         if isinstance(model, str):
             if model not in BUILT_IN:
                 problem = f"is {model!r}; known: {', '.join(BUILT_IN)}, or a mapping"
-                raise self.document.invalid(("manipulator",), problem)
+                raise self.document.invalid(self.at, problem)
             return built_in(model)
         if isinstance(model, schema.UrdfManipulatorModel):
             return self._from_urdf(model)
@@ -78,7 +87,7 @@ class ArmBuilder:
             low, high = (float(x) for x in self.frame.metres(model.base_range))
             if not low <= high:
                 problem = f"is {model.base_range}, expected the smaller value first"
-                raise self.document.invalid(("manipulator", "base_range"), problem)
+                raise self.document.invalid((*self.at, "base_range"), problem)
         self._check_extent(float(lengths.sum()), max(-low, high))
         thinnest = float(np.min(model.link_radius))
         try:
@@ -97,7 +106,7 @@ class ArmBuilder:
                 ignore_pairs=tuple((a, b) for a, b in model.ignore_pairs),
             )
         except InvalidInput as error:
-            raise self.document.invalid(("manipulator",), str(error)) from None
+            raise self.document.invalid(self.at, str(error)) from None
 
     def _radii(self, model: schema.ManipulatorModel) -> FloatArray:
         """Radius of every link; [m]."""
@@ -107,7 +116,7 @@ class ArmBuilder:
         if len(model.link_radius) != count:
             found = len(model.link_radius)
             problem = f"has {found} values, expected {count}, one per link"
-            raise self.document.invalid(("manipulator", "link_radius"), problem)
+            raise self.document.invalid((*self.at, "link_radius"), problem)
         return self.frame.metres(model.link_radius)
 
     def _feed(self, model: schema.ManipulatorModel, radius: float) -> Feed | None:
@@ -122,7 +131,7 @@ class ArmBuilder:
         self, model: schema.ManipulatorModel, arm_length: float
     ) -> tuple[LinkBody, ...]:
         """What the links carry, in their frames."""
-        at, count = ("manipulator", "bodies"), len(model.link_lengths)
+        at, count = (*self.at, "bodies"), len(model.link_lengths)
         for i, body in enumerate(model.bodies):
             if body.link > count:
                 problem = f"is {body.link}, expected 1 to {count}"
@@ -158,7 +167,7 @@ class ArmBuilder:
                 self._cables(model.cables, lengths, unit * found.link_radius),
             )
         except InvalidInput as error:
-            raise self.document.invalid(("manipulator", "urdf"), str(error)) from None
+            raise self.document.invalid((*self.at, "urdf"), str(error)) from None
 
     def _check_extent(self, length: float, stroke: float) -> None:
         """Distances are proved within a stated extent only, so the arm stays there."""
@@ -169,7 +178,7 @@ class ArmBuilder:
                 f"{self.frame.shown(stroke)} out; expected at most "
                 f"{self.frame.shown(limit)} together"
             )
-            raise self.document.invalid(("manipulator",), problem)
+            raise self.document.invalid(self.at, problem)
 
     def _cables(
         self,
@@ -183,7 +192,7 @@ class ArmBuilder:
         half_gap = DEFAULT_HALF_GAP * shortest
         angles = paper_hole_angles(count)
         if cables is not None:
-            at = ("manipulator", "cables")
+            at = (*self.at, "cables")
             hole_radius, half_gap = cables.hole_radius, cables.half_gap
             if not hole_radius < radius:
                 problem = (

@@ -11,13 +11,14 @@ from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.arm_builder import ArmBuilder
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
+from vdsm_pin.io.other_arms import OtherArms
 from vdsm_pin.io.path_builder import PathBuilder, spacing_of
 from vdsm_pin.io.posture_builder import PostureBuilder
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scene import HalfSpace, Scene, solid_of
+from vdsm_pin.scene import HalfSpace, Moving, Scene, solid_of
 from vdsm_pin.tolerances import TOLERANCES
 
 
@@ -38,7 +39,8 @@ def build_problem(
         folder: Where relative mesh paths start.
         digest: Gets the bytes of the arm's URDF, if one is named, then those of the
             meshes that links carry and those of the obstacles, in file order, then
-            those of the path's files.
+            those of the other arms and their trajectories, then those of the path's
+            files.
 
     Returns:
         The problem, in the base frame; [m], [rad].
@@ -52,6 +54,8 @@ def build_problem(
     _check_links_apart(arm, self_clearance, frame, document)
     obstacles = ObstacleBuilder(document, folder, frame, arm.total_length, digest)
     scene = obstacles.build_scene(model.obstacles, arm.body_names)
+    arms = OtherArms(document, frame, folder, digest)
+    scene = _joined(scene, arms.build(model.others), document)
     _check_ignored(arm, scene.names, document)
     _check_ends(model, document)
     paths = PathBuilder(document, frame, arm, folder, digest)
@@ -70,6 +74,14 @@ def build_problem(
         goal=postures.goal(model.goal, ("goal",)) if model.goal else None,
         errors=_errors(model.errors, frame, (arm.n_links, scene), document),
     )
+
+
+def _joined(scene: Scene, others: tuple[Moving, ...], document: YamlDocument) -> Scene:
+    """The obstacles, then the bodies of other arms."""
+    try:
+        return Scene((*scene.obstacles, *others)) if others else scene
+    except InvalidInput as error:
+        raise document.invalid(("others",), str(error)) from None
 
 
 def _frame(model: schema.ProblemModel) -> tuple[Frame, FloatArray]:

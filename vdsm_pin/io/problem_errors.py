@@ -59,6 +59,12 @@ _BODIES: Final[Mapping[str, type[FileModel]]] = {
 }
 """The same for what rides on links."""
 
+_LISTED: Final[Mapping[str, type[FileModel]]] = {
+    "others": schema.OtherModel,
+    "errors": schema.ObstacleErrorModel,
+}
+"""Those that stand in lists, of one form each."""
+
 _EITHER: Final[Mapping[str | int, str]] = {
     "manipulator": "the name of a built-in arm or a mapping",
     "start": "3 numbers or a mapping with joints",
@@ -145,6 +151,9 @@ def _known_shapes(loc: tuple[str | int, ...]) -> str:
 
 
 def _model(loc: tuple[str | int, ...]) -> type[FileModel]:
+    """The model that a field belongs to, by pydantic's location of the field."""
+    if len(loc) > 2 and isinstance(loc[-2], int):
+        return _LISTED["others" if "others" in loc else "errors"]
     if "bodies" in loc and str(loc[-2]) in _BODIES:
         return _BODIES[str(loc[-2])]
     return _MODELS[loc[-2]] if len(loc) > 1 else schema.ProblemModel

@@ -13,7 +13,11 @@ from vdsm_pin.io.obstacle_schema import FromFileModel
 from vdsm_pin.io.path_schema import FilePart
 from vdsm_pin.io.problem_builder import build_problem
 from vdsm_pin.io.problem_errors import first_error
-from vdsm_pin.io.problem_schema import ProblemModel, UrdfManipulatorModel
+from vdsm_pin.io.problem_schema import (
+    ManipulatorModel,
+    ProblemModel,
+    UrdfManipulatorModel,
+)
 from vdsm_pin.io.source import check_is_file, decode, read_bytes
 from vdsm_pin.io.yaml_reader import read_yaml
 from vdsm_pin.problem import PlanningProblem, ProblemSource
@@ -38,7 +42,15 @@ class ProblemFile:
     source: ProblemSource
 
     def under(self, errors: ErrorBox) -> "ProblemFile":
-        """The same, its clearances asked for under more errors than the file states."""
+        """The same, its clearances asked for under more errors than the file states.
+
+        Raises:
+            UnknownName: If they name an obstacle that there is not.
+        """
+        known = self.problem.scene.names
+        for one in errors.obstacles:
+            if one.name not in known:
+                raise UnknownName(kind="obstacle", name=one.name, known=known)
         widened = self.problem.errors.widened(errors)
         return replace(self, problem=replace(self.problem, errors=widened))
 
@@ -85,12 +97,24 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
 
 
 def _files_named(model: ProblemModel) -> list[str]:
-    """Arm, obstacles and path files, in the order in which the hash takes them."""
-    arm, path = model.manipulator, model.tip_path
-    urdf = [arm.urdf] if isinstance(arm, UrdfManipulatorModel) else []
+    """All files that a problem names, in the order in which the hash takes them."""
+    path = model.tip_path
     files = [one.file for one in model.obstacles if isinstance(one, FromFileModel)]
+    found = [*_files_of_arm(model.manipulator), *files]
+    for other in model.others:
+        found += [*_files_of_arm(other.manipulator), other.trajectory]
     parts = path.points if path else []
-    return [*urdf, *files, *(p.file for p in parts if isinstance(p, FilePart))]
+    return [*found, *(p.file for p in parts if isinstance(p, FilePart))]
+
+
+def _files_of_arm(
+    model: str | ManipulatorModel | UrdfManipulatorModel,
+) -> list[str]:
+    """The URDF of an arm, or the meshes that its links carry."""
+    if isinstance(model, UrdfManipulatorModel):
+        return [model.urdf]
+    bodies = [] if isinstance(model, str) else model.bodies
+    return [one.file for one in bodies if isinstance(one, FromFileModel)]
 
 
 def _files_of_obstacles(

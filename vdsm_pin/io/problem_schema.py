@@ -182,6 +182,25 @@ ManipulatorField: TypeAlias = Annotated[
 ]
 
 
+class OtherModel(FileModel):
+    """Another arm, which moves as its own trajectory says."""
+
+    name: Name = Field(
+        description="Its bodies are `NAME: link 1` and so on, in results and errors."
+    )
+    manipulator: ManipulatorField = Field(
+        description="Name of a built-in arm, or an arm of its own."
+    )
+    base: BasePoseModel = Field(
+        default=BasePoseModel(),
+        description="Where its rail is, in the frame of this file. Default: at the "
+        "origin.",
+    )
+    trajectory: Annotated[str, Field(min_length=1, max_length=4096)] = Field(
+        description="Its trajectory, a CSV with a column time_s, relative to this file."
+    )
+
+
 class JointsModel(FileModel):
     """Joint values of the whole arm."""
 
@@ -353,6 +372,11 @@ class ProblemModel(FileModel):
         description="Where the rail is. Default: at the origin.",
     )
     obstacles: list[MovableModel] = Field(default=[], description="Solids to avoid.")
+    others: list[OtherModel] = Field(
+        default=[],
+        description="Other arms: each link is an obstacle that moves. Trajectories "
+        "then need a column time_s.",
+    )
     tip_path: TipPathModel | None = Field(
         default=None,
         description="What the tip shall draw. Default: nothing; then clearance, "

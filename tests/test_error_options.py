@@ -1,0 +1,113 @@
+"""Errors as people state them: in degrees and millimetres, by joint and by obstacle."""
+
+from math import radians
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import vdsm_pin as vp
+from vdsm_pin import error_boxes
+from vdsm_pin.cli import app
+from vdsm_pin.cli.options import errors_of
+from vdsm_pin.errors import InvalidInput
+
+TEXT = """vdsm_problem: 1
+name: errors
+length_unit: mm
+manipulator: {link_lengths: [300, 300], link_radius: 40, max_link_angle_deg: 40,
+              max_joint_angle_deg: 40}
+obstacles:
+  - {name: a, shape: sphere, center: [300, 150, 0], radius: 50}
+  - {name: b, shape: box, center: [300, -160, 0], size: [100, 100, 100]}
+required_clearance: 5
+"""
+ROW = "waypoint,on_path,path_m,x0_m,alpha1_rad,theta1_rad,alpha2_rad,theta2_rad\n"
+
+
+def test_options_and_python_say_the_same() -> None:
+    words = ["1", "crate=2.5", "a=b=4"]
+    typed = errors_of("0.1,0.2,0.3", 2.0, 0.01, words, ["crate=0.5"])
+    box = vp.ErrorBox(
+        joint_deg=[0.1, 0.2, 0.3],
+        base_mm=2.0,
+        base_deg=0.01,
+        obstacle_mm=1.0,
+        obstacles_mm={"crate": 2.5, "a=b": 4.0},
+        obstacles_deg={"crate": 0.5},
+    )
+    assert typed.widened(error_boxes.ErrorBox()) == box.widened(error_boxes.ErrorBox())
+    assert typed.angles(3)[2].tolist() == [radians(0.3)] * 2
+    crate = typed.of_obstacle("crate")
+    assert crate.shift == 0.0025 and crate.turn == radians(0.5)
+    assert typed.of_obstacle("other").shift == 0.001
+    assert errors_of("0.1", 0.0, 0.0, None, None).angles(2).max() == radians(0.1)
+
+
+@pytest.mark.parametrize(
+    "joint, shifts, turns, words",
+    [
+        ("x", None, None, "--joint-error-deg is 'x'"),
+        ("0.1,", None, None, "--joint-error-deg is ''"),
+        ("-1", None, None, "expected a number, 0 or more"),
+        ("nan", None, None, "--joint-error-deg is 'nan'"),
+        ("inf", None, None, "--joint-error-deg is 'inf'"),
+        ("0", ["a=-1"], None, "--obstacle-error-mm is '-1'"),
+        ("0", ["1", "2"], None, "twice for all obstacles"),
+        ("0", ["a=1", "a=2"], None, "twice for a"),
+        ("0", None, ["1"], "needs the obstacle's name"),
+    ],
+)
+def test_what_is_no_error_is_refused(
+    joint: str, shifts: list[str] | None, turns: list[str] | None, words: str
+) -> None:
+    with pytest.raises(InvalidInput, match=words):
+        errors_of(joint, 0.0, 0.0, shifts, turns)
+
+
+def write(folder: Path) -> list[str]:
+    (folder / "p.yaml").write_text(TEXT)
+    (folder / "t.csv").write_text(ROW + "0,0,0,0,0,0,0,0\n1,0,0,0,0,0,0,0\n")
+    names = str(folder / "p.yaml"), "--trajectory", str(folder / "t.csv")
+    return ["verify", *names, "--out", str(folder / "out"), "--json"]
+
+
+def run(words: list[str]) -> tuple[int, str]:
+    found = CliRunner().invoke(app, words, obj="vdsm")
+    return found.exit_code, found.output + str(found.exception or "")
+
+
+@pytest.mark.parametrize(
+    "options, passes",
+    [
+        ([], True),
+        # The ball is 60 mm off, 5 are required; the box 70.
+        (["--obstacle-error-mm", "a=54.9"], True),
+        (["--obstacle-error-mm", "a=55.1"], False),
+        (["--obstacle-error-mm", "b=64.9"], True),
+        (["--obstacle-error-mm", "b=65.1"], False),
+        (["--obstacle-error-mm", "10", "--obstacle-error-mm", "b=64.9"], True),
+        (["--obstacle-error-mm", "56", "--obstacle-error-mm", "b=1"], False),
+        # Its corners are 86.6 mm from its middle.
+        (["--obstacle-error-deg", "b=40"], True),
+        (["--obstacle-error-deg", "b=44"], False),
+        # Joint 1 moves what is 300 mm away; joint 2 has a lever of 300 mm at most.
+        (["--joint-error-deg", "0,3"], True),
+        (["--joint-error-deg", "12,0"], False),
+    ],
+)
+def test_errors_count_for_their_joint_and_obstacle(
+    tmp_path: Path, options: list[str], passes: bool
+) -> None:
+    code, text = run([*write(tmp_path), *options])
+    assert code == (0 if passes else 1), text
+
+
+def test_an_unknown_obstacle_and_a_list_of_another_arm_are_named(
+    tmp_path: Path,
+) -> None:
+    words = write(tmp_path)
+    _, text = run([*words, "--obstacle-error-mm", "c=1"])
+    assert "'c'" in text and "a, b" in text
+    _, text = run([*words, "--joint-error-deg", "1,2,3"])
+    assert "errors of 3 joints, expected 2" in text

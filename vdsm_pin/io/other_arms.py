@@ -1,0 +1,104 @@
+"""Other arms of a problem: obstacles that ride on a tree and move by a trajectory."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from vdsm_pin.arm_tree import RAIL, arm_tree, link_frame
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.io.arm_builder import ArmBuilder
+from vdsm_pin.io.frames import Frame, radians
+from vdsm_pin.io.problem_schema import OtherModel
+from vdsm_pin.io.source import Digest, read_bytes
+from vdsm_pin.io.trajectory_file import TIME, read_trajectory
+from vdsm_pin.io.yaml_reader import Location, YamlDocument
+from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.proof.tree import Tree
+from vdsm_pin.scene import Capsule, Carrier, Moving, Solid
+from vdsm_pin.trajectory import Trajectory
+
+MAX_BYTES = 1 << 30
+"""Of a trajectory file."""
+
+
+@dataclass(frozen=True)
+class OtherArms:
+    """Converts the other arms of one file.
+
+    Args:
+        document: The file, for messages.
+        frame: Its unit and base.
+        folder: Where relative paths start.
+        digest: Gets the bytes of the files of each arm, then of its trajectory.
+    """
+
+    document: YamlDocument
+    frame: Frame
+    folder: Path
+    digest: Digest
+
+    def build(self, models: list[OtherModel]) -> tuple[Moving, ...]:
+        """The bodies of all arms, as obstacles.
+
+        Raises:
+            InvalidFile: If an arm or its trajectory breaks its contract.
+        """
+        found: list[Moving] = []
+        for i, model in enumerate(models):
+            at = ("others", i)
+            known = self.document, self.frame, self.folder, self.digest
+            arm = ArmBuilder(*known, (*at, "manipulator")).build(model.manipulator)
+            motion = self._motion(model, arm, at)
+            carrier = _carrier(arm, motion, self._pose(model))
+            found += [
+                Moving(replace(solid, name=f"{model.name}: {solid.name}"), carrier, k)
+                for k, solid in _solids(arm)
+            ]
+        return tuple(found)
+
+    def _motion(self, model: OtherModel, arm: Manipulator, at: Location) -> Trajectory:
+        """Its trajectory, with times."""
+        file = self.folder / model.trajectory
+        try:
+            motion = read_trajectory(file, arm)
+        except InvalidFile as error:
+            place = f" {error.where}:" if error.where else ""
+            problem = f"{model.trajectory!r}:{place} {error.problem}"
+            raise self.document.invalid((*at, "trajectory"), problem) from None
+        self.digest.update(read_bytes(file, limit=MAX_BYTES))
+        if motion.times is None:
+            problem = f"{model.trajectory!r} has no column {TIME!r}, which it needs"
+            raise self.document.invalid((*at, "trajectory"), problem)
+        return motion
+
+    def _pose(self, model: OtherModel) -> FloatArray:
+        """T_base_other: the other rail as seen from this base, (4, 4); [m]."""
+        pose = np.eye(4)
+        turn = rotation_from_rpy(radians(model.base.rpy_deg))
+        pose[:3, :3] = self.frame.rotation.T @ turn
+        pose[:3, 3] = self.frame.point(model.base.position)
+        return pose
+
+
+def _carrier(arm: Manipulator, motion: Trajectory, pose: FloatArray) -> Carrier:
+    from vdsm_pin.proof.paths import Path as Motion  # compiled code, which few need
+
+    joints = list(arm_tree(arm).joints)
+    joints[RAIL] = replace(joints[RAIL], placement=pose)
+    path = Motion(motion.joints, motion.inner, motion.times)
+    return Carrier(Tree(tuple(joints)), path)
+
+
+def _solids(arm: Manipulator) -> list[tuple[int, Solid]]:
+    """All that an arm consists of, each with the frame of its tree."""
+    found: list[tuple[int, Solid]] = []
+    axis = np.array([1.0, 0.0, 0.0])
+    for k, name in enumerate(arm.axis_names):
+        start, end = (float(x) for x in arm.axis_spans[k])
+        middle, half = (start + end) / 2.0 * axis, (end - start) / 2.0
+        rod = Capsule(name, middle, axis, half, float(arm.axis_radii[k]))
+        found.append((link_frame(min(k + 1, arm.n_links)), rod))
+    found += [(link_frame(link), solid) for link, solid in arm.carried]
+    return found
