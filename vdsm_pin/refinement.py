@@ -21,6 +21,7 @@ from vdsm_pin.planner.records import Plan
 from vdsm_pin.planner.start import with_known_insides
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.planner.time_limit import within_time
+from vdsm_pin.planner.waiting import waited
 from vdsm_pin.problem import Approach, PlanningProblem
 from vdsm_pin.progress import say
 from vdsm_pin.robot_model import RobotModel
@@ -115,6 +116,8 @@ def plan_and_verify(
 ) -> Refinement:
     """Plan by a strategy until the verification has nothing against the plan.
 
+    Where obstacles move, the plan stands at its start until all have come to rest.
+
     Args:
         problem: What is asked.
         strategy_name: A name in `STRATEGIES`.
@@ -129,6 +132,33 @@ def plan_and_verify(
         Infeasible: If the strategy has no plan, or none that is proved.
         OutOfTime: If the time is over.
     """
+    scene = problem.scene
+    if not scene.moving:
+        return _plan_at_rest(problem, strategy_name, robot, deadline)
+    still = replace(problem, scene=scene.at_time(scene.rest_time))
+    found = _plan_at_rest(still, strategy_name, robot, deadline)
+    plan = waited(found.plan, problem)
+    verification = verify(
+        _promised(problem),
+        plan.trajectory,
+        robot,
+        deadline=deadline,
+        centres=plan.centres,
+    )
+    if verification.verdict not in HANDED_OUT:
+        why = _proved(np.zeros((1, 1)), verification, ()).reason
+        message = f"a plan was found for where all comes to rest, but not proved: {why}"
+        raise NoPlanFound(message)
+    return Refinement(plan, verification, found.rounds)
+
+
+def _plan_at_rest(
+    problem: PlanningProblem,
+    strategy_name: str,
+    robot: RobotModel,
+    deadline: Deadline,
+) -> Refinement:
+    """The same where nothing moves."""
     plan_with = with_ends(problem, strategy(strategy_name))
     known = with_known_insides(with_path(problem))
     clearance = within_time(link_clearance(known.problem), deadline)

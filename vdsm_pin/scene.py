@@ -484,6 +484,33 @@ def solid_of(obstacle: Obstacle) -> Solid:
     return cast("Solid", found)
 
 
+def placed(solid: Solid, pose: FloatArray) -> Solid:
+    """A solid of one frame in another; `pose` is T_other_frame, (4, 4); [m]."""
+    turn, shift = pose[:3, :3], pose[:3, 3]
+    match solid:
+        case Sphere():
+            return replace(solid, centre=turn @ solid.centre + shift)
+        case Capsule() | Cylinder():
+            centre = turn @ solid.centre + shift
+            return replace(solid, centre=centre, axis=turn @ solid.axis)
+        case Box():
+            centre = turn @ solid.centre + shift
+            return replace(solid, centre=centre, rotation=turn @ solid.rotation)
+        case Prism():
+            origin = turn @ solid.origin + shift
+            return replace(solid, origin=origin, rotation=turn @ solid.rotation)
+        case HalfSpace():
+            point, normal = turn @ solid.point + shift, turn @ solid.normal
+            return replace(solid, point=point, normal=normal)
+        case Mesh():
+            return replace(solid, vertices=solid.vertices @ turn.T + shift)
+        case PointCloud():
+            return replace(solid, points=solid.points @ turn.T + shift)
+        case Voxels():
+            centres = solid.centres @ turn.T + shift
+            return replace(solid, centres=centres, rotation=turn @ solid.rotation)
+
+
 def reach_of(obstacle: Obstacle | ConvexCover) -> float:
     """Largest distance of a solid's stated points from the base's origin; [m].
 
@@ -549,6 +576,30 @@ class Scene:
         """The obstacles that do not."""
         still = (one for one in self.obstacles if not isinstance(one, Moving))
         return Scene(tuple(still)) if self.moving else self
+
+    @property
+    def rest_time(self) -> float:
+        """From when on nothing moves; -inf where nothing ever does; [s]."""
+        ends = (one.path.own_times[-1] for one in self.carriers)
+        return float(max(ends, default=-np.inf))
+
+    @property
+    def start_time(self) -> float:
+        """When the first one begins to move; inf where nothing ever does; [s]."""
+        begins = (one.path.own_times[0] for one in self.carriers)
+        return float(min(begins, default=np.inf))
+
+    def at_time(self, time: float) -> "Scene":
+        """The scene as it stands at a time, nothing of it moving any more; [s]."""
+        when = np.array([time])
+        return Scene(
+            tuple(
+                placed(solid_of(one), one.poses(when)[0])
+                if isinstance(one, Moving)
+                else one
+                for one in self.obstacles
+            )
+        )
 
     @property
     def carriers(self) -> tuple[Carrier, ...]:

@@ -39,6 +39,10 @@ def explain_to_folder(
     """
     check_output_folder(folder)
     check_kept([folder / PAGE], source.source.files)
+    if source.problem.scene.moving:
+        name = source.problem.scene.moving[0].name
+        message = f"obstacle {name!r} moves, which the paper's steps know nothing of"
+        raise InvalidInput(message)
     robot = load_robot(source.problem.manipulator)
     found = plan_and_verify(source.problem, "paper", robot)
     made = found.plan.steps
