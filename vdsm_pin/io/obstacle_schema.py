@@ -147,17 +147,3 @@ class VoxelsModel(FromFileModel):
         description="Edge lengths of a cell [length_unit]; the first cell of an array "
         "begins at its origin."
     )
-
-
-ObstacleModel: TypeAlias = Annotated[
-    CylinderModel
-    | PrismModel
-    | SphereModel
-    | CapsuleModel
-    | BoxModel
-    | HalfSpaceModel
-    | MeshModel
-    | PointsModel
-    | VoxelsModel,
-    Field(discriminator="shape"),
-]

@@ -11,13 +11,22 @@ from pydantic import Field, ValidationError
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.frames import Frame
+from vdsm_pin.io.motion_schema import MovableModel
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
-from vdsm_pin.io.obstacle_schema import ObstacleModel
 from vdsm_pin.io.problem_errors import first_error
 from vdsm_pin.io.schema_types import FileModel
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import Location, YamlDocument, read_yaml
-from vdsm_pin.scene import Box, Cylinder, HalfSpace, Mesh, Obstacle, Scene, Sphere
+from vdsm_pin.scene import (
+    Box,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Moving,
+    Obstacle,
+    Scene,
+    Sphere,
+)
 
 MAX_BYTES: Final = 32 << 20
 UNIT_NORM: Final = 1e-3
@@ -30,7 +39,7 @@ class SceneModel(FileModel):
     length_unit: Literal["mm", "m"] = Field(
         description="Unit of every length in this file."
     )
-    obstacles: list[ObstacleModel] = Field(description="Solids to avoid.")
+    obstacles: list[MovableModel] = Field(description="Solids to avoid.")
 
 
 def read_scene(path: Path, robot_size: float) -> Scene:
@@ -51,6 +60,9 @@ def read_scene(path: Path, robot_size: float) -> Scene:
     else:
         scene = _ours(document, path, robot_size)
     for k, obstacle in enumerate(scene.obstacles):
+        if isinstance(obstacle, Moving):
+            problem = "moves its obstacle, which is not judged for robots yet"
+            raise document.invalid(("obstacles", k, "motion"), problem)
         if isinstance(obstacle, Mesh) and not obstacle.is_surface:
             problem = (
                 f"{obstacle.name!r} may have an inside, which is not judged for robots "
