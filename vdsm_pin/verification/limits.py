@@ -12,7 +12,8 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.bernstein import part
 from vdsm_pin.kinematics import link_angles
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
@@ -52,6 +53,19 @@ class _Largest:
     joint: int = 0
     bound: float = -np.inf
 
+    def larger(
+        self, values: FloatArray, moments: FloatArray | IntArray, n_angles: int = 1
+    ) -> "_Largest":
+        """This, or the largest of values (m, n) seen at moments (m,).
+
+        So many columns belong to one joint.
+        """
+        at, column = np.unravel_index(int(np.argmax(values)), values.shape)
+        if values[at, column] <= self.seen:
+            return self
+        joint = int(column) // n_angles + 1
+        return _Largest(float(values[at, column]), float(moments[at]), joint)
+
     def verdict(self, limit: float) -> Verdict:
         """What this says of a limit."""
         if self.bound <= limit:
@@ -67,45 +81,68 @@ Measure: TypeAlias = Callable[[FloatArray], FloatArray]
 """Of rows of joint values (m, 1 + 2N), shape (m, n); largest at an end of a line."""
 
 
-def _stretches(trajectory: Trajectory) -> Iterator[tuple[int, int, Trajectory]]:
-    """Parts of a motion: the first row, rows for each of its own, and the part."""
-    parts = PARTS if trajectory.is_smooth else 1
-    step = CHUNK // parts
-    for first in range(0, trajectory.n_samples, step):
-        yield first, parts, trajectory.part(first, first + step + 1).refined(parts)
-
-
 def _largest(trajectory: Trajectory, measure: Measure) -> _Largest:
     """Largest value of a measure over a motion."""
-    found, bound = _Largest(), -np.inf
-    for first, parts, rows in _stretches(trajectory):
-        values = measure(rows.joints)
-        at, column = np.unravel_index(int(np.argmax(values)), values.shape)
-        if not values[at, column] <= found.seen:
-            moment = first + float(at) / parts
-            found = _Largest(float(values[at, column]), moment, int(column) + 1)
+    found = _Largest()
+    for first in range(0, trajectory.n_samples, CHUNK):
+        rows = trajectory.part(first, first + CHUNK)
+        found = found.larger(measure(rows.joints), first + np.arange(rows.n_samples))
+    bound = found.seen
+    for k, pieces in _wide(trajectory, measure, found.seen):
+        # Ends of parts are moments of the motion, their other control points are not.
+        values = measure(pieces.reshape(-1, pieces.shape[2]))
         bound = max(bound, float(values.max()))
-        if rows.is_smooth:
-            between = rows.inner.reshape(-1, rows.inner.shape[2])
-            bound = max(bound, float(measure(between).max()))
+        begins = values.reshape(*pieces.shape[:2], -1)[:, 0]
+        moments = np.repeat(k, PARTS) + np.tile(np.arange(PARTS) / PARTS, len(k))
+        found = found.larger(begins, moments)
     return replace(found, bound=bound)
+
+
+def _wide(
+    trajectory: Trajectory, measure: Measure, seen: float
+) -> Iterator[tuple[IntArray, FloatArray]]:
+    """The smooth pieces that may go beyond what was seen, cut into parts.
+
+    Yields:
+        Their numbers, shape (m,), and the control points of their parts, shape (m *
+        PARTS, degree + 1, 1 + 2N).
+    """
+    inner = trajectory.inner
+    for first in range(0, len(inner), CHUNK // PARTS):
+        some = inner[first : first + CHUNK // PARTS]
+        values = measure(some.reshape(-1, some.shape[2])).reshape(len(some), -1)
+        k = first + np.flatnonzero(values.max(axis=1) > seen)
+        if k.size:
+            yield k, _parts(trajectory, k)
+
+
+def _parts(trajectory: Trajectory, k: IntArray) -> FloatArray:
+    """Control points of the parts of some pieces, one piece after the other."""
+    pieces = np.repeat(trajectory.pieces(k), PARTS, axis=0)
+    edges = np.tile(np.arange(PARTS), len(k))
+    return part(pieces, edges / PARTS, (edges + 1) / PARTS)
 
 
 def _largest_change(trajectory: Trajectory) -> _Largest:
     """Largest difference of a joint angle between two moments of an interval."""
-    found, bound = _Largest(), -np.inf
-    for first, parts, rows in _stretches(trajectory):
-        n = (rows.n_samples - 1) // parts
-        if not n:
+    found, step = _Largest(), CHUNK // PARTS
+    for first in range(0, trajectory.n_samples - 1, step):
+        rows = trajectory.part(first, first + step + 1)
+        ends = np.abs(np.diff(rows.joints[:, 1:], axis=0))
+        found = found.larger(ends, first + np.arange(len(ends)), n_angles=2)
+    bound = found.seen
+    for first in range(0, len(trajectory.inner), step):
+        numbers = np.arange(first, min(first + step, len(trajectory.inner)))
+        controls = trajectory.pieces(numbers)[:, :, 1:]
+        k = numbers[np.ptp(controls, axis=1).max(axis=1) > found.seen]
+        if not k.size:
             continue
-        pieces = rows.controls[:, :, 1:].reshape(n, -1, 2 * rows.n_links)
-        bound = max(bound, float(np.ptp(pieces, axis=1).max()))
-        edges = np.arange(n)[:, None] * parts + np.arange(parts + 1)
-        seen = np.ptp(rows.joints[edges][:, :, 1:], axis=1)
-        at, column = np.unravel_index(int(np.argmax(seen)), seen.shape)
-        if not seen[at, column] <= found.seen:
-            joint = int(column) // 2 + 1
-            found = _Largest(float(seen[at, column]), float(first + at), joint)
+        pieces = _parts(trajectory, k)[:, :, 1:].reshape(
+            len(k), PARTS, -1, controls.shape[2]
+        )
+        bound = max(bound, float(np.ptp(pieces, axis=(1, 2)).max()))
+        edges = np.concatenate([pieces[:, :, 0], pieces[:, -1:, -1]], axis=1)
+        found = found.larger(np.ptp(edges, axis=1), k, n_angles=2)
     return replace(found, bound=bound)
 
 

@@ -27,7 +27,10 @@ CHUNK: Final = 16_384
 """Rows treated at once, so that memory stays bounded."""
 
 PARTS: Final = 16
-"""Parts of a smooth piece; its chord is that much nearer to it, squared."""
+"""Parts of a smooth piece at most; its chord is that much nearer to it, squared."""
+
+MOST: Final = 65_536
+"""Rows of a smooth motion so cut, unless it has more by itself."""
 
 
 @dataclass(frozen=True)
@@ -79,14 +82,22 @@ def second_derivatives(manipulator: Manipulator, trajectory: Trajectory) -> Floa
     return result
 
 
+def _parts(trajectory: Trajectory) -> int:
+    """Into how many a smooth piece is cut: fewer where there are many."""
+    if not trajectory.is_smooth:
+        return 1
+    return max(1, min(PARTS, MOST // trajectory.n_samples))
+
+
 def _cut(problem: PlanningProblem, trajectory: Trajectory) -> Trajectory:
     """A smooth motion with its pieces cut finely, so that chords are near them."""
     if not trajectory.is_smooth:
         return trajectory
-    fine, path = trajectory.refined(PARTS), problem.path
+    parts, path = _parts(trajectory), problem.path
+    fine = trajectory.refined(parts)
     # The tip runs the shorter way round between two rows, evenly in time.
     begin, run = wrapped(path, trajectory.path_m), runs(path, trajectory.path_m)
-    share = np.arange(PARTS) / PARTS
+    share = np.arange(parts) / parts
     between = (begin[:-1, None] + run[:, None] * share).reshape(-1)
     return replace(fine, path_m=np.append(between, trajectory.path_m[-1]))
 
@@ -178,7 +189,7 @@ def check_tip(problem: PlanningProblem, trajectory: Trajectory) -> TipReport:
     fine = _cut(problem, trajectory)
     some = tips if fine is trajectory else tip_positions(arm, fine)
     deviation, interval = _deviation(problem, fine, some)
-    interval //= PARTS if trajectory.is_smooth else 1
+    interval //= _parts(trajectory)
     share, undrawn = coverage(problem.path, trajectory)
     checks = (
         *ends,
