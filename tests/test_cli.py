@@ -475,7 +475,7 @@ def test_without_a_browser_nothing_is_verified_for_paper(
         "--out", tmp_path / "out", "--pdf", tmp_path / "report.pdf",
     )  # fmt: skip
     assert ran.status == 2
-    assert "--pdf needs Chromium" in one_message(ran)
+    assert "PDF, PNG and MP4 need Chromium" in one_message(ran)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -7,9 +7,10 @@ import made_up
 import pytest
 
 from vdsm_pin.errors import InvalidInput
+from vdsm_pin.report.browser import find_browser
 from vdsm_pin.report.facts import verification_file
 from vdsm_pin.report.html import write_report
-from vdsm_pin.report.pdf import find_browser, print_page
+from vdsm_pin.report.pdf import print_page
 
 
 def stand_in(folder: Path, script: str) -> str:
@@ -31,18 +32,21 @@ def test_without_a_browser_one_message_says_what_to_do(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("CHROMIUM", str(tmp_path / "absent"))
-    with pytest.raises(InvalidInput, match=r"--pdf needs Chromium .*absent"):
+    with pytest.raises(InvalidInput, match=r"need Chromium .*absent"):
         find_browser()
 
 
-@pytest.mark.parametrize("script", ["exit 0", "exit 3"])
+@pytest.mark.parametrize(
+    ("script", "said"),
+    [("exit 0", "printed nothing"), ("exit 3", r"failed \(status 3")],
+)
 def test_a_browser_that_prints_nothing_leaves_the_old_file(
-    monkeypatch: pytest.MonkeyPatch, page: Path, script: str
+    monkeypatch: pytest.MonkeyPatch, page: Path, script: str, said: str
 ) -> None:
     monkeypatch.setenv("CHROMIUM", stand_in(page.parent, script))
     old = page.with_suffix(".pdf")
     old.write_text("old")
-    with pytest.raises(InvalidInput, match="printed nothing"):
+    with pytest.raises(InvalidInput, match=said):
         print_page(page, old)
     assert old.read_text() == "old"
     assert {path.name for path in page.parent.iterdir()} == {

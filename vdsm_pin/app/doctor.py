@@ -10,7 +10,8 @@ from typing import Final
 
 from vdsm_pin import kept
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.report.pdf import find_browser
+from vdsm_pin.report.browser import find_browser
+from vdsm_pin.report.film import find_encoder
 from vdsm_pin.report.run_record import machine, versions
 
 USES: Final = {
@@ -47,7 +48,8 @@ def examine() -> list[Finding]:
     """Look at everything the commands use.
 
     Returns:
-        Findings: the machine, the libraries, the machine code, the browser, the extras.
+        Findings: the machine, the libraries, the machine code, the browser, the
+            encoder, the extras.
     """
     known = versions()
     head = f"vdsm-pin {known['vdsm-pin']}, Python {known['python']}, {machine()}"
@@ -56,6 +58,7 @@ def examine() -> list[Finding]:
         *_libraries(),
         _machine_code(),
         _browser(),
+        _encoder(),
         *_extras(),
     ]
 
@@ -97,10 +100,21 @@ def _machine_code() -> Finding:
 
 def _browser() -> Finding:
     try:
-        return Finding("browser", f"{find_browser()} prints reports", True)
+        what = f"{find_browser()} prints reports and draws pictures"
+        return Finding("browser", what, True)
     except InvalidInput:
         remedy = "install Chromium or Chrome, or set CHROMIUM to its program"
-        return Finding("browser", "none: no --pdf", False, remedy=remedy)
+        return Finding(
+            "browser", "none: no --pdf, no PNG, no MP4", False, remedy=remedy
+        )
+
+
+def _encoder() -> Finding:
+    try:
+        return Finding("encoder", f"{find_encoder()} makes films", True)
+    except InvalidInput:
+        remedy = "install ffmpeg, or set FFMPEG to its program"
+        return Finding("encoder", "none: no MP4", False, remedy=remedy)
 
 
 def _extras() -> Iterator[Finding]:

@@ -22,6 +22,7 @@ from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.folder import check_kept, check_output_file
 from vdsm_pin.report.html import message_page, view_page
 from vdsm_pin.report.postures import at_start
+from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.moving import untimed
 
 HOST: Final = "127.0.0.1"
@@ -35,12 +36,21 @@ def page(problem: PlanningProblem, trajectory: Path | None, live: str = "") -> s
     Raises:
         InvalidInput: If the trajectory is bad.
     """
+    return view_page(problem, shown_motion(problem, trajectory), live)
+
+
+def shown_motion(problem: PlanningProblem, trajectory: Path | None) -> Trajectory:
+    """The motion of a file, or the arm at the start.
+
+    Raises:
+        InvalidInput: If the trajectory is bad.
+    """
     if trajectory is None:
-        return view_page(problem, at_start(problem), live)
+        return at_start(problem)
     motion = read_trajectory(trajectory, problem.manipulator)
     if why := untimed(problem.scene, motion):
         raise InvalidFile(file=trajectory, where="line 1", problem=why)
-    return view_page(problem, motion, live)
+    return motion
 
 
 def write_page(path: Path, problem: str, trajectory: Path | None) -> None:

@@ -31,12 +31,12 @@ from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
 from vdsm_pin.io.atomic import atomic_path, write_text
 from vdsm_pin.io.problem_file import built_in_names
 from vdsm_pin.planner.strategies import strategy
+from vdsm_pin.report.browser import find_browser
 from vdsm_pin.report.columns import COLUMNS, write_columns
 from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.folder import check_kept, check_output_folder
 from vdsm_pin.report.html import write_index
 from vdsm_pin.report.junit import junit_text
-from vdsm_pin.report.pdf import find_browser
 from vdsm_pin.report.tables import SummaryCsv, write_summary
 
 SUMMARY: Final = "summary.csv"

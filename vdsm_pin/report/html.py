@@ -186,6 +186,16 @@ def view_page(problem: PlanningProblem, trajectory: Trajectory, live: str = "") 
     )
 
 
+def export_page(page: str, asked: str, size: tuple[int, int]) -> str:
+    """A 3D view of that size [pixels] that draws what is asked and writes it down."""
+    width, height = size
+    script = f'<script type="application/json" id="asked">{asked}</script>'
+    script += f"<script>{_asset('export.js')}</script>"
+    style = f"position: fixed; left: 0; top: 0; width: {width}px; height: {height}px"
+    style = f"<style>#view {{ {style} }}</style>"
+    return page.replace("</body>", f"{style}{script}</body>")
+
+
 def write_no_plan(
     path: Path, problem: PlanningProblem, error: VdsmError, run: PlanRun
 ) -> None:

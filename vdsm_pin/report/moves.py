@@ -40,7 +40,7 @@ def moves(obstacle: Obstacle, trajectory: Trajectory) -> dict[str, Any]:
     if times is None:
         times = obstacle.carrier.path.own_times[:1]
     poses = obstacle.poses(times)
-    turns = np.array([_quaternion(pose[:3, :3]) for pose in poses])
+    turns = np.array([quaternion(pose[:3, :3]) for pose in poses])
     return {
         "moves": {
             "moments": packed(moments, "<f8"),
@@ -67,7 +67,7 @@ def _moments(obstacle: Moving, trajectory: Trajectory) -> FloatArray:
     return np.asarray(np.interp(whole, times, np.arange(float(len(times)))))
 
 
-def _quaternion(turn: FloatArray) -> FloatArray:
+def quaternion(turn: FloatArray) -> FloatArray:
     """A rotation as (x, y, z, w), of either sign; [-]."""
     trace = float(np.trace(turn))
     k = int(np.argmax([*np.diag(turn), trace]))

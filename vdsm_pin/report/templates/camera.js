@@ -55,7 +55,7 @@ class Cameras {
   look(name) {
     this.name = name;
     this.flying = null;
-    this.view.arm.hideEnd(name === "tip");
+    this.view.hideEnd(name === "tip");
     this.perspective.fov = name === "tip" ? FIELD_AT_TIP : FIELD;
     this.use(name === "tip" || name === "overview" ? this.perspective : this.flat);
     this.viewer.controls.enabled = name !== "tip";

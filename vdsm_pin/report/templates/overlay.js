@@ -88,7 +88,7 @@ class Overlay {
   // The axes of the problem file's frame.
   triad() {
     const { Vector3 } = MeshCat.THREE;
-    const [left, low] = [34, this.height - 34];
+    const [left, low] = [44, this.height - 40];
     const turn = this.view.cameras.camera.matrixWorldInverse;
     const frame = this.view.viewer.scene.matrixWorld;
     const axes = AXES.map(([name, colour], k) => {
@@ -109,7 +109,7 @@ class Overlay {
     if (cameras.name === "tip") return;
     const scale = cameras.scale;
     const length = niceStep(BAR * scale, 1.7);
-    const [left, low, wide] = [78, this.height - 16, length / scale];
+    const [left, low, wide] = [92, this.height - 16, length / scale];
     this.line(this.ink, 2, [left, low - 5], [left, low], [left + wide, low], [left + wide, low - 5]);
     const mm = length * 1000;
     const about = cameras.camera === cameras.flat ? "" : "≈ ";

@@ -106,6 +106,7 @@ class ArmView {
     const corners = [];
     for (let i = 0; i < flat.length; i += 3) corners.push(new Vector3(...flat.slice(i, i + 3)));
     this.desired = new Group();
+    this.rods = new Group();
     const ink = new MeshBasicMaterial({ color: 0xd9480f });
     const thin = 0.11 * this.scene.radius;
     for (let i = 0; i + 1 < corners.length && corners.length < 400; i++) {
@@ -113,9 +114,9 @@ class ArmView {
       const rod = new Mesh(new CylinderGeometry(thin, thin, side.length(), 8), ink);
       rod.position.copy(corners[i]).addScaledVector(side, 0.5);
       rod.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), side.normalize());
-      this.desired.add(rod);
+      this.rods.add(rod);
     }
-    this.desired.add(this.line(corners.map((p) => p.toArray()), 0xd9480f));
+    this.desired.add(this.rods, this.line(corners.map((p) => p.toArray()), 0xd9480f));
     this.root.add(this.desired);
     corners.forEach((corner) => this.box.expandByPoint(corner));
 
@@ -187,6 +188,12 @@ class ArmView {
     this.viewer.scene.updateMatrixWorld(true);
   }
 
+  // What is in the way of a view from the tip: the last link and the rods of the path.
+  hideEnd(hidden) {
+    this.arm.hideEnd(hidden);
+    this.rods.visible = !hidden;
+  }
+
   look(name) {
     this.cameras.look(name);
   }
@@ -248,7 +255,7 @@ class ArmView {
   }
 
   // A still picture, for paper and for files.
-  picture() {
+  picture(type = "image/png", quality = undefined) {
     this.viewer.render();
     const sheet = document.createElement("canvas");
     const drawn = this.viewer.renderer.domElement;
@@ -258,7 +265,7 @@ class ArmView {
     pen.fillRect(0, 0, sheet.width, sheet.height);
     for (const layer of [drawn, this.overlay.sheet])
       pen.drawImage(layer, 0, 0, sheet.width, sheet.height);
-    return sheet.toDataURL("image/png");
+    return sheet.toDataURL(type, quality);
   }
 }
 

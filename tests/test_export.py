@@ -1,0 +1,186 @@
+"""Oracles: trimesh as a second reader of glTF, kinematics, pixels, stand-ins."""
+
+import io
+import json
+import shutil
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from made_up import problem as made_up_problem
+from made_up import trajectory
+from PIL import Image
+from problem_files import NEAR, write_problem
+
+from vdsm_pin.app.export import ExportOrder, export
+from vdsm_pin.cli import main
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.kinematics import joint_centres, link_frames
+from vdsm_pin.report.film import Shot, pictures
+from vdsm_pin.report.gltf import glb, play_times
+from vdsm_pin.report.html import view_page
+
+Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+
+needs_chromium = [
+    pytest.mark.display,
+    pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium here"),
+]
+
+
+def opened(data: bytes) -> tuple[dict[str, Any], bytes]:
+    """The JSON and the binary chunk, read by the specification."""
+    magic, version, length = struct.unpack_from("<4sII", data)
+    assert (magic, version, length) == (b"glTF", 2, len(data))
+    size, kind = struct.unpack_from("<I4s", data, 12)
+    assert (kind, size % 4) == (b"JSON", 0)
+    rest = 20 + size
+    binary, kind = struct.unpack_from("<I4s", data, rest)
+    assert (kind, rest + 8 + binary) == (b"BIN\0", len(data))
+    return json.loads(data[20:rest]), data[rest + 8 :]
+
+
+def array(content: dict[str, Any], binary: bytes, number: int) -> np.ndarray:
+    one = content["accessors"][number]
+    view = content["bufferViews"][one["bufferView"]]
+    part = binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
+    return np.frombuffer(part, "<f4").reshape(one["count"], -1)
+
+
+def turned(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    return v + 2.0 * np.cross(q[:3], np.cross(q[:3], v) + q[3] * v)
+
+
+def test_gltf_moves_every_link_as_the_arm_does() -> None:
+    task, rows = made_up_problem(), trajectory(60)
+    content, binary = opened(glb(task, rows, 12.0))
+    (motion,) = content["animations"]
+    centres = joint_centres(task.manipulator, rows.x0, rows.alpha, rows.theta)
+    frames = link_frames(rows.alpha, rows.theta)
+    seen = set()
+    for channel in motion["channels"]:
+        sampler = motion["samplers"][channel["sampler"]]
+        times = array(content, binary, sampler["input"])[:, 0]
+        assert times[0] == 0.0
+        assert times[-1] == pytest.approx(12.0)
+        assert (np.diff(times) > 0.0).all()
+        values = array(content, binary, sampler["output"])
+        node = content["nodes"][channel["target"]["node"]]
+        link = int(node["name"].split()[1])
+        seen.add((link, channel["target"]["path"]))
+        for k in range(rows.n_samples):
+            if channel["target"]["path"] == "translation":
+                np.testing.assert_allclose(values[k], centres[k, link - 1], atol=1e-6)
+                continue
+            for axis in range(3):
+                found = turned(values[k].astype(float), np.eye(3)[axis])
+                np.testing.assert_allclose(
+                    found, frames[k, link - 1, :, axis], atol=1e-5
+                )
+    assert seen == {(k, p) for k in range(1, 9) for p in ("translation", "rotation")}
+
+
+def test_a_second_reader_finds_every_body_where_it_is() -> None:
+    task = made_up_problem()
+    scene = trimesh.load(io.BytesIO(glb(task, trajectory(2), 1.0)), file_type="glb")
+    solids = {one.name: one for one in task.scene.obstacles}
+    assert solids.keys() | {f"link {k}" for k in range(1, 9)} == set(scene.geometry)
+    for name in ("pillar", "ball", "crate"):
+        shape = scene.geometry[name]
+        turn, _ = scene.graph[name]
+        middle = trimesh.transform_points(shape.bounds, turn).mean(axis=0)
+        centre = Y_UP @ task.T_world_base[:3, :3] @ solids[name].centre
+        np.testing.assert_allclose(middle, centre, atol=1e-5)
+
+
+def test_a_motion_plays_evenly_by_what_moves_most_and_by_its_own_times() -> None:
+    task, rows = made_up_problem(), trajectory(60)
+    centres = joint_centres(task.manipulator, rows.x0, rows.alpha, rows.theta)
+    most = np.linalg.norm(np.diff(centres, axis=0), axis=2).max(axis=1)
+    speed = most / np.diff(play_times(task, rows, 7.0))
+    np.testing.assert_allclose(speed, speed[0], rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--out", "a.gif"], "ends in none of .glb, .png, .mp4"),
+        (["--out", "a.png", "--look", "below"], "expected one of overview"),
+        (["--out", "a.png", "--moment", "3"], "a waypoint from 0 to 0"),
+        (["--out", "a.mp4"], "an MP4 needs ffmpeg: 'nothing' is not installed"),
+        (["--out", "near.yaml"], "ends in none of"),
+    ],
+)
+def test_what_cannot_be_exported_is_one_message(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    words: list[str],
+    said: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("FFMPEG", "nothing")
+    write_problem(tmp_path / "near.yaml", NEAR)
+    with pytest.raises(SystemExit) as ended:
+        main(["export", "near.yaml", *words])
+    assert ended.value.code == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert told.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["near.yaml"]
+
+
+def test_glb_is_written_without_a_browser(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CHROMIUM", "nothing")
+    file = write_problem(tmp_path / "near.yaml", NEAR)
+    with pytest.raises(SystemExit) as ended:
+        main(["export", str(file), "--out", str(tmp_path / "near.glb")])
+    assert ended.value.code == 0
+    content, _ = opened((tmp_path / "near.glb").read_bytes())
+    assert len(content["meshes"]) == 8 + 1 + 1
+
+
+class TestWithABrowser:
+    pytestmark = needs_chromium
+
+    def test_a_picture_has_its_size_and_shows_another_moment_differently(
+        self, tmp_path: Path
+    ) -> None:
+        page = view_page(made_up_problem(), trajectory(60))
+        shot = Shot("side", 640, 360)
+        first, same, other = pictures(page, [0.0, 0.0, 20.0], shot, "png", tmp_path)
+        seen = [Image.open(io.BytesIO(one)) for one in (first, same, other)]
+        assert {one.size for one in seen} == {(640, 360)}
+        colours = np.asarray(seen[0].convert("RGB")).reshape(-1, 3)
+        assert len(np.unique(colours, axis=0)) > 100
+        assert first == same != other
+
+    def test_the_encoder_gets_every_frame(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        program = tmp_path / "encoder"
+        program.write_text('#!/bin/sh\nfor to; do :; done\ncat > "$to"\n')
+        program.chmod(0o755)
+        monkeypatch.setenv("FFMPEG", str(program))
+        source = read_problem(write_problem(tmp_path / "near.yaml", NEAR))
+        order = ExportOrder(source, None, tmp_path / "near.mp4", seconds=1.0)
+        export(order)
+        written = order.out.read_bytes()
+        assert written.count(b"\xff\xd8\xff\xe0") == 2  # it stands still
+
+    def test_a_browser_that_draws_nothing_is_told(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        program = tmp_path / "browser"
+        program.write_text("#!/bin/sh\nexit 0\n")
+        program.chmod(0o755)
+        monkeypatch.setenv("CHROMIUM", str(program))
+        page = view_page(made_up_problem(), trajectory(5))
+        with pytest.raises(InvalidInput, match="drew 0 of 1 pictures"):
+            pictures(page, [0.0], Shot(), "png", tmp_path / "a.png")

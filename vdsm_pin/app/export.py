@@ -1,0 +1,120 @@
+"""A motion as a file for others: glTF, a picture or a film."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.app.visualization import shown_motion
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.atomic import atomic_path
+from vdsm_pin.io.problem_file import ProblemFile
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.report.film import (
+    FRAMES_PER_SECOND,
+    LOOKS,
+    Shot,
+    encode,
+    find_encoder,
+    pictures,
+)
+from vdsm_pin.report.folder import check_kept, check_output_file
+from vdsm_pin.report.gltf import glb, play_times
+from vdsm_pin.report.html import view_page
+from vdsm_pin.trajectory import Trajectory
+
+ENDINGS: Final = (".glb", ".png", ".mp4")
+SECONDS: Final = 10.0
+"""Length of a motion that states no times; [s]."""
+
+MOST_SECONDS: Final = 120.0
+"""Of a film; [s]."""
+
+
+@dataclass(frozen=True)
+class ExportOrder:
+    """What to export.
+
+    Args:
+        source: The problem as it was read.
+        trajectory: The motion; None for the arm at the start.
+        out: The file; its ending says what it is.
+        moment: Which moment a picture shows, in waypoints.
+        seconds: How long it plays; None: as the trajectory's times say, or `SECONDS`.
+        shot: How to look.
+    """
+
+    source: ProblemFile
+    trajectory: Path | None
+    out: Path
+    moment: float = 0.0
+    seconds: float | None = None
+    shot: Shot = field(default_factory=Shot)
+
+
+def export(order: ExportOrder) -> None:
+    """Write the file.
+
+    Raises:
+        InvalidInput: If it cannot be written, or what draws it is missing.
+    """
+    _check(order)
+    problem = order.source.problem
+    motion = shown_motion(problem, order.trajectory)
+    with atomic_path(order.out) as file:
+        match order.out.suffix.lower():
+            case ".glb":
+                file.write_bytes(glb(problem, motion, order.seconds or SECONDS))
+            case ".png":
+                moment = _within(order.moment, motion)
+                page = view_page(problem, motion)
+                (one,) = pictures(page, [moment], order.shot, "png", order.out)
+                file.write_bytes(one)
+            case _:
+                moments = _moments(problem, motion, order.seconds)
+                page = view_page(problem, motion)
+                frames = pictures(page, moments, order.shot, "jpeg", order.out)
+                encode(frames, file, order.out)
+
+
+def _check(order: ExportOrder) -> None:
+    """Refuse what cannot be done before any work is."""
+    if order.out.suffix.lower() not in ENDINGS:
+        message = f"{order.out}: ends in none of {', '.join(ENDINGS)}"
+        raise InvalidInput(message)
+    if order.shot.look not in LOOKS:
+        message = f"--look is {order.shot.look!r}, expected one of {', '.join(LOOKS)}"
+        raise InvalidInput(message)
+    if order.out.suffix.lower() == ".mp4":
+        find_encoder()
+    check_output_file(order.out)
+    motion = () if order.trajectory is None else (order.trajectory,)
+    check_kept([order.out], [*order.source.source.files, *motion])
+
+
+def _within(moment: float, motion: Trajectory) -> float:
+    last = motion.n_samples - 1
+    if not 0.0 <= moment <= last:
+        message = f"--moment is {moment:g}, expected a waypoint from 0 to {last}"
+        raise InvalidInput(message)
+    return moment
+
+
+def _moments(
+    problem: PlanningProblem, motion: Trajectory, seconds: float | None
+) -> list[float]:
+    """The moment of each frame of a film, in waypoints."""
+    times: FloatArray = play_times(problem, motion, SECONDS)
+    if seconds is not None and times[-1] > 0.0:
+        times = times * (seconds / times[-1])
+    if times[-1] > MOST_SECONDS:
+        message = (
+            f"a film of {times[-1]:.0f} s is longer than {MOST_SECONDS:.0f} s; "
+            "--seconds says how long it shall play"
+        )
+        raise InvalidInput(message)
+    count = max(2, round(float(times[-1]) * FRAMES_PER_SECOND) + 1)
+    clock = np.linspace(0.0, times[-1], count)
+    return [float(at) for at in np.interp(clock, times, np.arange(len(times)))]

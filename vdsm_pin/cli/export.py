@@ -1,0 +1,58 @@
+"""`vdsm export`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vdsm_pin.cli.options import Problem, examples, family
+
+commands = family()
+
+
+@commands.command(
+    epilog=examples(
+        "vdsm export paper/obs1 --trajectory out/obs1/trajectory.csv --out obs1.glb",
+        "vdsm export mine.yaml --trajectory mine.csv --out mine.png --moment 120",
+        "vdsm export mine.yaml --trajectory mine.csv --out mine.mp4 --look tip",
+    ),
+)
+def export(
+    problem: Problem,
+    out: Annotated[
+        Path, typer.Option(help="The file: .glb (glTF), .png or .mp4 (needs ffmpeg).")
+    ],
+    trajectory: Annotated[
+        Path | None, typer.Option(help="A trajectory.csv; without it the start.")
+    ] = None,
+    moment: Annotated[
+        float, typer.Option(min=0.0, help="Waypoint of a .png; 12.5 is between two.")
+    ] = 0.0,
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            min=0.1, help="How long it plays; 10, or as the trajectory's times say."
+        ),
+    ] = None,
+    look: Annotated[
+        str, typer.Option(help="overview, side, top, front or tip.")
+    ] = "overview",
+    width: Annotated[int, typer.Option(min=64, max=4096, help="In pixels.")] = 1280,
+    height: Annotated[int, typer.Option(min=64, max=4096, help="In pixels.")] = 720,
+    numbers: Annotated[
+        bool, typer.Option("--numbers", help="Number the links.")
+    ] = False,
+) -> None:
+    """Write a motion as glTF, as a picture or as a film.
+
+    PNG and MP4 are drawn by a Chromium or Chrome of this machine, without a window.
+    """
+    from vdsm_pin.app.export import ExportOrder
+    from vdsm_pin.app.export import export as write
+    from vdsm_pin.io.problem_file import read_problem
+    from vdsm_pin.report.film import Shot
+
+    shot = Shot(look, width - width % 2, height - height % 2, numbers)
+    source = read_problem(problem)
+    write(ExportOrder(source, trajectory, out, moment, seconds, shot))
+    typer.echo(f"wrote {out}")

@@ -1,0 +1,113 @@
+"""Pictures and films of a motion: the page draws them, a Chromium runs it."""
+
+import base64
+import json
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.report.browser import open_page
+from vdsm_pin.report.html import export_page
+
+LOOKS: Final = ("overview", "side", "top", "front", "tip")
+FRAMES_PER_SECOND: Final = 24
+_START: Final = 120.0
+_EACH: Final = 2.0
+"""Seconds that a browser may take at all, and for each picture."""
+
+_BEGIN: Final = b'<pre id="pictures">'
+_PICTURE: Final = re.compile(rb"data:image/\w+;base64,([A-Za-z0-9+/=]+)")
+
+
+@dataclass(frozen=True)
+class Shot:
+    """How a motion is looked at.
+
+    Args:
+        look: One of `LOOKS`.
+        width: Of a picture; [pixels].
+        height: Of a picture; [pixels].
+        numbers: Whether links have their numbers.
+    """
+
+    look: str = "overview"
+    width: int = 1280
+    height: int = 720
+    numbers: bool = False
+
+
+def pictures(
+    page: str, moments: Sequence[float], shot: Shot, kind: str, wanted: Path
+) -> list[bytes]:
+    """Pictures of moments of a motion.
+
+    Args:
+        page: The 3D view as a page.
+        moments: In waypoints.
+        shot: How to look.
+        kind: "png" or "jpeg".
+        wanted: What is made of them, for messages.
+
+    Raises:
+        InvalidInput: If there is no browser, or it draws nothing.
+    """
+    asked = {"look": shot.look, "numbers": shot.numbers, "type": f"image/{kind}"}
+    asked["moments"] = list(moments)
+    with tempfile.TemporaryDirectory(prefix="vdsm-") as folder:
+        file = Path(folder) / "view.html"
+        drawing = export_page(page, json.dumps(asked), (shot.width, shot.height))
+        file.write_text(drawing, encoding="utf-8")
+        options = ["--dump-dom", f"--window-size={shot.width},{shot.height}"]
+        longest = _START + _EACH * len(moments)
+        told = open_page(file, options, wanted, longest)
+    _, _, drawn = told.rpartition(_BEGIN)
+    found = [base64.b64decode(text) for text in _PICTURE.findall(drawn)]
+    if len(found) != len(moments):
+        message = f"{wanted}: the browser drew {len(found)} of {len(moments)} pictures"
+        raise InvalidInput(message)
+    return found
+
+
+def find_encoder() -> str:
+    """The program that makes films: the variable FFMPEG, or `ffmpeg`.
+
+    Raises:
+        InvalidInput: If there is none.
+    """
+    name = os.environ.get("FFMPEG", "ffmpeg")
+    found = shutil.which(name)
+    if found is None:
+        message = (
+            f"an MP4 needs ffmpeg: {name!r} is not installed; install it, or set "
+            "FFMPEG to its program; .glb and .png do without"
+        )
+        raise InvalidInput(message)
+    return found
+
+
+def encode(frames: Sequence[bytes], file: Path, wanted: Path) -> None:
+    """Make a film of JPEG pictures.
+
+    Raises:
+        InvalidInput: If there is no ffmpeg, or it fails.
+    """
+    encoder = find_encoder()
+    command = [encoder, "-y", "-loglevel", "error", "-f", "image2pipe"]
+    command += ["-framerate", str(FRAMES_PER_SECOND), "-c:v", "mjpeg", "-i", "-"]
+    # What every player understands: colours at half the resolution, black at 16.
+    command += ["-vf", "scale=out_range=tv", "-pix_fmt", "yuv420p"]
+    command += ["-movflags", "+faststart", "-f", "mp4", str(file)]
+    ran = subprocess.run(
+        command, input=b"".join(frames), check=False, capture_output=True
+    )
+    if ran.returncode:
+        told = ran.stderr.decode(errors="replace").strip().splitlines()
+        message = f"{wanted}: {encoder} failed: {told[-1] if told else ran.returncode}"
+        raise InvalidInput(message)

@@ -1,0 +1,250 @@
+"""A problem and its motion as binary glTF 2.0, for other programs' 3D views.
+
+Links are nodes that an animation moves, obstacles are glass, the desired path is a
+line. glTF has metres, y up, and quaternions (x, y, z, w).
+"""
+
+import json
+import struct
+from typing import Any, Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.kinematics import joint_centres, link_frames
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.report.moves import quaternion
+from vdsm_pin.report.palette import link_colours
+from vdsm_pin.report.solids import FINE, Surface, detail, surface
+from vdsm_pin.report.thinning import thinned
+from vdsm_pin.scene import Capsule, Moving, solid_of
+from vdsm_pin.trajectory import Trajectory
+
+_BINARY: Final = 0x4E4F534A, 0x004E4942  # the chunks JSON and BIN
+_FLOATS, _NUMBERS = 5126, 5125
+_POINTS, _INDICES = 34962, 34963
+_LINE: Final = 3
+_KINDS: Final = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+_Y_UP: Final = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
+_GLASS, _GREY, _DARK, _PATH = 0.42, "#8a94a6", "#3b4048", "#d9480f"
+
+
+def glb(problem: PlanningProblem, trajectory: Trajectory, seconds: float) -> bytes:
+    """The bytes of a .glb file.
+
+    Args:
+        problem: Arm, scene and desired path.
+        trajectory: The motion; one row stands still.
+        seconds: How long it plays where it has no times of its own; [s].
+    """
+    file = _File()
+    rows = trajectory if trajectory.is_smooth else _fewer(trajectory)
+    rows = rows.refined(8)
+    clock = file.times(play_times(problem, rows, seconds))
+    parts = [*_arm(file, problem, rows, clock), *_scene(file, problem, rows, clock)]
+    if problem.tip_path is not None:
+        parts.append(file.line("desired path", problem.tip_path.corners, _PATH))
+    matrix = problem.T_world_base.T.ravel().tolist()
+    base = file.node(name="base", matrix=matrix, children=parts)
+    root = file.node(name=problem.name, rotation=_Y_UP, children=[base])
+    return file.packed(root)
+
+
+def play_times(
+    problem: PlanningProblem, rows: Trajectory, seconds: float
+) -> FloatArray:
+    """When each row is reached, from 0, shape (n_samples,); [s].
+
+    By its own times, else so that the joint centre that moves most moves evenly.
+    """
+    if rows.times is not None:
+        return np.asarray(rows.times - rows.times[0])
+    arm = problem.manipulator
+    centres = joint_centres(arm, rows.x0, rows.alpha, rows.theta)
+    steps = np.linalg.norm(np.diff(centres, axis=0), axis=2).max(axis=1, initial=0.0)
+    way = np.append(0.0, np.cumsum(steps + 1e-9))
+    return np.asarray(seconds * way / max(way[-1], 1e-9))
+
+
+def _fewer(trajectory: Trajectory) -> Trajectory:
+    """The rows that a page shows."""
+    chosen = thinned(trajectory, np.zeros(0, dtype=np.int64)).rows
+    if len(chosen) == trajectory.n_samples:
+        return trajectory
+    return trajectory.at(chosen.astype(float))
+
+
+def _arm(
+    file: "_File", problem: PlanningProblem, rows: Trajectory, clock: int
+) -> list[int]:
+    """A node for each link with its tool, and for what the links carry."""
+    arm = problem.manipulator
+    centres = joint_centres(arm, rows.x0, rows.alpha, rows.theta)
+    turns = link_frames(rows.alpha, rows.theta)
+    colours = [*link_colours(arm.n_links), _DARK]
+    axes = zip(arm.axis_spans, arm.axis_radii, arm.axis_names, strict=True)
+    parts: list[tuple[int, str, Surface, str]] = []
+    for k, ((start, end), radius, name) in enumerate(axes):
+        middle = np.array([(start + end) / 2.0, 0.0, 0.0])
+        axis, half = np.array([1.0, 0.0, 0.0]), float(end - start) / 2.0
+        rod = Capsule(name, middle, axis, half, float(radius))
+        link = min(k + 1, arm.n_links)
+        parts.append((link, name, surface(rod, 1.0, FINE), colours[k]))
+    parts += [(k, s.name, surface(s, 1.0, FINE), _DARK) for k, s in arm.carried]
+    still = np.broadcast_to(np.eye(3), (rows.n_samples, 3, 3))
+    nodes = []
+    for link, name, skin, colour in parts:
+        node = file.node(name=name, mesh=file.mesh(name, skin, colour))
+        turn = turns[:, link - 1] if link else still
+        file.move(node, clock, centres[:, max(0, link - 1)], turn)
+        nodes.append(node)
+    return nodes
+
+
+def _scene(
+    file: "_File", problem: PlanningProblem, rows: Trajectory, clock: int
+) -> list[int]:
+    """A node for each obstacle; what moves is moved."""
+    obstacles, extent = problem.scene.obstacles, problem.manipulator.total_length
+    fine, nodes = detail(len(obstacles)), []
+    for one in obstacles:
+        skin = surface(solid_of(one), extent, fine)
+        mesh = file.mesh(one.name, skin, _GREY, _GLASS)
+        nodes.append(file.node(name=one.name, mesh=mesh))
+        if isinstance(one, Moving):
+            own = one.carrier.path.own_times[:1].repeat(rows.n_samples)
+            poses = one.poses(own if rows.times is None else rows.times)
+            file.move(nodes[-1], clock, poses[:, :3, 3], poses[:, :3, :3])
+    return nodes
+
+
+class _File:
+    """A glTF file while it is made."""
+
+    def __init__(self) -> None:
+        self.bytes = bytearray()
+        self.views: list[dict[str, Any]] = []
+        self.accessors: list[dict[str, Any]] = []
+        self.nodes: list[dict[str, Any]] = []
+        self.meshes: list[dict[str, Any]] = []
+        self.materials: list[dict[str, Any]] = []
+        self.channels: list[dict[str, Any]] = []
+        self.samplers: list[dict[str, Any]] = []
+
+    def values(self, values: FloatArray | IntArray, target: int | None = None) -> int:
+        """Put an array into the file; number of its accessor."""
+        kind = np.dtype("<f4" if values.dtype.kind == "f" else "<u4")
+        flat = np.ascontiguousarray(values, kind)
+        view = {"buffer": 0, "byteOffset": len(self.bytes), "byteLength": flat.nbytes}
+        self.views.append(view | ({} if target is None else {"target": target}))
+        self.bytes += flat.tobytes()
+        table = flat.reshape(len(flat), -1)
+        self.accessors.append(
+            {
+                "bufferView": len(self.views) - 1,
+                "componentType": _FLOATS if kind.kind == "f" else _NUMBERS,
+                "count": len(table),
+                "type": _KINDS[table.shape[1]],
+                "min": table.min(axis=0).tolist(),
+                "max": table.max(axis=0).tolist(),
+            }
+        )
+        return len(self.accessors) - 1
+
+    def times(self, times: FloatArray) -> int:
+        """The moments of the animation; [s]."""
+        return self.values(times)
+
+    def node(self, **fields: Any) -> int:
+        """A node with these properties."""
+        self.nodes.append(fields)
+        return len(self.nodes) - 1
+
+    def mesh(self, name: str, skin: Surface, colour: str, opacity: float = 1.0) -> int:
+        """A mesh of triangles; without normals viewers shade its faces flat."""
+        attributes = {"POSITION": self.values(skin.vertices, _POINTS)}
+        if skin.round:
+            attributes["NORMAL"] = self.values(_normals(skin), _POINTS)
+        part = {
+            "attributes": attributes,
+            "indices": self.values(skin.triangles.ravel(), _INDICES),
+            "material": self.material(colour, opacity),
+        }
+        self.meshes.append({"name": name, "primitives": [part]})
+        return len(self.meshes) - 1
+
+    def line(self, name: str, points: FloatArray, colour: str) -> int:
+        """A node with a polyline, shape (n, 3); [m]."""
+        part = {
+            "attributes": {"POSITION": self.values(points, _POINTS)},
+            "mode": _LINE,
+            "material": self.material(colour, 1.0),
+        }
+        self.meshes.append({"name": name, "primitives": [part]})
+        return self.node(name=name, mesh=len(self.meshes) - 1)
+
+    def material(self, colour: str, opacity: float) -> int:
+        """A dull colour #rrggbb."""
+        channels = np.array([int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5)])
+        linear = np.where(
+            channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4
+        )
+        surface_look = {
+            "baseColorFactor": [*linear.tolist(), opacity],
+            "metallicFactor": 0.0,
+            "roughnessFactor": 0.6,
+        }
+        look = {"pbrMetallicRoughness": surface_look, "doubleSided": True}
+        look |= {"alphaMode": "BLEND"} if opacity < 1.0 else {}
+        if look not in self.materials:
+            self.materials.append(look)
+        return self.materials.index(look)
+
+    def move(
+        self, node: int, clock: int, places: FloatArray, turns: FloatArray
+    ) -> None:
+        """Animate a node: places (n, 3) [m] and rotations (n, 3, 3) [-]."""
+        around = np.array([quaternion(turn) for turn in turns])
+        for k in range(1, len(around)):  # either sign is right; the nearer one is short
+            if around[k] @ around[k - 1] < 0.0:
+                around[k] = -around[k]
+        for path, values in (("translation", places), ("rotation", around)):
+            self.nodes[node][path] = values[0].tolist()
+            sampler = {"input": clock, "output": self.values(values)}
+            self.samplers.append(sampler)
+            target = {"node": node, "path": path}
+            self.channels.append({"sampler": len(self.samplers) - 1, "target": target})
+
+    def packed(self, root: int) -> bytes:
+        """The whole file."""
+        motion = {"channels": self.channels, "samplers": self.samplers}
+        content = {
+            "asset": {"version": "2.0", "generator": "vdsm-pin"},
+            "scene": 0,
+            "scenes": [{"nodes": [root]}],
+            "nodes": self.nodes,
+            "meshes": self.meshes,
+            "materials": self.materials,
+            "animations": [{"name": "motion", **motion}],
+            "accessors": self.accessors,
+            "bufferViews": self.views,
+            "buffers": [{"byteLength": len(self.bytes)}],
+        }
+        text = json.dumps(content, separators=(",", ":"), allow_nan=False).encode()
+        chunks = (text + b" " * (-len(text) % 4), bytes(self.bytes))
+        body = b"".join(
+            struct.pack("<II", len(chunk), kind) + chunk
+            for kind, chunk in zip(_BINARY, chunks, strict=True)
+        )
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
+
+
+def _normals(skin: Surface) -> FloatArray:
+    """Directions out of a smooth surface at its corners, shape (n, 3); [-]."""
+    corners = skin.vertices[skin.triangles]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    found = np.zeros_like(skin.vertices)
+    for k in range(3):
+        np.add.at(found, skin.triangles[:, k], across)
+    size = np.linalg.norm(found, axis=1, keepdims=True)
+    return np.where(size > 0.0, found / np.where(size > 0.0, size, 1.0), [0, 0, 1.0])
