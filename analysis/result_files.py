@@ -30,7 +30,7 @@ def write_table(folder: Path, name: str, rows: Sequence[Any], text: str) -> None
         text: The same for reading.
     """
     plain = [row if isinstance(row, dict) else asdict(row) for row in rows]
-    content = json.dumps(plain, indent=1) + "\n"
+    content = "[\n" + ",\n".join(map(json.dumps, plain)) + "\n]\n"
     (folder / f"{name}.json").write_text(content, encoding="utf-8")
     (folder / f"{name}.md").write_text(text, encoding="utf-8")
     print(text)

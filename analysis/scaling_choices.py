@@ -12,23 +12,32 @@ clearance? Four ways to place the joints' projections P_i for a tip T are compar
 
 For each the smallest largest psi is told too. Every choice but the first changes one
 link angle more.
+
+Then `ratios` of the problem file, which hold for a whole path: on a lattice of scaling
+centres, of one ratio and of cylinders, how many draw all of it, and with which angles.
 """
 
 import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from result_files import output_folder, write_table
 
 from benchmarks.hrm1000.generate import generate
+from vdsm_pin.errors import Infeasible
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.kinematics import joint_angles, link_angles
 from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.scaling import OtherRatios, ProjectionCylinder, Scaling, ScalingCentre
 from vdsm_pin.verification.link_clearance import link_clearance
 
 PAPER = ("obs1", "obs2", "obs2-small", "obs3")
+WHOLE = ("free", *PAPER)
 FAMILIES = ("prismatic_x", "crossing", "clutter", "wall", "narrow")
 PER_FAMILY = 3
 """Problems of each family."""
@@ -36,6 +45,10 @@ SPACING = 0.15
 """Distance of the tip positions; [m]."""
 LATTICE = 0.06
 """Step of the slopes P / s that are tried; [-]."""
+CYLINDERS = {
+    "cylinder, R 1.31 to 2 m": (1.31, 1.4, 1.6, 1.8, 2.0),
+    "cylinder, R 3 to 100 m": (3.0, 5.0, 10.0, 100.0),
+}
 NAMES = ("constant", "varying ratios", "another centre")
 
 
@@ -134,6 +147,78 @@ def _medians(angles: FloatArray) -> list[float | None]:
     return [round(value, 1) if np.isfinite(value) else None for value in values]
 
 
+def settings(arm: Manipulator) -> Iterator[tuple[str, Scaling | None]]:
+    """Every setting of `ratios` that is tried, by the name of its kind."""
+    yield "constant", None
+    for joint in range(2, arm.n_links + 1):
+        for factor in np.arange(0.5, 1.51, 0.05):
+            knots = [0.0, arm.ratios[joint - 1], 1.0]
+            ratios = np.interp(arm.ratios, knots, [0.0, factor * knots[1], 1.0])
+            yield "one ratio times 0.5 to 1.5", OtherRatios(ratios[1:-1])
+        for y in np.arange(-0.5, 0.51, 0.05):
+            for z in np.arange(-0.5, 0.51, 0.05):
+                yield "another centre", ScalingCentre(np.array([y, z]), joint)
+    for kind, radii in CYLINDERS.items():
+        for radius in radii:
+            for axis in ("y", "z"):
+                yield kind, ProjectionCylinder(radius, axis)
+
+
+def whole(problem: PlanningProblem) -> list[dict[str, object]]:
+    """What the settings of each kind do for a whole path, kind by kind."""
+    found: dict[str, list[list[float]]] = {}
+    asked: dict[str, int] = {}
+    for kind, scaling in settings(problem.manipulator):
+        asked[kind] = asked.get(kind, 0) + 1
+        found.setdefault(kind, [])
+        own = replace(problem, scaling=scaling)
+        try:
+            plan = plan_paper(own, link_clearance(own), np.zeros(0))
+        except Infeasible:
+            continue
+        if len(plan.undrawn):
+            continue
+        motion = plan.trajectory
+        psi = link_angles(motion.alpha, motion.theta)
+        changed = float((psi > np.deg2rad(0.01)).sum(axis=1)[motion.on_path].mean())
+        best = [np.rad2deg(psi.max()), float(np.ptp(motion.x0)), changed]
+        found[kind].append(best)
+    return [
+        {
+            "scene": f"paper/{problem.name}",
+            "ratios": kind,
+            "tried": count,
+            "drawn": len(found[kind]),
+            "best": np.round(min(found[kind], default=[]), 3).tolist(),
+        }
+        for kind, count in asked.items()
+    ]
+
+
+def whole_table(rows: list[dict[str, object]]) -> str:
+    """What holds for a whole path, as Markdown."""
+    lines = [
+        "",
+        "## Held along a whole path",
+        "",
+        "The `ratios` of the problem file. Constant ratios go round obstacles by",
+        "Step 5, the others do not. Angles and stroke are those of the setting that",
+        "draws the whole path with the least psi; where none does, there is no row.",
+        "",
+        "| scene | ratios | tried | draw it all | largest psi [deg] | "
+        "stroke of x0 [mm] | changed link angles, mean |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for one in rows:
+        if not one["drawn"]:
+            continue
+        psi, stroke, changed = one["best"]  # type: ignore[misc]
+        best = f"{psi:.2f} | {1e3 * stroke:.0f} | {changed:.2f}"
+        cells = [one["scene"], one["ratios"], one["tried"], one["drawn"], best]
+        lines.append("| " + " | ".join(map(str, cells)) + " |")
+    return "\n".join(lines) + "\n"
+
+
 def table(rows: list[dict[str, object]]) -> str:
     """The rows as Markdown."""
     lines = [
@@ -168,7 +253,11 @@ def main() -> None:
                 found.append(measured(read_problem(path).problem))
         rows.append(row(f"{PER_FAMILY} of {family}", np.concatenate(found)))
         print(rows[-1], flush=True)
-    write_table(folder, "scaling_choices", rows, table(rows))
+    held = [
+        one for name in WHOLE for one in whole(read_problem(f"paper/{name}").problem)
+    ]
+    text = table(rows) + whole_table(held)
+    write_table(folder, "scaling_choices", [*rows, *held], text)
 
 
 if __name__ == "__main__":

@@ -36,6 +36,7 @@ LAYERS = {
     "urdf_validator": 4,
     "trajectory": 5,
     "pointing": 5,
+    "scaling": 5,
     "problem": 6,
     "io": 7,
     "planner": 8,

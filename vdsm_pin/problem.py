@@ -14,6 +14,7 @@ from vdsm_pin.geometry.arrays import FloatArray, frozen, running_sums
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.pointing import Pointing
+from vdsm_pin.scaling import Scaling
 from vdsm_pin.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M, in_mm
@@ -265,6 +266,8 @@ class PlanningProblem(Summarised):
         goal: Where a motion without tip path ends; None where anywhere will do.
         errors: How far the motion, base and obstacles may be off: every clearance is
             asked for under them.
+        scaling: What takes the place of constant ratios about the rail in the paper's
+            Step 3; None for those.
         source: Where it was read; None where it was built in Python or changed since.
 
     Raises:
@@ -285,6 +288,7 @@ class PlanningProblem(Summarised):
     start: Posture | None = None
     goal: Posture | None = None
     errors: ErrorBox = field(default_factory=ErrorBox)
+    scaling: Scaling | None = None
     source: ProblemSource | None = field(default=None, init=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -304,6 +308,8 @@ class PlanningProblem(Summarised):
         if self.tip_path is not None and (self.start or self.goal):
             message = "start and goal belong to problems without tip_path"
             raise InvalidInput(message)
+        if self.scaling is not None:
+            self.scaling.check(self.manipulator.n_links)
         for name in self.scene.names:
             if name in self.manipulator.body_names:
                 message = f"obstacle {name!r}: a body of the arm has this name"

@@ -160,6 +160,9 @@ def _plan_at_rest(
 ) -> Refinement:
     """The same where nothing moves."""
     plan_with = with_ends(problem, strategy(strategy_name))
+    if problem.scaling is not None and strategy_name != "paper":
+        message = f"strategy {strategy_name!r} does not read ratios, which 'paper' does"
+        raise NoPlanFound(message)
     known = with_known_insides(with_path(problem))
     clearance = within_time(link_clearance(known.problem), deadline)
     rounds: list[Round] = []

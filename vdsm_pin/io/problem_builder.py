@@ -18,6 +18,12 @@ from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.scaling import (
+    OtherRatios,
+    ProjectionCylinder,
+    Scaling,
+    ScalingCentre,
+)
 from vdsm_pin.scene import HalfSpace, Moving, Scene, solid_of
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -73,6 +79,7 @@ def build_problem(
         start=postures.start(model.start, ("start",)) if model.start else None,
         goal=postures.goal(model.goal, ("goal",)) if model.goal else None,
         errors=_errors(model.errors, frame, (arm.n_links, scene), document),
+        scaling=_scaling(model.ratios, arm, frame, document),
     )
 
 
@@ -132,6 +139,38 @@ def _errors(
             for one in model.obstacles
         ),
     )
+
+
+def _scaling(
+    model: schema.RatiosModel | None,
+    arm: Manipulator,
+    frame: Frame,
+    document: YamlDocument,
+) -> Scaling | None:
+    """What takes the place of constant ratios about the rail."""
+    if model is None:
+        return None
+    given = (model.values, model.scaling_centre, model.cylinder_radius)
+    if sum(one is not None for one in given) != 1:
+        problem = "expected one of values, scaling_centre and cylinder_radius"
+        raise document.invalid(("ratios",), problem)
+    if (model.joint is None) != (model.scaling_centre is None):
+        problem = "expected scaling_centre and joint together"
+        raise document.invalid(("ratios",), problem)
+    try:
+        found: Scaling
+        if model.values is not None:
+            found = OtherRatios(np.array(model.values))
+        elif model.scaling_centre is not None and model.joint is not None:
+            centre = frame.metres(np.array(model.scaling_centre))
+            found = ScalingCentre(np.asarray(centre), model.joint)
+        else:
+            radius = float(frame.metres(model.cylinder_radius))
+            found = ProjectionCylinder(radius, model.cylinder_axis)
+        found.check(arm.n_links)
+    except InvalidInput as error:
+        raise document.invalid(("ratios",), str(error)) from None
+    return found
 
 
 def _tip_tolerance(

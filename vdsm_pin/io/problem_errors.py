@@ -27,6 +27,7 @@ _MODELS: Final[Mapping[str | int, type[FileModel]]] = {
     "tool": schema.ToolModel,
     "feed": schema.FeedModel,
     "errors": schema.ErrorsModel,
+    "ratios": schema.RatiosModel,
     "base": schema.BasePoseModel,
     "tip_path": schema.TipPathModel,
     "pointing": schema.PointingModel,

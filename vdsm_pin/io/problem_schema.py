@@ -36,6 +36,8 @@ Retreat: TypeAlias = Annotated[
 ]
 """A length, or the word home."""
 
+Pair: TypeAlias = Annotated[list[Number], Field(min_length=2, max_length=2)]
+
 Lengths: TypeAlias = Annotated[
     list[Positive], Field(min_length=2, max_length=MAX_LINKS)
 ]
@@ -314,6 +316,30 @@ class TipPathModel(FileModel):
     )
 
 
+class RatiosModel(FileModel):
+    """What takes the place of constant ratios about the rail, one of the three."""
+
+    values: Annotated[list[Number], Field(max_length=MAX_LINKS)] | None = Field(
+        default=None, description="k_2 to k_N in P_i = k_i T, with the tip's T [-]."
+    )
+    scaling_centre: Pair | None = Field(
+        default=None,
+        description="y and z in the base's frame over which `joint` stays while the "
+        "path is drawn; joints after it are scaled about it [length_unit].",
+    )
+    joint: int | None = Field(
+        default=None, ge=2, description="Joint of the scaling centre, 2 to N."
+    )
+    cylinder_radius: Positive | None = Field(
+        default=None,
+        description="Of the cylinder onto which points are projected along x, and on "
+        "which they are scaled [length_unit].",
+    )
+    cylinder_axis: Literal["y", "z"] = Field(
+        default="z", description="Axis of the base along which it touches x = 0."
+    )
+
+
 class ObstacleErrorModel(FileModel):
     """How far one obstacle may be off."""
 
@@ -395,6 +421,11 @@ class ProblemModel(FileModel):
     errors: ErrorsModel = Field(
         default=ErrorsModel(),
         description="Every clearance is asked for under them. Default: none.",
+    )
+    ratios: RatiosModel | None = Field(
+        default=None,
+        description="How strategy `paper` scales the path to the joints. Default: in "
+        "the ratios of the arm's lengths, about the rail.",
     )
     required_clearance: NotNegative = Field(
         description="Between the surfaces of arm and obstacles [length_unit]."

@@ -61,6 +61,15 @@ def scaling_step(moment: Moment) -> Part:
     """Step 3 (3.4-3.5, Eq. 5, 6)."""
     arm = moment.plan.problem.manipulator
     last = arm.n_links + 1
+    words = (
+        f"The reference is the straight arm: Pᵢ = kᵢ,{last} {name('P', last)}, "
+        f"with kᵢ,{last} the length up to joint i over the whole length."
+    )
+    if moment.plan.problem.scaling is not None:
+        words = (
+            "The reference is placed as `ratios` in the problem file asks for; kᵢ,"
+            f"{last} are those of the straight arm, from which it comes."
+        )
     made = pictures.canvas(moment, pictures.VIEWS["y"])
     pictures.chain(made, arm, moment.reference, "P")
     rows = [
@@ -70,10 +79,7 @@ def scaling_step(moment: Moment) -> Part:
     return Part(
         "Step 3: scale the tip's path to the joints",
         "sections 3.4, 3.5, Eq. 5, 6",
-        (
-            f"The reference is the straight arm: Pᵢ = kᵢ,{last} {name('P', last)}, "
-            f"with kᵢ,{last} the length up to joint i over the whole length.",
-        ),
+        (words,),
         (table(("", f"kᵢ,{last}", "y [mm]", "z [mm]"), rows),),
         (made.svg("the straight arm and the shadow of the obstacles"),),
     )

@@ -54,10 +54,14 @@ class OnlineRule:
         """The rule of a plan of the strategy `paper`.
 
         Raises:
-            ValueError: If it is of another strategy.
+            ValueError: If it is of another strategy, or with other ratios, which the
+                arm takes on by and by.
         """
         if plan.steps is None:
             message = f"the strategy is {plan.strategy!r}, expected 'paper'"
+            raise ValueError(message)
+        if plan.problem.scaling is not None:
+            message = "the plan has ratios of its own, expected those of the arm"
             raise ValueError(message)
         return cls(plan.problem, plan.steps.avoidance)
 

@@ -10,8 +10,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.feasibility import check_feasibility
 from vdsm_pin.planner.paper.avoidance import Avoidance, Straight, avoidances
 from vdsm_pin.planner.paper.lift import lift
-from vdsm_pin.planner.paper.project import project
-from vdsm_pin.planner.paper.scale import scale
+from vdsm_pin.planner.paper.scale import references
 from vdsm_pin.planner.paper.solve import solve
 from vdsm_pin.planner.paper.steps import PaperSteps
 from vdsm_pin.planner.paper.tip_path import Route, subdivided
@@ -111,6 +110,8 @@ def _best_motion(
     motion = _motion(problem, straight, straight.route(np.inf))
     if straight.clearance(motion.centres) >= problem.required_clearance:
         return motion
+    if problem.scaling is not None:
+        _refuse_scaled(problem, straight.clearance(motion.centres))
     best: PaperSteps | None = None
     missing, reason, grazing = np.inf, None, np.inf
     for avoidance in avoidances(problem, margins):
@@ -145,8 +146,7 @@ def _motion(problem: PlanningProblem, avoidance: Avoidance, route: Route) -> Pap
     manipulator = problem.manipulator
     for _ in range(SUBDIVISIONS):
         points = route.tip_path.points
-        tip = project(points)  # Step 2
-        reference = scale(manipulator, tip)  # Step 3
+        reference = references(problem, route.tip_path)  # Steps 2 and 3
         planar = avoidance.joints(route, reference)  # Step 5
         centres = lift(manipulator, planar, points[:, 0])  # Step 6
         trajectory = solve(manipulator, route, centres)  # Step 7
@@ -167,6 +167,15 @@ def _motion(problem: PlanningProblem, avoidance: Avoidance, route: Route) -> Pap
     message = (
         f"a joint turns by {np.rad2deg(steps.max()):.1f} deg at once near waypoint "
         f"{int(np.argmax(steps))}: the paper's rule is not continuous there"
+    )
+    raise NoPlanFound(message)
+
+
+def _refuse_scaled(problem: PlanningProblem, clearance: float) -> None:
+    message = (
+        f"with the ratios that are asked for the links come within {in_mm(clearance)} "
+        f"of an obstacle, {in_mm(problem.required_clearance)} are required; the "
+        "paper's rule goes round obstacles with constant ratios about the rail only"
     )
     raise NoPlanFound(message)
 
