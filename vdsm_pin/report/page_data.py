@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -212,7 +212,13 @@ def view_data(problem: PlanningProblem, trajectory: Trajectory) -> str:
 
 
 def impasse_data(problem: PlanningProblem, place: Impasse) -> str:
-    """The data of a page about a search without a plan: the arm where it ended."""
+    """The data of a page about a search without a plan: the arm where it ended.
+
+    What moves is drawn as it comes to rest, which is what plans are made for.
+    """
+    if problem.scene.moving:
+        still = problem.scene.at_time(problem.scene.rest_time)
+        problem = replace(problem, scene=still)
     scene = problem.scene.obstacles
     # The obstacle in the way is shown, however many there are.
     first = sorted(range(len(scene)), key=lambda k: scene[k].name != place.obstacle)
