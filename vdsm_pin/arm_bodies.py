@@ -33,6 +33,7 @@ class ArmBody:
         piece: The solid.
         axial: Whether it is the whole axis of its link, grown by a radius.
         carried: Whether it is none of the arm's own: links, tool and feed.
+        of: The body that it is a part of; empty where it is no part.
     """
 
     name: str
@@ -40,11 +41,12 @@ class ArmBody:
     piece: Hull | FlatCylinder
     axial: bool = False
     carried: bool = False
+    of: str = ""
 
     @property
     def owner(self) -> str:
-        """The name without the number of its part."""
-        return self.name.split(PART)[0]
+        """The name of the whole."""
+        return self.of or self.name
 
     @property
     def corners(self) -> FloatArray:
@@ -103,7 +105,7 @@ def arm_bodies(arm: Manipulator) -> tuple[ArmBody, ...]:
         pieces = convex_cover(body)
         for k, piece in enumerate(pieces, start=1):
             part = f"{body.name}{PART}{k}" if len(pieces) > 1 else body.name
-            found.append(ArmBody(part, body.link, piece, carried=True))
+            found.append(ArmBody(part, body.link, piece, carried=True, of=body.name))
     return tuple(found)
 
 

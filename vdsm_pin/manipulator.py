@@ -222,8 +222,8 @@ class Manipulator:
             raise InvalidInput(message)
         names = {*self.axis_names, TOOL, FEED}
         for body in self.bodies:
-            if body.name in names:
-                message = f"body {body.name!r}: another body has this name"
+            if body.name in names or self.owner_of(body.name) != body.name:
+                message = f"body {body.name!r}: another body, or a part, has this name"
                 raise InvalidInput(message)
             names.add(body.name)
             if not 1 <= body.link <= self.n_links or body.parts < 1:
@@ -269,7 +269,7 @@ class Manipulator:
             InvalidInput: If neither is a body, or both are the same one.
         """
         own = self.body_names
-        bodies = [name.split(PART)[0] in own for name in pair]
+        bodies = [self.owner_of(name) in own for name in pair]
         for name, is_body in zip(pair, bodies, strict=True):
             if not is_body and name not in obstacles:
                 known = (*own, *obstacles)
@@ -278,9 +278,16 @@ class Manipulator:
             message = f"{list(pair)} are not a body and what it is held apart from"
             raise InvalidInput(message)
 
+    def owner_of(self, name: str) -> str:
+        """The body that a name is of, or of a part of; any other name as it is."""
+        owner = name.rpartition(PART)[0]
+        return owner if owner in (body.name for body in self.bodies) else name
+
     def ignores(self, one: str, other: str) -> bool:
         """Whether two named bodies, or parts of bodies, are not to be held apart."""
-        names = {one, one.split(PART)[0]}, {other, other.split(PART)[0]}
+        if not self.ignore_pairs:
+            return False
+        names = {one, self.owner_of(one)}, {other, self.owner_of(other)}
         return any(
             (a in names[0] and b in names[1]) or (b in names[0] and a in names[1])
             for a, b in self.ignore_pairs

@@ -311,7 +311,7 @@ class PlanningProblem(Summarised):
         if self.scaling is not None:
             self.scaling.check(self.manipulator.n_links)
         for name in self.scene.names:
-            if name in self.manipulator.body_names:
+            if self.manipulator.owner_of(name) in self.manipulator.body_names:
                 message = f"obstacle {name!r}: a body of the arm has this name"
                 raise InvalidInput(message)
         for posture in (self.begin, self.goal):

@@ -45,7 +45,7 @@ def problem_in(folder: Path, arm: Any, obstacles: Any, **more: Any) -> Path:
         "obstacles": obstacles,
         "required_clearance": 0.005,
     }
-    path.write_text(yaml.safe_dump(data | more))
+    path.write_text(yaml.safe_dump(json.loads(json.dumps(data | more))))
     return path
 
 
@@ -374,3 +374,53 @@ def test_random_bodies_by_the_hundred(tmp_path: Path) -> None:
         (folder := tmp_path / str(seed)).mkdir()
         count += run_random(folder, seed)[0]
     assert 30 < count < 270
+
+
+def test_an_obstacle_may_be_named_like_a_part_of_a_mesh(tmp_path: Path) -> None:
+    post = BALL | {"name": "post part 2"}
+    file = problem_in(tmp_path, {"bodies": [CAMERA]}, [post])
+    problem = read_problem(file).problem
+    motion = motion_in(tmp_path, np.zeros((2, 7)))
+    robot = load_robot(problem.manipulator)
+    found = verify(problem, read_trajectory(motion, problem.manipulator), robot)
+    names = {near.pair.obstacle for near in found.approaches}
+    assert "post part 2" in names
+    assert not [c for c in found.checks if c.where.startswith("not done")]
+
+
+def test_a_pair_left_out_leaves_out_no_other_name(tmp_path: Path) -> None:
+    """`post` is ignored; `post part 2`, another obstacle, is not."""
+    near = BALL | {"center": [1.25, 0.09, 0.0]}  # it meets the camera
+    both = [near, near | {"name": "post part 2"}]
+    for names, verdict in (
+        ([["camera", "post"]], Verdict.REFUTED),
+        ([["camera", "post"], ["camera", "post part 2"]], Verdict.CERTIFIED),
+    ):
+        arm = {"bodies": [CAMERA], "ignore_pairs": names}
+        file = problem_in(tmp_path, arm, both)
+        source, found = judged(file, motion_in(tmp_path, np.zeros((2, 7))))
+        check = next(c for c in found.checks if c.name == "clearance from obstacles")
+        assert check.verdict is verdict
+        pairs = {(p.own, p.obstacle) for p in found.pairs}
+        assert (("camera", "post part 2") in pairs) == (verdict is Verdict.REFUTED)
+        assert source.problem.scene.names == ("post", "post part 2")
+
+
+@pytest.mark.parametrize("name", ["camera", "camera part 2"])
+def test_no_two_things_share_a_name_or_that_of_a_part(
+    tmp_path: Path, name: str
+) -> None:
+    file = problem_in(tmp_path, {"bodies": [CAMERA]}, [BALL | {"name": name}])
+    with pytest.raises(InvalidFile, match=r"obstacles\[0\].name.*a body of the arm"):
+        read_problem(file)
+    bodies = [CAMERA, CAMERA | {"name": name}]
+    with pytest.raises(InvalidFile, match=r"body|called already"):
+        read_problem(problem_in(tmp_path, {"bodies": bodies}, []))
+
+
+def test_a_body_may_be_named_like_a_part_of_none(tmp_path: Path) -> None:
+    lens = CAMERA | {"name": "lens part 1"}
+    file = problem_in(tmp_path, {"bodies": [lens]}, [BALL])
+    _, found = judged(file, motion_in(tmp_path, np.zeros((2, 7))))
+    assert ("lens part 1", "post") in {(p.own, p.obstacle) for p in found.pairs}
+    assert any("carried and moving bodies by Coal" in c.name for c in found.checks)

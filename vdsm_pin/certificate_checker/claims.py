@@ -188,7 +188,8 @@ class Check:
 
     def _ignored(self, one: str, other: str) -> bool:
         """Whether the problem leaves two names, or parts of what they name, out."""
-        mine, theirs = ({name, name.split(" part ")[0]} for name in (one, other))
+        own = {body.name for body in self.arm.bodies}
+        mine, theirs = ({n, *({n.rpartition(" part ")[0]} & own)} for n in (one, other))
         return any(
             (a in mine and b in theirs) or (b in mine and a in theirs)
             for a, b in self.arm.ignore_pairs

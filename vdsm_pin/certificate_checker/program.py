@@ -108,9 +108,8 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
     rows = read_trajectory(trajectory, source.problem.manipulator, "linear")
     sha256, reason = sha256_of_file(trajectory), ""
     hashes = {"problem_sha256": source.sha256, "trajectory_sha256": sha256}
-    if source.problem.scene.moving:
-        name = source.problem.scene.moving[0].name
-        reason = printable(f"obstacle {name!r} moves, which is not rechecked yet")
+    if moving := source.problem.scene.moving:
+        reason = printable(f"{moving[0].name!r} moves, which is not rechecked yet")
         return Outcome(False, reason, 0, 0, ())
     with ctx.workprec(PRECISION):
         check = Check(source.problem, rows, hashes)

@@ -1,7 +1,7 @@
 """Solids of a problem file, obstacles and what links carry, in metres."""
 
 import re
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import singledispatchmethod
 from pathlib import Path
@@ -21,6 +21,7 @@ from vdsm_pin.io.motion_builder import FLOATING, rigid_carrier
 from vdsm_pin.io.motion_schema import MotionModel, MovableModel
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
+from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import UNITS_PER_METRE
 
@@ -60,20 +61,20 @@ class ObstacleBuilder:
     origin: str = "the base"
 
     def build_scene(
-        self, models: Sequence[MovableModel], bodies: Collection[str]
+        self, models: Sequence[MovableModel], arm: Manipulator
     ) -> scene.Scene:
         """All obstacles, in file order.
 
         Args:
             models: Of the file.
-            bodies: Names that bodies of the arm have.
+            arm: Whose bodies have names too.
 
         Raises:
             InvalidFile: If one is not a solid, has a body's name, or two share one.
         """
         obstacles = self.build_all(models, ("obstacles",))
         for i, model in enumerate(models):
-            if model.name in bodies:
+            if arm.owner_of(model.name) in arm.body_names:
                 problem = f"is {model.name!r}, which a body of the arm is called"
                 raise self.document.invalid(("obstacles", i, "name"), problem)
         return scene.Scene(obstacles)

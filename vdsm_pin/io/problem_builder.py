@@ -59,7 +59,7 @@ def build_problem(
     self_clearance = float(frame.metres(model.required_self_clearance))
     _check_links_apart(arm, self_clearance, frame, document)
     obstacles = ObstacleBuilder(document, folder, frame, arm.total_length, digest)
-    scene = obstacles.build_scene(model.obstacles, arm.body_names)
+    scene = obstacles.build_scene(model.obstacles, arm)
     arms = OtherArms(document, frame, folder, digest)
     scene = _joined(scene, arms.build(model.others), document)
     _check_ignored(arm, scene.names, document)

@@ -12,7 +12,6 @@ from typing import Any, Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.manipulator import PART
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import RobotModel
 from vdsm_pin.scene import Mesh, Moving, solid_of
@@ -137,8 +136,8 @@ def _groups(
     carried = {solid.name for _, solid in arm.carried}
     moving = {one.name for one in problem.scene.moving}
     for number, pair in enumerate(pairs):
-        names = pair.own.split(PART)[0], pair.label.split(PART)[0]
-        other = names[1] if not pair.obstacle else ""
+        other = arm.owner_of(pair.other_body)
+        names = arm.owner_of(pair.own), pair.obstacle or other or pair.label
         if carried & {names[0], other} or pair.obstacle in moving:
             found.setdefault(names, []).append(number)
     return {names: np.array(numbers) for names, numbers in found.items()}
