@@ -23,6 +23,7 @@ from vdsm_pin.kinematics import joint_centres, link_frames
 from vdsm_pin.report.film import Shot, pictures
 from vdsm_pin.report.gltf import glb, play_times
 from vdsm_pin.report.html import view_page
+from vdsm_pin.trajectory import Trajectory
 
 Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
 
@@ -184,3 +185,33 @@ class TestWithABrowser:
         page = view_page(made_up_problem(), trajectory(5))
         with pytest.raises(InvalidInput, match="drew 0 of 1 pictures"):
             pictures(page, [0.0], Shot(), "png", tmp_path / "a.png")
+
+
+@pytest.mark.parametrize("n", [2, 3000])
+def test_gltf_moves_what_moves_between_the_rows_too(tmp_path: Path, n: int) -> None:
+    """A ball that goes out and back in one interval, and rows that are thinned out."""
+    ball = """vdsm_problem: 1
+length_unit: mm
+manipulator: {link_lengths: [300, 300], link_radius: 40, max_link_angle_deg: 40,
+              max_joint_angle_deg: 40}
+obstacles:
+  - {name: ball, shape: sphere, center: [0, 0, 0], radius: 50, motion:
+      {times_s: [1, 2, 3], positions: [[0, 0, 900], [0, 0, 500], [0, 0, 900]]}}
+required_clearance: 5
+"""
+    file = tmp_path / "p.yaml"
+    file.write_text(ball)
+    problem = read_problem(file).problem
+    none, angles = np.zeros(n), np.zeros((2, n, 2))
+    rows = Trajectory(none > 0, none, none, *angles, times=np.linspace(0.0, 4.0, n))
+    content, binary = opened(glb(problem, rows, 1.0))
+    (motion,) = content["animations"]
+    numbers = [k for k, node in enumerate(content["nodes"]) if node["name"] == "ball"]
+    for channel in motion["channels"]:
+        if channel["target"] == {"node": numbers[0], "path": "translation"}:
+            sampler = motion["samplers"][channel["sampler"]]
+            times = array(content, binary, sampler["input"])[:, 0]
+            places = array(content, binary, sampler["output"])
+    heights = np.interp(times, [1.0, 2.0, 3.0], [0.9, 0.5, 0.9])
+    np.testing.assert_allclose(places[:, 2], heights, atol=1e-6)
+    assert places[:, 2].min() < 0.501

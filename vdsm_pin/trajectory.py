@@ -197,10 +197,12 @@ class Trajectory(Summarised):
         return np.interp(moments, np.arange(self.n_samples), self.times)
 
     def at(self, moments: FloatArray) -> "Trajectory":
-        """Rows at moments in waypoints, in any order, without times, shape (m,)."""
+        """Rows at moments in waypoints, shape (m,); with times where those rise."""
         before = np.minimum(moments.astype(np.int64), self.n_samples - 1)
-        joints = self.joints_at(moments)
-        return _of_joints(joints, self.on_path[before], self.path_m[before])
+        joints, times = self.joints_at(moments), self.times_at(moments)
+        if times is not None and not (np.diff(times) > 0.0).all():
+            times = None
+        return _of_joints(joints, self.on_path[before], self.path_m[before], times)
 
     def within(self, interval: int, low: float, high: float) -> "Trajectory":
         """A part of one interval as a motion of two rows; its tip draws nothing.

@@ -13,7 +13,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.kinematics import joint_centres, link_frames
 from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.report.moves import quaternion
+from vdsm_pin.report.moves import quaternion, told_moments
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import FINE, Surface, detail, surface
 from vdsm_pin.report.thinning import thinned
@@ -38,8 +38,7 @@ def glb(problem: PlanningProblem, trajectory: Trajectory, seconds: float) -> byt
         seconds: How long it plays where it has no times of its own; [s].
     """
     file = _File()
-    rows = trajectory if trajectory.is_smooth else _fewer(trajectory)
-    rows = rows.refined(8)
+    rows = _drawn(problem, trajectory)
     clock = file.times(play_times(problem, rows, seconds))
     parts = [*_arm(file, problem, rows, clock), *_scene(file, problem, rows, clock)]
     if problem.tip_path is not None:
@@ -64,6 +63,16 @@ def play_times(
     steps = np.linalg.norm(np.diff(centres, axis=0), axis=2).max(axis=1, initial=0.0)
     way = np.append(0.0, np.cumsum(steps + 1e-9))
     return np.asarray(seconds * way / max(way[-1], 1e-9))
+
+
+def _drawn(problem: PlanningProblem, trajectory: Trajectory) -> Trajectory:
+    """Rows near enough to each other that straight lines between them will do."""
+    rows = trajectory if trajectory.is_smooth else _fewer(trajectory)
+    rows = rows.refined(8)
+    told = [told_moments(one, rows) for one in problem.scene.moving]
+    if not told or rows.times is None:
+        return rows
+    return rows.at(np.unique(np.concatenate([np.arange(rows.n_samples), *told])))
 
 
 def _fewer(trajectory: Trajectory) -> Trajectory:

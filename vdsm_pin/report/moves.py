@@ -35,7 +35,7 @@ def moves(obstacle: Obstacle, trajectory: Trajectory) -> dict[str, Any]:
     """
     if not isinstance(obstacle, Moving):
         return {}
-    moments = _moments(obstacle, trajectory)
+    moments = told_moments(obstacle, trajectory)
     times = trajectory.times_at(moments)
     if times is None:
         times = obstacle.carrier.path.own_times[:1]
@@ -50,7 +50,7 @@ def moves(obstacle: Obstacle, trajectory: Trajectory) -> dict[str, Any]:
     }
 
 
-def _moments(obstacle: Moving, trajectory: Trajectory) -> FloatArray:
+def told_moments(obstacle: Moving, trajectory: Trajectory) -> FloatArray:
     """When to tell where it stands, in waypoints, rising."""
     times, path = trajectory.times, obstacle.carrier.path
     if times is None or len(times) == 1:
