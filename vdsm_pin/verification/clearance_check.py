@@ -1,7 +1,7 @@
 """What the clearance proof comes to: a row for the obstacles and one for the links."""
 
 from dataclasses import replace
-from math import nan
+from math import isnan, nan
 
 import numpy as np
 
@@ -98,10 +98,10 @@ def _first(row: Check, contact: FirstContact) -> Check:
     """The row with the beginning of what it names at its worst."""
     found = "first too close" if contact.clear_before else "first found too close"
     pair = f"{contact.pair.own} and {contact.pair.label}"
-    moment = f"{contact.moment:.6f}".rstrip("0").rstrip(".")
+    moment = _told(contact.moment, contact.time)
     where = f"{row.where}; {found} at waypoint {moment}: {pair}"
     if contact.intervals:
-        last = f"{contact.last:.6f}".rstrip("0").rstrip(".")
+        last = _told(contact.last, contact.last_time)
         runs = "" if contact.stretches == 1 else f" in {contact.stretches} stretches"
         where += f"; last at waypoint {last}; {contact.intervals} intervals{runs}"
     return replace(
@@ -112,6 +112,12 @@ def _first(row: Check, contact: FirstContact) -> Check:
         too_close=contact.intervals,
         stretches=contact.stretches,
     )
+
+
+def _told(moment: float, time: float) -> str:
+    """A moment in waypoints, and its time where that is known."""
+    text = f"{moment:.6f}".rstrip("0").rstrip(".")
+    return text if isnan(time) else f"{text} ({time:.4f} s)"
 
 
 def _refuted(row: Check, found: Counterexample, nominal: bool) -> Check:

@@ -41,6 +41,8 @@ class FirstContact:
         intervals: How many intervals some pair of its kind is too close in; 0 where
             nobody noted them.
         stretches: How many runs of neighbours they make.
+        time: When `moment` is; NaN where rows have no times; [s].
+        last_time: When `last` is; [s].
     """
 
     pair: Pair
@@ -49,6 +51,15 @@ class FirstContact:
     last: float = nan
     intervals: int = 0
     stretches: int = 0
+    time: float = nan
+    last_time: float = nan
+
+    def timed(self, trajectory: Trajectory) -> "FirstContact":
+        """The same with the times of its moments, where there are any."""
+        times = trajectory.times_at(np.array([self.moment, self.last]))
+        if times is None:
+            return self
+        return replace(self, time=float(times[0]), last_time=float(times[1]))
 
 
 class TooClose:
@@ -108,7 +119,7 @@ def first_contacts(
         found = search.first(mine) if proof.counts[mine, REFUTED].any() else None
         if found is not None and noted is not None:
             found = search.with_end(found, mine, noted.of(obstacles=kind))
-        contacts += [] if found is None else [found]
+        contacts += [] if found is None else [found.timed(trajectory)]
     return tuple(contacts)
 
 
