@@ -31,7 +31,7 @@ urdf: $(VENV)/.installed
 
 figures: $(VENV)/.installed
 	$(BIN)/python analysis/figures.py --out reports/paper
-	$(BIN)/python analysis/readme_animation.py --out reports
+	$(BIN)/python analysis/readme_animation.py
 	$(BIN)/python analysis/conventions.py
 	$(BIN)/python analysis/theory_pictures.py
 	$(BIN)/python analysis/architecture_picture.py

@@ -29,7 +29,7 @@ QUALITY: Final = 85
 def run(script: Path, folder: Path) -> Path | None:
     """The first report that an example writes, if it writes one."""
     subprocess.run([sys.executable, str(script)], cwd=folder, check=True)
-    reports = sorted(folder.glob("*.html"))
+    reports = sorted([*folder.glob("*.html"), *folder.glob("*_out/*/report.html")])
     return reports[0] if reports else None
 
 
@@ -48,7 +48,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("examples", nargs="*")
     asked = parser.parse_args().examples
-    scripts = sorted((ROOT / "examples").glob("*.py"))
+    scripts = sorted((ROOT / "examples").rglob("*.py"))
     TARGET.mkdir(exist_ok=True)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=find_browser(), args=FLAGS)

@@ -148,3 +148,18 @@ def test_writers_that_meet_and_are_killed_leave_it_whole(folder: Path) -> None:
 def _is_whole(content: bytes | None) -> bool:
     assert content is not None
     return content == b"first" or content == content[:1] * 300_000
+
+
+def test_it_is_cold_until_machine_code_for_a_plan_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kept, "folders", lambda: iter([tmp_path / "a", tmp_path / "b"]))
+    assert kept.is_cold()
+    (tmp_path / "b").mkdir()
+    for k in range(kept.FEW):
+        (tmp_path / "b" / f"report.html.{k}").touch()
+    assert kept.is_cold(), "templates are no machine code"
+    for k in range(kept.FEW):
+        assert kept.is_cold()
+        (tmp_path / "b" / f"vdsm_pin.planner.{k}").touch()
+    assert not kept.is_cold()

@@ -13,6 +13,9 @@ from typing import Final
 
 _DIGEST: Final = hashlib.sha256
 
+FEW: Final = 30
+"""Functions; planning needs more."""
+
 
 def folders() -> Iterator[Path]:
     """Where files are looked for, and written in the first that can be."""
@@ -20,6 +23,16 @@ def folders() -> Iterator[Path]:
     cache = os.environ.get("XDG_CACHE_HOME")
     with suppress(RuntimeError):  # a user without a home, as in many containers
         yield (Path(cache) if cache else Path.home() / ".cache") / "vdsm_pin"
+
+
+def functions(folder: Path) -> int:
+    """How many functions' machine code is kept in a folder."""
+    return sum(1 for _ in folder.glob("vdsm_pin.*")) if folder.is_dir() else 0
+
+
+def is_cold() -> bool:
+    """Whether most machine code is still to be made, which takes about a minute."""
+    return sum(functions(folder) for folder in folders()) < FEW
 
 
 def read(name: str) -> bytes | None:

@@ -39,6 +39,16 @@ def test_examples_are_short_and_listed() -> None:
         assert str(script.relative_to(FOLDER)) in listed, script
 
 
+def test_every_example_that_writes_a_report_has_its_picture() -> None:
+    listed = (FOLDER / "README.md").read_text(encoding="utf-8")
+    for script in SCRIPTS:
+        if script.stem.startswith("test_"):
+            continue
+        picture = ROOT / "docs" / "gallery" / f"{script.stem}.jpg"
+        assert picture.stat().st_size < 60_000
+        assert f"../docs/gallery/{picture.name}" in listed, script
+
+
 @pytest.mark.pages
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_runs_from_top_to_bottom(

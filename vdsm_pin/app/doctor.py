@@ -84,7 +84,7 @@ def _machine_code() -> Finding:
         what = "switched off by NUMBA_DISABLE_JIT: everything takes much longer"
         return Finding("machine code", what, False, True, "unset NUMBA_DISABLE_JIT")
     for folder in kept.folders():
-        count = sum(1 for _ in folder.glob("vdsm_pin.*")) if folder.is_dir() else 0
+        count = kept.functions(folder)
         try:
             kept.probe(folder)
         except OSError:

@@ -14,7 +14,6 @@ from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.report.film import (
     FRAMES_PER_SECOND,
-    LOOKS,
     Shot,
     encode,
     find_encoder,
@@ -83,9 +82,6 @@ def _check(order: ExportOrder) -> None:
     """Refuse what cannot be done before any work is."""
     if order.out.suffix.lower() not in ENDINGS:
         message = f"{order.out}: ends in none of {', '.join(ENDINGS)}"
-        raise InvalidInput(message)
-    if order.shot.look not in LOOKS:
-        message = f"--look is {order.shot.look!r}, expected one of {', '.join(LOOKS)}"
         raise InvalidInput(message)
     if order.out.suffix.lower() == ".mp4":
         find_encoder()

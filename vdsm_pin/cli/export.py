@@ -35,7 +35,8 @@ def export(
         ),
     ] = None,
     look: Annotated[
-        str, typer.Option(help="overview, side, top, front or tip.")
+        str,
+        typer.Option(help="overview, side, top, front, tip, or from where: 1,-1,0.5."),
     ] = "overview",
     width: Annotated[int, typer.Option(min=64, max=4096, help="In pixels.")] = 1280,
     height: Annotated[int, typer.Option(min=64, max=4096, help="In pixels.")] = 720,
@@ -50,9 +51,9 @@ def export(
     from vdsm_pin.app.export import ExportOrder
     from vdsm_pin.app.export import export as write
     from vdsm_pin.io.problem_file import read_problem
-    from vdsm_pin.report.film import Shot
+    from vdsm_pin.report.film import Shot, look_of
 
-    shot = Shot(look, width - width % 2, height - height % 2, numbers)
+    shot = Shot(look_of(look), width - width % 2, height - height % 2, numbers)
     source = read_problem(problem)
     write(ExportOrder(source, trajectory, out, moment, seconds, shot))
     typer.echo(f"wrote {out}")

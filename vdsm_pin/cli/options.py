@@ -62,7 +62,8 @@ ObstacleTurns = Annotated[
 ]
 
 PlanningTime = Annotated[
-    float, typer.Option(min=0.001, help="Time limit in seconds; inf for none.")
+    float | None,
+    typer.Option(min=0.001, help="Time limit in seconds; 60 by default, inf for none."),
 ]
 TimeLimit = Annotated[
     float | None,

@@ -2,6 +2,7 @@
 
 import time
 from contextlib import nullcontext
+from typing import Final
 
 import typer
 
@@ -27,6 +28,10 @@ from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
 from vdsm_pin.time_limit import Deadline, enforced
 
+LIMIT: Final = 60.0
+COLD_LIMIT: Final = 600.0
+"""Seconds to plan by default; more where machine code is made, once and for all."""
+
 commands = family()
 
 
@@ -46,7 +51,7 @@ def plan(
     base_error_deg: BaseTurn = 0.0,
     obstacle_error_mm: ObstacleErrors = None,
     obstacle_error_deg: ObstacleTurns = None,
-    time_limit: PlanningTime = 60.0,
+    time_limit: PlanningTime = None,
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
@@ -59,6 +64,7 @@ def plan(
     """
     from vdsm_pin.app.workflow import NO_PLAN, plan_to_folder
     from vdsm_pin.io.problem_file import read_problem
+    from vdsm_pin.kept import is_cold
     from vdsm_pin.progress import shown
     from vdsm_pin.report.terminal import show_plan
     from vdsm_pin.report.words import outcome
@@ -70,12 +76,15 @@ def plan(
         obstacle_error_mm,
         obstacle_error_deg,
     )
-    deadline, begin = Deadline.after(time_limit), time.monotonic()
+    limit = time_limit
+    if limit is None:
+        limit = COLD_LIMIT if is_cold() else LIMIT
+    deadline, begin = Deadline.after(limit), time.monotonic()
     page = f"see {out / NO_PLAN}"
     try:
         with enforced(deadline):
             source = read_problem(problem).under(errors)
-            with nullcontext() if quiet or as_json else shown(limit=time_limit):
+            with nullcontext() if quiet or as_json else shown(limit=limit):
                 file = plan_to_folder(source, strategy, out, context.obj, deadline)
     except OutOfTime as error:  # which tells its time itself
         error.args = (f"no plan found: {error}; {page}",)

@@ -2,6 +2,7 @@
 
 import base64
 import json
+import math
 import os
 import re
 import shutil
@@ -31,16 +32,35 @@ class Shot:
     """How a motion is looked at.
 
     Args:
-        look: One of `LOOKS`.
+        look: One of `LOOKS`, or the direction from the scene to the eye in the base
+            frame; [-].
         width: Of a picture; [pixels].
         height: Of a picture; [pixels].
         numbers: Whether links have their numbers.
     """
 
-    look: str = "overview"
+    look: str | tuple[float, float, float] = "overview"
     width: int = 1280
     height: int = 720
     numbers: bool = False
+
+
+def look_of(text: str) -> str | tuple[float, float, float]:
+    """A look by its name or by three numbers, as "1,-1,0.5".
+
+    Raises:
+        InvalidInput: If it is neither.
+    """
+    if text in LOOKS:
+        return text
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        x = y = z = 0.0
+    if math.isfinite(x + y + z) and (x, y, z) != (0.0, 0.0, 0.0):
+        return x, y, z
+    message = f"--look is {text!r}, expected one of {', '.join(LOOKS)}, or as 1,-1,0.5"
+    raise InvalidInput(message)
 
 
 def pictures(
@@ -58,8 +78,12 @@ def pictures(
     Raises:
         InvalidInput: If there is no browser, or it draws nothing.
     """
-    asked = {"look": shot.look, "numbers": shot.numbers, "type": f"image/{kind}"}
-    asked["moments"] = list(moments)
+    asked = {
+        "look": shot.look,
+        "numbers": shot.numbers,
+        "type": f"image/{kind}",
+        "moments": list(moments),
+    }
     with tempfile.TemporaryDirectory(prefix="vdsm-") as folder:
         file = Path(folder) / "view.html"
         drawing = export_page(page, json.dumps(asked), (shot.width, shot.height))

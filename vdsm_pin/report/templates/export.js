@@ -6,7 +6,10 @@
   const asked = JSON.parse(document.getElementById("asked").textContent);
   if (!view) return;
   view.resize();
-  view.look(asked.look);
+  if (Array.isArray(asked.look)) {
+    view.look("overview");
+    view.cameras.fit(asked.look);
+  } else view.look(asked.look);
   view.toggle("numbers", asked.numbers);
   const pictures = asked.moments.map((moment) => {
     motion.go(moment);
