@@ -1,6 +1,7 @@
 """What is asked as compiled code reads it: bodies, pairs, what lies between them."""
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
@@ -79,17 +80,51 @@ def _inverse(solid: Hull | FlatCylinder) -> float:
     return 1.0 / squared if squared > 0.0 else 0.0
 
 
+FEW: Final = 8
+"""Bodies of more corners are not looked through for corners that others have too."""
+
+
 class _PlaceTable:
-    """Collects the places of corners, each once."""
+    """Collects the places of corners, those of small bodies each once."""
 
     def __init__(self, tree: PackedTree) -> None:
         self.ways = WayTable(tree.parent)
         self._tree = tree
-        self._points: dict[tuple[int, bytes, float], int] = {}
+        self._known: dict[tuple[int, bytes, float], int] = {}
+        self._blocks: dict[int, IntArray] = {}
         self._local: dict[tuple[int, int], int] = {}
-        self._rows: list[tuple[int, FloatArray, float]] = []
+        self._frames: list[int] = []
+        self._at: list[FloatArray] = [np.zeros((0, 3))]
+        self._lever: list[FloatArray] = [np.zeros(0)]
+        self._points: list[int] = []
+        self._seen_on: list[int] = []
 
-    def corner(
+    def places(self, bodies: Bodies, body: int, rest: int) -> IntArray:
+        """Where the corners of a body are seen from a frame.
+
+        Returns:
+            Numbers of points in the world; of other places -1 - their number.
+        """
+        corners = slice(bodies.first[body], bodies.first[body + 1])
+        at, lever = bodies.corners[corners], bodies.levers[corners]
+        frame = int(bodies.frame[body])
+        if len(at) > FEW:
+            if body not in self._blocks:
+                self._blocks[body] = self._add(frame, at, lever)
+            points = self._blocks[body]
+            if rest == WORLD:
+                return points
+            way, first = self.ways.number(rest, frame), len(self._points)
+            self._points += points.tolist()
+            self._seen_on += [way] * len(points)
+            return -1 - np.arange(first, first + len(points))
+        found = [
+            self._place(rest, *self._corner(rest, frame, *corner))
+            for corner in zip(at, lever.tolist(), strict=True)
+        ]
+        return np.array(found, dtype=np.int64)
+
+    def _corner(
         self, rest: int, frame: int, at: FloatArray, lever: float
     ) -> tuple[int, int]:
         """The point of a corner and the way on which it is seen.
@@ -105,32 +140,38 @@ class _PlaceTable:
             frame, at = int(tree.parent[joint]), tree.shift[joint]
             lever = float(tree.lever[joint])
         key = (frame, at.tobytes(), lever)
-        if key not in self._points:
-            self._points[key] = len(self._rows)
-            self._rows.append((frame, at, lever))
-        return self._points[key], self.ways.number(rest, frame)
+        if key not in self._known:
+            self._known[key] = int(self._add(frame, at[None], np.array([lever]))[0])
+        return self._known[key], self.ways.number(rest, frame)
 
-    def place(self, rest: int, point: int, way: int) -> tuple[int, int]:
-        """Where a point is seen from: the world, or another frame by its number."""
+    def _place(self, rest: int, point: int, way: int) -> int:
         if rest == WORLD:
-            return -1, point
-        return self._local.setdefault((point, way), len(self._local)), point
+            return point
+        if (point, way) not in self._local:
+            self._local[point, way] = len(self._points)
+            self._points.append(point)
+            self._seen_on.append(way)
+        return -1 - self._local[point, way]
+
+    def _add(self, frame: int, at: FloatArray, lever: FloatArray) -> IntArray:
+        """Numbers of new points of a frame."""
+        first = len(self._frames)
+        self._frames += [frame] * len(at)
+        self._at.append(at)
+        self._lever.append(lever)
+        return np.arange(first, len(self._frames))
 
     def packed(self) -> Places:
         """All places, those in the world first."""
-        frames = [frame for frame, _, _ in self._rows]
-        ways = [self.ways.number(WORLD, frame) for frame in frames]
-        points = list(range(len(frames)))
-        points += [point for point, _ in self._local]
-        ways += [way for _, way in self._local]
-        at = np.array([at for _, at, _ in self._rows]).reshape(-1, 3)
-        lever = np.array([lever for _, _, lever in self._rows])
+        n = len(self._frames)
+        ways = [self.ways.number(WORLD, frame) for frame in self._frames]
+        points = np.array([*range(n), *self._points], dtype=np.int64)
         return Places(
-            n_points=len(frames),
-            point=np.array(points, dtype=np.int64),
-            way=np.array(ways, dtype=np.int64),
-            at=at[points],
-            lever=lever[points],
+            n_points=n,
+            point=points,
+            way=np.array([*ways, *self._seen_on], dtype=np.int64),
+            at=np.concatenate(self._at)[points],
+            lever=np.concatenate(self._lever)[points],
         )
 
 
@@ -153,20 +194,18 @@ def _pack_pairs(
         rests * n + pairs.body, return_index=True, return_inverse=True
     )
     way_of, slot_of = np.zeros((2, each.size), np.int64)
-    found: list[tuple[int, int]] = []
+    found, count = [np.zeros(0, np.int64)], 0
     for k, pair in enumerate(first.tolist()):
         body, rest = int(pairs.body[pair]), int(rests[pair])
         frame = int(bodies.frame[body])
-        way_of[k], slot_of[k] = table.ways.number(rest, frame), len(found)
-        for corner in range(bodies.first[body], bodies.first[body + 1]):
-            at, lever = bodies.corners[corner], float(bodies.levers[corner])
-            found.append(table.place(rest, *table.corner(rest, frame, at, lever)))
-    places = table.packed()
-    slots = [point if k < 0 else places.n_points + k for k, point in found]
+        way_of[k], slot_of[k] = table.ways.number(rest, frame), count
+        found.append(table.places(bodies, body, rest))
+        count += len(found[-1])
+    places, slots = table.packed(), np.concatenate(found)
     packed = pairs._replace(
         way=way_of[number],
         slot=slot_of[number],
-        slots=np.array(slots, dtype=np.int64),
+        slots=np.where(slots < 0, places.n_points - 1 - slots, slots),
     )
     return table.ways.packed(), places, packed
 

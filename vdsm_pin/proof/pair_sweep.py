@@ -39,7 +39,6 @@ from vdsm_pin.proof.layouts import (
 )
 from vdsm_pin.proof.packed_tree import Motion
 from vdsm_pin.proof.results import Results, note_upper
-from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.search import bound_between, new_witness, resolve
 from vdsm_pin.proof.slices import leaf_bracket, loaded_bound
 from vdsm_pin.proof.swept_bodies import to_body
@@ -133,7 +132,7 @@ def _renew_witness(
     own[:] = space.out[NEAR:FAR]
     take_row(rows, local, desk.ends.start)
     to_body(mover, desk.ends.start, own)
-    place_own(mover, rows, desk.runs, plane, BLOCK)
+    place_own(mover, rows, desk.runs, plane, rows.ways.shape[2])
 
 
 @compiled

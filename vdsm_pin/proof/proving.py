@@ -27,6 +27,7 @@ from vdsm_pin.proof.layouts import (
 from vdsm_pin.proof.least_bracket import narrow
 from vdsm_pin.proof.packed_tree import Motion
 from vdsm_pin.proof.results import Candidates, Dense, Results
+from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.search import Witnesses
 from vdsm_pin.proof.terms import CERTIFIED, LINKS, OBSTACLES, UNDECIDED, Task
 from vdsm_pin.proof.witnesses import place_best, place_points
@@ -227,7 +228,9 @@ def new_proving(
     return Proving(
         task=task,
         motion=motion,
-        desk=new_workspace(task, motion.knots.shape[1], budget.slices),
+        desk=new_workspace(
+            task, motion.knots.shape[1], budget.slices, min(BLOCK, n_intervals)
+        ),
         results=new_results(task.pairs.body.size, columns, n_intervals, budget),
         broad=new_broad_phase(task, n_obstacles),
         budget=budget,

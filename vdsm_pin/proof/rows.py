@@ -69,22 +69,22 @@ SWING: Final = 3
 
 
 @compiled
-def new_rows(n_frames: int, n_ways: int, n_places: int) -> Rows:
-    """Fresh working space; the world's frame is set."""
-    frames = np.zeros((n_frames, 3, 3, BLOCK + 1))
+def new_rows(n_frames: int, n_ways: int, n_places: int, block: int) -> Rows:
+    """Fresh working space of so many intervals; the world's frame is set."""
+    frames = np.zeros((n_frames, 3, 3, block + 1))
     for c in range(3):
         frames[0, c, c] = 1.0
     return Rows(
         frames,
-        np.zeros((n_frames, 3, BLOCK + 1)),
+        np.zeros((n_frames, 3, block + 1)),
         Tracks(
-            np.zeros((n_places, 3, BLOCK + 1)),
-            np.zeros((n_places, BLOCK)),
-            np.zeros((n_places, BLOCK)),
+            np.zeros((n_places, 3, block + 1)),
+            np.zeros((n_places, block)),
+            np.zeros((n_places, block)),
         ),
-        np.zeros((n_ways, 4, BLOCK)),
-        np.zeros((n_frames - 1, 3, BLOCK)),
-        np.zeros((8, BLOCK + 1)),
+        np.zeros((n_ways, 4, block)),
+        np.zeros((n_frames - 1, 3, block)),
+        np.zeros((8, block + 1)),
     )
 
 

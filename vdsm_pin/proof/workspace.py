@@ -44,20 +44,23 @@ def forget(planes: FloatArray) -> None:
     planes[:, SUPPORT] = planes[:, HELD_CLEARANCE] = -np.inf
 
 
-def new_workspace(task: Task, n_columns: int, budget: int) -> Workspace:
+def new_workspace(
+    task: Task, n_columns: int, budget: int, block: int = BLOCK
+) -> Workspace:
     """Fresh working space; no pair remembers a plane yet.
 
     Args:
         task: What is asked.
         n_columns: Length of a row of q.
         budget: Most slices of one interval and pair.
+        block: Most intervals whose rows are filled at once, BLOCK at most.
     """
     n_joints, n_ways = task.tree.parent.size, task.ways.rest.size
     corners = int(np.diff(task.bodies.first).max(initial=1))
     planes = np.zeros((task.pairs.body.size, HELD_AT + 3 * corners))
     forget(planes)
     return Workspace(
-        new_rows(n_joints + 1, n_ways, task.places.way.size),
+        new_rows(n_joints + 1, n_ways, task.places.way.size, block),
         new_runs(corners),
         planes,
         new_ends(n_joints + 1, n_ways, n_columns),
@@ -107,7 +110,7 @@ def load_rows(task: Task, mover: Mover, desk: Workspace, first: int, last: int) 
             loaded.discs[0, c] = runs.axis[c, first]
             loaded.discs[1, c] = runs.axis[c, last]
     if not task.rules.steady:
-        interval, way = min(first, BLOCK - 1), mover.way
+        interval, way = min(first, rows.ways.shape[2] - 1), mover.way
         while way >= 0:
             ends.bends.drifts[way] = rows.ways[way, DRIFT, interval]
             ends.bends.turns[way] = rows.ways[way, TURN, interval]

@@ -1,12 +1,13 @@
 """Proof that two bodies meet: a ball that lies in both.
 
 The clearance of two hulls that meet is known to be 0 at most, which refutes no required
-clearance of 0. Coal proposes a point in both; the corners of a small tetrahedron around
-it are proved to lie in a piece of each, so its ball does too.
+clearance of 0. A climb finds a point that is deep in both; the corners of a small
+tetrahedron around it are proved to lie in a piece of each, so its ball does too.
 """
 
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Callable, Iterator, Sequence
+from itertools import product
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -14,52 +15,131 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
+from vdsm_pin.robots.hulls import hull_planes, is_solid
 from vdsm_pin.tolerances import TOLERANCES
 
 CORNERS: Final = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / 3**0.5
 """Of a tetrahedron about the origin whose inner ball has a third of their distance."""
 
-SHARES: Final = (0.5, 0.2, 0.05, 0.01)
-"""Sizes that are tried, as parts of the depth that Coal measures; [-]."""
+SHARES: Final = (0.9, 0.5, 0.1)
+"""Sizes that are tried, as parts of the depth that was climbed to; [-]."""
 
 MOST_PIECES: Final = 64
 """Of bodies of more pieces no common ball is looked for."""
 
+STEPS: Final = 200
+"""Of a climb."""
+
+SHORTER: Final = 0.97
+"""How much shorter each step is than the one before; [-]."""
+
+Slack: TypeAlias = Callable[[FloatArray], tuple[float, FloatArray]]
+"""How deep a point lies in a piece, at most, and the way to lie deeper; [m], [-]."""
+
 
 def common_ball(
-    one: Sequence[Piece], other: Sequence[Piece], point: FloatArray, depth: float
-) -> float:
-    """Radius of a ball proved to lie in a piece of each body; 0 if none is found; [m].
+    one: Sequence[Piece], other: Sequence[Piece], point: FloatArray
+) -> tuple[float, FloatArray]:
+    """A ball proved to lie in a piece of each body.
 
     Args:
         one: Pieces in the world's frame.
         other: Of the other body.
-        point: Where it is looked for, shape (3,); [m].
-        depth: How deep the bodies seem to meet; [m].
+        point: Where it is looked for first, shape (3,); [m].
+
+    Returns:
+        Radius, 0 if none is found, and centre; [m].
     """
     if max(len(one), len(other)) > MOST_PIECES or not np.isfinite(point).all():
-        return 0.0
+        return 0.0, point
     lost = TOLERANCES.bracket_gap + TOLERANCES.arithmetic
-    for share in SHARES:
-        size = share * depth
-        corners = point + size * CORNERS
-        radius = size / 3.0 - lost
-        if radius > 0.0 and _hold(one, corners, lost) and _hold(other, corners, lost):
-            return radius
-    return 0.0
+    for mine, theirs in product(one, other):
+        depth, centre = _climb((_slack(mine), _slack(theirs)), point)
+        for share in SHARES:
+            corners = centre + share * depth * CORNERS
+            radius = share * depth / 3.0 - lost
+            if radius > 0.0 and all(_holds(p, corners, lost) for p in (mine, theirs)):
+                return radius, centre
+    return 0.0, point
 
 
-def _hold(pieces: Sequence[Piece], corners: FloatArray, lost: float) -> bool:
-    """Whether one of the pieces holds all corners, to within what is lost."""
-    n = len(pieces)
-    packed = pack_pieces([[piece] for piece in pieces])
-    ends = np.ascontiguousarray(np.repeat(np.tile(corners, (n, 1))[:, None], 2, axis=1))
-    number = np.repeat(np.arange(n), len(corners))
-    off = row_brackets(packed, ends, number, TOLERANCES.bracket_gap)[:, 1]
-    return bool((off.reshape(n, -1) <= lost).all(axis=1).any())
+def _climb(slacks: tuple[Slack, Slack], start: FloatArray) -> tuple[float, FloatArray]:
+    """The deepest point that steps along slopes find, and how deep it seems to lie.
+
+    The lesser of two concave depths is concave: shortening steps up its slope lead near
+    its top, and steps up both slopes at once along the ridge on which both are equal.
+    """
+    best, where = -np.inf, start
+    longest = max(1e-3, *(abs(slack(start)[0]) for slack in slacks))
+    if not np.isfinite(longest):
+        return best, where
+    for along_ridge in (False, True):
+        at, step = where, longest
+        for _ in range(STEPS):
+            found = [slack(at) for slack in slacks]
+            depth, way = min(found, key=lambda one: one[0])
+            if depth > best:
+                best, where = depth, at
+            elif along_ridge:
+                at, found = where, [slack(where) for slack in slacks]
+            both = found[0][1] + found[1][1]
+            size = float(np.linalg.norm(both))
+            level = abs(found[0][0] - found[1][0]) <= step
+            if along_ridge and level and size > 0.0:
+                way = both / size
+            at, step = at + step * way, SHORTER * step
+    return best, where
 
 
-def in_world(pieces: Sequence[Piece], placement: FloatArray) -> list[Piece]:
+def _slack(piece: Piece) -> Slack:
+    """How deep points lie in a piece; never in one without an inside."""
+    if isinstance(piece, HalfSpacePiece):
+        return lambda x: (piece.offset - float(piece.normal @ x), -piece.normal)
+    if isinstance(piece, FlatCylinder):
+        return lambda x: _in_cylinder(piece, x)
+    if len(piece.points) <= 2:
+        return lambda x: _in_capsule(piece, x)
+    if not is_solid(piece.points):
+        return lambda x: (-np.inf, np.zeros(3))
+    normals, offsets = hull_planes(piece.points)
+
+    def in_hull(x: FloatArray) -> tuple[float, FloatArray]:
+        rooms = offsets - normals @ x
+        k = int(np.argmin(rooms))
+        return float(rooms[k]) + piece.radius, -normals[k]
+
+    return in_hull
+
+
+def _in_cylinder(piece: FlatCylinder, x: FloatArray) -> tuple[float, FloatArray]:
+    along = float(piece.axis @ (x - piece.centre))
+    across = x - piece.centre - along * piece.axis
+    far = float(np.linalg.norm(across))
+    end, side = piece.half_length - abs(along), piece.radius - far
+    if end < side:
+        return end, -np.copysign(1.0, along) * piece.axis
+    return side, -across / far if far > 0.0 else np.zeros(3)
+
+
+def _in_capsule(piece: Hull, x: FloatArray) -> tuple[float, FloatArray]:
+    first, way = piece.points[0], piece.points[-1] - piece.points[0]
+    length = float(way @ way)
+    share = float(np.clip((x - first) @ way / length, 0.0, 1.0)) if length else 0.0
+    off = first + share * way - x
+    far = float(np.linalg.norm(off))
+    return piece.radius - far, off / far if far > 0.0 else np.zeros(3)
+
+
+def _holds(piece: Piece, corners: FloatArray, lost: float) -> bool:
+    """Whether a piece holds all corners, to within what is lost."""
+    ends = np.ascontiguousarray(np.repeat(corners[:, None], 2, axis=1))
+    none = np.zeros(len(corners), np.int64)
+    packed = pack_pieces([[piece]])
+    off = row_brackets(packed, ends, none, TOLERANCES.bracket_gap)[:, 1]
+    return bool((off <= lost).all())
+
+
+def in_world(pieces: Sequence[Piece], placement: FloatArray) -> Iterator[Piece]:
     """Pieces of a link where it stands.
 
     Args:
@@ -67,12 +147,10 @@ def in_world(pieces: Sequence[Piece], placement: FloatArray) -> list[Piece]:
         placement: T_world_link, shape (4, 4); [m].
     """
     turn, shift = placement[:3, :3], placement[:3, 3]
-    found: list[Piece] = []
     for piece in pieces:
         assert not isinstance(piece, HalfSpacePiece)  # links have none
         if isinstance(piece, Hull):
-            found.append(Hull(piece.points @ turn.T + shift, piece.radius))
-            continue
-        centre, axis = turn @ piece.centre + shift, turn @ piece.axis
-        found.append(FlatCylinder(centre, axis, piece.half_length, piece.radius))
-    return found
+            yield Hull(piece.points @ turn.T + shift, piece.radius)
+        else:
+            centre, axis = turn @ piece.centre + shift, turn @ piece.axis
+            yield FlatCylinder(centre, axis, piece.half_length, piece.radius)

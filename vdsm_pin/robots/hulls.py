@@ -51,3 +51,13 @@ def coal_hull(points: FloatArray) -> Any:
     vertices = coal.StdVec_Vec3s()
     vertices.extend([np.array(point) for point in points])
     return coal.Convex.convexHull(vertices, True, "Qt")
+
+
+def hull_planes(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Planes n.x = d of the faces of a hull, of points for which `is_solid` holds.
+
+    Returns:
+        Outward unit normals, shape (n_faces, 3), and offsets, shape (n_faces,); [m].
+    """
+    hull = coal_hull(points)
+    return np.array(hull.normals()), -np.array(hull.offsets()).ravel()

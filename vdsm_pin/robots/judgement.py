@@ -14,9 +14,10 @@ from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import Proof, prove
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, WORLD
+from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.contacts import common_ball, in_world
 from vdsm_pin.robots.model import Robot
-from vdsm_pin.robots.second_opinion import coal_parts, placed, pose_difference
+from vdsm_pin.robots.second_opinion import link_shapes, placed, pose_difference
 from vdsm_pin.scene import Scene, solid_of
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
@@ -41,6 +42,9 @@ POSE_ERROR: Final = 1e-9
 
 MEETING: Final = 2.0 * TOLERANCES.bracket_gap
 """Bodies that come so near may meet; [m]."""
+
+BESIDE: Final = (0.0, 0.01, -0.01, 0.05, -0.05)
+"""Where a ball in both is looked for, beside the moment at which bodies meet; [-]."""
 
 COMPARED: Final = 1000
 """Most waypoints at which poses are compared, spread evenly."""
@@ -134,13 +138,14 @@ def verify_robot(
     coal = _Coal(robot, scene)
     judged = _judged(proof, pairs, bodies, n)
     judged = tuple(
-        _met(one, pair, path, coal) for one, pair in zip(judged, pairs, strict=True)
+        _met(one, pair, (robot.tree, path), coal)
+        for one, pair in zip(judged, pairs, strict=True)
     )
     checks = [
         _poses(robot, path),
         *_limits(robot, path),
         *_clearances(judged, required, required_self),
-        _coal(coal, path, proof, pairs),
+        _coal(coal, robot.tree, path, proof, pairs),
     ]
     return RobotVerification(robot, scene, path, tuple(checks), judged)
 
@@ -170,26 +175,28 @@ def _judged(
     return tuple(rows)
 
 
-def _met(one: JudgedPair, pair: Pair, path: Path, coal: "_Coal") -> JudgedPair:
+def _met(
+    one: JudgedPair, pair: Pair, motion: tuple[Tree, Path], coal: "_Coal"
+) -> JudgedPair:
     """The same, refuted where a ball is proved to lie in both bodies."""
     if one.verdict is not Verdict.UNDECIDED or not one.upper <= MEETING:
         return one
-    interval = min(int(one.moment), path.n_intervals - 1)
-    q = at_moment(path, interval, one.moment - interval)
-    found = coal.measured(pair, q)
-    if not -inf < found.distance < 0.0:
-        return one
-    middle = 0.5 * (found.near + found.far)
-    radius = common_ball(*coal.pieces(pair, q), middle, -found.distance)
-    if not radius > 0.0:
-        return one
-    return replace(
-        one,
-        verdict=Verdict.REFUTED,
-        upper=-radius,
-        link_point=frozen(middle),
-        other_point=frozen(middle),
-    )
+    tree, path = motion
+    for moment in one.moment + np.array(BESIDE):
+        interval = int(np.clip(np.floor(moment), 0, path.n_intervals - 1))
+        q = at_moment(path, interval, float(np.clip(moment - interval, 0.0, 1.0)))
+        bodies = coal.pieces(pair, tree.poses(q[None])[0])
+        radius, centre = common_ball(*bodies, 0.5 * (one.link_point + one.other_point))
+        if radius > 0.0:
+            return replace(
+                one,
+                verdict=Verdict.REFUTED,
+                upper=-radius,
+                moment=float(np.clip(moment, 0.0, path.n_intervals)),
+                link_point=frozen(centre),
+                other_point=frozen(centre),
+            )
+    return one
 
 
 def _poses(robot: Robot, path: Path) -> Check:
@@ -283,27 +290,29 @@ def at_moment(path: Path, interval: int, share: float) -> FloatArray:
 
 
 class _Coal:
-    """Coal's distances of the pairs of a robot and a scene."""
+    """Coal's distances of the pairs of a robot and a scene.
+
+    Poses are those of all frames at one configuration, shape (n_frames, 4, 4).
+    """
 
     def __init__(self, robot: Robot, scene: Scene) -> None:
         self._robot, self._scene, self._n = robot, scene, len(robot.bodies)
-        self._links = [coal_parts(body.pieces) for body in robot.bodies]
+        self._links = link_shapes(robot)
         self._things = [coal_bodies(solid_of(one)) for one in scene.obstacles]
 
-    def pieces(self, pair: Pair, q: FloatArray) -> tuple[list[Piece], list[Piece]]:
-        """Of both bodies at a row of q, in the world's frame."""
-        poses, found = self._robot.poses(q[None]), []
+    def pieces(self, pair: Pair, poses: FloatArray) -> tuple[list[Piece], list[Piece]]:
+        """Of both bodies where the links stand, in the world's frame."""
+        found = []
         for body in (pair.one, pair.other):
             if body >= self._n:
                 found.append(list(self._scene.obstacles[body - self._n].pieces))
             else:
                 link = self._robot.bodies[body]
-                found.append(in_world(link.pieces, poses[link.name][0]))
+                found.append(list(in_world(link.pieces, poses[link.frame])))
         return found[0], found[1]
 
-    def measured(self, pair: Pair, q: FloatArray) -> Measured:
-        """At a row of q; NaN where Coal cannot take a shape."""
-        poses = self._robot.poses(q[None])
+    def measured(self, pair: Pair, poses: FloatArray) -> Measured:
+        """Where the links stand; NaN where Coal cannot take a shape."""
         outer = pair.one >= self._n
         mine = self._placed(pair.other if outer else pair.one, poses)
         if outer:
@@ -316,21 +325,23 @@ class _Coal:
         found = (measure(request, b.geometry, b.pose, theirs) for b in mine)
         return min(found, key=lambda one: one.distance)
 
-    def _placed(
-        self, body: int, poses: dict[str, FloatArray]
-    ) -> tuple[CoalBody, ...] | None:
+    def _placed(self, body: int, poses: FloatArray) -> tuple[CoalBody, ...] | None:
         parts = self._links[body]
         if parts is None:
             return None
-        return tuple(placed(poses[self._robot.bodies[body].name][0], p) for p in parts)
+        return tuple(placed(poses[self._robot.bodies[body].frame], p) for p in parts)
 
 
-def _coal(coal: "_Coal", path: Path, proof: Proof, pairs: list[Pair]) -> Check:
+def _coal(
+    coal: "_Coal", tree: Tree, path: Path, proof: Proof, pairs: list[Pair]
+) -> Check:
     """Coal's distance of each pair at its witness, which the bracket must hold."""
     off = np.full(len(pairs), nan)
-    for k in np.flatnonzero(np.isfinite(proof.upper)).tolist():
-        q = at_moment(path, int(proof.interval[k]), float(proof.share[k]))
-        value = coal.measured(pairs[k], q).distance
+    seen = np.flatnonzero(np.isfinite(proof.upper)).tolist()
+    rows = [at_moment(path, int(proof.interval[k]), proof.share[k]) for k in seen]
+    poses = tree.poses(np.reshape(rows, (-1, tree.n_columns)))
+    for row, k in enumerate(seen):
+        value = coal.measured(pairs[k], poses[row]).distance
         if np.isnan(value):
             continue
         # Where bodies meet only the sign counts, on both sides.

@@ -1,7 +1,8 @@
 """Pinocchio and Coal about a robot: poses from the same URDF, distances of pairs."""
 
 from collections.abc import Sequence
-from typing import Any
+from functools import lru_cache
+from typing import Any, Final
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
 from vdsm_pin.robots.hulls import coal_hull, is_solid
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.verification.coal_bodies import CoalBody, turn_z_to
+
+KEPT: Final = 8
+"""Robots whose models are kept for their next motion."""
 
 
 def pose_difference(robot: Robot, q: FloatArray) -> FloatArray:
@@ -27,11 +31,7 @@ def pose_difference(robot: Robot, q: FloatArray) -> FloatArray:
     """
     import pinocchio as pin
 
-    try:
-        model = pin.buildModelFromXML(robot.text)
-    except (ValueError, RuntimeError) as error:
-        message = f"Pinocchio refuses the URDF: {error}"
-        raise VerificationFailed(message) from None
+    model = _model(robot.text)
     data, values = model.createData(), robot.tree.values(q)
     poses, worst = robot.poses(q), np.zeros(len(q))
     numbers = {name: model.getFrameId(name, pin.BODY) for name in robot.frames}
@@ -48,6 +48,22 @@ def pose_difference(robot: Robot, q: FloatArray) -> FloatArray:
     return worst
 
 
+@lru_cache(maxsize=KEPT)
+def _model(text: str) -> Any:
+    """Pinocchio's model of a URDF.
+
+    Raises:
+        VerificationFailed: If Pinocchio refuses it.
+    """
+    import pinocchio as pin
+
+    try:
+        return pin.buildModelFromXML(text)
+    except (ValueError, RuntimeError) as error:
+        message = f"Pinocchio refuses the URDF: {error}"
+        raise VerificationFailed(message) from None
+
+
 def _configuration(pin: Any, model: Any, robot: Robot, values: FloatArray) -> Any:
     """Pinocchio's q, which has a cosine and a sine for a joint without limits."""
     full = pin.neutral(model)
@@ -61,6 +77,12 @@ def _configuration(pin: Any, model: Any, robot: Robot, values: FloatArray) -> An
         elif model.nqs[number] == 1:
             full[at] = value
     return full
+
+
+@lru_cache(maxsize=KEPT)
+def link_shapes(robot: Robot) -> tuple[tuple[CoalBody, ...] | None, ...]:
+    """Coal's shapes of each body of a robot, in its link's frame."""
+    return tuple(coal_parts(body.pieces) for body in robot.bodies)
 
 
 def coal_parts(pieces: Sequence[Piece]) -> tuple[CoalBody, ...] | None:

@@ -1,0 +1,148 @@
+"""Verdicts on one plan: by samples of several densities, and by the proof."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from benchmarks.foreign_plans.sampled import Sampled
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.proof.paths import Path as Motion
+from vdsm_pin.robots.judgement import (
+    LINKS,
+    OBSTACLES,
+    RobotVerification,
+    at_moment,
+    verify_robot,
+)
+from vdsm_pin.robots.model import Robot
+from vdsm_pin.scene import Scene
+from vdsm_pin.verification.records import Verdict, combine
+
+DENSITIES: Final = ("0.01", "0.005", "1 deg", "1 mm")
+"""Of samples: parts of the space's extent, the fastest joint, the fastest frame."""
+
+DENSE: Final = 2000
+"""Samples that look for what is wrong in a certified plan."""
+
+AGREED: Final = 1e-6
+"""Contact within which no verdict is asked; [m]."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A plan of OMPL.
+
+    Args:
+        robot: Name of the robot.
+        family: The problem's set.
+        number: The problem.
+        resolution: At which it was planned; [-].
+        waypoints: Rows of joint values; [rad].
+    """
+
+    robot: str
+    family: str
+    number: int
+    resolution: float
+    waypoints: list[list[float]]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One plan and what each judge says.
+
+    Args:
+        plan: The plan.
+        verdict: By the proof, of all clearances.
+        milliseconds: Processor time of the whole verification; [ms].
+        caught: Which densities of samples meet a collision.
+        depth: The deepest that samples each 1 mm and the witness find; [m].
+        fault: Where judges contradict each other; empty where not.
+    """
+
+    plan: Plan
+    verdict: str
+    milliseconds: float
+    caught: list[bool]
+    depth: float
+    fault: str
+
+
+def judge(plan: Plan, sampled: Sampled, robot: Robot, scene: Scene) -> Judged:
+    """Judge a plan.
+
+    Args:
+        plan: The plan.
+        sampled: The oracle.
+        robot: As the proof reads it.
+        scene: As the proof reads it.
+    """
+    rows = np.array(plan.waypoints)
+    motion = Motion(rows)
+    verify_robot(robot, scene, Motion(rows[:1]), 0.0)  # compiled, nothing kept
+    begin = time.process_time()
+    found = verify_robot(robot, scene, motion, 0.0)
+    spent = 1e3 * (time.process_time() - begin)
+    about = [one.verdict for one in found.checks if one.name in (OBSTACLES, LINKS)]
+    verdict = combine(tuple(about))
+    extent = np.linalg.norm(np.ptp(sampled.limits, axis=0))
+    states = [_samples(rows, count) for count in _counts(sampled, float(extent))]
+    hits = [[q for q in some if sampled.collides(q)] for some in states]
+    least = min((sampled.clearance(q) for q in hits[-1]), default=0.0)
+    near = sampled.clearance(_witness(found, motion))
+    return Judged(
+        plan=plan,
+        verdict=verdict.value,
+        milliseconds=spent,
+        caught=[bool(some) for some in hits],
+        depth=-min(least, near, 0.0),
+        fault=_fault(sampled, rows, verdict, bool(hits[-1]), near),
+    )
+
+
+def _counts(
+    sampled: Sampled, extent: float
+) -> list[Callable[[FloatArray, FloatArray], float]]:
+    """How many steps each density asks for between two waypoints."""
+    return [
+        lambda a, b: float(np.linalg.norm(b - a)) / (0.01 * extent),
+        lambda a, b: float(np.linalg.norm(b - a)) / (0.005 * extent),
+        lambda a, b: float(np.degrees(np.abs(b - a).max())),
+        lambda a, b: sampled.travel(a, b) / 1e-3,
+    ]
+
+
+def _samples(
+    plan: FloatArray, count: Callable[[FloatArray, FloatArray], float]
+) -> FloatArray:
+    """States along a plan, waypoints among them, shape (n_states, n); [rad]."""
+    rows = [plan[:1]]
+    for a, b in pairwise(plan):
+        shares = np.linspace(0.0, 1.0, int(np.ceil(max(count(a, b), 1.0))) + 1)[1:]
+        rows.append(a + shares[:, None] * (b - a))
+    return np.concatenate(rows)
+
+
+def _witness(found: RobotVerification, motion: Motion) -> FloatArray:
+    """The configuration at which the proof finds two bodies nearest; [rad]."""
+    worst = min(found.pairs, key=lambda pair: pair.upper)
+    interval = min(int(worst.moment), motion.n_intervals - 1)
+    return at_moment(motion, interval, worst.moment - interval)
+
+
+def _fault(
+    sampled: Sampled, plan: FloatArray, verdict: Verdict, hit: bool, near: float
+) -> str:
+    """How the oracle contradicts the proof; empty where it does not."""
+    if verdict is Verdict.REFUTED and near > AGREED:
+        return f"refuted, and Coal finds {1e3 * near:.4f} mm at the witness"
+    if verdict is not Verdict.CERTIFIED:
+        return ""
+    dense = DENSE / max(len(plan) - 1, 1)
+    if hit or any(sampled.collides(q) for q in _samples(plan, lambda a, b: dense)):
+        return "certified, and a sample collides"
+    return ""

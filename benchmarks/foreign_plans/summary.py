@@ -1,0 +1,95 @@
+"""The page of the benchmark."""
+
+from collections.abc import Sequence
+from importlib.metadata import version
+
+import numpy as np
+
+from benchmarks.common import described, surroundings
+from benchmarks.foreign_plans.judges import DENSITIES, Judged
+from benchmarks.foreign_plans.problems import Problem
+from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.records import Verdict
+
+DEFAULT = 0.01
+"""OMPL's resolution where nobody states one; [-]."""
+
+HEAD = (
+    "robot",
+    "resolution",
+    "plans",
+    "collide",
+    "deeper than 1 mm",
+    "deepest [mm]",
+    *(f"missed at {name}" for name in DENSITIES),
+    "undecided",
+    "median [ms]",
+    "p99 [ms]",
+)
+
+
+def document(judged: Sequence[Judged], unplanned: Sequence[Problem]) -> str:
+    """One table, and above it the sentence that it comes to."""
+    rows = [HEAD, ("---",) * len(HEAD)]
+    for key in sorted({_key(one) for one in judged}):
+        rows.append(_row([one for one in judged if _key(one) == key]))
+    table = "\n".join("| " + " | ".join(row) + " |" for row in rows)
+    faults = [o for o in judged if o.fault]
+    lines = [
+        "# Plans of OMPL, judged",
+        _sentence(judged),
+        "RRTConnect with OMPL's simplification, fixed seed, on problems of "
+        "MotionBenchMaker; links and obstacles as the convex bodies that the plan was "
+        "made with. Missed: plans that collide and in which samples of that density "
+        "(part of the space's extent, the fastest joint, the fastest frame) meet no "
+        "collision. Deepest: by Coal. Times: processor time of a whole verification, "
+        "Pinocchio and Coal included. `python -m benchmarks.foreign_plans.run`.",
+        table,
+        f"Verdicts that Coal contradicts: {len(faults)}. Problems and resolutions "
+        f"without a plan: {len(unplanned)}"
+        f"{_where(unplanned)}.",
+        described(surroundings()).rstrip(".") + f", ompl {version('ompl')}.",
+    ]
+    return "\n\n".join(lines) + "\n"
+
+
+def _key(one: Judged) -> tuple[str, float]:
+    return one.plan.robot, -one.plan.resolution
+
+
+def _sentence(judged: Sequence[Judged]) -> str:
+    """What the proof finds in plans at OMPL's default resolution."""
+    default = [one for one in judged if one.plan.resolution == DEFAULT]
+    lost = [one for one in default if one.verdict == Verdict.REFUTED.value]
+    hidden = sum(not one.caught[0] for one in lost)
+    worst = MM_PER_M * max((one.depth for one in lost), default=0.0)
+    return (
+        f"**Of {len(default)} plans that OMPL's RRTConnect returns at its default "
+        f"resolution, {len(lost)} collide, {hidden} of them in no state at that "
+        f"resolution, the worst {worst:.1f} mm deep.**"
+    )
+
+
+def _row(judged: Sequence[Judged]) -> tuple[str, ...]:
+    lost = [one for one in judged if one.verdict == Verdict.REFUTED.value]
+    depth = [MM_PER_M * one.depth for one in lost]
+    spent = [one.milliseconds for one in judged]
+    missed = [sum(not one.caught[k] for one in lost) for k in range(len(DENSITIES))]
+    return (
+        judged[0].plan.robot,
+        f"{judged[0].plan.resolution:g}",
+        str(len(judged)),
+        f"{len(lost)} ({100 * len(lost) / len(judged):.0f} %)",
+        str(sum(value > 1.0 for value in depth)),
+        f"{max(depth, default=0.0):.1f}",
+        *map(str, missed),
+        str(sum(one.verdict == Verdict.UNDECIDED.value for one in judged)),
+        f"{np.median(spent):.1f}",
+        f"{np.percentile(spent, 99):.1f}",
+    )
+
+
+def _where(unplanned: Sequence[Problem]) -> str:
+    """In which sets, in brackets."""
+    sets = sorted({f"{one.robot} {one.family}" for one in unplanned})
+    return f" ({', '.join(sets)})" if sets else ""
