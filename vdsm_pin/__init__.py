@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from vdsm_pin.trajectory import Trajectory
     from vdsm_pin.verification.records import Verdict
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "Box",

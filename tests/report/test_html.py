@@ -1,12 +1,14 @@
 """Oracles: an HTML parser, the records, and what a self-contained page may not hold."""
 
 import math
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import jinja2
 import made_up
+import numpy as np
 import pytest
 
 from vdsm_pin import kept
@@ -160,3 +162,11 @@ def test_templates_are_compiled_once_and_again_where_what_was_kept_is_damaged(
     html._environment.cache_clear()
     assert compiled[: len(compiled) // 2] == compiled[len(compiled) // 2 :] != []
     assert pages[0] == pages[1] == pages[2]
+
+
+def test_plots_run_over_time_where_the_motion_has_times(tmp_path: Path) -> None:
+    judged = made_up.verification(n=40)
+    option = '<option value="time">'
+    assert option not in report(tmp_path, judged)
+    rows = replace(judged.trajectory, times=np.linspace(3.0, 5.0, 40))
+    assert option in report(tmp_path, replace(judged, trajectory=rows))

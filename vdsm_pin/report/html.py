@@ -163,6 +163,7 @@ def write_report(
         most_drawn=MOST_DRAWN,
         charts=data.charts,
         complete=data.complete,
+        timed=verification.trajectory.times is not None,
         obstacles=scene_rows(verification.problem),
         drawn=data.triangles,
         worst=nearest_to_obstacle(verification),

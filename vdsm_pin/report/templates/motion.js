@@ -39,6 +39,7 @@ class Motion {
     this.speed = 1;
     this.listeners = [];
     this.scales = { waypoint: this.rows, travel: this.travel() };
+    if (this.times) this.scales.time = this.times.map((time) => time - this.times[0]);
     this.scale = this.scales.waypoint;
   }
 

@@ -143,7 +143,9 @@ class Plot {
   }
 
   get along() {
-    return this.motion.scale === this.motion.rows ? "waypoint" : "way of the tip [mm]";
+    const { scale, scales } = this.motion;
+    if (scale === scales.time) return "time from the start [s]";
+    return scale === scales.travel ? "way of the tip [mm]" : "waypoint";
   }
 
   axes() {
@@ -156,12 +158,13 @@ class Plot {
       element("line", { x1: left, x2: width - right, y1: y, y2: y, class: "grid" }, this.svg);
       element("text", { x: left - 6, y: y + 4, class: "tick end" }, this.svg, shortNumber(value));
     }
-    const { scale } = this.motion;
+    const { scale, scales } = this.motion;
     const end = scale[scale.length - 1] || 1;
-    for (const value of ticks(0, end, NARROW ? 4 : 8).filter((t) => t % 1 === 0)) {
+    const whole = scale === scales.waypoint;
+    for (const value of ticks(0, end, NARROW ? 4 : 8).filter((t) => !whole || t % 1 === 0)) {
       const x = left + ((width - left - right) * value) / end;
       element("line", { x1: x, x2: x, y1: height - bottom, y2: height - bottom + 4, class: "axis" }, this.svg);
-      element("text", { x, y: height - bottom + 16, class: "tick middle" }, this.svg, value);
+      element("text", { x, y: height - bottom + 16, class: "tick middle" }, this.svg, Number(value.toPrecision(6)));
     }
     element("line", { x1: left, x2: left, y1: top, y2: height - bottom, class: "axis" }, this.svg);
     element("line", { x1: left, x2: width - right, y1: height - bottom, y2: height - bottom, class: "axis" }, this.svg);
