@@ -234,7 +234,8 @@ def write_certificate(
     if source is None:
         message = "a certificate is bound to a problem file; this problem has none"
         raise InvalidInput(message)
-    if not _same(read_trajectory(trajectory, problem, "linear"), result.trajectory):
+    joined = result.trajectory.interpolation
+    if not _same(read_trajectory(trajectory, problem, joined), result.trajectory):
         message = f"{trajectory}: is another motion than the verified one"
         raise InvalidInput(message)
     check_kept([Path(path)], [*source.files, Path(trajectory)])

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
@@ -140,6 +140,13 @@ class Trajectory(Summarised):
     def is_smooth(self) -> bool:
         """Whether smooth pieces join the rows, not straight lines."""
         return self.rates is not None and self.n_samples > 1
+
+    @property
+    def interpolation(self) -> Literal["linear", "cubic", "quintic"]:
+        """What joins the rows: linear, cubic or quintic pieces."""
+        if self.rates is None:
+            return "linear"
+        return "cubic" if self.changes is None else "quintic"
 
     @cached_property
     def inner(self) -> FloatArray:

@@ -19,6 +19,15 @@ def path(rng: np.random.Generator, closed: bool) -> DesiredPath:
     return DesiredPath(corners[0], corners, closed)
 
 
+def _draw(
+    drawing: Drawing, begin: float, end: float, tips: Any, bend: float = 0.0
+) -> None:
+    """One interval between two stations."""
+    stations = arb(begin), arb(end)
+    start = drawing.begin(stations[0])
+    drawing.draw(start, drawing.step(*stations), tips, arb(bend))
+
+
 def line(length: int, closed: bool) -> Drawing:
     """A drawing along x; a closed one goes there and back."""
     half = length / 2 if closed else float(length)
@@ -87,7 +96,7 @@ def test_the_deviation_is_the_largest_distance_at_the_same_share(
     worst = np.linalg.norm(found - wanted, axis=1).max()
     bend = float(rng.choice([0.0, 0.25]))
     balls = [column(*tip.tolist()) for tip in tips]
-    drawing.draw([arb(begin), arb(end)], balls, arb(bend))
+    _draw(drawing, begin, end, balls, bend)
     step = 3.0 * length / 4000
     assert worst - TINY <= float(drawing.deviation) - bend <= worst + step
     assert float(drawing.coverage()) == pytest.approx(abs(end - begin) / length)
@@ -97,9 +106,9 @@ def test_what_is_drawn_in_one_go_is_one_stretch() -> None:
     drawing = line(8, closed=False)
     tip = [column(0, 0, 0)] * 2
     for begin, end in ((0, 2), (2, 3), (3, 1)):
-        drawing.draw([arb(begin), arb(end)], tip, arb(0))
+        _draw(drawing, begin, end, tip)
     drawing.last = None
-    drawing.draw([arb(6), arb(7)], tip, arb(0))
+    _draw(drawing, 6, 7, tip)
     assert [(float(a), float(b)) for a, b in drawing.stretches] == [(0, 3), (6, 7)]
     assert float(drawing.coverage()) == 4 / 8
 

@@ -1,33 +1,107 @@
-"""A problem that asks where the last link looks is not accepted unseen."""
+"""Where the last link looks: proved again between rows, and wrong looks refused."""
 
+import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pytest
+from oracles.certificate_cases import certificate_lines
+from oracles.certificate_oracle import sealed, sha256
 
-from vdsm_pin.certificate_checker.program import check_certificate
-from vdsm_pin.io.trajectory_file import write_trajectory
+from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
+from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.manipulator import built_in
+from vdsm_pin.robot_model import load_robot
 from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
+from vdsm_pin.verification.pointing import NAME
+from vdsm_pin.verification.verify import verify
 
-PROBLEM = """
-vdsm_problem: 1
-length_unit: mm
-manipulator: hrm8
-tip_path:
-  start: [3126, 0, 0]
-  points: [[3126, 0, 0], [3136, 0, 0]]
-  pointing: {direction: [1, 0, 0], cone_deg: 5}
-required_clearance: 3.5
-"""
+ARM = built_in("hrm8")
 
 
-def test_no_certificate_is_accepted_that_does_not_state_it(tmp_path: Path) -> None:
-    problem, rows = tmp_path / "p.yaml", tmp_path / "t.csv"
-    problem.write_text(PROBLEM)
-    x0, flat = np.array([0.0, 0.01]), np.zeros((2, 8))
-    on = np.ones(2, dtype=np.bool_)
-    write_trajectory(rows, Trajectory(on, x0, x0, flat, flat))
-    certificate = tmp_path / "c"
-    certificate.write_text("{}\n")
-    outcome = check_certificate(certificate, problem, rows)
-    assert not outcome.accepted
-    assert "pointing is not rechecked" in outcome.reason
+class Looking:
+    """A random motion all of which draws, its last link near to where it shall look."""
+
+    def __init__(self, folder: Path, seed: int, smooth: bool = False) -> None:
+        rng, rows = np.random.default_rng(seed), 5
+        self.problem, self.rows = folder / "p.yaml", folder / "t.csv"
+        self.certificate = folder / "c"
+        turns = rng.uniform(-1.0, 1.0, (2, rows, ARM.n_links))
+        angles = rng.uniform(-0.2, 0.2, (2, 1, ARM.n_links)) + 0.002 * turns.cumsum(1)
+        x0 = 0.002 * rng.uniform(0.0, 1.0, rows).cumsum()
+        centres = joint_centres(ARM, x0, *angles)
+        self.tips = centres[:, -1]
+        gaps = np.linalg.norm(np.diff(self.tips, axis=0), axis=1)
+        on, more = np.ones(rows, dtype=np.bool_), {}
+        if smooth:
+            more["times"] = np.arange(rows) * 1.0
+            more["rates"] = 1e-4 * rng.normal(size=(rows, 1 + 2 * ARM.n_links))
+        stations = np.append(0.0, gaps.cumsum())
+        write_trajectory(self.rows, Trajectory(on, stations, x0, *angles, **more))
+        axes = centres[:, -1] - centres[:, -2]
+        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+        aside = 0.02 * rng.normal(size=3)
+        self.aims: dict[str, Any] = {
+            "target": (self.tips[2] + 2.0 * axes[2] + 0.1 * aside).tolist(),
+            "direction": (axes[2] + aside).tolist(),
+            "directions": (axes + aside).tolist(),
+        }
+
+    def ask(self, cone: float, kind: str) -> None:
+        """Write the problem file."""
+        points = self.tips.tolist()
+        path = {"points": points, "spacing": 1.0, "required_coverage": 0.0}
+        rows = read_trajectory(self.rows, ARM)
+        path["start"] = {
+            "joints": {
+                "x0": float(rows.x0[0]),
+                "alpha_deg": np.rad2deg(rows.alpha[0]).tolist(),
+                "theta_deg": np.rad2deg(rows.theta[0]).tolist(),
+            }
+        }
+        path["pointing"] = {"cone_deg": cone, kind: self.aims[kind]}
+        data = {"vdsm_problem": 1, "length_unit": "m", "manipulator": "hrm8"}
+        data |= {"obstacles": [], "required_clearance": 0.0, "tip_path": path}
+        self.problem.write_text(json.dumps(data))
+
+    def look(self) -> float:
+        """Write a certificate; the proved bound of the angle; [deg]."""
+        file, arm = read_problem(self.problem), ARM
+        found = verify(file.problem, read_trajectory(self.rows, arm), load_robot(arm))
+        row = next(check for check in found.checks if check.name == NAME)
+        assert found.verdict.value == "certified", found.checks
+        hashes = Hashes(file.sha256, sha256(self.rows.read_bytes()), "0" * 64)
+        write_certificate(self.certificate, found, hashes)
+        self.lines = certificate_lines(self.certificate)[:-1]
+        return float(np.rad2deg(row.worst))
+
+    def reason(self) -> str:
+        found = check_certificate(self.certificate, self.problem, self.rows)
+        return found.reason
+
+    def forge(self) -> None:
+        """Make the certificate one of the problem file as it is now."""
+        lines = self.lines
+        lines[0]["problem_sha256"] = read_problem(self.problem).sha256
+        self.certificate.write_bytes(sealed(lines))
+
+
+@pytest.mark.parametrize("kind", ["target", "direction", "directions"])
+@pytest.mark.parametrize("smooth", [False, True])
+def test_a_narrower_cone_is_refused(kind: str, smooth: bool, tmp_path: Path) -> None:
+    for seed in range(3):
+        case = Looking(tmp_path, seed, smooth)
+        case.ask(30.0, kind)
+        worst = case.look()
+        assert case.reason() == ""
+        for cone, good in ((1.02 * worst, True), (0.98 * worst - 0.06, False)):
+            if cone <= 0.0:
+                continue
+            case.ask(cone, kind)
+            case.forge()
+            assert (case.reason() == "") is good, (seed, worst)
+            assert good or "last link" in case.reason()

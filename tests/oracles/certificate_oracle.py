@@ -344,7 +344,7 @@ class OracleWriter:
             for i, other in self.partners()
         ]
         return {
-            "vdsm_certificate": 4,
+            "vdsm_certificate": 5,
             "problem_sha256": self.file.sha256,
             "trajectory_sha256": sha256(self.trajectory_path.read_bytes()),
             "urdf_sha256": "0" * 64,
@@ -359,6 +359,7 @@ class OracleWriter:
                 "obstacles": {},
             },
             "n_rows": self.trajectory.n_samples,
+            "interpolation": "linear",
             "pairs": pairs,
             "pieces": self.pieces(),
             "joined": {},

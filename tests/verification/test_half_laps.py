@@ -56,7 +56,8 @@ def checkers_run(path: DesiredPath, begin: float, end: float) -> float:
     with ctx.workprec(PRECISION):
         drawing, tip = Drawing(path), column(3, 0, 0)
         stations = [arb(begin), arb(end)]
-        drawing.draw(stations, [tip, tip], arb(0))
+        start, run = drawing.begin(stations[0]), drawing.step(*stations)
+        drawing.draw(start, run, [tip, tip], arb(0))
         return float(drawing.last - stations[0])
 
 

@@ -268,12 +268,9 @@ def _certify(order: VerifyOrder, verification: Verification, record: RunRecord) 
     # Imported by those who ask for one: its schema takes a while to build.
     from vdsm_pin.verification.certificate_writer import (
         Hashes,
-        unstated,
         write_certificate,
     )
 
-    if why := unstated(verification.problem, verification.trajectory):
-        return why
     hashes = Hashes(
         problem=record.problem_sha256,
         trajectory=record.trajectory_sha256,

@@ -20,6 +20,9 @@ A point is a sum of four terms and off by 28 units of 2^-53 at most, its product
 rounded n by seven: 35 in all, and this is 128.
 """
 
+MM: Final = 1000  # messages tell lengths in millimetres
+SLACK: Final = 1e-9  # claims may understate by this, limits be passed; [m], [rad], [-]
+
 
 class Rejected(Exception):
     """A claim is false or missing."""
@@ -51,6 +54,12 @@ def column(x: Ball, y: Ball, z: Ball) -> Matrix:
 def dot(a: Matrix, b: Matrix) -> Ball:
     """Scalar product."""
     return (a.transpose() * b)[0, 0]
+
+
+def cross(a: Matrix, b: Matrix) -> Matrix:
+    """Vector product."""
+    (ax, ay, az), (bx, by, bz) = a.entries(), b.entries()
+    return column(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
 
 
 def norm(a: Matrix) -> Ball:

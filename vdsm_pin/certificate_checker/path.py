@@ -29,6 +29,10 @@ class Drawing:
         self.here: Ball | None = None  # station of the latest row on the path
         self.advanced = arb(0)  # from the first row on the path to that one
         self.left = False  # whether rows off the path lie in between
+        self.aims: list[Matrix] = []  # where the last link shall look at each corner
+        if path.pointing is not None and path.pointing.directions is not None:
+            self.aims = [column(*one) for one in path.pointing.directions.tolist()]
+            self.aims *= len(self.corners) if len(self.aims) == 1 else 1
 
     def laps(self, station: Ball) -> int:
         """Whole laps in a station; the nearest number where that is not certain."""
@@ -44,12 +48,35 @@ class Drawing:
 
     def point(self, station: Ball) -> Matrix:
         """The point of the path at a station."""
+        return self._blend(self.corners, station)
+
+    def aim(self, station: Ball) -> Matrix:
+        """Along which the last link shall look there, of any length."""
+        return self._blend(self.aims, station)
+
+    def _blend(self, values: list[Matrix], station: Ball) -> Matrix:
+        """Vectors given at the corners, straight from each to the next one."""
         s, last = self.local(station), len(self.corners) - 2
         if last < 0:
-            return self.corners[0]
+            return values[0]
         i = min(max(bisect_right(self.stations, s) - 1, 0), last)
-        a, b = self.corners[i : i + 2]
-        return a + (b - a) * ((s - self.stations[i]) / norm(b - a))
+        a, b = values[i : i + 2]
+        return a + (b - a) * ((s - self.stations[i]) / self._side(i))
+
+    def _side(self, i: int) -> Ball:
+        return norm(self.corners[i + 1] - self.corners[i])
+
+    @property
+    def steepest(self) -> Ball:
+        """How much the aim changes at most per length of path."""
+        found = arb(0)
+        for i, (a, b) in enumerate(pairwise(self.aims)):
+            found = found.max(norm(b - a) / self._side(i))
+        return found
+
+    def begin(self, station: Ball) -> Ball:
+        """Where an interval begins to draw."""
+        return station if self.closed else self.local(station)
 
     def step(self, a: Ball, b: Ball) -> Ball:
         """How far an interval between two stations advances.
@@ -84,17 +111,17 @@ class Drawing:
         self.advanced += advance
         return advance
 
-    def draw(self, stations: list[Ball], tips: list[Matrix], bend: Ball) -> None:
-        """Take in an interval with both rows on the path.
+    def draw(self, begin: Ball, run: Ball, tips: list[Matrix], bend: Ball) -> None:
+        """Take in an interval with both rows on the path, or a part of one.
 
         Args:
-            stations: path_m of both rows; [m].
-            tips: The tip at both.
+            begin: Station where it begins, as `begin` has it; [m].
+            run: How far it advances, as `step` has it; [m].
+            tips: The tip at both ends.
             bend: How far it may lie off the chord in between; [m].
         """
-        first = stations[0] if self.closed else self.local(stations[0])
-        start = first if self.last is None else self.last
-        stop = start + self.step(*stations)
+        start = begin if self.last is None else self.last
+        stop = start + run
         if self.last is None:
             self.stretches.append((start, start))
         low, high = self.stretches[-1]

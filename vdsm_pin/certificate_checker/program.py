@@ -23,7 +23,9 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.source import bounded_lines, check_is_file, sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.text import printable, show_everything
+from vdsm_pin.trajectory import Trajectory
 
+VERSION: Final = 5
 PRECISION: Final = 128
 """Bits of a ball: lengths are known to about 1e-35 m."""
 
@@ -35,8 +37,8 @@ DAMAGE: Final = (
 
 
 JUDGED: Final = (
-    "clearance, limits, start, goal and path hold as the problem asks; cables are not "
-    "judged"
+    "clearance, limits, start, goal, path and pointing hold as the problem asks; "
+    "cables are not judged"
 )
 """What an accepted certificate says, and what it does not."""
 
@@ -89,6 +91,16 @@ def _unique(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
     return dict(pairs)
 
 
+def _rows(header: dict[str, Any], file: Path, arm: Any) -> Trajectory:
+    """The trajectory, its rows joined as the certificate says."""
+    version, kinds = header.get("vdsm_certificate"), ("linear", "cubic", "quintic")
+    by = f"as vdsm-pin {header.get('versions', {}).get('vdsm_pin')} writes and reads it"
+    claim(version == VERSION, f"is of version {version}, {by}; expected {VERSION}")
+    joined: Any = header.get("interpolation")
+    claim(joined in kinds, f"interpolation is {joined}, expected one of {kinds}")
+    return read_trajectory(file, arm, joined)
+
+
 def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Outcome:
     """Recompute every claim of a certificate.
 
@@ -104,26 +116,32 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
         InvalidFile: If one of the files is not what its format says.
     """
     check_is_file(certificate)
-    source = read_problem(problem)
-    rows = read_trajectory(trajectory, source.problem.manipulator, "linear")
-    sha256, reason = sha256_of_file(trajectory), ""
-    hashes = {"problem_sha256": source.sha256, "trajectory_sha256": sha256}
-    if moving := source.problem.scene.moving:
-        reason = printable(f"{moving[0].name!r} moves, which is not rechecked yet")
-        return Outcome(False, reason, 0, 0, ())
+    check_is_file(trajectory)
+    source, lines, check = read_problem(problem), _lines(certificate), None
+    hashes = {
+        "problem_sha256": source.sha256,
+        "trajectory_sha256": sha256_of_file(trajectory),
+    }
+    reason = ""
     with ctx.workprec(PRECISION):
-        check = Check(source.problem, rows, hashes)
         try:
-            looks = getattr(source.problem.tip_path, "pointing", None)
-            claim(not looks, "pointing is not rechecked yet")
-            check.run(_lines(certificate))
+            header = next(lines, {})
+            rows = _rows(header, trajectory, source.problem.manipulator)
+            check = Check(source.problem, rows, hashes)
+            check.run(header, lines)
         except Rejected as error:
-            reason = printable(f"{check.place}: {error}")
+            reason = printable(f"{check.place if check else 'header'}: {error}")
         except DAMAGE as error:
-            text, at = f"cannot be read as a certificate: {error}", check.place
+            text = f"cannot be read as a certificate: {error}"
+            at = check.place if check else "header"
             raise InvalidFile(file=certificate, where=at, problem=text) from None
-    notes = tuple(note for mesh in check.meshes.values() for note in mesh.notes())
-    return Outcome(not reason, reason, check.n_intervals, check.n_claims, notes)
+    if check is None:
+        return Outcome(False, reason, 0, 0, ())
+    notes = [note for mesh in check.meshes.values() for note in mesh.notes()]
+    if check.smooth != "linear":
+        notes.append(f"{check.smooth} pieces join the rows")
+    counts = check.n_intervals, check.n_claims
+    return Outcome(not reason, reason, *counts, tuple(notes))
 
 
 def main(arguments: Sequence[str]) -> int:

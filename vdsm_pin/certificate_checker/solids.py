@@ -6,8 +6,9 @@ ball or a disc. Of a half-space the point that its plane goes through is enough.
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from functools import cache
 from itertools import pairwise, product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from flint import arb
@@ -20,6 +21,7 @@ from vdsm_pin.certificate_checker.balls import (
     claim,
     column,
     dot,
+    norm,
     unit,
 )
 from vdsm_pin.certificate_checker.inside import Surface
@@ -44,6 +46,12 @@ class Solid:
         self.normal: Matrix | None = None  # of a half-space
         self.ends: Any = None  # of a prism: its corners at both, shape (2, c, 3)
         self.extent = float(np.abs(self.points).max() + np.abs(origin).max())
+
+    @cache  # noqa: B019  (solids live as long as the check)
+    def corner(self, i: int) -> tuple[Matrix, Ball]:
+        """A corner of the first piece, and how far it is with a disc about it."""
+        corner = column(*self.points[0][i].tolist())
+        return corner, norm(corner) + self.disc_radius
 
     def support(self, n: Matrix, first: int, last: int) -> Ball:
         """Least n.x over the pieces first..last-1, for a unit n."""
@@ -148,8 +156,10 @@ class Mesh(Solid):
         return [note for note, holds in told.items() if holds]
 
 
-def solid(obstacle: scene.Obstacle) -> Solid:
-    """The solid of an obstacle as it was read."""
+def solid(obstacle: Any) -> Solid:
+    """The solid of an obstacle as it was read, in the frame that carries it."""
+    if isinstance(obstacle, scene.Moving):
+        obstacle = obstacle.solid
     name = obstacle.name
     match obstacle:
         case scene.Sphere():
@@ -186,3 +196,40 @@ def solid(obstacle: scene.Obstacle) -> Solid:
         case scene.Mesh():
             return Mesh(obstacle)
     return found
+
+
+class Body(NamedTuple):
+    """A convex solid that rides on a frame of the tree.
+
+    Args:
+        frame: The frame.
+        solid: Of one piece, in its coordinates.
+        own: Whether it is a link, the tool or the feed: a capsule about the arm's axis.
+    """
+
+    frame: int
+    solid: Solid
+    own: bool = True
+
+
+class Pair(NamedTuple):
+    """A body and a solid that rests in another frame.
+
+    Args:
+        body: What moves as seen from there.
+        solid: Of any number of pieces.
+        rest: The frame.
+        required: Least clearance; [m].
+        lost: Radius of the body and errors that do not turn; [m].
+    """
+
+    body: Body
+    solid: Solid
+    rest: int
+    required: Ball
+    lost: Ball
+
+    @property
+    def names(self) -> list[str]:
+        """As the header has them."""
+        return [self.body.solid.name, self.solid.name]

@@ -48,7 +48,7 @@ class ClaimedLimits(LineModel):
 class HeaderLine(LineModel):
     """Line 1."""
 
-    vdsm_certificate: Literal[4] = Field(default=4, description="version of the format")
+    vdsm_certificate: Literal[5] = Field(default=5, description="version of the format")
     problem_sha256: Sha256 = Field(description="problem file and the meshes it names")
     trajectory_sha256: Sha256 = Field(description="trajectory.csv")
     urdf_sha256: Sha256 = Field(description="told, not proved")
@@ -57,6 +57,9 @@ class HeaderLine(LineModel):
     required_self_clearance_m: FiniteFloat = Field(description="between links")
     errors: ErrorLimits
     n_rows: int = Field(ge=1, description="rows of the trajectory")
+    interpolation: Literal["linear", "cubic", "quintic"] = Field(
+        description="what joins the rows: straight lines or smooth pieces"
+    )
     pairs: list[Pair] = Field(
         description="moving body, `link 1` and so on, `tool`, `feed` or the name of "
         "what a link carries, and what it is proved clear of: an obstacle's name, or "

@@ -22,20 +22,19 @@ from vdsm_pin import __version__
 from vdsm_pin.arm_bodies import triangle_groups
 from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import VerificationFailed
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import CLAIM, FIRST, LAST, PLANE_NORMAL, RECORD
-from vdsm_pin.proof.packed_tree import straight_motion
+from vdsm_pin.proof.packed_tree import Motion
 from vdsm_pin.proof.recording import record
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.workspace import new_workspace
-from vdsm_pin.scene import Mesh, Prism, with_hulls
+from vdsm_pin.scene import Mesh, Prism, solid_of, with_hulls
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.certificate_file import (
     ClaimedLimits,
     ErrorLimits,
@@ -45,6 +44,7 @@ from vdsm_pin.verification.certificate_file import (
 )
 from vdsm_pin.verification.inside import locate_start, unlocated
 from vdsm_pin.verification.limits import extremes
+from vdsm_pin.verification.moving import whole_motion
 from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.task import all_pairs, make_task
 
@@ -100,37 +100,22 @@ def write_certificate(
         message = f"no certificate is written: the verdict is {verdict}"
         raise VerificationFailed(message)
     problem, trajectory = verification.problem, verification.trajectory
-    if why := unstated(problem, trajectory):
-        message = f"no certificate is written: {why}"
-        raise VerificationFailed(message)
     # Of a mesh without known inside the hull is proved clear, by planes for all of it.
     hulls = unlocated(locate_start(problem, trajectory))
     scene = with_hulls(problem.scene, hulls)
-    reach, budget = np.abs(trajectory.joints).max(axis=0), Budget(until=deadline.end)
-    asked = replace(problem, scene=scene)
+    asked, budget = replace(problem, scene=scene), Budget(until=deadline.end)
+    motion, reach, _ = whole_motion(asked, trajectory)
     task = make_task(asked, verification.errors, budget=budget, reach=reach)
     digest = hashlib.sha256()
     with atomic_path(path) as temporary, _packed(temporary) as file:
         header = _header(verification, hashes, task.pieces)
-        lines = _lines(verification, task, hulls, deadline)
+        lines = _lines(motion, task, _whole(problem, task, hulls), deadline)
         for text in chain([header.model_dump_json()], lines):
             line = text.encode() + b"\n"
             digest.update(line)
             file.write(line)
         last = LastLine(end=True, sha256=digest.hexdigest())
         file.write(last.model_dump_json().encode() + b"\n")
-
-
-def unstated(problem: PlanningProblem, trajectory: Trajectory) -> str:
-    """What a certificate cannot state yet of a motion, in words; empty for nothing."""
-    if problem.tip_path is not None and problem.tip_path.pointing is not None:
-        return "it cannot state `pointing` yet"
-    if problem.scene.moving:
-        name = problem.scene.moving[0].name
-        return f"it cannot state yet that an obstacle moves, as {name!r} does"
-    if trajectory.is_smooth:
-        return "it cannot state yet that smooth pieces join the rows"
-    return ""
 
 
 @contextmanager
@@ -149,6 +134,8 @@ def _header(
     problem, trajectory = verification.problem, verification.trajectory
     box, found = verification.errors, extremes(trajectory)
     drawn = problem.tip_path is not None
+    # Control points within a smooth piece are rounded, rows are exact.
+    pad = TOLERANCES.arithmetic if trajectory.is_smooth else 0.0
     return HeaderLine(
         problem_sha256=hashes.problem,
         trajectory_sha256=hashes.trajectory,
@@ -164,15 +151,16 @@ def _header(
             obstacles=_single_errors(box),
         ),
         n_rows=trajectory.n_samples,
+        interpolation=trajectory.interpolation,
         pairs=_pairs(problem),
         pieces=_pieces(problem, pieces),
         joined=_joined(problem),
         limits=ClaimedLimits(
-            alpha_rad=found.alpha,
-            theta_rad=found.theta,
+            alpha_rad=found.alpha + pad,
+            theta_rad=found.theta + pad,
             psi_rad=found.psi + TOLERANCES.arithmetic,
-            x0_min_m=found.x0_min,
-            x0_max_m=found.x0_max,
+            x0_min_m=found.x0_min - pad,
+            x0_max_m=found.x0_max + pad,
         ),
         tip_deviation_m=verification.tip_deviation if drawn else None,
         coverage=verification.coverage if drawn else None,
@@ -200,7 +188,7 @@ def _pieces(problem: PlanningProblem, pieces: PackedPieces) -> dict[str, list[An
     triangles for a mesh that was sorted; of a mesh on a link those of each hull.
     """
     result: dict[str, list[Any]] = {}
-    for k, obstacle in enumerate(problem.scene.obstacles):
+    for k, obstacle in enumerate(map(solid_of, problem.scene.obstacles)):
         order = pieces.order[pieces.first_piece[k] : pieces.first_piece[k + 1]]
         if isinstance(obstacle, Prism) and len(order) > 1:
             triangles = _triangles(obstacle)
@@ -218,7 +206,7 @@ def _pieces(problem: PlanningProblem, pieces: PackedPieces) -> dict[str, list[An
 def _joined(problem: PlanningProblem) -> dict[str, tuple[list[Any], list[Any]]]:
     """By mesh the corners that are joined to close it, and its seams."""
     result = {}
-    for mesh in problem.scene.obstacles:
+    for mesh in map(solid_of, problem.scene.obstacles):
         if isinstance(mesh, Mesh) and mesh.has_inside:
             joined = _corners_and_seams(mesh)
             if any(joined):
@@ -257,20 +245,20 @@ def _sense(polygon: FloatArray) -> int:
     return 1 if sum(a[0] * b[1] - a[1] * b[0] for a, b in edges) > 0 else -1
 
 
-def _lines(
-    verification: Verification,
-    task: Task,
-    hulls: Collection[str],
-    deadline: Deadline,
-) -> Iterator[str]:
-    """One line per interval; planes clear of a mesh's hull serve all its triangles."""
-    trajectory = verification.trajectory
-    motion = straight_motion(trajectory.joints)
-    n_intervals = max(1, trajectory.n_samples - 1)
+def _whole(problem: PlanningProblem, task: Task, hulls: Collection[str]) -> IntArray:
+    """Pieces of each obstacle whose hull is proved clear: one plane serves them all."""
     whole = np.zeros(len(task.pieces.root), np.int64)
-    for k, obstacle in enumerate(verification.problem.scene.obstacles):
+    for k, obstacle in enumerate(problem.scene.obstacles):
         if obstacle.name in hulls:
             whole[k] = len(obstacle.pieces)
+    return whole
+
+
+def _lines(
+    motion: Motion, task: Task, whole: IntArray, deadline: Deadline
+) -> Iterator[str]:
+    """One line per interval."""
+    n_intervals = max(1, len(motion.knots) - 1)
     desk = new_workspace(task, motion.knots.shape[1], Budget().slices)
     records, first = np.zeros((ROOM, RECORD)), 0
     while first < n_intervals:

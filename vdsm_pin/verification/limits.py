@@ -147,14 +147,20 @@ def _largest_change(trajectory: Trajectory) -> _Largest:
 
 
 def extremes(trajectory: Trajectory) -> Extremes:
-    """The extreme values of a motion."""
+    """Bounds of a motion's extreme values; exact where straight lines join rows."""
+    low, high = (_largest(trajectory, _along(sign)).bound for sign in (-1.0, 1.0))
     return Extremes(
-        alpha=_largest(trajectory, _alpha).seen,
-        theta=_largest(trajectory, _theta).seen,
-        psi=_largest(trajectory, _psi).seen,
-        x0_min=float(trajectory.x0.min()),
-        x0_max=float(trajectory.x0.max()),
+        alpha=_largest(trajectory, _alpha).bound,
+        theta=_largest(trajectory, _theta).bound,
+        psi=_largest(trajectory, _psi).bound,
+        x0_min=-low,
+        x0_max=high,
     )
+
+
+def _along(sign: float) -> Measure:
+    """x0, or its negative."""
+    return lambda joints: sign * joints[:, :1]
 
 
 def _alpha(joints: FloatArray) -> FloatArray:

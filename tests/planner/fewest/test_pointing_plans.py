@@ -1,13 +1,11 @@
 """Plans whose last link looks somewhere: certified, and by plain sampling too."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scenes_for_fewest import problem
 
-from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
@@ -17,7 +15,6 @@ from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.refinement import Refinement, plan_and_verify
 from vdsm_pin.robot_model import load_robot
 from vdsm_pin.scene import Cylinder, Obstacle, Sphere
-from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
 from vdsm_pin.verification.pointing import NAME
 from vdsm_pin.verification.records import Verdict
 
@@ -106,11 +103,3 @@ def test_links_share_a_turn_towards_an_aim() -> None:
     np.testing.assert_allclose(np.linalg.norm(turned, axis=2), 1.0, atol=1e-12)
     np.testing.assert_allclose(turned[~some], shapes[~some], atol=1e-12)
     assert np.median(angles_between(turned[some, -1], aims[some])) < 0.15
-
-
-def test_no_certificate_is_written_that_cannot_state_it(tmp_path: Path) -> None:
-    found = planned(looking(Pointing(0.1, directions=AHEAD)))
-    hashes = Hashes("", "", "")
-    with pytest.raises(VerificationFailed, match="cannot state `pointing`"):
-        write_certificate(tmp_path / "c", found.verification, hashes)
-    assert not (tmp_path / "c").exists()

@@ -1,0 +1,87 @@
+"""Proofs of trees as the certificate checker's core takes them."""
+
+from typing import Any
+
+import numpy as np
+from flint import arb
+from oracles.tree_queries import TreeQuery
+
+from vdsm_pin.certificate_checker.balls import column
+from vdsm_pin.certificate_checker.motion import Branch, Interval, Path
+from vdsm_pin.certificate_checker.solids import Body, Pair, Solid
+from vdsm_pin.certificate_checker.tree import SLIDES, Joint, Tree
+from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece
+from vdsm_pin.proof.bodies import Pair as Asked
+from vdsm_pin.proof.bodies import PairTable
+from vdsm_pin.proof.error_box import ErrorBox
+from vdsm_pin.proof.layouts import CLAIM, FIRST, LAST, PLANE_NORMAL, RECORD
+from vdsm_pin.proof.prover import start_proof
+from vdsm_pin.proof.recording import record
+
+ROOM = 20_000
+
+
+def solid_of(name: str, piece: Any) -> Solid:
+    """One convex piece."""
+    if isinstance(piece, HalfSpacePiece):
+        found = Solid(name, [[piece.offset * piece.normal]])
+        found.normal = column(*piece.normal.tolist())
+        return found
+    if isinstance(piece, FlatCylinder):
+        half = piece.half_length * piece.axis
+        found = Solid(name, [[piece.centre - half, piece.centre + half]])
+        found.disc_axis = column(*piece.axis.tolist())
+        found.disc_radius = arb(piece.radius)
+        return found
+    return Solid(name, [piece.points], radius=piece.radius)
+
+
+def tree_of(query: TreeQuery, box: ErrorBox, path: Path) -> Tree:
+    """The joints with their errors, and how far those that slide reach."""
+    joints, reach = [], path.reach()
+    for k, one in enumerate(query.tree.joints):
+        moved = one.column, one.ratio, one.offset
+        joint = Joint(one.parent, one.kind.name, one.axis, one.placement, *moved)
+        joint.err(*(arb(float(x[k])) for x in (box.joints, box.shifts, box.tilts)))
+        if joint.kind == SLIDES:
+            most = 0 if one.column is None else reach[one.column]
+            joint.stroke = abs(joint.ratio) * most + abs(joint.offset)
+        joints.append(joint)
+    return Tree(joints)
+
+
+class Core:
+    """The checker's view of a query of two bodies of one piece each."""
+
+    def __init__(self, query: TreeQuery, box: ErrorBox, required: float) -> None:
+        motion = query.path
+        inner = motion.inner if motion.inner.size else None
+        self.path = Path(Branch(motion.knots, None, inner, []), [])
+        tree, (one, other) = tree_of(query, box, self.path), query.bodies
+        body = Body(one.frame, solid_of(one.name, one.pieces[0]))
+        lost = body.solid.radius + tree.slip(other.frame, one.frame)
+        rests = solid_of(other.name, other.pieces[0])
+        self.pair = Pair(body, rests, other.frame, arb(required), lost)
+        self.tree = tree
+
+    def interval(self, k: int) -> Interval:
+        """The motion between two knots."""
+        return Interval(self.tree, self.path.controls(k))
+
+
+def proofs_of(query: TreeQuery, box: ErrorBox, required: float) -> list[Any] | None:
+    """The proof of each interval by the prover, None where it finds none."""
+    table = PairTable.of([Asked(0, 1, required)])
+    made, plan = start_proof(query.tree, query.bodies, query.path, table, box)
+    if plan.swapped.any():
+        return None
+    records = np.zeros((ROOM, RECORD))
+    n = query.path.n_intervals
+    count, reached, pair = record(made.task, made.motion, made.desk, 0, n, records)
+    if pair >= 0 or reached < n:
+        return None
+    proofs: list[Any] = [[] for _ in range(n)]
+    for row in records[:count].tolist():
+        plane = [int(row[FIRST]), int(row[LAST]), *row[PLANE_NORMAL:CLAIM], row[CLAIM]]
+        proofs[int(row[0])].append([row[2], row[3], [plane]])
+    return [sorted(slices) for slices in proofs]
