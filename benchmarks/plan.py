@@ -19,7 +19,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from benchmarks.common import MICRO, Results, command, timed
 from benchmarks.hrm2000.references.arm import Arm, Wanted, along
-from benchmarks.hrm2000.references.damped_least_squares import reach
+from benchmarks.hrm2000.references.jacobian import damped_least_squares
 from vdsm_pin.errors import VdsmError
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.records import Plan
@@ -65,12 +65,12 @@ def _peer(plan: Plan, repeats: int = 3) -> dict[str, float]:
     goal = Wanted(tip.points[1:], tip.path_m[1:], tip.on_path[1:])
     begin = time.process_time()
     try:
-        motion = along(Arm(problem, robot, clearance), reach, goal)
+        motion = along(Arm(problem, robot, clearance), damped_least_squares, goal)
     except VdsmError:
         spent = MICRO * (time.process_time() - begin) / len(tip.points)
         return {"median": spent, "completes": 0.0, "certified": 0.0}
     spans = timed(
-        lambda: along(Arm(problem, robot, clearance), reach, goal),
+        lambda: along(Arm(problem, robot, clearance), damped_least_squares, goal),
         repeats,
         MICRO / motion.n_samples,
         warm_up=False,

@@ -17,10 +17,11 @@ from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.planner.time_limit import within_time
 from vdsm_pin.problem import Blocked, PlanningProblem
 from vdsm_pin.refinement import plan_and_verify
+from vdsm_pin.report.facts import changed_angles, motion_facts
 from vdsm_pin.robot_model import RobotModel, load_robot
 from vdsm_pin.time_limit import Deadline
-from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.units import in_mm
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.verify import verify
@@ -173,16 +174,21 @@ def measured(problem: PlanningProblem, judged: Judged) -> Outcome:
     """A motion in numbers; one that is certified is sampled densely besides."""
     trajectory, verification = judged.trajectory, judged.verification
     angles = link_angles(trajectory.alpha, trajectory.theta)
-    changed = (angles > TOLERANCES.changed_angle).sum(axis=1)[trajectory.on_path]
+    facts = motion_facts(problem, trajectory)
+    changed = changed_angles(angles)[trajectory.on_path]
     near = [item.lower for item in verification.approaches if item.pair.obstacle]
-    failed = [c.name for c in verification.checks if c.verdict is not Verdict.CERTIFIED]
+    failed = [
+        f"{c.name} ({in_mm(c.worst)})" if c.unit == "m" else c.name
+        for c in verification.checks
+        if c.verdict is not Verdict.CERTIFIED
+    ]
     faults: tuple[str, ...] = ()
     if verification.verdict is Verdict.CERTIFIED:
         faults = sample(problem, trajectory).faults
     return Outcome(
         problem.name, "", 0, "", str(verification.verdict), "; ".join(failed),
         judged.plan_s, judged.plan_s, verification.coverage,
-        float(changed.mean()) if changed.size else None,
+        facts.changed_angles_mean_on_path,
         int(changed.max()) if changed.size else None,
         float(np.rad2deg(angles.max())), float(min(near)) if near else None,
         "; ".join(faults),

@@ -8,6 +8,7 @@ import pytest
 from benchmarks.hrm2000.references import REFERENCES, reference
 from benchmarks.hrm2000.references.follow_the_leader import behind
 from benchmarks.hrm2000.references.multi_directional import _turned
+from benchmarks.hrm2000.references.neural_network import Network
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.kinematics import joint_centres
@@ -30,8 +31,8 @@ def ahead(problem: PlanningProblem = FREE) -> PlanningProblem:
     return replace(problem, tip_path=path)
 
 
-@pytest.mark.parametrize("name", ["pseudo-inverse", "gradient-projection"])
-def test_jacobian_methods_draw_the_free_square_and_change_every_angle(
+@pytest.mark.parametrize("name", ["pseudo-inverse", "gradient-projection", "spiral"])
+def test_methods_without_obstacles_draw_the_free_square_and_change_every_angle(
     name: str,
 ) -> None:
     coarse = replace(FREE, tip_path=replace(FREE.path, spacing=0.05))
@@ -103,6 +104,25 @@ def test_a_branch_turns_no_more_than_allowed() -> None:
         assert np.arccos(np.clip(old @ new, -1.0, 1.0)) <= 0.3 + 1e-9
 
 
-def test_every_reference_has_a_module() -> None:
-    for module in REFERENCES.values():
+def test_a_network_is_trained_by_its_gradients_and() -> None:
+    rng = np.random.default_rng(7)
+    network = Network(3, 5, rng)
+    inputs, wanted = rng.normal(size=(20, 3)), rng.normal(size=(20, 5))
+
+    def loss() -> float:
+        return float(((network.layers(inputs)[-1] - wanted) ** 2).sum() / 40)
+
+    slopes = network.gradients(inputs, wanted)
+    for weights, slope in zip(network.weights, slopes, strict=True):
+        weights[1, 2] += 1e-6
+        more = loss()
+        weights[1, 2] -= 2e-6
+        assert slope[1, 2] == pytest.approx((more - loss()) / 2e-6, abs=1e-8)
+        weights[1, 2] += 1e-6
+
+
+def test_every_reference_names_a_module_and_a_function() -> None:
+    for where in REFERENCES.values():
+        module, function = where.split(":")
         assert module.isidentifier()
+        assert function.isidentifier()

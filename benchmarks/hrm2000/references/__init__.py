@@ -1,4 +1,4 @@
-"""What users would plan with instead, one module each, all called in the same way.
+"""What users would plan with instead, all called in the same way.
 
     follow(problem, robot, clearance) -> Trajectory
 
@@ -9,7 +9,7 @@ Pink and OMPL need the extra `references`: pip install 'vdsm-pin[references]'.
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from types import MappingProxyType
-from typing import Final, TypeAlias, cast
+from typing import Any, Final, TypeAlias, cast
 
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem import PlanningProblem
@@ -20,20 +20,32 @@ Follow: TypeAlias = Callable[[PlanningProblem, RobotModel, LinkClearance], Traje
 
 REFERENCES: Final[Mapping[str, str]] = MappingProxyType(
     {
-        "pseudo-inverse": "pseudo_inverse",
-        "gradient-projection": "gradient_projection",
-        "damped-least-squares": "damped_least_squares",
-        "follow-the-leader": "follow_the_leader",
-        "mda-rrt": "multi_directional",
-        "differential-evolution": "differential_evolution",
-        "pink-barriers": "pink_barriers",
-        "ompl-rrt-connect": "rrt_connect",
+        "pseudo-inverse": "jacobian:pseudo_inverse",
+        "gradient-projection": "jacobian:gradient_projection",
+        "damped-least-squares": "jacobian:damped_least_squares",
+        "differential-evolution": "differential_evolution:reach",
+        "spiral": "spiral:reach",
+        "neural-network": "neural_network:follow",
+        "follow-the-leader": "follow_the_leader:follow",
+        "mda-rrt": "multi_directional:follow",
+        "pink-barriers": "pink_barriers:follow",
+        "ompl-rrt-connect": "rrt_connect:follow",
     }
 )
-"""Module of each reference by its name."""
+"""Module and function of each: `follow`, or what finds one row from the one before."""
 
 
 def reference(name: str) -> Follow:
     """The reference of that name."""
-    module = import_module(f"{__name__}.{REFERENCES[name]}")
-    return cast(Follow, module.follow)
+    file, function = REFERENCES[name].split(":")
+    found: Any = getattr(import_module(f"{__name__}.{file}"), function)
+    return cast(Follow, found) if function == "follow" else row_by_row(found)
+
+
+def row_by_row(reach: Any) -> Follow:
+    """The motion of a `Reach` along the whole path; see `arm.along`."""
+    from benchmarks.hrm2000.references.arm import Arm, along
+
+    return lambda problem, robot, clearance: along(
+        Arm(problem, robot, clearance), reach
+    )

@@ -7,14 +7,10 @@ brought onto the path by the pseudo-inverse, as evolution does not get there exa
 import numpy as np
 from scipy.optimize import differential_evolution
 
-from benchmarks.hrm2000.references.arm import Arm, along
-from benchmarks.hrm2000.references.pseudo_inverse import reach as onto
+from benchmarks.hrm2000.references.arm import Arm
+from benchmarks.hrm2000.references.jacobian import pseudo_inverse
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import RobotModel
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 
 GENERATIONS = 120
 MEMBERS = 6  # times 17 unknowns
@@ -44,16 +40,5 @@ def reach(arm: Arm, q: FloatArray, tip: FloatArray) -> FloatArray | None:
         cost, list(zip(low, high, strict=True)), maxiter=GENERATIONS, popsize=MEMBERS,
         rng=0, polish=False, x0=q, vectorized=True, updating="deferred", tol=0.0,
     )  # fmt: skip
-    best = onto(arm, np.asarray(found.x), tip)
+    best = pseudo_inverse(arm, np.asarray(found.x), tip)
     return best if best is not None and arm.valid(best) else None
-
-
-def follow(
-    problem: PlanningProblem, robot: RobotModel, clearance: LinkClearance
-) -> Trajectory:
-    """Along the desired path, row after row from the one before.
-
-    Raises:
-        NoPlanFound: Where a row is not reached.
-    """
-    return along(Arm(problem, robot, clearance), reach)

@@ -8,7 +8,7 @@ import numpy as np
 from ompl import base, geometric, util
 
 from benchmarks.hrm2000.references.arm import Arm, Rows, wanted
-from benchmarks.hrm2000.references.damped_least_squares import reach
+from benchmarks.hrm2000.references.jacobian import damped_least_squares
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance
@@ -74,7 +74,7 @@ def _another(
 ) -> FloatArray | None:
     """A valid configuration with that tip, from joint values drawn by chance."""
     guess = q + rng.normal(0.0, SPREAD, arm.nq)
-    return reach(arm, arm.bounded(guess), tip)
+    return damped_least_squares(arm, arm.bounded(guess), tip)
 
 
 def follow(
@@ -92,7 +92,7 @@ def follow(
     rows = Rows(arm.start(), goal.stations[first])
     k, fresh, at = first, True, 0
     while k < len(goal.tips):
-        q = None if fresh else reach(arm, rows.joints[-1], goal.tips[k])
+        q = None if fresh else damped_least_squares(arm, rows.joints[-1], goal.tips[k])
         if q is not None and np.abs(q - rows.joints[-1])[1:].max() < 0.08:
             rows.add(q, goal.stations[k], True)
             k += 1

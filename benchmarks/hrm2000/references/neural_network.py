@@ -1,0 +1,96 @@
+"""A neural network from tip to joint values, learnt from the arm's own kinematics.
+
+Two hidden layers, trained by Adam on postures drawn by chance: joint angles within a
+few degrees of each other, the base anywhere. What it answers is taken as it comes.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+
+from benchmarks.hrm2000.references.arm import Arm, along
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.trajectory import Trajectory
+
+POSTURES, BATCH, STEPS, WIDTH = 40_000, 256, 6_000, 64
+BEND, SCATTER = np.deg2rad(12.0), np.deg2rad(1.0)
+"""Largest bend that all joints share, and standard deviation of each from it."""
+RATE, FIRST, SECOND = 3e-3, 0.9, 0.999
+"""Step size of Adam, and its two rates of forgetting."""
+
+
+class Network:
+    """Weights of three layers with tanh between them."""
+
+    def __init__(self, inputs: int, outputs: int, rng: np.random.Generator) -> None:
+        sizes = [inputs, WIDTH, WIDTH, outputs]
+        self.weights = [
+            rng.normal(size=(a + 1, b)) / np.sqrt(a + 1) for a, b in pairwise(sizes)
+        ]
+
+    def layers(self, inputs: FloatArray) -> list[FloatArray]:
+        """What every layer is given, a column of ones added, then the answer."""
+        found = [np.column_stack([inputs, np.ones(len(inputs))])]
+        for weights in self.weights[:-1]:
+            hidden = np.tanh(found[-1] @ weights)
+            found.append(np.column_stack([hidden, np.ones(len(hidden))]))
+        return [*found, found[-1] @ self.weights[-1]]
+
+    def gradients(self, inputs: FloatArray, wanted: FloatArray) -> list[FloatArray]:
+        """Of the mean square error, by the weights of each layer."""
+        *given, answer = self.layers(inputs)
+        back, found = (answer - wanted) / len(inputs), []
+        for values, weights in zip(given[::-1], self.weights[::-1], strict=True):
+            found.append(values.T @ back)
+            back = (back @ weights.T * (1.0 - values**2))[:, :-1]
+        return found[::-1]
+
+    def train(
+        self, inputs: FloatArray, wanted: FloatArray, rng: np.random.Generator
+    ) -> None:
+        """Adam on batches drawn by chance, its step falling to 0."""
+        means = [np.zeros_like(w) for w in self.weights]
+        squares = [np.zeros_like(w) for w in self.weights]
+        for step in range(1, STEPS + 1):
+            rows = rng.integers(len(inputs), size=BATCH)
+            rate = RATE * (1.0 - step / STEPS)
+            for k, slope in enumerate(self.gradients(inputs[rows], wanted[rows])):
+                means[k] += (1.0 - FIRST) * (slope - means[k])
+                squares[k] += (1.0 - SECOND) * (slope**2 - squares[k])
+                mean = means[k] / (1.0 - FIRST**step)
+                size = np.sqrt(squares[k] / (1.0 - SECOND**step)) + 1e-8
+                self.weights[k] -= rate * mean / size
+
+
+def postures(arm: Arm, rng: np.random.Generator) -> FloatArray:
+    """Joint values within the limits, shape (POSTURES, 1 + 2 N)."""
+    shared = rng.uniform(-BEND, BEND, (POSTURES, 1, 2))
+    angles = shared + SCATTER * rng.normal(size=(POSTURES, arm.n, 2))
+    x0 = rng.uniform(-1.0, 1.0, (POSTURES, 1)) * 0.3 * arm.problem.path.start[0]
+    return np.hstack([x0, angles.reshape(POSTURES, -1)])
+
+
+def follow(
+    problem: PlanningProblem, robot: RobotModel, clearance: LinkClearance
+) -> Trajectory:
+    """Trained for this arm, then asked row after row; the judge has the rest to say.
+
+    Raises:
+        NoPlanFound: If two rows are too far apart.
+    """
+    arm, rng = Arm(problem, robot, clearance), np.random.default_rng(0)
+    joints = postures(arm, rng)
+    tips = arm.centres(joints)[:, -1]
+    middle, spread = tips.mean(axis=0), tips.std(axis=0)
+    centre, scale = joints.mean(axis=0), joints.std(axis=0)
+    network = Network(3, arm.nq, rng)
+    network.train((tips - middle) / spread, (joints - centre) / scale, rng)
+
+    def reach(arm: Arm, q: FloatArray, tip: FloatArray) -> FloatArray:
+        answer = network.layers(((tip - middle) / spread)[None])[-1][0]
+        return arm.bounded(centre + scale * answer)
+
+    return along(arm, reach)
