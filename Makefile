@@ -41,6 +41,7 @@ report: figures
 	$(BIN)/python analysis/obs2_orientations.py --out reports/paper
 	$(BIN)/python analysis/scaling_choices.py --out reports/paper
 	$(BIN)/python analysis/step5_choices.py --out reports/paper
+	$(BIN)/python analysis/moving_obstacle.py --out reports/paper
 	$(BIN)/python analysis/closed_loop.py --out reports/paper
 	PYTHONPATH=. $(BIN)/python analysis/baselines.py --out reports/paper --sample 2
 

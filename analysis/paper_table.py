@@ -68,6 +68,15 @@ PAPER: Final = {
     ("obs1", "A4"): "psi7, psi8 besides psi1 (6.2.2)",
     ("obs1", "A5"): "psi4..psi8 besides psi1 (6.2.1)",
     ("obs1", "A6"): "psi1, psi4, psi5, psi6 (6.2.1)",
+    ("obs1", "stretch"): "A3 to A7 (6.2.2)",
+    ("obs2", "stretch"): "B1 to B4 and B6 to B10 (6.2.2)",
+    ("obs2-small", "stretch"): "B1 to B4 and B6 to B10 (6.2.2)",
+    ("obs3", "stretch"): "A2 to A7 (6.2.2)",
+    ("obs1", "order"): "psi8, psi7, .. psi4 near A5 (6.2.2)",
+    ("obs2", "order"): "psi2..psi8 slightly all at once, then separately (6.2.2)",
+    ("obs2-small", "order"): "psi2..psi8 slightly all at once, then separately (6.2.2)",
+    ("obs3", "order"): "psi4..psi6, psi4 and psi6 never together (6.2.2)",
+    ("obs3", "joint"): "within 35 (7)",
     ("obs1", "error"): "mostly within 0.3, up to about 4 (7)",
     ("obs3", "error"): "mostly within 0.3, up to about 4 (7)",
 }
@@ -89,6 +98,25 @@ def moments(trajectory: Trajectory, tip: FloatArray) -> dict[str, int]:
     return {"A4": int(left[0]), "A5": int(joined[1]), "A6": int(np.argmax(corner))}
 
 
+def stretch(result: Refinement) -> str:
+    """Where on the path more than psi1 is changed, from first to last row, y and z."""
+    trajectory = result.plan.trajectory
+    bent = link_angles(trajectory.alpha, trajectory.theta)[:, 1:].max(axis=1)
+    rows = np.flatnonzero(trajectory.on_path & (bent > TOLERANCES.changed_angle))
+    if not len(rows):
+        return "nowhere"
+    ends = result.plan.tip_path.points[rows[[0, -1]], 1:] * MM_PER_M
+    return " to ".join(f"({y:.0f}, {z:.0f})" for y, z in ends)
+
+
+def order(psi: FloatArray) -> str:
+    """The link angles in the order in which they first change; psi of shape (n, N)."""
+    bent = psi > TOLERANCES.changed_angle
+    first = [(int(np.argmax(bent[:, k])), k + 1) for k in range(1, bent.shape[1])]
+    names = [f"psi{joint}" for row, joint in sorted(first) if row]
+    return ", ".join(names) or "psi1 alone"
+
+
 def touching_error(result: Refinement) -> float:
     """The largest joint error for which no contact is proved; [rad]."""
     problem = replace(result.plan.problem, required_clearance=0.0)
@@ -104,6 +132,15 @@ def rows_of(scene: str, result: Refinement) -> list[Row]:
     ours = {
         "psi": ("largest psi [deg]", f"{np.rad2deg(psi.max()):.2f}"),
         "changed": ("link angles that change", changed(psi)),
+        "order": ("link angles in the order in which they begin", order(psi)),
+        "stretch": (
+            "more than psi1 is changed, on the path (y, z) [mm]",
+            stretch(result),
+        ),
+        "joint": (
+            "largest joint angle [deg]",
+            f"{np.rad2deg(np.abs(trajectory.joints[:, 1:]).max()):.2f}",
+        ),
         "x0 min": ("x0 min [mm]", f"{trajectory.x0.min() * MM_PER_M:.1f}"),
         "x0 max": ("x0 max [mm]", f"{trajectory.x0.max() * MM_PER_M:.1f}"),
         "step": (

@@ -172,6 +172,16 @@ def test_obs2_begins_and_ends_at_its_equidistant_point() -> None:
     np.testing.assert_allclose(drawn[[0, -1], 1:], 1.0, atol=1e-9)
 
 
+@pytest.mark.parametrize(("name", "arc"), [("obs2", 1.764), ("obs2-small", 1.572)])
+def test_the_way_onto_the_path_is_hardly_longer_than_the_arc(
+    name: str, arc: float
+) -> None:
+    tip_path = plan_of(name).tip_path
+    way = tip_path.points[: int(np.argmax(tip_path.on_path)) + 1, 1:]
+    length = np.linalg.norm(np.diff(way, axis=0), axis=1).sum()
+    assert arc < length < 1.2 * arc
+
+
 def test_undrawn_stretches_are_told() -> None:
     plan = plan_of("obs2")
     assert any("from 2200.000 mm" in stretch for stretch in plan.undrawn)

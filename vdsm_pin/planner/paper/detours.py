@@ -10,7 +10,7 @@ other side (A5).
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -265,8 +265,7 @@ def _connect(
     it first goes back along the path it can draw, out of the shadow.
     """
     lines = []
-    far, farther = len(begin.retreat), len(end.retreat)
-    for k, m in dict.fromkeys([(1, 1), (far, 1), (1, farther), (far, farther)]):
+    for k, m in product(*map(_retreats, (begin, end))):
         out, back = begin.retreat[:k], end.retreat[:m][::-1]
         lines += [
             np.concatenate([out, line, back])
@@ -281,6 +280,12 @@ def _connect(
             return way.part(0, len(way) - 1, side)
     reason = "the tip cannot get round it with the arm on the side it needs"
     raise PathBlocked(obstacle=shadow.region.name, reason=reason)
+
+
+def _retreats(end: _End) -> list[int]:
+    """How many waypoints to go back along the path: 1, 2, 4, .., all."""
+    most = len(end.retreat)
+    return [*(2**k for k in range(most.bit_length()) if 2**k < most), most]
 
 
 def _ways_round(
