@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -59,3 +61,20 @@ def test_the_changelog_begins_with_this_version_or_what_comes() -> None:
     page = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     first = re.findall(r"^## \[(.*?)\]", page, re.MULTILINE)[0]
     assert first in ("Unreleased", vdsm_pin.__version__)
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
+def test_the_number_on_the_first_screen_is_the_one_measured(page: str) -> None:
+    report = (ROOT / "reports" / "foreign_plans.md").read_text(encoding="utf-8")
+    (number,) = re.findall(r"^\*\*(.*)\*\*$", report, re.MULTILINE)
+    shown = " ".join((ROOT / page).read_text(encoding="utf-8").split())
+    assert f"**{number}**" in shown[:1500]
+
+
+def test_the_python_of_the_readme_runs() -> None:
+    page = (ROOT / "README.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"^```python\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    ran = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert re.search(r"verdict +certified", ran.stdout)
