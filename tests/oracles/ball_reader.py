@@ -17,10 +17,9 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 import yaml
-from flint import arb
+from flint import arb, arb_mat
 
 from vdsm_pin.certificate_checker.balls import Ball, Matrix, column, dot, unit
-from vdsm_pin.certificate_checker.motion import turn
 
 NUMBER: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 HRM8: Final = {
@@ -154,6 +153,14 @@ def _reals(texts: Any, count: int) -> list[Ball]:
     good = isinstance(texts, list | tuple) and len(texts) == count
     require(good, f"{texts!r} is not a list of {count} numbers")
     return [_real(text) for text in texts]
+
+
+def turn(axis: int, angle: Ball) -> Matrix:
+    """Rotation about x, y or z (0, 1, 2)."""
+    matrix, i, j = arb_mat(3, 3, 1), (axis + 1) % 3, (axis + 2) % 3
+    sine, cosine = angle.sin_cos()
+    matrix[i, i], matrix[i, j], matrix[j, i], matrix[j, j] = cosine, -sine, sine, cosine
+    return matrix
 
 
 def _rotation(rpy_deg: Any) -> Matrix:
