@@ -26,7 +26,7 @@ from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.planner.fewest.bounds import least_changed
+from vdsm_pin.planner.impossible.bounds import least_changed
 from vdsm_pin.planner.paper import pipeline, side_rules
 from vdsm_pin.planner.paper.online import OnlineRule
 from vdsm_pin.refinement import plan_and_verify

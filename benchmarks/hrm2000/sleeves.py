@@ -22,9 +22,9 @@ from benchmarks.hrm2000.sweeps import Rng, required_clearance, scale
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.planner.fewest.bounds import prove_tips
-from vdsm_pin.planner.fewest.last_link import hemmed_in
-from vdsm_pin.planner.fewest.passage import cut_off
+from vdsm_pin.planner.impossible.bounds import prove_tips
+from vdsm_pin.planner.impossible.cut_off import cut_off
+from vdsm_pin.planner.impossible.last_link import hemmed_in
 from vdsm_pin.problem import DesiredPath, PlanningProblem
 from vdsm_pin.scene import Box, Scene
 from vdsm_pin.verification.link_clearance import link_clearance

@@ -14,7 +14,7 @@ from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.planner.fewest.passage import cut_off
+from vdsm_pin.planner.impossible.cut_off import cut_off
 from vdsm_pin.planner.upper_clearance import upper_bounds
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.proof.layouts import LOW, UP

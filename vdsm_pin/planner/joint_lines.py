@@ -46,10 +46,10 @@ def clear_line(
         share = np.arange(count + 1)[:, None] / count
         rows = (1.0 - share) * begin + share * end
         centres = joint_centres(arm, rows[:, 0], rows[:, 1::2], rows[:, 2::2])
-        room = clearance(centres).min(axis=1, initial=np.inf)
-        if not (room >= need).all():
+        clearances = clearance(centres).min(axis=1, initial=np.inf)
+        if not (clearances >= need).all():
             return None
-        if (room[:-1] + room[1:] - way / count >= 2.0 * need).all():
+        if (clearances[:-1] + clearances[1:] - way / count >= 2.0 * need).all():
             return np.asarray(rows)
         count *= 2
     return None

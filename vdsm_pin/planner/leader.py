@@ -17,7 +17,7 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.kinematics import joint_angles, link_angles
 from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.planner.fewest.follow import beyond
+from vdsm_pin.planner.fewest.follow_the_leader import beyond
 from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan, TipPath
 from vdsm_pin.planner.start import check_start, start_centres

@@ -113,8 +113,8 @@ def check_start(problem: PlanningProblem, clearance: LinkClearance) -> None:
         return
     _check_outside(problem)
     if not clearance(centres[None]).min() >= required:
-        link, obstacle, room = culprit(problem, centres)
+        link, obstacle, least = culprit(problem, centres)
         bent = problem.path.start_joints is not None
         raise StartBlocked(
-            link=link, obstacle=obstacle, clearance=room, required=required, bent=bent
+            link=link, obstacle=obstacle, clearance=least, required=required, bent=bent
         )

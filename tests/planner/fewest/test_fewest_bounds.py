@@ -7,8 +7,7 @@ from scenes_for_fewest import problem, straight_arm
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres, link_angles
 from vdsm_pin.manipulator import built_in
-from vdsm_pin.planner.fewest.bounds import least_changed
-from vdsm_pin.planner.fewest.sway import sway
+from vdsm_pin.planner.impossible.bounds import deviation, least_changed
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.scene import Cylinder, Sphere
 from vdsm_pin.tolerances import TOLERANCES
@@ -50,7 +49,7 @@ def test_two_changed_angles_are_proved_needed_only_where_no_single_one_does() ->
             reachable.append(clearance(centres).min() >= task.required_clearance)
         assert not (any(reachable) and bound == 2)
         lost += bound == 1 and not any(reachable)
-    # What the sway of unchanged angles costs: proofs at a few tips, not at most.
+    # What the deviation of unchanged angles costs: proofs at a few tips, not at most.
     assert lost < 0.15 * (least == 2).sum()
 
 
@@ -98,7 +97,7 @@ def from_axis(points: FloatArray, centres: FloatArray) -> FloatArray:
 
 @pytest.mark.parametrize("worst", [True, False])
 @pytest.mark.parametrize("joint", [None, *range(8)])
-def test_the_sway_bound_holds_and_is_not_far_above_what_happens(
+def test_the_deviation_bound_holds_and_is_not_far_above_what_happens(
     joint: int | None, worst: bool
 ) -> None:
     rng = np.random.default_rng([77, 9 if joint is None else joint])
@@ -107,7 +106,7 @@ def test_the_sway_bound_holds_and_is_not_far_above_what_happens(
         centres, angles = leaning(rng, joint, worst=worst)
         tip = centres[-1]
         off = np.array([np.hypot(tip[1], tip[2])])
-        bound = sway(ARM, off)
+        bound = deviation(ARM, off)
         if joint is None:
             assert off[0] <= bound.straight
             seen = max(seen, off[0] / bound.straight)

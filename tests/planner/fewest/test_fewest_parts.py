@@ -9,17 +9,18 @@ from scenes_for_fewest import problem
 from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.kinematics import joint_angles, link_angles
 from vdsm_pin.manipulator import built_in
-from vdsm_pin.planner.fewest.bounds import prove_tips
-from vdsm_pin.planner.fewest.cores import blocked_by, cores_of
-from vdsm_pin.planner.fewest.growth import Grown, Population, vary
+from vdsm_pin.planner.fewest.broad_phase import broad_phase
+from vdsm_pin.planner.fewest.growth import Grown, Population
+from vdsm_pin.planner.fewest.inner_capsules import blocked_by, cores_of
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.kernels import pose_shapes
 from vdsm_pin.planner.fewest.motion import Intervals
-from vdsm_pin.planner.fewest.nearby import nearby
-from vdsm_pin.planner.fewest.poses import bends_of, room_along
+from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Pricing, build_roadmap
+from vdsm_pin.planner.fewest.roadmap_kernels import pose_shapes
 from vdsm_pin.planner.fewest.route import path_rows, tip_route
 from vdsm_pin.planner.fewest.shapes import Shapes, one_knee_shapes
+from vdsm_pin.planner.fewest.vary import vary
+from vdsm_pin.planner.impossible.bounds import prove_tips
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.scene import Box, Capsule, Cylinder, HalfSpace, Obstacle, Prism, Sphere
 from vdsm_pin.tolerances import TOLERANCES
@@ -86,7 +87,7 @@ def test_bounds_from_boxes_never_exceed_the_clearance_and_are_exact_when_near() 
     )
     exact = link_clearance(task)
     segments = rng.uniform([-1, -1.5, -1.5], [4, 1.5, 1.5], (4000, 2, 3))
-    quick = nearby(task, exact)
+    quick = broad_phase(task, exact)
     truth, bound = exact(segments)[:, 0], quick(segments)[:, 0]
     # Below zero the clearance function promises the sign alone.
     apart, near = truth > 0.0, bound < quick.far
@@ -237,15 +238,15 @@ def test_an_interval_is_clear_exactly_where_dense_samples_are(seed: int) -> None
             np.tile(np.linspace(0, 1, 65), 399),
         )
         centres = intervals.centres(ARM, rows, places)
-        room = clearance(centres).min(axis=1)
-        room[~(bends_of(centres).max(axis=1) <= judge.limit)] = -np.inf
-        room = room.reshape(399, 65)
+        clearances = clearance(centres).min(axis=1)
+        clearances[~(bends_of(centres).max(axis=1) <= judge.limit)] = -np.inf
+        clearances = clearances.reshape(399, 65)
         assert 0.03 < clear.mean() < 0.9
         # What is clear may lose half of the finest way between two looks.
-        assert room[clear].min() >= task.required_clearance - finest / 2.0
-        assert (room[~clear].min(axis=1) < task.required_clearance + finest).all()
+        assert clearances[clear].min() >= task.required_clearance - finest / 2.0
+        assert (clearances[~clear].min(axis=1) < task.required_clearance + finest).all()
         # Below zero the clearance function promises the sign alone.
-        kept, first = begin >= 0.0, room[:, 0]
+        kept, first = begin >= 0.0, clearances[:, 0]
         np.testing.assert_array_equal(kept, first >= 0.0)
         np.testing.assert_allclose(begin[kept], first[kept], atol=1e-8)
 
@@ -254,13 +255,13 @@ def test_pieces_cut_at_other_knees_have_the_least_room_of_what_they_share() -> N
     rng = np.random.default_rng(3)
     knees, others = rng.random((2, 400, 9)) < 0.4
     knees[:, [0, -1]] = others[:, [0, -1]] = True
-    room = np.where(knees[:, 1:], rng.uniform(size=(400, 8)), np.inf)
-    found = room_along(room, knees, others)
+    clearances = np.where(knees[:, 1:], rng.uniform(size=(400, 8)), np.inf)
+    found = clearances_along(clearances, knees, others)
     for row in range(400):
         cuts, ends = np.flatnonzero(others[row]), np.flatnonzero(knees[row])
         expected = np.full(8, np.inf)
         for a, b in itertools.pairwise(cuts):
-            shared = [room[row, d - 1] for c, d in itertools.pairwise(ends)
+            shared = [clearances[row, d - 1] for c, d in itertools.pairwise(ends)
                       if c < b and a < d]  # fmt: skip
             expected[b - 1] = min(shared)
         np.testing.assert_array_equal(found[row], expected)
@@ -300,7 +301,7 @@ def test_nothing_grows_through_a_rod_though_children_stand_behind_it() -> None:
     assert judge.clear(lines(tips, tree)).all()
     # Where no way is looked at, some children are beyond the rod at one bound.
     root = np.zeros((1, 9, 2))
-    jumped, _ = population._grown(root, 0, 5, every_way=False)
+    jumped, _ = population._grown(root, 0, 5, every_connection=False)
     clear = judge.clear(lines(tips, jumped))
     assert 0.5 < clear.mean() < 1.0
     assert len(population._reached(jumped, root, 0).layer) < clear.sum()

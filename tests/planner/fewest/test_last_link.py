@@ -15,9 +15,9 @@ from vdsm_pin.manipulator import (
     built_in,
     paper_hole_angles,
 )
-from vdsm_pin.planner.fewest.last_link import _least_along, hemmed_in
-from vdsm_pin.planner.fewest.nearby import nearby
+from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.strategy import plan_fewest
+from vdsm_pin.planner.impossible.last_link import _least_along, hemmed_in
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.scene import Box
 from vdsm_pin.verification.link_clearance import link_clearance
@@ -70,7 +70,7 @@ def shelf_above(gap: float, half: float, count: int = 4) -> PlanningProblem:
 
 
 def is_hemmed(task: PlanningProblem, tip: FloatArray) -> bool:
-    clearance = nearby(task, link_clearance(task)).up_to(task.required_clearance)
+    clearance = broad_phase(task, link_clearance(task)).up_to(task.required_clearance)
     return bool(hemmed_in(task, clearance, tip[None])[0])
 
 
@@ -92,7 +92,7 @@ def test_the_tip_of_a_plan_is_never_hemmed_in() -> None:
     for task in tasks:
         clearance = link_clearance(task)
         tips = plan_fewest(task, clearance, 0.0).tip_path.points[::10]
-        assert not hemmed_in(task, nearby(task, clearance), tips).any()
+        assert not hemmed_in(task, broad_phase(task, clearance), tips).any()
 
 
 def test_a_tip_that_is_hemmed_in_is_refused_with_its_place() -> None:

@@ -8,12 +8,12 @@ import pytest
 from scenes_for_fewest import problem
 
 from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.explore import explore
 from vdsm_pin.planner.fewest.levels import QUICK, THOROUGH, Effort, Insert
-from vdsm_pin.planner.fewest.motion import Knots
-from vdsm_pin.planner.fewest.nearby import nearby
+from vdsm_pin.planner.fewest.motion import Corners
 from vdsm_pin.planner.fewest.roadmap import CostWeights
-from vdsm_pin.planner.fewest.smooth import smooth
+from vdsm_pin.planner.fewest.shortcut import shortcut
 from vdsm_pin.planner.fewest.strategy import CLEAREST, FEWEST
 from vdsm_pin.planner.fewest.unbend import unbend
 from vdsm_pin.problem import DesiredPath, Order, PlanningProblem
@@ -93,12 +93,12 @@ def scaled(task: PlanningProblem, factor: float) -> PlanningProblem:
     )
 
 
-def found(task: PlanningProblem, weights: CostWeights, effort: Effort) -> Knots:
+def found(task: PlanningProblem, weights: CostWeights, effort: Effort) -> Corners:
     """The motion of the last search, smoothed."""
-    clearance = nearby(task, link_clearance(task))
+    clearance = broad_phase(task, link_clearance(task))
     *_, outcome = explore(task, clearance, 0.0, weights, effort)
     assert outcome.found is not None
-    return smooth(outcome.judge, outcome.found.knots, weights)
+    return shortcut(outcome.judge, outcome.found.corners, weights)
 
 
 def frame() -> list[Obstacle]:

@@ -15,12 +15,12 @@ from vdsm_pin.io.problem_file import built_in_text, read_problem
 from vdsm_pin.kinematics import joint_centres, link_angles
 from vdsm_pin.manipulator import CableLayout, Manipulator, paper_hole_angles
 from vdsm_pin.planner.fewest import explore
+from vdsm_pin.planner.fewest.insertion import Inserted
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap
 from vdsm_pin.planner.fewest.start_node import with_start
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.unbend import leans_ahead, unbend
-from vdsm_pin.planner.fewest.ways_in import Inserted
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import load_robot
@@ -113,10 +113,10 @@ def test_unbending_keeps_limits_and_clearance_and_gives_up_where_it_cannot() -> 
     )
 
     def never(centres: FloatArray) -> FloatArray:
-        room = np.full(centres[:, 1:, 0].shape, -1.0)
-        room[(centres == joint_centres(arm, rows[:1, 0], rows[:1, 1::2],
+        clearances = np.full(centres[:, 1:, 0].shape, -1.0)
+        clearances[(centres == joint_centres(arm, rows[:1, 0], rows[:1, 1::2],
               rows[:1, 2::2])).all(axis=(1, 2))] = 1.0  # fmt: skip
-        return room
+        return clearances
 
     with pytest.raises(NoPlanFound, match="backwards"):
         unbend(task, never, 0.0)
@@ -169,7 +169,7 @@ def test_a_start_that_is_left_by_a_finer_search_alone_is_left(
     assert plan.trajectory.on_path.any()
     assert len(tried) == 2
     needed = 1000
-    monkeypatch.setattr(explore, "ways_in", lambda *_: Inserted(None, None))
+    monkeypatch.setattr(explore, "insert", lambda *_: Inserted(None, None))
     with pytest.raises(NoWayOut, match="out of the start"):
         plan_fewest(task, link_clearance(task), 0.0)
 

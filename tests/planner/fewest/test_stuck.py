@@ -9,10 +9,10 @@ from scenes_for_fewest import problem
 from vdsm_pin.errors import NoPlanFound, OutOfReach
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.feasibility import rail_distance
+from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.explain import refuse
 from vdsm_pin.planner.fewest.explore import explore
 from vdsm_pin.planner.fewest.levels import Effort, Insert
-from vdsm_pin.planner.fewest.nearby import nearby
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.stuck import Stuck, where_stuck
@@ -93,8 +93,8 @@ def test_a_search_in_vain_tells_where_it_ended(
     task = replace(task, manipulator=arm)
     tip = task.path.points[-1]
     assert float(rail_distance(arm, tip[None])[0]) < arm.total_length
-    clearance = nearby(task, link_clearance(task))
-    effort = Insert(step=0.02, population=10, ways=1, returns=1, seed=0)
+    clearance = broad_phase(task, link_clearance(task))
+    effort = Insert(step=0.02, population=10, routes=1, returns=1, seed=0)
     with shown(quiet=0.0):
         *_, outcome = explore(
             task, clearance, 0.0, CostWeights(), Effort((effort,), False)

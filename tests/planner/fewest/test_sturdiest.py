@@ -11,6 +11,7 @@ from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
+from vdsm_pin.planner.fewest.joint_error import levers, link_by_link, link_margins
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import CostWeights, build_roadmap
@@ -21,7 +22,6 @@ from vdsm_pin.planner.fewest.strategy import (
     plan_fewest,
     plan_sturdiest,
 )
-from vdsm_pin.planner.fewest.taper import kept_by_links, levers, link_by_link
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.refinement import plan_and_verify
@@ -53,10 +53,10 @@ def test_a_lever_is_how_far_the_end_of_a_link_moves_as_all_joints_turn() -> None
     np.testing.assert_allclose(
         np.linalg.norm(moved[1:, 1:], axis=1), turn * levers(ARM), rtol=1e-9
     )
-    kept = kept_by_links(ARM, 0.01)
+    kept = link_margins(ARM, 0.01)
     assert kept is not None
     np.testing.assert_array_equal(kept, 0.01 * levers(ARM))
-    assert kept_by_links(ARM, 0.0) is None
+    assert link_margins(ARM, 0.0) is None
 
 
 @pytest.mark.parametrize("knees", [[], [3], [5, 5], [1, 7], [0, 4]])
@@ -78,8 +78,8 @@ def test_each_link_keeps_its_own() -> None:
         Sphere("ball", np.array([2.0, 0.5, 0.3]), 0.2),
         Cylinder("bar", np.array([1.0, -0.6, 0.0]), np.array([0.0, 0, 1]), 2.0, 0.1),
     )
-    clearance, weights = link_clearance(task), CostWeights(taper=0.01)
-    kept = kept_by_links(ARM, weights.taper)
+    clearance, weights = link_clearance(task), CostWeights(joint_error=0.01)
+    kept = link_margins(ARM, weights.joint_error)
     rows = path_rows(task.path)
     route = tip_route(task, rows, np.zeros(len(rows.tips), dtype=np.bool_), 0.2, 0.0)
     shapes = one_knee_shapes(ARM, ARM.max_link_angle, 0.2, 8)

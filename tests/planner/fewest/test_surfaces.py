@@ -5,8 +5,8 @@ import pytest
 import trimesh
 from scenes_for_fewest import problem
 
-from vdsm_pin.planner.fewest.nearby import nearby
-from vdsm_pin.planner.fewest.surfaces import STEP, surfaces_of
+from vdsm_pin.planner.fewest.broad_phase import broad_phase
+from vdsm_pin.planner.fewest.mesh_distance import STEP, surfaces_of
 from vdsm_pin.scene import Mesh
 from vdsm_pin.verification.link_clearance import link_clearance
 
@@ -89,7 +89,7 @@ def test_the_clearance_function_is_asked_where_a_step_decides() -> None:
 
     rng = np.random.default_rng(3)
     segments = rng.uniform([1.0, -1.0, -1.0], [3.0, 1.0, 1.0], (2000, 2, 3))
-    quick, need = nearby(task, counted), task.required_clearance
+    quick, need = broad_phase(task, counted), task.required_clearance
     bound, truth = quick(segments)[:, 0], exact(segments)[:, 0]
     np.testing.assert_array_equal(bound >= need, truth >= need)
     assert sum(asked) < 10

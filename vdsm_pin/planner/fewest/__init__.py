@@ -1,5 +1,12 @@
 """Plans in any scene with few bent joints: one graph of sparse shapes.
 
+How a plan is made: `strategy` tells the story, `explore` goes through its searches. A
+`roadmap` of sparse `shapes` along a tip `route` is searched (`search`, `sequence`).
+Where it ends, arms are grown: along the path (`growth`) or through openings
+(`tip_routes`, `insertion`). A `judge` says what is clear. What was found is pulled
+straight (`shortcut`) and bends fewer joints (`sparsify`). `vdsm_pin.planner.impossible`
+proves what nobody can draw.
+
 Words of these modules:
 
 * tip: a tip position at which arms are tried; layer: one of those on the desired path,
@@ -8,10 +15,11 @@ Words of these modules:
   tip has it; chart: tip and offsets together, in which motions are straight lines.
 * knee: a joint whose link angle is not zero; shape: the offsets of an arm with few of
   them, at any tip; node: a shape at a tip that keeps limits and clearance.
-* room: the clearance of a configuration; weights: what a strategy prefers among nodes;
-  population: arms that are varied and selected from layer to layer.
-* home: the node the motion starts from; way: a motion off the path; leg: a run of nodes
-  that is drawn, or a way; sequence: all legs.
-* knot: a corner of the motion in the chart; row: a configuration of the trajectory.
+* weights: what a strategy prefers among nodes; population: arms that are varied and
+  selected from layer to layer.
+* start node: the node the motion starts from; connection: a motion off the path; leg: a
+  run of nodes that is drawn, or a connection; sequence: all legs.
+* corner: a place where the motion turns in the chart; row: a configuration of the
+  trajectory.
 * closed: proved that nobody can draw it; skipped: not drawn, for whatever reason.
 """

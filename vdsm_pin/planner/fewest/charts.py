@@ -6,9 +6,9 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.planner.fewest.directions import vary_directions
-from vdsm_pin.planner.fewest.growth import COPIED, SCALES, vary
+from vdsm_pin.planner.fewest.direction_kernels import vary_directions
 from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.planner.fewest.vary import COPIED, SCALES, vary
 
 TURNS: Final = (0.02, 0.08, 0.25)
 """Sizes of a turn of links; [rad]."""

@@ -16,16 +16,16 @@ from vdsm_pin.errors import (
 )
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.feasibility import curled_reach, rail_distance
-from vdsm_pin.planner.fewest.bounds import (
+from vdsm_pin.planner.fewest.explore import Outcome
+from vdsm_pin.planner.fewest.motion import Corners, Intervals
+from vdsm_pin.planner.fewest.pose_kernels import bends_of
+from vdsm_pin.planner.fewest.route import PathRows
+from vdsm_pin.planner.fewest.stuck import where_stuck
+from vdsm_pin.planner.impossible.bounds import (
     TipProof,
     least_changed,
 )
-from vdsm_pin.planner.fewest.explore import Outcome
-from vdsm_pin.planner.fewest.motion import Intervals, Knots
-from vdsm_pin.planner.fewest.passage import narrowest
-from vdsm_pin.planner.fewest.poses import bends_of
-from vdsm_pin.planner.fewest.route import PathRows
-from vdsm_pin.planner.fewest.stuck import where_stuck
+from vdsm_pin.planner.impossible.cut_off import narrowest
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.time_limit import deadline_of
 from vdsm_pin.planner.upper_clearance import culprit, upper_clearance
@@ -102,13 +102,13 @@ def _proved(
         return _cut_off(problem, rows, proof, deadline)
     first = int(np.flatnonzero(proof.buried)[0])
     tip = rows.tips[first]
-    _, name, room = culprit(problem, np.stack([tip, tip]))
+    _, name, least = culprit(problem, np.stack([tip, tip]))
     return PathBlocked(
         obstacle=name,
         station=float(rows.stations[first]),
         reason=(
             f"at {in_mm(rows.stations[first])} along the path the tip itself would "
-            f"have at most {in_mm(room)} to it, required are "
+            f"have at most {in_mm(least)} to it, required are "
             f"{in_mm(problem.required_clearance)}"
         ),
     )
@@ -141,11 +141,11 @@ def _cut_off(
         place = None
     words = ""
     if place is not None:
-        room = upper_clearance(problem, np.stack([place, place])[None])[0]
+        clearances = upper_clearance(problem, np.stack([place, place])[None])[0]
         scene, required = problem.scene.obstacles, problem.required_clearance
-        near = [o.name for o, r in zip(scene, room, strict=True) if r < required]
+        near = [o.name for o, r in zip(scene, clearances, strict=True) if r < required]
         words = (
-            f"the widest way tried has at most {in_mm(room.min())} to "
+            f"the widest way tried has at most {in_mm(clearances.min())} to "
             f"{', '.join(map(repr, near))} at "
             f"{problem.in_file(place)}, required are "
             f"{in_mm(required)}"
@@ -158,12 +158,12 @@ def say_drawn(problem: PlanningProblem, outcome: Outcome) -> None:
     if outcome.found is None:
         return
     drawn, length = _drawn(problem, outcome), problem.path.length
-    knots = outcome.found.knots
-    on = np.flatnonzero(knots.drawn)
-    _, changed, _ = outcome.judge.look(knots.tips[on], knots.offsets[on])
+    corners = outcome.found.corners
+    on = np.flatnonzero(corners.drawn)
+    _, changed, _ = outcome.judge.look(corners.tips[on], corners.offsets[on])
     say(
         "draws %s of %s of the path, up to %s along it, bending at most %d joints",
-        in_mm(drawn), in_mm(length), in_mm(float(knots.stations[1:][on].max())),
+        in_mm(drawn), in_mm(length), in_mm(float(corners.stations[1:][on].max())),
         int(changed.max()),
     )  # fmt: skip
 
@@ -194,8 +194,8 @@ def how_far(problem: PlanningProblem, outcome: Outcome) -> Reached:
     centres = straight.centres(problem.manipulator, place, np.zeros(1))[0]
     if not problem.scene.obstacles or not np.isfinite(centres).all():
         return Reached(words, station)
-    link, name, room = culprit(problem, centres)
-    words += f"; link {link} of the straight arm there has {in_mm(room)} to {name!r}"
+    link, name, least = culprit(problem, centres)
+    words += f"; link {link} of the straight arm there has {in_mm(least)} to {name!r}"
     return Reached(words, station, link, name)
 
 
@@ -239,12 +239,12 @@ def notes_of(
         f"fewer, counting up to {np.rad2deg(TOLERANCES.changed_angle):.2g} deg as "
         "unchanged, would break a limit or the clearance there"
     )
-    ways = _ways(on_path)
-    if len(ways) > 1:
-        often = "once" if len(ways) == 2 else f"{len(ways) - 1} times"
+    connections = _connections(on_path)
+    if len(connections) > 1:
+        often = "once" if len(connections) == 2 else f"{len(connections) - 1} times"
         notes.append(f"the tip leaves the path {often} to let the arm change sides")
     retreat = problem.path.retreat
-    back = _farthest_back(trajectory, centres[:, -1], ways)
+    back = _farthest_back(trajectory, centres[:, -1], connections)
     if back > retreat + TOLERANCES.tip_on_path:
         notes.append(
             f"off the path the tip steps back by up to {in_mm(back)}, more than the "
@@ -253,7 +253,7 @@ def notes_of(
     return tuple(notes)
 
 
-def _ways(on_path: BoolArray) -> list[tuple[int, int]]:
+def _connections(on_path: BoolArray) -> list[tuple[int, int]]:
     """Runs of rows off the path: their first row and the row past their last."""
     marks = np.flatnonzero(np.diff(on_path.astype(np.int64))) + 1
     edges = [0, *marks.tolist(), len(on_path)]
@@ -261,11 +261,11 @@ def _ways(on_path: BoolArray) -> list[tuple[int, int]]:
 
 
 def _farthest_back(
-    trajectory: Trajectory, tips: FloatArray, ways: list[tuple[int, int]]
+    trajectory: Trajectory, tips: FloatArray, connections: list[tuple[int, int]]
 ) -> float:
     """How far the tip goes behind both ends of a way; [m]."""
     worst = 0.0
-    for a, b in ways:
+    for a, b in connections:
         ends = min(tips[max(a - 1, 0), 0], tips[min(b, len(tips) - 1), 0])
         worst = max(worst, float(ends - tips[a:b, 0].min()))
     return worst
@@ -274,19 +274,19 @@ def _farthest_back(
 def _order(outcome: Outcome) -> list[str]:
     """In which order and directions the pieces are drawn, where it is not as given."""
     assert outcome.found is not None
-    ends = _pieces(outcome.found.knots)
+    ends = _pieces(outcome.found.corners)
     if all(np.diff(np.array(ends).ravel()) >= 0.0):
         return []
     pieces = ", then ".join(f"from {in_mm(a)} to {in_mm(b)}" for a, b in ends)
     return [f"drawn in another order than given, as the problem allows: {pieces}"]
 
 
-def _pieces(knots: Knots) -> list[tuple[float, float]]:
+def _pieces(corners: Corners) -> list[tuple[float, float]]:
     """Stations between which the path is drawn in one direction, piece by piece."""
     pieces: list[tuple[float, float]] = []
     going, way = False, 0.0
-    for k, drawn in enumerate(knots.drawn.tolist()):
-        a, b = float(knots.stations[k]), float(knots.stations[k + 1])
+    for k, drawn in enumerate(corners.drawn.tolist()):
+        a, b = float(corners.stations[k]), float(corners.stations[k + 1])
         if drawn and going and (b - a) * way >= 0.0:
             pieces[-1] = (pieces[-1][0], b)
             way = way or b - a
@@ -328,8 +328,8 @@ def _closed_by(
         reasons.append("beyond the reach of the arm")
     tips = rows.tips[proof.buried & here]
     if len(tips):
-        room = upper_clearance(problem, np.stack([tips, tips], axis=1)).min(axis=0)
-        near = np.flatnonzero(room < problem.required_clearance)
+        bounds = upper_clearance(problem, np.stack([tips, tips], axis=1))
+        near = np.flatnonzero(bounds.min(axis=0) < problem.required_clearance)
         names = [repr(problem.scene.obstacles[int(o)].name) for o in near]
         reasons.append(f"within the margin of {', '.join(names)}")
     if (proof.hemmed_in & here).any():

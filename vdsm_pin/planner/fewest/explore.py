@@ -13,13 +13,12 @@ import numpy as np
 
 from vdsm_pin.errors import NoWayOut
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
-from vdsm_pin.planner.fewest.bounds import TipProof, prove_tips
+from vdsm_pin.planner.fewest.broad_phase import BroadPhase
+from vdsm_pin.planner.fewest.grown_nodes import fill
+from vdsm_pin.planner.fewest.insertion import insert, tip_space
+from vdsm_pin.planner.fewest.joint_error import link_margins
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.last_link import hemmed_in
 from vdsm_pin.planner.fewest.levels import FULL, SEED, Effort, Insert, Level
-from vdsm_pin.planner.fewest.nearby import Nearby
-from vdsm_pin.planner.fewest.passage import cut_off
-from vdsm_pin.planner.fewest.population import fill
 from vdsm_pin.planner.fewest.roadmap import (
     CostWeights,
     Roadmap,
@@ -36,9 +35,10 @@ from vdsm_pin.planner.fewest.search import (
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes
 from vdsm_pin.planner.fewest.start_node import largest_start_angle, with_start
 from vdsm_pin.planner.fewest.stuck import Stuck
-from vdsm_pin.planner.fewest.taper import kept_by_links
-from vdsm_pin.planner.fewest.tip_ways import TipSpace
-from vdsm_pin.planner.fewest.ways_in import tip_space, ways_in
+from vdsm_pin.planner.fewest.tip_routes import TipSpace
+from vdsm_pin.planner.impossible.bounds import TipProof, prove_tips
+from vdsm_pin.planner.impossible.cut_off import cut_off
+from vdsm_pin.planner.impossible.last_link import hemmed_in
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
@@ -88,7 +88,7 @@ class Outcome:
 
 def explore(
     problem: PlanningProblem,
-    clearance: Nearby,
+    clearance: BroadPhase,
     margin: float,
     weights: CostWeights,
     effort: Effort = FULL,
@@ -125,7 +125,7 @@ def explore(
     # The way out of a start that is bent more than is liked must be allowed.
     bent = largest_start_angle(problem) + TOLERANCES.joint_limit
     least_ease = min(1.0, bent / link_limit(problem))
-    unreached, kept = False, kept_by_links(problem.manipulator, weights.taper)
+    unreached, kept = False, link_margins(problem.manipulator, weights.joint_error)
     stuck: NoWayOut | None = None
     inserted: Stuck | None = None
     spaces: dict[tuple[float, float, int], TipSpace] = {}
@@ -213,12 +213,12 @@ def _once_inserted(
     before: Outcome, space: TipSpace, level: Insert, soon: Deadline
 ) -> Outcome:
     closed = before.proof.closed
-    now = ways_in(before.judge, space, before.rows, closed, level, soon)
+    now = insert(before.judge, space, before.rows, closed, level, soon)
     return replace(before, found=now.found, stuck=now.stuck or before.stuck)
 
 
 def _proofs(
-    problem: PlanningProblem, clearance: Nearby, outcome: Outcome
+    problem: PlanningProblem, clearance: BroadPhase, outcome: Outcome
 ) -> Iterator[TipProof]:
     """More and more that is proved about what is not drawn."""
     tips, proof = outcome.rows.tips, outcome.proof
@@ -244,21 +244,21 @@ def _look(
     roadmap = build_roadmap(
         problem, judge.rough, judge.pricing(weights), route, shapes, level.around
     )
-    roadmap, home = with_start(judge, roadmap, weights)
+    roadmap, start_node = with_start(judge, roadmap, weights)
     rng = np.random.default_rng(SEED)
-    found = search(judge, roadmap, home, level.rounds, nothing_blocked())
+    found = search(judge, roadmap, start_node, level.rounds, nothing_blocked())
     for _ in range(level.grow):
         if found is None or not found.missing > 0.0:
             break
         skipped = tuple(k for k in found.skipped if not route.closed[k])
         if back == 0.0 and _unreached(found):
             break
-        more = fill(judge, found.roadmap, found.ways, skipped, rng, weights)
+        more = fill(judge, found.roadmap, found.lengths, skipped, rng, weights)
         if more is None:
             break
-        home = int(_same_nodes(found.roadmap, more, np.array(found.home)))
+        start_node = int(_same_nodes(found.roadmap, more, np.array(found.start_node)))
         blocked = _same_nodes(found.roadmap, more, found.blocked)
-        again = search(judge, more, home, level.rounds, blocked)
+        again = search(judge, more, start_node, level.rounds, blocked)
         if again is None or not again.missing < found.missing:
             break
         found = again
@@ -274,7 +274,7 @@ def _unreached(found: Searched | None) -> bool:
         if roadmap.route.closed[k]:
             continue
         tip = roadmap.route.layers[k]
-        if not np.isfinite(found.ways[roadmap.nodes_at(tip)]).all():
+        if not np.isfinite(found.lengths[roadmap.nodes_at(tip)]).all():
             return True
     return False
 

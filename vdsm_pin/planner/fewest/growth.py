@@ -14,11 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.compiled import compiled
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
-from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.planner.fewest.vary import SCALES, vary
 
 FAMILY = 8
 """Children tried for each parent."""
@@ -28,14 +27,8 @@ RETRIES = 4
 """Rounds of change at rest before a population that cannot go on is given up."""
 KEPT = 6
 """Configurations at the farthest layer whose ancestors are kept."""
-COPIED, AT_KNEE, STRAIGHTENED = 0.05, 0.3, 0.45
-"""Of a half: up to where a child is its parent, moves a knee, moves any joint; beyond,
-a joint is put in line with its neighbours; [-]."""
-STRAIGHT = TOLERANCES.straight_slope
 WIDE = 0.5
 """Room beyond this part of the body's radius is worth nothing more; [-]."""
-SCALES = (0.008, 0.025, 0.06)
-"""Sizes of a change over the arm's length; [-]."""
 
 
 @dataclass(frozen=True)
@@ -79,98 +72,10 @@ class Grown:
         return self.take(np.array(sorted(kept), dtype=np.int64))
 
 
-@compiled
-def _bent_joints(row: FloatArray, stations: FloatArray, bent: BoolArray) -> IntArray:
-    """Set which joints of a configuration bend; they are returned in order too."""
-    last = stations.size - 1
-    for i in range(1, last):
-        turn = 0.0
-        for c in range(2):
-            after = (row[i + 1, c] - row[i, c]) / (stations[i + 1] - stations[i])
-            before = (row[i, c] - row[i - 1, c]) / (stations[i] - stations[i - 1])
-            turn = max(turn, abs(after - before))
-        bent[i] = turn > STRAIGHT
-    return np.flatnonzero(bent)
-
-
-@compiled
-def _line_up(
-    row: FloatArray, stations: FloatArray, first: int, last: int, place: FloatArray
-) -> None:
-    """Put the joints between two others, and the last one, on a line.
-
-    Args:
-        row: Offsets of one configuration, shape (N + 1, 2); [m].
-        stations: Arc length of the joints, shape (N + 1,); [m].
-        first: The joint the line begins at.
-        last: The joint it ends at.
-        place: Where that one comes to be, shape (2,); [m].
-    """
-    span = stations[last] - stations[first]
-    for i in range(last, first, -1):
-        share = (stations[i] - stations[first]) / span
-        for c in range(2):
-            row[i, c] = (1.0 - share) * row[first, c] + share * place[c]
-
-
-@compiled
-def vary(
-    offsets: FloatArray,
-    stations: FloatArray,
-    moved: FloatArray,
-    joint: FloatArray,
-    kind: FloatArray,
-    shift: FloatArray,
-) -> FloatArray:
-    """Children of configurations, one each.
-
-    Args:
-        offsets: Parents, shape (n, N + 1, 2); [m].
-        stations: Arc length of the joints, shape (N + 1,); [m].
-        moved: How far the tip has moved across the rail since, shape (n, 2); [m].
-        joint: Which joint to move, as a number in [0, 1), shape (n,).
-        kind: What to do, as a number in [0, 1), shape (n,).
-        shift: How far to move that joint, shape (n, 2); [m].
-
-    Returns:
-        Children, shape (n, N + 1, 2); [m].
-    """
-    last = stations.size - 1
-    result = offsets.copy()
-    bent = np.zeros(last + 1, dtype=np.bool_)
-    for r in range(offsets.shape[0]):
-        row = result[r]
-        knees = _bent_joints(row, stations, bent)
-        if kind[r] < 0.5 and knees.size > 0:
-            # The projections stay where they are up to the last knee.
-            for i in range(1, knees[-1] + 1):
-                for c in range(2):
-                    row[i, c] -= stations[i] / stations[last] * moved[r, c]
-            _line_up(row, stations, knees[-1], last, row[last].copy())
-        half = kind[r] % 0.5
-        if half < COPIED:
-            continue
-        m = 1 + int(joint[r] * (last - 1))
-        if half < AT_KNEE and knees.size > 0:
-            m = knees[int(joint[r] * knees.size)]
-        low, high = m - 1, m + 1
-        while low > 0 and not bent[low]:
-            low -= 1
-        while high < last and not bent[high]:
-            high += 1
-        place = row[m] + shift[r]
-        if half > STRAIGHTENED:
-            share = (stations[m] - stations[low]) / (stations[high] - stations[low])
-            place = (1.0 - share) * row[low] + share * row[high]
-        _line_up(row, stations, low, m, place)
-        _line_up(row, stations, m, high, row[high].copy())
-    return result
-
-
-def lacking(judge: Judge, room: FloatArray) -> FloatArray:
+def lacking(judge: Judge, clearances: FloatArray) -> FloatArray:
     """What clearances [m] lack of what is wanted, 0 for nothing, 1 for all; [-]."""
     wanted = WIDE * judge.problem.manipulator.most_radius
-    return np.asarray(np.maximum(0.0, 1.0 - (room - judge.required) / wanted))
+    return np.asarray(np.maximum(0.0, 1.0 - (clearances - judge.required) / wanted))
 
 
 class Population:
@@ -188,7 +93,7 @@ class Population:
         self.judge, self.tips, self.rng = judge, tips, rng
 
     def _children(
-        self, offsets: FloatArray, layer: int, to: int, every_way: bool
+        self, offsets: FloatArray, layer: int, to: int, every_connection: bool
     ) -> tuple[FloatArray, IntArray]:
         """Living children at layer `to` and the row of each one's parent."""
         arm = self.judge.problem.manipulator
@@ -202,11 +107,11 @@ class Population:
             self.rng.random(n), self.rng.random(n), shift,
         )  # fmt: skip
         tips = np.broadcast_to(self.tips[to], (n, 3))
-        room, changed, _ = self.judge.look(tips, born)
-        alive = np.flatnonzero(room >= self.judge.required)
-        order = self._choice(room[alive], changed[alive])
+        clearances, changed, _ = self.judge.look(tips, born)
+        alive = np.flatnonzero(clearances >= self.judge.required)
+        order = self._choice(clearances[alive], changed[alive])
         picked = alive[order]
-        if not every_way:
+        if not every_connection:
             return born[picked], rows[picked]
         lines = Intervals(
             np.broadcast_to(self.tips[layer], (len(picked), 3)),
@@ -217,12 +122,12 @@ class Population:
         good = self.judge.clear(lines) if len(picked) else np.zeros(0, bool)
         return born[picked[good]], rows[picked[good]]
 
-    def _choice(self, room: FloatArray, changed: IntArray) -> IntArray:
+    def _choice(self, clearances: FloatArray, changed: IntArray) -> IntArray:
         """Half the best, half by chance."""
-        if len(room) <= POPULATION:
-            return np.arange(len(room))
-        lack = lacking(self.judge, room)
-        score = changed + 2.0 * lack**2 + self.rng.random(len(room))
+        if len(clearances) <= POPULATION:
+            return np.arange(len(clearances))
+        lack = lacking(self.judge, clearances)
+        score = changed + 2.0 * lack**2 + self.rng.random(len(clearances))
         order = np.argsort(score, kind="stable")
         best, rest = order[: POPULATION // 2], order[POPULATION // 2 :]
         return np.concatenate(
@@ -240,15 +145,15 @@ class Population:
         Returns:
             The few best of those that came farthest, with their ancestors.
         """
-        tree = self._best(*self._grown(offsets, first, last, every_way=False))
+        tree = self._best(*self._grown(offsets, first, last, every_connection=False))
         reached = self._reached(tree, offsets, first)
         # Those that came farthest stand last.
         if np.array_equal(reached.layer[-1:], tree.layer[-1:]):
             return reached
-        return self._best(*self._grown(offsets, first, last, every_way=True))
+        return self._best(*self._grown(offsets, first, last, every_connection=True))
 
     def _grown(
-        self, offsets: FloatArray, first: int, last: int, every_way: bool
+        self, offsets: FloatArray, first: int, last: int, every_connection: bool
     ) -> tuple[Grown, IntArray]:
         """All that grew, and the numbers of those that came farthest."""
         none = np.zeros(0, dtype=np.int64)
@@ -257,10 +162,10 @@ class Population:
         at, layer, retries = offsets, first, 0
         numbers = -1 - np.arange(len(offsets))
         while layer != last and len(at):
-            born, rows = self._children(at, layer, layer + step, every_way)
+            born, rows = self._children(at, layer, layer + step, every_connection)
             if len(born) < POPULATION // 10 and retries < RETRIES:
                 retries += 1
-                side, side_rows = self._children(at, layer, layer, every_way)
+                side, side_rows = self._children(at, layer, layer, every_connection)
                 ids = len(tree.layer) + np.arange(len(side))
                 tree = tree.with_more(layer, side, numbers[side_rows])
                 at = np.concatenate([at, side])
@@ -283,8 +188,8 @@ class Population:
         if not len(front):
             return tree.take(front)
         tips = self.tips[tree.layer[front]]
-        room, changed, _ = self.judge.look(tips, tree.offsets[front])
-        lack = lacking(self.judge, room)
+        clearances, changed, _ = self.judge.look(tips, tree.offsets[front])
+        lack = lacking(self.judge, clearances)
         best = np.argsort(changed + lack, kind="stable")[:KEPT]
         return tree.with_ancestors(front[best])
 

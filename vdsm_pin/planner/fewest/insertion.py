@@ -1,290 +1,255 @@
-"""Insertion: a population of arms follows the tip through openings, along the path.
+"""Motions in by the openings of a scene, along the path, and out again.
 
-From layer to layer of tips each arm has children. Some follow the leader: their joints
-move on along the arm's own curve. The others keep their shape, and bend a joint a
-little, add a knee or take one away (`growth.vary`). Children that are clear and can be
-reached from their parent live on, half of them the best, half by chance. Where none is
-left, the population of some layers before is varied and tries again.
+The tip's way from the start to the path is sought alone (`tip_ways`); the arm is grown
+along it and on along the path (`insertion`). Where it gets stuck, it draws back the way
+it came, and goes in again to where it left the path, by another way or in another
+posture. What cannot be drawn at all is skipped.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.charts import Chart, turned_towards
-from vdsm_pin.planner.fewest.follow import followed
-from vdsm_pin.planner.fewest.growth import FAMILY, lacking
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.planner.fewest.broad_phase import BroadPhase
+from vdsm_pin.planner.fewest.charts import Chart, Directions, Projections
+from vdsm_pin.planner.fewest.insertion_population import Chain, Insertion, Layers
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.motion import Intervals
-from vdsm_pin.pointing import angles_between
+from vdsm_pin.planner.fewest.levels import Insert
+from vdsm_pin.planner.fewest.motion import Corners, Intervals
+from vdsm_pin.planner.fewest.route import PathRows, TipRoute, tip_route
+from vdsm_pin.planner.fewest.search import Found
+from vdsm_pin.planner.fewest.start_node import checked_start
+from vdsm_pin.planner.fewest.stuck import Stuck
+from vdsm_pin.planner.fewest.tip_routes import TipSpace
+from vdsm_pin.progress import say
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.units import in_mm
 
-LED: Final = 0.4
-"""Part of the children that follow the leader; [-]."""
-UNCHANGED: Final = 0.3
-"""Part of these that are not varied besides; [-]."""
-AIMED: Final = 0.5
-"""Part of the children that are turned to where the last link shall look; [-]."""
-PULL: Final = 4.0
-"""What an arm is worse for if it looks a radian past where it shall soon; [-]."""
-RESTS: Final = 4
-"""Rounds of change at rest before a population that dwindles goes back."""
+PLAY: Final = 0.3
+"""How far the tip may be from its way off the path, over the body's radius; [-]."""
+AHEAD: Final = (3, 8, 20)
+"""Layers ahead of a place of the path by way of which it is come to."""
+TURNING: Final = 12
+"""Layers before the path from which on the arm turns to where it shall look there."""
+FAILURES: Final = 3
+"""Places of the path at which the arm is not got in before the search gives up."""
 
 
 @dataclass(frozen=True)
-class Layers:
-    """Where the tip goes.
+class _Visit:
+    """A motion from the start to the path and along it.
 
     Args:
-        tips: Shape (l, 3); [m].
-        play: How far the tip may be from there, 0 on the desired path, shape (l,); [m].
-        aims: Where the last link shall look, shape (l, 3); None for anywhere.
-        pull: How much that counts, 0 to 1: from 1 on it must, shape (l,); [-].
+        first: Layer of the path at which it begins to draw.
+        before: Layers of the chain that come before that one.
+        chain: The motion.
+        route: Of the tip to the path, shape (k, 3); [m].
     """
 
-    tips: FloatArray
-    play: FloatArray
-    aims: FloatArray | None = None
-    pull: FloatArray | None = None
+    first: int
+    before: int
+    chain: Chain
+    route: FloatArray
 
-    def must(self, layer: int) -> bool:
-        """Whether the last link must look somewhere at a layer."""
-        return self.pull is not None and bool(self.pull[layer] >= 1.0)
+    @property
+    def come(self) -> tuple[int, float]:
+        """How far it came: layer of the path, part of the way to the path."""
+        reached = float(self.chain.layer[-1])
+        return self.last, min(1.0, reached / max(self.before, 1))
+
+    @property
+    def last(self) -> int:
+        """Layer of the path up to which it draws, -1 if it does not come there."""
+        drawn = int(self.chain.layer[-1]) - self.before
+        return self.first + drawn if drawn >= 0 else -1
 
 
 @dataclass(frozen=True)
-class Chain:
-    """A motion through layers, every interval clear.
+class Inserted:
+    """What an insertion came to.
 
     Args:
-        layer: Layer of each configuration, shape (c,).
-        tips: Shape (c, 3); [m].
-        offsets: Shape coordinates, shape (c, N + 1, 2) or (c, N, 3).
+        found: The motion, None if nothing is drawn.
+        stuck: The visit that came farthest, None if there is no way for the tip.
     """
 
-    layer: IntArray
-    tips: FloatArray
-    offsets: FloatArray
+    found: Found | None
+    stuck: Stuck | None
 
 
-@dataclass(frozen=True)
-class _Crowd:
-    """Arms of one layer and the number of each in the family's records."""
-
-    number: IntArray
-    tips: FloatArray
-    offsets: FloatArray
-
-    def take(self, rows: IntArray) -> "_Crowd":
-        return _Crowd(self.number[rows], self.tips[rows], self.offsets[rows])
-
-    def joined(self, other: "_Crowd") -> "_Crowd":
-        return _Crowd(
-            np.append(self.number, other.number),
-            np.concatenate([self.tips, other.tips]),
-            np.concatenate([self.offsets, other.offsets]),
-        )
-
-
-class Insertion:
-    """Grows a motion along layers of tips.
+def insert(
+    judge: Judge,
+    space: TipSpace,
+    rows: PathRows,
+    closed: BoolArray,
+    effort: Insert,
+    soon: Deadline = NO_LIMIT,
+) -> Inserted:
+    """A motion that draws what it can, going in as often as it takes.
 
     Args:
         judge: Says what is clear.
-        layers: Where the tip goes.
-        rng: Source of chance.
-        population: Arms that live on at a layer.
-        chart: How they are described.
+        space: Has the ways of the tip.
+        rows: The desired path row by row.
+        closed: Rows that nobody can reach, shape (r,).
+        effort: How thoroughly to look.
+        soon: From when on what is not drawn yet is skipped, if something is drawn.
+
+    Raises:
+        LimitExceeded: If the start breaks a limit.
     """
+    step = effort.step * judge.problem.manipulator.total_length
+    route = tip_route(judge.problem, rows, closed, step, 0.0)
+    search = _Search(judge, space, route, effort)
+    return Inserted(search.found(soon), search.stuck())
+
+
+def tip_space(judge: Judge, clearance: BroadPhase, effort: Insert) -> TipSpace:
+    """The ways of the tip for an effort."""
+    problem = judge.problem
+    # How far a blocked place is from a clear one tells where to look for a hole.
+    exact = replace(clearance, floor=-np.inf)
+    step = effort.step * problem.manipulator.total_length
+    return TipSpace(problem, exact, judge.required, step, effort.cells)
+
+
+class _Search:
+    """The visits of one route."""
 
     def __init__(
-        self,
-        judge: Judge,
-        layers: Layers,
-        rng: np.random.Generator,
-        population: int,
-        chart: Chart,
+        self, judge: Judge, space: TipSpace, route: TipRoute, effort: Insert
     ) -> None:
-        self.judge, self.layers, self.rng = judge, layers, rng
-        self.population, self.chart = population, chart
-        arm = judge.problem.manipulator
-        self.arm, self.radius = arm, arm.most_radius
+        self.judge, self.space = judge, space
+        self.route, self.effort = route, effort
+        self.tips = route.tips[route.layers]
+        self.chart: Chart = Directions() if effort.directed else Projections()
+        self.root = checked_start(judge, route.tips[:1], self.chart)
+        self.rng = np.random.default_rng(effort.seed)
+        self.farthest: _Visit | None = None
 
-    def _forget(self, root: FloatArray) -> None:
-        """Begin with empty records; `root` tells how arms are described."""
-        self.layer, self.parent = np.zeros(0, np.int64), np.zeros(0, np.int64)
-        self.tips, self.offsets = np.zeros((0, 3)), np.zeros((0, *root.shape))
-        self.room = np.zeros(0)
+    def found(self, soon: Deadline) -> Found | None:
+        """Visits until the path's end is reached or too many are in vain."""
+        visits: list[_Visit] = []
+        skipped: list[int] = []
+        k, failures, last = 0, 0, len(self.tips) - 1
+        while k < last:
+            if (
+                self.route.closed[k + 1]
+                or failures == FAILURES
+                or (visits and soon.passed)
+            ):
+                k += 1
+                skipped.append(k)
+                continue
+            visit = self._visit(k)
+            if visit is None or visit.last <= k:
+                failures += 1
+                k += 1
+                skipped.append(k)
+                continue
+            visits.append(visit)
+            k = visit.last
+        if not visits:
+            return None
+        return Found(self.route, self._corners(visits), tuple(skipped))
 
-    def _recorded(
-        self,
-        layer: int,
-        tips: FloatArray,
-        offsets: FloatArray,
-        room: FloatArray,
-        parent: IntArray,
-    ) -> _Crowd:
-        """Arms with their numbers, after they are put on record."""
-        number = len(self.layer) + np.arange(len(tips))
-        self.layer = np.append(self.layer, np.full(len(tips), layer))
-        self.parent = np.append(self.parent, parent)
-        self.tips = np.concatenate([self.tips, tips])
-        self.offsets = np.concatenate([self.offsets, offsets])
-        self.room = np.append(self.room, room)
-        return _Crowd(number, tips, offsets)
+    def stuck(self) -> Stuck | None:
+        """Where the visit that came farthest ended."""
+        visit = self.farthest
+        if visit is None:
+            return None
+        tip, shape = visit.chain.tips[-1:], visit.chain.offsets[-1:]
+        still = Intervals(tip, tip, shape, shape)
+        arm, place = self.judge.problem.manipulator, np.zeros(1, np.int64)
+        centres = still.centres(arm, place, np.zeros(1))[0]
+        come = 1 + min(int(visit.chain.layer[-1]), visit.before)
+        return Stuck(visit.route, come, centres)
 
-    def grow(self, root: FloatArray, most_returns: int) -> Chain:
-        """The motion from a configuration at the first layer that comes farthest.
+    def _visit(self, k: int) -> _Visit | None:
+        """The visit that draws most from layer k on."""
+        shut = np.flatnonzero(self.route.closed[k + 1 :])
+        end = k + 1 + int(shut[0]) if len(shut) else len(self.tips)
+        best: _Visit | None = None
+        path = self.tips[k:end]
+        for route in self._routes(path):
+            before = len(route) - 1
+            play = np.zeros(before + len(path))
+            play[1:before] = PLAY * self.judge.problem.manipulator.most_radius
+            tips = np.vstack([route, path[1:]])
+            layers = Layers(tips, play, *self._pull(k, before, tips))
+            grown = Insertion(
+                self.judge, layers, self.rng, self.effort.population, self.chart
+            )
+            chain = grown.grow(self.root, self.effort.returns)
+            visit = _Visit(k, before, chain, route)
+            if self.farthest is None or visit.come > self.farthest.come:
+                self.farthest = visit
+            if best is None or visit.last > best.last:
+                best = visit
+            reached, part = visit.come
+            say(
+                "an arm came %.0f %% of a way in, to %s along the path", 100.0 * part,
+                in_mm(float(self.route.stations[reached]) if reached >= 0 else 0.0),
+            )  # fmt: skip
+            if best.last == end - 1:
+                break
+        return best
+
+    def _pull(
+        self, k: int, before: int, tips: FloatArray
+    ) -> tuple[FloatArray | None, FloatArray | None]:
+        """Where the last link shall look at layers, and how much that counts.
 
         Args:
-            root: Its shape coordinates.
-            most_returns: Times the population may go back, each time twice as far.
+            k: Layer of the path that comes after those of the way in.
+            before: Number of these.
+            tips: Of all layers, shape (l, 3); [m].
         """
-        self._forget(root)
-        tip, none = self.layers.tips[:1], np.full(1, -1)
-        room, _, _ = self.judge.look(tip, root[None])
-        crowd = self._recorded(0, tip, root[None], room, none)
-        crowds, last = [crowd], len(self.layers.tips) - 1
-        returns = 0
-        best, farthest = 0, 0
-        while len(crowds) - 1 < last:
-            crowd = self._next(len(crowds) - 1, crowds[-1])
-            if len(crowd.number):
-                crowds.append(crowd)
-                if len(crowds) - 1 > farthest:
-                    farthest = len(crowds) - 1
-                    best = int(crowd.number[0])
-                continue
-            if returns == most_returns:
-                break
-            back = min(len(crowds) - 1, 2**returns)
-            crowds = crowds[: len(crowds) - back]
-            layer = len(crowds) - 1
-            for _ in range(2):
-                crowds[-1] = self._varied(layer, crowds[-1])
-            returns += 1
-        return self._chain(best)
+        path = self.judge.problem.path
+        if path.pointing is None:
+            return None, None
+        number = np.arange(len(tips))
+        stations = self.route.stations[k + np.maximum(number - before, 0)]
+        pull = np.clip(1.0 + (number - before) / TURNING, 0.0, 1.0)
+        return path.aims(tips, stations), pull
 
-    def _chain(self, number: int) -> Chain:
-        """The ancestors of an arm and itself."""
-        line = [number]
-        while self.parent[line[-1]] >= 0:
-            line.append(int(self.parent[line[-1]]))
-        kept = np.array(line[::-1])
-        return Chain(self.layer[kept], self.tips[kept], self.offsets[kept])
+    def _routes(self, path: FloatArray) -> Iterator[FloatArray]:
+        """Ways of the tip to a path's first point, also by way of points after it.
 
-    def _next(self, layer: int, crowd: _Crowd) -> _Crowd:
-        """The arms of the next layer, the best first; none where it is not reached."""
-        for rest in range(RESTS):
-            born = self._children(layer, layer + 1, crowd)
-            if len(born.number) >= self.population // 10 or rest == RESTS - 1:
-                return born
-            crowd = self._varied(layer, crowd)
-        return crowd
+        Who comes from there arrives in a posture that goes on to there.
+        """
+        yield from self.space.routes(path[0], self.effort.routes)
+        for ahead in AHEAD:
+            if ahead < len(path):
+                for route in self.space.routes(path[ahead], 1):
+                    yield np.vstack([route, path[ahead - 1 :: -1]])
 
-    def _varied(self, layer: int, crowd: _Crowd) -> _Crowd:
-        """Arms of a layer and others of the same that can be reached from them."""
-        both = crowd.joined(self._children(layer, layer, crowd))
-        if len(both.number) <= 2 * self.population:
-            return both
-        return both.take(self.rng.permutation(len(both.number))[: 2 * self.population])
-
-    def _children(self, layer: int, to: int, crowd: _Crowd) -> _Crowd:
-        """Living children at a layer, the best first."""
-        rows, tips, offsets = self._born(to, crowd)
-        aims = self._aims(to, tips)
-        must = aims if self.layers.must(to) else None
-        room, changed, bend = self.judge.look(tips, offsets, must)
-        alive = np.flatnonzero(room >= self.judge.required)
-        score = self._score(room[alive], changed[alive], bend[alive])
-        if aims is not None and must is None:
-            score += self._pull(to, offsets[alive], aims[alive])
-        picked = alive[self._choice(score)]
-        parents = crowd.take(rows[picked])
-        lines = Intervals(
-            parents.tips, tips[picked], parents.offsets, offsets[picked],
-            self._looking(layer, parents.tips, must, picked),
+    def _corners(self, visits: list[_Visit]) -> Corners:
+        """The visits one after the other, out by the way in after all but the last."""
+        stations, first = self.route.stations, visits[0]
+        tips, offsets = [first.chain.tips[:1]], [first.chain.offsets[:1]]
+        at, drawn = [stations[first.first : first.first + 1]], [np.zeros(0, np.bool_)]
+        left = first.first
+        for visit in visits:
+            chain = visit.chain
+            place = visit.first + chain.layer - visit.before
+            on = place >= visit.first
+            tips.append(chain.tips[1:])
+            offsets.append(chain.offsets[1:])
+            at.append(stations[np.where(on, place, left)][1:])
+            drawn.append(on[:-1] & on[1:])
+            left = visit.last
+            if visit is not visits[-1]:
+                tips.append(chain.tips[-2::-1])
+                offsets.append(chain.offsets[-2::-1])
+                at.append(np.full(len(on) - 1, stations[left]))
+                drawn.append(np.zeros(len(on) - 1, dtype=np.bool_))
+        every = np.concatenate(drawn)
+        edges = np.full((len(every), 2), -1)
+        return Corners(
+            np.concatenate(tips), np.concatenate(offsets), np.concatenate(at), every,
+            edges,
         )  # fmt: skip
-        # The start may be closer than the margin asks for.
-        need = np.minimum(self.judge.required, self.room[parents.number])
-        good = self.judge.clear(lines, need) if len(picked) else np.zeros(0, bool)
-        picked, number = picked[good], parents.number[good]
-        return self._recorded(to, tips[picked], offsets[picked], room[picked], number)
-
-    def _aims(self, layer: int, tips: FloatArray) -> FloatArray | None:
-        """Where last links shall look with tips at a layer, shape (n, 3)."""
-        aims, pull = self.layers.aims, self.layers.pull
-        if aims is None or pull is None or not pull[layer] > 0.0:
-            return None
-        return np.broadcast_to(aims[layer], tips.shape)
-
-    def _looking(
-        self, layer: int, tips: FloatArray, must: FloatArray | None, picked: IntArray
-    ) -> FloatArray | None:
-        """Aims at both ends of ways from a layer to one where there are such."""
-        before = self._aims(layer, tips)
-        if must is None or before is None or not self.layers.must(layer):
-            return None
-        return np.stack([before, must[picked]], axis=1)
-
-    def _pull(self, layer: int, offsets: FloatArray, aims: FloatArray) -> FloatArray:
-        """What arms are worse for that do not look to where they shall soon."""
-        pull = self.layers.pull
-        assert pull is not None
-        off = angles_between(offsets[:, -1], aims)
-        return np.asarray(PULL * pull[layer] * off**2)
-
-    def _born(self, to: int, crowd: _Crowd) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Children at a layer: row of the parent, tip, offsets."""
-        rows = np.repeat(np.arange(len(crowd.number)), self._family(crowd))
-        n, arm, rng = len(rows), self.arm, self.rng
-        shift = rng.normal(size=(n, 3)) * self.layers.play[to] / 2.0
-        tips = self.layers.tips[to] + shift
-        offsets = crowd.offsets[rows]
-        moved = tips[:, 1:] - crowd.tips[rows, 1:]
-        led = np.flatnonzero(rng.random(n) < LED)
-        offsets[led], fits = self._led(crowd, rows[led], tips[led])
-        led = led[fits]
-        moved[led] = 0.0
-        kept = np.zeros(n, dtype=np.bool_)
-        kept[led[rng.random(len(led)) < UNCHANGED]] = True
-        born = self.chart.varied(arm, offsets, moved, kept, rng)
-        aims = self._aims(to, tips)
-        if aims is not None:
-            born = turned_towards(born, aims, rng.random(n) < AIMED, rng)
-        return rows, tips, self.chart.settled(arm, tips, born)
-
-    def _family(self, crowd: _Crowd) -> int:
-        """Children of each arm: a small population has more."""
-        return max(FAMILY, FAMILY * self.population // (2 * len(crowd.number)))
-
-    def _led(
-        self, crowd: _Crowd, rows: IntArray, tips: FloatArray
-    ) -> tuple[FloatArray, BoolArray]:
-        """Shapes of arms that follow the leader, and which of them can."""
-        arm = self.arm
-        still = Intervals(crowd.tips, crowd.tips, crowd.offsets, crowd.offsets)
-        number = np.arange(len(crowd.number))
-        centres = still.centres(arm, number, np.zeros(len(number)))
-        after = followed(centres[rows], np.ascontiguousarray(tips), arm.link_lengths)
-        offsets = self.chart.of_centres(arm, after)
-        fits = np.asarray(np.isfinite(after).all(axis=(1, 2)))
-        return np.where(fits[:, None, None], offsets, crowd.offsets[rows]), fits
-
-    def _score(
-        self, room: FloatArray, changed: IntArray, bend: FloatArray
-    ) -> FloatArray:
-        """How bad arms are."""
-        lack = lacking(self.judge, room)
-        steep = (bend / self.judge.limit) ** 4
-        return np.asarray(0.5 * changed + 2.0 * lack**2 + 2.0 * steep)
-
-    def _choice(self, score: FloatArray) -> IntArray:
-        """Half the best, half by chance, the best first."""
-        order = np.argsort(score + self.rng.random(len(score)), kind="stable")
-        if len(order) <= self.population:
-            return order
-        best, rest = order[: self.population // 2], order[self.population // 2 :]
-        chosen = self.rng.permutation(rest)[: self.population - len(best)]
-        return np.concatenate([best, chosen])

@@ -12,9 +12,9 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.motion import Intervals, Knots
-from vdsm_pin.planner.fewest.parts import Parts
-from vdsm_pin.planner.fewest.poses import bends_of, pieces_of, room_along
+from vdsm_pin.planner.fewest.interval_parts import Parts
+from vdsm_pin.planner.fewest.motion import Corners, Intervals
+from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along, pieces_of
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Pricing, link_limit
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.pointing import angles_between
@@ -84,19 +84,19 @@ class Judge:
         length = self.problem.manipulator.total_length
         return Pricing(self.required, self.limit, length, weights, self.cone)
 
-    def lines(self, knots: Knots, intervals: IntArray) -> Intervals:
+    def lines(self, corners: Corners, intervals: IntArray) -> Intervals:
         """Some intervals of a motion, with where the last link shall look on the path.
 
         Args:
-            knots: The motion.
+            corners: The motion.
             intervals: Numbers, shape (n,).
         """
-        lines, path = knots.pick(intervals), self.problem.path
+        lines, path = corners.pick(intervals), self.problem.path
         if path.pointing is None:
             return lines
-        aims = path.aims(knots.tips, knots.stations)
+        aims = path.aims(corners.tips, corners.stations)
         both = np.stack([aims[intervals], aims[intervals + 1]], axis=1)
-        both[~knots.drawn[intervals]] = np.nan
+        both[~corners.drawn[intervals]] = np.nan
         return replace(lines, aims=both)
 
     def look(
@@ -118,14 +118,14 @@ class Judge:
         knees = self._cuts(still)
         number, share = np.arange(len(tips)), np.zeros(len(tips))
         most = np.full(len(tips), self.limit)
-        centres, room = self._states(
+        centres, clearances = self._states(
             still, number, share, most, self.rough, knees, knees[:, 1:]
         )
         if aims is not None:
-            room[~self._aimed(centres, aims)] = -np.inf
+            clearances[~self._aimed(centres, aims)] = -np.inf
         angles = bends_of(centres)
         changed = (angles > TOLERANCES.changed_angle).sum(axis=1)
-        return room.min(axis=1), changed, angles.max(axis=1)
+        return clearances.min(axis=1), changed, angles.max(axis=1)
 
     def _aimed(self, centres: FloatArray, aims: FloatArray) -> BoolArray:
         """Whether last links look where they shall, shape (n,)."""
@@ -177,14 +177,14 @@ class Judge:
         base = centres[:, 0, 0]
         low, high = manipulator.base_range
         fine = (peak <= most) & (base >= low) & (base <= high)
-        room = np.full(asked.shape, np.inf)
-        room[~fine] = -np.inf
+        clearances = np.full(asked.shape, np.inf)
+        clearances[~fine] = -np.inf
         pieces, place = pieces_of(centres, knees, interval, asked & fine[:, None])
         if len(pieces):
-            room.ravel()[place] = clearance(pieces)[:, 0]
+            clearances.ravel()[place] = clearance(pieces)[:, 0]
         if self.kept is not None:
-            room -= self.kept
-        return centres, room
+            clearances -= self.kept
+        return centres, clearances
 
     def clear(
         self,
@@ -223,7 +223,9 @@ class Judge:
         c0, r0 = self._states(intervals, number, low, most, ask, knees, every)
         # Most intervals end where the next one begins.
         c1 = np.roll(c0, -1, axis=0)
-        r1 = room_along(np.roll(r0, -1, axis=0), np.roll(knees, -1, axis=0), knees)
+        r1 = clearances_along(
+            np.roll(r0, -1, axis=0), np.roll(knees, -1, axis=0), knees
+        )
         ends = np.flatnonzero(~intervals.continued())
         c1[ends], r1[ends] = self._states(
             intervals, ends, high[ends], most[ends], ask, knees, every[ends]
@@ -240,12 +242,12 @@ class Judge:
             parts, counts = parts.take(doubtful), counts[doubtful]
             inner = parts.inner(counts.max(axis=1))
             where = parts.interval[inner.part]
-            centres, room = self._states(
+            centres, clearances = self._states(
                 intervals, where, inner.share, most[where], ask,
                 knees, counts[inner.part] > 0,
             )  # fmt: skip
-            good[where[~(room.min(axis=1) >= need[where] - tol)]] = False
-            parts = parts.cut(inner, centres, room)
+            good[where[~(clearances.min(axis=1) >= need[where] - tol)]] = False
+            parts = parts.cut(inner, centres, clearances)
         # What is not settled after all cuts is not known to be clear.
         good[parts.interval] = False
         return good, begin

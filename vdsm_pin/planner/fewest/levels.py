@@ -43,7 +43,7 @@ class Insert:
     Args:
         step: Distance of the tips over the arm's length; [-].
         population: Arms that live on at a tip.
-        ways: Largest number of ways of the tip tried from the start to one place.
+        routes: Largest number of ways of the tip tried from the start to one place.
         returns: Times a population that is stuck goes back, each time twice as far.
         seed: Of the source of chance.
         cells: Cells at which the search for a way of the tip ends.
@@ -58,7 +58,7 @@ class Insert:
 
     step: float
     population: int
-    ways: int
+    routes: int
     returns: int
     seed: int
     cells: int = 300_000
@@ -80,26 +80,26 @@ THOROUGH: Final[tuple[Level | Insert, ...]] = (
     Level(step=0.08, coarse=0.013, places=8, rounds=40, back=0.0, grow=3, around=4),
     Level(step=0.08, coarse=0.0065, places=8, rounds=40, back=0.0, grow=4, around=8),
     Level(step=0.08, coarse=0.026, places=8, rounds=40, back=1.0, grow=2),
-    Insert(step=0.02, population=10, ways=1, returns=2, seed=0, cells=60_000),
+    Insert(step=0.02, population=10, routes=1, returns=2, seed=0, cells=60_000),
     Insert(
-        step=0.02, population=10, ways=2, returns=3, seed=0, cells=60_000,
+        step=0.02, population=10, routes=2, returns=3, seed=0, cells=60_000,
         directed=True,
     ),
-    Insert(step=0.02, population=30, ways=2, returns=4, seed=1),
-    Insert(step=0.02, population=30, ways=3, returns=4, seed=1, directed=True),
+    Insert(step=0.02, population=30, routes=2, returns=4, seed=1),
+    Insert(step=0.02, population=30, routes=3, returns=4, seed=1, directed=True),
     Level(step=0.08, coarse=0.013, places=8, rounds=40, back=1.0, grow=3),
     Level(
         step=0.05, coarse=0.013, places=10, rounds=60, back=1.0, grow=3,
         slack=9.6e-6, finest=1.6e-4,
     ),
-    Insert(step=0.02, population=60, ways=4, returns=5, seed=2),
-    Insert(step=0.02, population=60, ways=4, returns=5, seed=2, directed=True),
+    Insert(step=0.02, population=60, routes=4, returns=5, seed=2),
+    Insert(step=0.02, population=60, routes=4, returns=5, seed=2, directed=True),
     Insert(
-        step=0.01, population=120, ways=6, returns=6, seed=3,
+        step=0.01, population=120, routes=6, returns=6, seed=3,
         slack=9.6e-6, finest=1.6e-4,
     ),
     Insert(
-        step=0.01, population=120, ways=6, returns=6, seed=3,
+        step=0.01, population=120, routes=6, returns=6, seed=3,
         slack=9.6e-6, finest=1.6e-4,
         directed=True,
     ),

@@ -1,9 +1,9 @@
-"""A motion as knots in the chart, and its rows (Eq. 5, 7).
+"""A motion as corners in the chart, and its rows (Eq. 5, 7).
 
 The chart is (tip, D_2..D_N): D_i is the offset of joint i's projection from where the
-straight arm to that tip has it, P_i = k_i T + D_i. Between knots tip and offsets run
+straight arm to that tip has it, P_i = k_i T + D_i. Between corners tip and offsets run
 along straight lines, so the tip is exact, links keep their length, and an arm that is
-straight at both knots stays straight. An offset with a corner at joint m is a knee
+straight at both corners stays straight. An offset with a corner at joint m is a knee
 there; where one knee turns into another, both are bent on the way and no third one.
 
 Where a link leans backwards that chart ends. There the directions of the links stand in
@@ -20,8 +20,8 @@ from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.kinematics import joint_angles, joint_centres
 from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.planner.fewest.directions import placed_between
-from vdsm_pin.planner.fewest.poses import centres_between, knees_between
+from vdsm_pin.planner.fewest.direction_kernels import placed_between
+from vdsm_pin.planner.fewest.pose_kernels import centres_between, knees_between
 from vdsm_pin.planner.fewest.roadmap import Roadmap
 from vdsm_pin.planner.fewest.sequence import Sequence
 from vdsm_pin.planner.spacing import count_of, row_steps
@@ -35,7 +35,7 @@ ROUNDS: Final = 12
 
 
 @dataclass(frozen=True)
-class Knots:
+class Corners:
     """Corners of the motion in the chart.
 
     Args:
@@ -44,7 +44,7 @@ class Knots:
             directions of the links, shape (n, N, 3) [-].
         stations: Arc length along the desired path, on ways that of the place left,
             shape (n,); [m].
-        drawn: Whether the tip draws from knot k to k + 1, shape (n - 1,).
+        drawn: Whether the tip draws from corner k to k + 1, shape (n - 1,).
         edges: Nodes joined by each interval, -1 where it is none of the graph's, shape
             (n - 1, 2).
     """
@@ -55,12 +55,12 @@ class Knots:
     drawn: BoolArray
     edges: IntArray
 
-    def take(self, kept: IntArray) -> "Knots":
-        """Only these knots; an interval is drawn if all it replaces were."""
+    def take(self, kept: IntArray) -> "Corners":
+        """Only these corners; an interval is drawn if all it replaces were."""
         drawn = [self.drawn[a:b].all() for a, b in itertools.pairwise(kept)]
         whole = np.diff(kept) == 1
         edges = np.where(whole[:, None], self.edges[kept[:-1]], -1)
-        return Knots(
+        return Corners(
             self.tips[kept],
             self.offsets[kept],
             self.stations[kept],
@@ -159,8 +159,10 @@ class Intervals:
         )  # fmt: skip
 
 
-def knots_of(manipulator: Manipulator, roadmap: Roadmap, sequence: Sequence) -> Knots:
-    """The knots of a sequence; a leg begins where the one before ends."""
+def motion_corners(
+    manipulator: Manipulator, roadmap: Roadmap, sequence: Sequence
+) -> Corners:
+    """The corners of a sequence; a leg begins where the one before ends."""
     nodes: list[int] = []
     stations: list[float] = []
     drawn: list[bool] = []
@@ -172,7 +174,7 @@ def knots_of(manipulator: Manipulator, roadmap: Roadmap, sequence: Sequence) -> 
     number = np.array(nodes)
     tips, offsets = roadmap.poses_of(manipulator, number)
     edges = np.stack([number[:-1], number[1:]], axis=1)
-    return Knots(
+    return Corners(
         tips, offsets, np.array(stations), np.array(drawn, dtype=np.bool_), edges
     )
 
@@ -182,7 +184,7 @@ class Rows:
     """Configurations along the motion, close enough to be rows of a trajectory.
 
     Args:
-        interval: Interval of the knots each row lies in, shape (r,).
+        interval: Interval of the corners each row lies in, shape (r,).
         share: Where in its interval, 0 to 1, shape (r,).
         centres: Joint centres, shape (r, N + 1, 3), NaN where a link is too short; [m].
     """
@@ -193,18 +195,18 @@ class Rows:
 
 
 def rows_at(
-    manipulator: Manipulator, knots: Knots, interval: IntArray, share: FloatArray
+    manipulator: Manipulator, corners: Corners, interval: IntArray, share: FloatArray
 ) -> Rows:
     """Configurations at given places of the motion."""
-    every = knots.pick(np.arange(len(knots.drawn)))
+    every = corners.pick(np.arange(len(corners.drawn)))
     return Rows(interval, share, every.centres(manipulator, interval, share))
 
 
 def spread(counts: IntArray) -> tuple[IntArray, FloatArray]:
-    """Places that divide each interval evenly, the very last knot included.
+    """Places that divide each interval evenly, the very last corner included.
 
     Args:
-        counts: Number of rows from each knot (included) to the next (left out).
+        counts: Number of rows from each corner (included) to the next (left out).
     """
     interval = np.repeat(np.arange(len(counts)), counts)
     begin = np.concatenate([[0], np.cumsum(counts)[:-1]])
@@ -216,16 +218,20 @@ def spread(counts: IntArray) -> tuple[IntArray, FloatArray]:
 
 
 def dense_rows(
-    manipulator: Manipulator, knots: Knots, spacing: float, turn: float, stray: float
+    manipulator: Manipulator,
+    corners: Corners,
+    spacing: float,
+    turn: float,
+    stray: float,
 ) -> Rows:
     """Rows close enough that straight lines in joint space follow the chart.
 
-    Every knot is a row. Midway between two rows the tip strays from the path it draws
+    Every corner is a row. Midway between two rows the tip strays from the path it draws
     by no more than `TOLERANCES.planned_stray`.
 
     Args:
         manipulator: The arm.
-        knots: The motion.
+        corners: The motion.
         spacing: Largest distance of the tips of two rows; [m].
         turn: Largest change of a joint angle between two rows; [rad].
         stray: Largest distance of a joint centre, midway between two rows in joint
@@ -234,21 +240,24 @@ def dense_rows(
     Raises:
         NoPlanFound: If no number of rows is enough, as where a joint angle jumps.
     """
-    way = np.linalg.norm(np.diff(knots.tips, axis=0), axis=1)
-    counts = np.maximum(1, count_of(way / spacing))
+    travel = np.linalg.norm(np.diff(corners.tips, axis=0), axis=1)
+    counts = np.maximum(1, count_of(travel / spacing))
     most = MOST_MORE * int(counts.sum()) + SOME_MORE
-    excess, rows = np.full(len(counts), np.inf), Rows(counts[:0], way[:0], way[:0])
+    excess, rows = (
+        np.full(len(counts), np.inf),
+        Rows(counts[:0], travel[:0], travel[:0]),
+    )
     for _ in range(ROUNDS):
         if counts.sum() > most:
             break
-        rows = rows_at(manipulator, knots, *spread(counts))
+        rows = rows_at(manipulator, corners, *spread(counts))
         alpha, theta = joint_angles(manipulator, rows.centres)
         step, _ = row_steps(manipulator, alpha, theta)
-        strays = _stray(manipulator, knots, rows, alpha, theta)
+        strays = _stray(manipulator, corners, rows, alpha, theta)
         # Straying falls with the square of the distance of the rows.
         bow = np.sqrt(strays.max(axis=1) / stray)
         tip = np.sqrt(strays[:, -1] / TOLERANCES.planned_stray)
-        bow = np.where(knots.drawn[rows.interval[:-1]], np.maximum(bow, tip), bow)
+        bow = np.where(corners.drawn[rows.interval[:-1]], np.maximum(bow, tip), bow)
         excess = np.zeros(len(counts))
         np.maximum.at(excess, rows.interval[:-1], np.maximum(step / turn, bow))
         if (excess <= 1.0).all():
@@ -264,7 +273,7 @@ def dense_rows(
 
 def _stray(
     manipulator: Manipulator,
-    knots: Knots,
+    corners: Corners,
     rows: Rows,
     alpha: FloatArray,
     theta: FloatArray,
@@ -276,7 +285,7 @@ def _stray(
     """
     ends = np.where(np.diff(rows.interval) > 0, 1.0, rows.share[1:])
     middle = (rows.share[:-1] + ends) / 2.0
-    chart = rows_at(manipulator, knots, rows.interval[:-1], middle).centres
+    chart = rows_at(manipulator, corners, rows.interval[:-1], middle).centres
     joint = joint_centres(
         manipulator,
         (rows.centres[:-1, 0, 0] + rows.centres[1:, 0, 0]) / 2.0,

@@ -7,10 +7,10 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
 from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.planner.fewest.kernels import Barred, Graph, pose_shapes
+from vdsm_pin.planner.fewest.joint_error import link_by_link, link_margins
+from vdsm_pin.planner.fewest.roadmap_kernels import Barred, Graph, pose_shapes
 from vdsm_pin.planner.fewest.route import TipRoute
 from vdsm_pin.planner.fewest.shapes import Shapes
-from vdsm_pin.planner.fewest.taper import kept_by_links, link_by_link
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.pointing import angles_between
 from vdsm_pin.problem import PlanningProblem
@@ -34,7 +34,7 @@ class CostWeights:
         clearance_cost: Cost of having none of it.
         easy_bend: Link angles up to this cost nothing more; [rad].
         bend_cost: Cost of bending to the limit.
-        taper: Error of all joints that what each link keeps shall make up for; [rad].
+        joint_error: Error of all joints that each link keeps clearance for; [rad].
     """
 
     angle: float = 1.0
@@ -42,7 +42,7 @@ class CostWeights:
     clearance_cost: float = 0.5
     easy_bend: float = float(np.deg2rad(30.0))
     bend_cost: float = 4.0
-    taper: float = 0.0
+    joint_error: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -64,17 +64,17 @@ class Pricing:
     cone: float = np.inf
 
     def prices(
-        self, bends: FloatArray, room: FloatArray
+        self, bends: FloatArray, clearances: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Cost of a length drawn, and what entering adds to a way, shape (v,) each.
 
         Args:
             bends: Link angles, shape (v, k); [rad].
-            room: Clearances, shape (v,); [m].
+            clearances: Clearances, shape (v,); [m].
         """
         weights, most = self.weights, bends.max(axis=1, initial=0.0)
         changed = (bends > TOLERANCES.changed_angle).sum(axis=1)
-        spare = (room - self.required) / self.length
+        spare = (clearances - self.required) / self.length
         lack = np.maximum(0.0, 1.0 - spare / weights.clearance)
         over = np.maximum(0.0, most - weights.easy_bend)
         bent = (over / max(self.limit - weights.easy_bend, 0.02)) ** 2
@@ -168,7 +168,7 @@ def build_roadmap(
             where the straight arm does not do; None: every shape at every tip.
     """
     arm, weights, required = problem.manipulator, pricing.weights, pricing.required
-    kept, aims = kept_by_links(arm, weights.taper), _aims(problem, route)
+    kept, aims = link_margins(arm, weights.joint_error), _aims(problem, route)
 
     def tried(whole: BoolArray) -> Roadmap:
         node, ends, bends = pose_shapes(
@@ -182,9 +182,11 @@ def build_roadmap(
             node, ends, bends = node[looks], ends[looks], bends[looks]
         if kept is not None:
             ends = link_by_link(ends, arm.stations)
-        room = _least(clearance, ends, required, kept)
-        keep = room >= required
-        return _assemble(pricing, route, shapes, node[keep], bends[keep], room[keep])
+        clearances = _least(clearance, ends, required, kept)
+        keep = clearances >= required
+        return _assemble(
+            pricing, route, shapes, node[keep], bends[keep], clearances[keep]
+        )
 
     count = len(route.tips)
     if around is None:
@@ -218,14 +220,14 @@ def _least(
         required: Clearance below which a piece lacks it; [m].
         kept: What each piece keeps besides, shape (p,); None for nothing; [m].
     """
-    room = np.full(len(ends), np.inf)
+    clearances = np.full(len(ends), np.inf)
     rows = np.arange(len(ends))
     for piece in range(ends.shape[1] - 2, -1, -1):
         values = clearance(ends[rows, piece : piece + 2])[:, 0]
         values = values if kept is None else values - kept[piece]
-        room[rows] = np.minimum(room[rows], values)
+        clearances[rows] = np.minimum(clearances[rows], values)
         rows = rows[values >= required]
-    return room
+    return clearances
 
 
 def _spread(route: TipRoute, picked: BoolArray, times: int) -> BoolArray:
@@ -244,9 +246,9 @@ def _assemble(
     shapes: Shapes,
     node: IntArray,
     bends: FloatArray,
-    room: FloatArray,
+    clearances: FloatArray,
 ) -> Roadmap:
-    cost, strain = pricing.prices(bends, room)
+    cost, strain = pricing.prices(bends, clearances)
     lean = bends[:, KNEES].sum(axis=1)
     lean[node % shapes.size == 0] = 0.0
     return _indexed(Roadmap(route, shapes, node, node, node, lean, cost, strain))
@@ -276,7 +278,7 @@ def extended(
     pricing: Pricing,
     tips: IntArray,
     bends: FloatArray,
-    room: FloatArray,
+    clearances: FloatArray,
     shapes: Shapes,
 ) -> Roadmap:
     """The roadmap with grown configurations as further nodes.
@@ -286,13 +288,13 @@ def extended(
         pricing: What nodes keep and cost.
         tips: Tip number of each new node, shape (g,).
         bends: Link angles of each, shape (g, N); [rad].
-        room: Clearance of each, shape (g,); [m].
+        clearances: Clearance of each, shape (g,); [m].
         shapes: The shapes with the new ones at their end.
     """
     old, every = roadmap.shapes.size, np.arange(len(roadmap.node))
     same = roadmap.tips_of(every) * shapes.size + roadmap.shapes_of(every)
     fresh = tips * shapes.size + old + np.arange(len(tips))
-    more = _assemble(pricing, roadmap.route, shapes, fresh, bends, room)
+    more = _assemble(pricing, roadmap.route, shapes, fresh, bends, clearances)
     return _indexed(
         replace(
             roadmap,

@@ -1,15 +1,29 @@
-"""The order of configurations: what is drawn with which, and the ways in between."""
+"""The order of configurations: what is drawn with which, and the connections between.
 
+Where the arm must leave the path to change sides, the path falls into pieces, each
+drawn in one go. In the order given the connections between them may be long; drawn in
+another order, or from their other end, they may be short, where the problem allows it:
+a square round an obstacle that no arm encircles is begun where it has to be left
+otherwise.
+"""
+
+import itertools
 from dataclasses import dataclass
+from typing import Final, TypeAlias
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.planner.fewest.kernels import FROM_HOME, Labels, Weights, stage_programme
 from vdsm_pin.planner.fewest.roadmap import Roadmap, nothing_barred, with_barred
-from vdsm_pin.planner.fewest.ways import TipLinks, shortest_ways
+from vdsm_pin.planner.fewest.roadmap_kernels import (
+    FROM_START,
+    Labels,
+    Weights,
+    stage_programme,
+)
+from vdsm_pin.planner.fewest.shortest_paths import TipLinks, shortest_paths
 
-WEIGHTS = Weights(turn=0.048, still=0.0064, visit=0.96, way=0.05, skip=1000.0)
+WEIGHTS = Weights(turn=0.048, still=0.0064, visit=0.96, connection=0.05, skip=1000.0)
 """Costs in arm lengths drawn with one changed angle more."""
 REST = 0.0032
 """Length over the arm's that drawing a single point counts for; [-]."""
@@ -54,39 +68,39 @@ class Planner:
     Args:
         roadmap: The graph.
         length: Of the arm; all lengths are over it; [m].
-        home: The node the motion starts from.
+        start_node: The node the motion starts from.
         blocked: Pairs of nodes whose edges are known to be blocked, shape (n, 2).
     """
 
     def __init__(
-        self, roadmap: Roadmap, length: float, home: int, blocked: IntArray
+        self, roadmap: Roadmap, length: float, start_node: int, blocked: IntArray
     ) -> None:
-        self.roadmap, self.home, self.graph = roadmap, home, roadmap.graph()
+        self.roadmap, self.start_node, self.graph = roadmap, start_node, roadmap.graph()
         self.barred = nothing_barred(len(roadmap.node))
         route = roadmap.route
         self.gap = np.concatenate([[0.0], np.diff(route.stations) / length])
         # Resting at a single point costs like a stretch, or it would be left out.
         self.gap[1:][self.gap[1:] == 0.0] = REST
         self.gaps = route.gaps / length
-        self.way_gaps = self.gaps.copy()
+        self.connection_gaps = self.gaps.copy()
         self._bar(blocked)
-        self.from_home, self.before = self.ways(home)
+        self.from_start, self.before = self.lengths_from(start_node)
 
-    def block(self, edges: IntArray, on_ways: bool) -> None:
+    def block(self, edges: IntArray, on_connections: bool) -> None:
         """Leave out edges, and lengthen all ways between the same two tips.
 
         What blocks one shape is likely to block its neighbours too.
 
         Args:
             edges: Pairs of nodes, shape (n, 2).
-            on_ways: Whether one of them was part of a way, so that ways change.
+            on_connections: Whether one of them was part of a way, so that ways change.
         """
         self._bar(edges)
-        # Blocked on the path, an edge may be part of a way from home all the same.
+        # Blocked on the path, an edge may be part of a way from the start all the same.
         here, there = edges.T
         on_tree = (self.before[here] == there) | (self.before[there] == here)
-        if on_ways or on_tree.any():
-            self.from_home, self.before = self.ways(self.home)
+        if on_connections or on_tree.any():
+            self.from_start, self.before = self.lengths_from(self.start_node)
 
     def _bar(self, edges: IntArray) -> None:
         self.barred = with_barred(self.barred, edges)
@@ -95,21 +109,23 @@ class Planner:
             for u, v in ((a, b), (b, a)):
                 row = slice(route.first[u], route.first[u + 1])
                 link = route.links[row] == v
-                self.way_gaps[row] += link * (self.gaps[row] + DISTRUST)
+                self.connection_gaps[row] += link * (self.gaps[row] + DISTRUST)
 
-    def ways(self, source: int, target: int = -1) -> tuple[FloatArray, IntArray]:
-        """Shortest ways from a node, off the path; see `shortest_ways`."""
+    def lengths_from(
+        self, source: int, target: int = -1
+    ) -> tuple[FloatArray, IntArray]:
+        """Shortest ways from a node, off the path; see `shortest_paths`."""
         route = self.roadmap.route
-        tips = TipLinks(route.first, route.links, self.way_gaps)
-        return shortest_ways(
+        tips = TipLinks(route.first, route.links, self.connection_gaps)
+        return shortest_paths(
             source, target, self.graph, tips, self.roadmap.strain, TURN, self.barred
         )
 
-    def way(self, source: int, target: int) -> tuple[int, ...]:
-        """Nodes of the shortest way between nodes that a way from home leads to."""
+    def connection(self, source: int, target: int) -> tuple[int, ...]:
+        """Nodes of the shortest way between nodes that can be reached."""
         before = self.before
-        if source != self.home:
-            _, before = self.ways(source, target)
+        if source != self.start_node:
+            _, before = self.lengths_from(source, target)
         nodes = [target]
         while nodes[-1] != source:
             nodes.append(int(before[nodes[-1]]))
@@ -118,23 +134,23 @@ class Planner:
 
     def sequence(self) -> Sequence:
         """The cheapest sequence under the edges blocked so far."""
-        labels, home_cost, home_from = stage_programme(
+        labels, start_cost, left_from = stage_programme(
             self.graph, self.roadmap.route.layers, self.gap, self.roadmap.cost,
-            self.from_home, WEIGHTS, self.barred,
+            self.from_start, WEIGHTS, self.barred,
         )  # fmt: skip
-        return self._trace(labels, home_cost, home_from)
+        return self._trace(labels, start_cost, left_from)
 
     def _trace(
-        self, labels: Labels, home_cost: FloatArray, home_from: IntArray
+        self, labels: Labels, start_cost: FloatArray, left_from: IntArray
     ) -> Sequence:
         """Backwards from the cheapest end."""
         roadmap = self.roadmap
-        k = len(home_cost) - 1
+        k = len(start_cost) - 1
         tip = roadmap.route.layers[k]
         begin, end = roadmap.tip_nodes[tip], roadmap.tip_nodes[tip + 1]
         last = labels.cost[begin:end]
         node = -1
-        if not home_cost[k] < last.min(initial=np.inf) and end > begin:
+        if not start_cost[k] < last.min(initial=np.inf) and end > begin:
             node = int(begin + np.argmin(last))
         runs: list[Leg] = []
         skipped: list[int] = []
@@ -142,19 +158,19 @@ class Planner:
             if node >= 0:
                 run, k = self._run(labels.parent, node, k)
                 runs.append(run)
-            while k >= 0 and home_from[k] < 0:
+            while k >= 0 and left_from[k] < 0:
                 if k > 0:
                     skipped.append(k)
                 k -= 1
             if k < 0:
                 break
-            node = int(home_from[k])
+            node = int(left_from[k])
         return self.joined(runs[::-1], tuple(sorted(skipped)))
 
     def _run(self, parent: IntArray, node: int, k: int) -> tuple[Leg, int]:
         """The drawn leg that ends in a node at layer k, and the layer it begins at."""
         nodes = [node]
-        while parent[nodes[-1]] != FROM_HOME:
+        while parent[nodes[-1]] != FROM_START:
             nodes.append(int(parent[nodes[-1]]))
         tips = self.roadmap.tips_of(np.array(nodes))
         marks = k - np.cumsum(np.append(0, tips[1:] != tips[:-1]))
@@ -164,12 +180,97 @@ class Planner:
     def joined(self, runs: list[Leg], skipped: tuple[int, ...]) -> Sequence:
         """Drawn legs with the shortest ways between them."""
         legs: list[Leg] = []
-        at, left = self.home, runs[0].layers[0] if runs else 0
+        at, left = self.start_node, runs[0].layers[0] if runs else 0
         for run in runs:
-            way = self.way(at, run.nodes[0])
-            if len(way) > 1:
-                marks = (left,) * (len(way) - 1) + (run.layers[0],)
-                legs.append(Leg(False, way, marks))
+            connection = self.connection(at, run.nodes[0])
+            if len(connection) > 1:
+                marks = (left,) * (len(connection) - 1) + (run.layers[0],)
+                legs.append(Leg(False, connection, marks))
             legs.append(run)
             at, left = run.nodes[-1], run.layers[-1]
         return Sequence(tuple(legs), skipped)
+
+
+MOST_PIECES: Final = 9
+"""Pieces up to which the best order is sought among all of them."""
+
+Visit: TypeAlias = tuple[int, bool]
+"""Number of a piece, and whether it is drawn backwards."""
+
+
+def backwards(leg: Leg) -> Leg:
+    """The same leg from its other end."""
+    return Leg(leg.drawn, leg.nodes[::-1], leg.layers[::-1])
+
+
+def reordered(planner: Planner, sequence: Sequence) -> Sequence:
+    """The same pieces in the order and directions with the shortest ways between.
+
+    Args:
+        planner: Knows the ways.
+        sequence: The path in the order given.
+
+    Returns:
+        The sequence itself where nothing is gained.
+    """
+    runs = [leg for leg in sequence.legs if leg.drawn]
+    if not 1 <= len(runs) <= MOST_PIECES:
+        return sequence
+    entry = np.array([[run.nodes[0], run.nodes[-1]] for run in runs])
+    first = planner.from_start[entry]
+    between = np.stack(
+        [[planner.lengths_from(int(node))[0][entry] for node in pair] for pair in entry]
+    )
+    order = shortest_tour(first, between)
+    given = tuple((number, False) for number in range(len(runs)))
+    gain = tour_length(first, between, given) - tour_length(first, between, order)
+    if not gain > 0.0:
+        return sequence
+    chosen = [backwards(runs[k]) if back else runs[k] for k, back in order]
+    return planner.joined(chosen, sequence.skipped)
+
+
+def tour_length(
+    first: FloatArray, between: FloatArray, order: tuple[Visit, ...]
+) -> float:
+    """Length of the ways of a tour; see `shortest_tour`."""
+    number, back = order[0]
+    total = float(first[number, int(back)])
+    for (a, a_back), (b, b_back) in itertools.pairwise(order):
+        # A piece drawn forwards is left at its last node.
+        total += float(between[a, int(not a_back), b, int(b_back)])
+    return total
+
+
+def shortest_tour(first: FloatArray, between: FloatArray) -> tuple[Visit, ...]:
+    """Order and directions of pieces with the shortest ways, by subsets.
+
+    Args:
+        first: Way from the start to both ends of each piece, shape (n, 2).
+        between: Way from end e of piece a to end f of piece b at [a, e, b, f], shape
+            (n, 2, n, 2).
+    """
+    n = len(first)
+    # best[set, k, f]: the pieces of the set drawn, k last and entered at its end f.
+    best = np.full((1 << n, n, 2), np.inf)
+    before: IntArray = np.full((1 << n, n, 2), -1)
+    for k in range(n):
+        best[1 << k, k] = first[k]
+    for done in range(1, 1 << n):
+        for a, b in itertools.permutations(range(n), 2):
+            if not done & (1 << a) or done & (1 << b):
+                continue
+            more = done | (1 << b)
+            for e, f in itertools.product((0, 1), repeat=2):
+                value = best[done, a, e] + between[a, 1 - e, b, f]
+                if value < best[more, b, f]:
+                    best[more, b, f], before[more, b, f] = value, 2 * a + e
+    done = (1 << n) - 1
+    k, f = divmod(int(np.argmin(best[done])), 2)
+    tour = [(k, bool(f))]
+    while before[done, k, f] >= 0:
+        last = int(before[done, k, f])
+        done ^= 1 << k
+        k, f = divmod(last, 2)
+        tour.append((k, bool(f)))
+    return tuple(reversed(tour))

@@ -74,7 +74,7 @@ def with_start(
         return roadmap, int(roadmap.index[0])
     tip = roadmap.route.tips[:1]
     offsets = checked_start(judge, tip, Projections())[None]
-    room, _, _ = judge.look(tip, offsets)
+    clearances, _, _ = judge.look(tip, offsets)
     shapes = roadmap.shapes
     nodes = roadmap.nodes_at(0)
     _, around = roadmap.poses_of(judge.problem.manipulator, nodes)
@@ -85,7 +85,7 @@ def with_start(
         every, every, np.broadcast_to(offsets, around[near].shape), around[near]
     )
     # The start may be closer than the margin asks for; the way out only gets better.
-    need = np.minimum(judge.required, float(room[0])) * np.ones(len(near))
+    need = np.minimum(judge.required, float(clearances[0])) * np.ones(len(near))
     good = judge.clear(lines, need) if len(near) else np.zeros(0, bool)
     if not good.any():
         raise NoWayOut
@@ -95,7 +95,7 @@ def with_start(
     links = np.column_stack([ids, there, turn])
     more = extended(
         roadmap, judge.pricing(weights), np.zeros(1, dtype=np.int64),
-        judge.bends(tip, offsets), room, shapes.with_grown(offsets, links),
+        judge.bends(tip, offsets), clearances, shapes.with_grown(offsets, links),
     )  # fmt: skip
     return more, int(more.index[shapes.size])
 

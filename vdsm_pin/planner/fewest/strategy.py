@@ -11,6 +11,7 @@ from vdsm_pin.cables import cable_lengths
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.kinematics import joint_angles
+from vdsm_pin.planner.fewest.broad_phase import BroadPhase, broad_phase
 from vdsm_pin.planner.fewest.explain import (
     how_far,
     notes_of,
@@ -20,21 +21,20 @@ from vdsm_pin.planner.fewest.explain import (
     undrawn,
 )
 from vdsm_pin.planner.fewest.explore import Outcome, explore
+from vdsm_pin.planner.fewest.joint_error import levers
+from vdsm_pin.planner.fewest.largest_margin import drawn_length, widest
 from vdsm_pin.planner.fewest.levels import FULL, LEANING, QUICK, Effort, pointed
-from vdsm_pin.planner.fewest.motion import Knots, Rows, dense_rows
-from vdsm_pin.planner.fewest.nearby import Nearby, nearby
+from vdsm_pin.planner.fewest.motion import Corners, Rows, dense_rows
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.search import Searched
-from vdsm_pin.planner.fewest.smooth import lifted, smooth, straightened
+from vdsm_pin.planner.fewest.shortcut import lifted, shortcut, straightened
 from vdsm_pin.planner.fewest.sparsify import sparser
-from vdsm_pin.planner.fewest.taper import levers
 from vdsm_pin.planner.fewest.unbend import (
     from_there,
     leans_ahead,
     unbend,
     with_unbending,
 )
-from vdsm_pin.planner.fewest.widest import drawn_length, widest
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan, TipPath
 from vdsm_pin.planner.start import check_start
 from vdsm_pin.planner.time_limit import deadline_of
@@ -151,8 +151,8 @@ class _Search:
             self.weights, QUICK,
         )  # fmt: skip
 
-    def with_taper(self, error: float) -> Plan:
-        weights = replace(self.weights, taper=error)
+    def with_joint_error(self, error: float) -> Plan:
+        weights = replace(self.weights, joint_error=error)
         return _plan(
             self.problem, self.clearance, self.margin, self.name, weights, QUICK
         )
@@ -161,28 +161,30 @@ class _Search:
         """Plans with more and more clearance, and what the last has in reserve; [m]."""
         low = float(self.clearance(first.centres).min()) - self.kept
         start = float(self.clearance(first.centres[:1]).min())
-        high = min(self._room_at_tips(first), start) - self.kept
+        high = min(self._clearance_at_tips(first), start) - self.kept
         return widest(self.with_reserve, first, low, high)
 
     def sturdier(self, first: Plan) -> list[Plan]:
         """Plans whose links keep what larger and larger joint errors use up."""
         reach = float(levers(self.problem.manipulator)[-1])
         high = min(
-            (self._room_at_tips(first) - self.kept) / reach,
+            (self._clearance_at_tips(first) - self.kept) / reach,
             self.survived(first.centres[:1]),
         )
-        return widest(self.with_taper, first, self.survived(first.centres), high)[0]
+        return widest(self.with_joint_error, first, self.survived(first.centres), high)[
+            0
+        ]
 
     def survived(self, centres: FloatArray) -> float:
         """Error of all joints that configurations have room for, roughly; [rad]."""
-        room = self.clearance(centres) - self.kept
-        return float((room / levers(self.problem.manipulator)).min())
+        clearances = self.clearance(centres) - self.kept
+        return float((clearances / levers(self.problem.manipulator)).min())
 
-    def _room_at_tips(self, plan: Plan) -> float:
+    def _clearance_at_tips(self, plan: Plan) -> float:
         """Least clearance of the tip alone where it draws: no plan has more; [m]."""
         tips = plan.tip_path.points[plan.tip_path.on_path]
-        room = self.clearance(np.stack([tips, tips], axis=1))
-        return float(room.min(initial=np.inf))
+        clearances = self.clearance(np.stack([tips, tips], axis=1))
+        return float(clearances.min(initial=np.inf))
 
 
 def _plan(
@@ -205,8 +207,8 @@ def _plan(
     if problem.path.pointing is not None and effort is not LEANING:
         effort = pointed(effort)
     # What is kept is judged exactly, however much it is.
-    most = margin + weights.taper * float(levers(problem.manipulator)[-1])
-    quick = nearby(problem, clearance)
+    most = margin + weights.joint_error * float(levers(problem.manipulator)[-1])
+    quick = broad_phase(problem, clearance)
     quick = quick.up_to(quick.far + most)
     best: Outcome | None = None
     try:
@@ -233,7 +235,7 @@ def _soon(problem: PlanningProblem, clearance: LinkClearance) -> Deadline:
 
 def _written(
     problem: PlanningProblem,
-    clearance: Nearby,
+    clearance: BroadPhase,
     name: str,
     weights: CostWeights,
     outcome: Outcome,
@@ -241,17 +243,17 @@ def _written(
     """What was found, smoothed and row by row."""
     assert outcome.found is not None
     judge, arm = outcome.judge, problem.manipulator
-    knots = outcome.found.knots
+    corners = outcome.found.corners
     if not isinstance(outcome.found, Searched):
-        knots = sparser(judge, knots)
-    knots = smooth(judge, knots, weights)
-    knots = lifted(judge, straightened(judge, knots))
+        corners = sparser(judge, corners)
+    corners = shortcut(judge, corners, weights)
+    corners = lifted(judge, straightened(judge, corners))
     turn = problem.planned_row_change
-    rows = dense_rows(arm, knots, problem.path.spacing, turn, judge.slack)
+    rows = dense_rows(arm, corners, problem.path.spacing, turn, judge.slack)
     alpha, theta = joint_angles(arm, rows.centres)
     # Proofs of what is needed ask no more than whether there is the clearance required.
     enough = clearance.up_to(problem.required_clearance)
-    stations, on_path = _stations(knots, rows)
+    stations, on_path = _stations(corners, rows)
     trajectory = Trajectory(on_path, stations, rows.centres[:, 0, 0], alpha, theta)
     return Plan(
         problem,
@@ -265,11 +267,11 @@ def _written(
     )
 
 
-def _stations(knots: Knots, rows: Rows) -> tuple[FloatArray, BoolArray]:
+def _stations(corners: Corners, rows: Rows) -> tuple[FloatArray, BoolArray]:
     """Arc length along the desired path and whether the tip draws, row by row."""
     a, t = rows.interval, rows.share
-    stations = (1.0 - t) * knots.stations[a] + t * knots.stations[a + 1]
-    on_path = knots.drawn[a].copy()
+    stations = (1.0 - t) * corners.stations[a] + t * corners.stations[a + 1]
+    on_path = corners.drawn[a].copy()
     begins = t == 0.0
-    on_path[begins] |= knots.drawn[np.maximum(a[begins] - 1, 0)]
-    return np.where(knots.drawn[a], stations, knots.stations[a]), on_path
+    on_path[begins] |= corners.drawn[np.maximum(a[begins] - 1, 0)]
+    return np.where(corners.drawn[a], stations, corners.stations[a]), on_path

@@ -7,7 +7,7 @@ import numpy as np
 
 from vdsm_pin.errors import Reached
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.planner.fewest.poses import bends_of
+from vdsm_pin.planner.fewest.pose_kernels import bends_of
 from vdsm_pin.planner.upper_clearance import culprit, upper_clearance
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.units import in_mm
@@ -26,13 +26,13 @@ class Stuck:
     """The insertion that came farthest.
 
     Args:
-        way: Of the tip from the start to the path, widest first tried, shape (k, 3),
+        route: Of the tip from the start to the path, widest first tried, shape (k, 3),
             k >= 1; [m].
         come: Its points that the tip has reached, 1 to k.
         centres: Joint centres of the arm there, or on the path, shape (N + 1, 3); [m].
     """
 
-    way: FloatArray
+    route: FloatArray
     come: int
     centres: FloatArray
 
@@ -53,7 +53,7 @@ def where_stuck(
     if problem.scene.obstacles:
         parts.append(_passage(problem, stuck))
         link, obstacle, _ = culprit(problem, stuck.centres)
-        narrowest = stuck.way[_opening(problem, stuck)[0]].tolist()
+        narrowest = stuck.route[_opening(problem, stuck)[0]].tolist()
     parts.append(_stop(problem, stuck))
     parts.append(f"try {' or '.join(_advice(problem, stuck))}")
     centres = stuck.centres.tolist()
@@ -62,9 +62,11 @@ def where_stuck(
 
 def _opening(problem: PlanningProblem, stuck: Stuck) -> tuple[int, float]:
     """Number of the narrowest point of the way, and how wide it is there; [m]."""
-    room = upper_clearance(problem, np.stack([stuck.way, stuck.way], axis=1))
-    narrow = int(np.argmin(room.min(axis=1)))
-    return narrow, 2.0 * (float(room[narrow].min()) + problem.manipulator.most_radius)
+    clearances = upper_clearance(problem, np.stack([stuck.route, stuck.route], axis=1))
+    narrow = int(np.argmin(clearances.min(axis=1)))
+    return narrow, 2.0 * (
+        float(clearances[narrow].min()) + problem.manipulator.most_radius
+    )
 
 
 def _needed(problem: PlanningProblem) -> float:
@@ -76,22 +78,22 @@ def _passage(problem: PlanningProblem, stuck: Stuck) -> str:
     narrow, width = _opening(problem, stuck)
     arm = problem.manipulator
     return (
-        f"the best way in is narrowest at {problem.in_file(stuck.way[narrow])}: "
+        f"the best way in is narrowest at {problem.in_file(stuck.route[narrow])}: "
         f"{in_mm(width)} wide, for a body of {in_mm(2.0 * arm.most_radius)} with "
         f"{in_mm(problem.required_clearance)} on either side"
     )
 
 
 def _stop(problem: PlanningProblem, stuck: Stuck) -> str:
-    gaps = np.linalg.norm(np.diff(stuck.way, axis=0), axis=1)
+    gaps = np.linalg.norm(np.diff(stuck.route, axis=0), axis=1)
     whole, come = float(gaps.sum()), float(gaps[: stuck.come - 1].sum())
     words = f"the arm came {in_mm(come)} of {in_mm(whole)} along it"
-    if stuck.come == len(stuck.way):
+    if stuck.come == len(stuck.route):
         tip = problem.in_file(stuck.centres[-1])
         words = f"the arm came all the way in and along the path to {tip}"
     if problem.scene.obstacles:
-        link, name, room = culprit(problem, stuck.centres)
-        words += f", where link {link} has {in_mm(room)} to {name!r}"
+        link, name, least = culprit(problem, stuck.centres)
+        words += f", where link {link} has {in_mm(least)} to {name!r}"
     return words
 
 

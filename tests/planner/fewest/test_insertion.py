@@ -10,18 +10,18 @@ from scenes_for_fewest import problem
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
+from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.charts import Directions, Projections
-from vdsm_pin.planner.fewest.follow import followed
-from vdsm_pin.planner.fewest.insertion import Insertion, Layers
+from vdsm_pin.planner.fewest.follow_the_leader import followed
+from vdsm_pin.planner.fewest.insertion import insert
+from vdsm_pin.planner.fewest.insertion_population import Insertion, Layers
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
 from vdsm_pin.planner.fewest.motion import Intervals
-from vdsm_pin.planner.fewest.nearby import nearby
 from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.fewest.sparsify import sparser
 from vdsm_pin.planner.fewest.strategy import plan_fewest
-from vdsm_pin.planner.fewest.tip_ways import TipSpace, resampled
-from vdsm_pin.planner.fewest.ways_in import ways_in
+from vdsm_pin.planner.fewest.tip_routes import TipSpace, resampled
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.robot_model import load_robot
@@ -69,7 +69,7 @@ def two_windows(half: float) -> PlanningProblem:
 
 
 def judge_of(task: PlanningProblem) -> Judge:
-    clearance = nearby(task, link_clearance(task))
+    clearance = broad_phase(task, link_clearance(task))
     return Judge(task, clearance, 0.0, 3e-4, 2e-3)
 
 
@@ -78,8 +78,8 @@ def space_of(task: PlanningProblem) -> TipSpace:
     return TipSpace(task, link_clearance(task), required, 0.06, 60_000)
 
 
-def length_of(way: FloatArray) -> float:
-    return float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+def length_of(route: FloatArray) -> float:
+    return float(np.linalg.norm(np.diff(route, axis=0), axis=1).sum())
 
 
 def bent_arms(rng: np.random.Generator, count: int) -> FloatArray:
@@ -138,24 +138,24 @@ def test_an_arm_that_cannot_follow_is_not_a_number() -> None:
 
 
 def test_points_along_a_way_are_even_and_keep_its_ends() -> None:
-    way = np.array([[0.0, 0, 0], [0.0, 0, 0], [1.0, 0, 0], [1.0, 1.05, 0]])
-    points = resampled(way, 0.1)
+    route = np.array([[0.0, 0, 0], [0.0, 0, 0], [1.0, 0, 0], [1.0, 1.05, 0]])
+    points = resampled(route, 0.1)
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     assert gaps.max() <= 0.1 + 1e-12
-    np.testing.assert_array_equal(points[[0, -1]], way[[0, -1]])
-    assert len(resampled(way[:2], 0.1)) == 1
+    np.testing.assert_array_equal(points[[0, -1]], route[[0, -1]])
+    assert len(resampled(route[:2], 0.1)) == 1
 
 
 @pytest.mark.parametrize("half", [0.085, 0.075, 0.07])
 def test_the_tip_finds_windows_and_no_way_where_they_are_shut(half: float) -> None:
     task = two_windows(half)
     goal = task.path.points[0]
-    (way, *_) = space_of(task).ways(goal, 1)
-    room = link_clearance(task)(np.stack([way[:-1], way[1:]], axis=1))[:, 0]
-    assert room.min() >= task.required_clearance
-    np.testing.assert_array_equal(way[[0, -1]], [START, goal])
+    (route, *_) = space_of(task).routes(goal, 1)
+    clearances = link_clearance(task)(np.stack([route[:-1], route[1:]], axis=1))[:, 0]
+    assert clearances.min() >= task.required_clearance
+    np.testing.assert_array_equal(route[[0, -1]], [START, goal])
     shut = two_windows(ARM.link_radius + 0.003)
-    assert not list(space_of(shut).ways(goal, 1))
+    assert not list(space_of(shut).routes(goal, 1))
 
 
 def test_a_second_way_takes_the_other_window() -> None:
@@ -173,8 +173,8 @@ def test_a_second_way_takes_the_other_window() -> None:
     task = problem(
         *bars, *lintels, points=ends[1:], start=(0.0, 0.0, 0.0), closed=False
     )
-    one, other = space_of(task).ways(ends[1], 2)
-    sides = [way[np.abs(way[:, 0] - 1.0).argmin(), 1] for way in (one, other)]
+    one, other = space_of(task).routes(ends[1], 2)
+    sides = [route[np.abs(route[:, 0] - 1.0).argmin(), 1] for route in (one, other)]
     assert sorted(np.sign(sides)) == [-1.0, 1.0]
     assert length_of(one) < length_of(other) + 0.2
 
@@ -182,15 +182,15 @@ def test_a_second_way_takes_the_other_window() -> None:
 def test_what_is_inserted_keeps_clearance_limits_and_layers() -> None:
     task = two_windows(0.08)
     judge = judge_of(task)
-    (way, *_) = space_of(task).ways(task.path.points[0], 1)
-    play = np.full(len(way), 0.02)
+    (route, *_) = space_of(task).routes(task.path.points[0], 1)
+    play = np.full(len(route), 0.02)
     play[[0, -1]] = 0.0
     rng = np.random.default_rng(0)
     root = np.zeros((ARM.n_links + 1, 2))
-    chain = Insertion(judge, Layers(way, play), rng, 24, Projections()).grow(root, 3)
-    assert chain.layer[-1] == len(way) - 1
+    chain = Insertion(judge, Layers(route, play), rng, 24, Projections()).grow(root, 3)
+    assert chain.layer[-1] == len(route) - 1
     assert (np.diff(chain.layer) >= 0).all()
-    np.testing.assert_array_equal(chain.tips[[0, -1]], way[[0, -1]])
+    np.testing.assert_array_equal(chain.tips[[0, -1]], route[[0, -1]])
     lines = Intervals(
         chain.tips[:-1], chain.tips[1:], chain.offsets[:-1], chain.offsets[1:]
     )
@@ -217,19 +217,19 @@ def test_a_path_behind_a_pipe_is_drawn_in_visits_that_come_home() -> None:
     )
     judge, rows = judge_of(task), path_rows(task.path)
     closed = np.zeros(len(rows.tips), dtype=np.bool_)
-    effort = Insert(step=0.02, population=24, ways=2, returns=3, seed=0)
-    found = ways_in(judge, space_of(task), rows, closed, effort).found
+    effort = Insert(step=0.02, population=24, routes=2, returns=3, seed=0)
+    found = insert(judge, space_of(task), rows, closed, effort).found
     assert found is not None
     # Late, one visit is enough, but not none.
     late = Deadline(1.0, 0.0)
-    soon = ways_in(judge, space_of(task), rows, closed, effort, late).found
+    soon = insert(judge, space_of(task), rows, closed, effort, late).found
     assert soon is not None
     assert found.missing <= soon.missing < task.path.length
-    assert judge.clear(found.knots.pick(np.arange(len(found.knots.drawn)))).all()
-    drawn = found.knots.drawn
-    way = np.linalg.norm(np.diff(found.knots.tips, axis=0), axis=1)
-    assert way[drawn].sum() == pytest.approx(task.path.length - found.missing)
-    on_line = found.knots.tips[:-1][drawn]
+    assert judge.clear(found.corners.pick(np.arange(len(found.corners.drawn)))).all()
+    drawn = found.corners.drawn
+    route = np.linalg.norm(np.diff(found.corners.tips, axis=0), axis=1)
+    assert route[drawn].sum() == pytest.approx(task.path.length - found.missing)
+    on_line = found.corners.tips[:-1][drawn]
     np.testing.assert_allclose(on_line[:, [0, 2]] - [2.4, 0.0], 0.0, atol=1e-12)
 
 
@@ -263,18 +263,20 @@ def test_between_directions_the_arm_moves_steadily(
 def test_knees_are_taken_away_and_the_motion_stays_clear() -> None:
     task = two_windows(0.09)
     judge, rows = judge_of(task), path_rows(task.path)
-    effort = Insert(step=0.02, population=10, ways=1, returns=2, seed=0, directed=True)
+    effort = Insert(
+        step=0.02, population=10, routes=1, returns=2, seed=0, directed=True
+    )
     closed = np.zeros(len(rows.tips), dtype=np.bool_)
-    found = ways_in(judge, space_of(task), rows, closed, effort).found
+    found = insert(judge, space_of(task), rows, closed, effort).found
     assert found is not None
     assert not found.missing > 0.0
-    fewer = sparser(judge, found.knots)
+    fewer = sparser(judge, found.corners)
     assert judge.clear(fewer.pick(np.arange(len(fewer.drawn)))).all()
-    np.testing.assert_array_equal(fewer.tips, found.knots.tips)
+    np.testing.assert_array_equal(fewer.tips, found.corners.tips)
     on = fewer.drawn.nonzero()[0]
     counts = [
-        judge.look(knots.tips[on], knots.offsets[on])[1]
-        for knots in (found.knots, fewer)
+        judge.look(corners.tips[on], corners.offsets[on])[1]
+        for corners in (found.corners, fewer)
     ]
     assert counts[1].mean() < 0.7 * counts[0].mean()
 

@@ -15,8 +15,8 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.compiled import borrowed, compiled
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hulls, Piece
 from vdsm_pin.geometry.ordering import coherent_order
-from vdsm_pin.planner.fewest.cores import blocked_by, cores_of
-from vdsm_pin.planner.fewest.surfaces import STEP, Surfaces, surfaces_of
+from vdsm_pin.planner.fewest.inner_capsules import blocked_by, cores_of
+from vdsm_pin.planner.fewest.mesh_distance import STEP, Surfaces, surfaces_of
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.time_limit import deadline_of
 from vdsm_pin.problem import PlanningProblem
@@ -36,7 +36,7 @@ MOST_BOXES = 32
 
 
 @dataclass(frozen=True)
-class Nearby:
+class BroadPhase:
     """Lower bounds of the clearance, exact where it is small but enough.
 
     Near meshes bounds may be up to two steps of `surfaces` below the clearance.
@@ -68,29 +68,29 @@ class Nearby:
         self.deadline.check()
         ends = np.stack([centres[:, :-1], centres[:, 1:]], axis=2).reshape(-1, 2, 3)
         enough = self.far + self.radius
-        room = _box_bounds(ends, self.boxes, self.planes, STRETCHES, enough)
-        room -= self.radius
+        clearances = _box_bounds(ends, self.boxes, self.planes, STRETCHES, enough)
+        clearances -= self.radius
         low = self.floor + self.radius
         mesh = self.surfaces.least(ends, low, enough, self.deadline) - self.radius
         # A step below the distance will do, but not where it decides.
-        near = room < self.far
+        near = clearances < self.far
         near |= mesh < min(self.far, self.floor + STEP)
-        np.minimum(room, mesh, out=room)
+        np.minimum(clearances, mesh, out=clearances)
         asked = np.flatnonzero(near)
         if asked.size:
             blocked = blocked_by(self.cores, ends[asked], self.floor + self.radius)
             blocked |= mesh[asked] < self.floor - STEP
-            room[asked[blocked]] = -np.inf
+            clearances[asked[blocked]] = -np.inf
             asked = asked[~blocked]
-            room[asked] = self.clearance(ends[asked])[:, 0]
-        return room.reshape(len(centres), centres.shape[1] - 1)
+            clearances[asked] = self.clearance(ends[asked])[:, 0]
+        return clearances.reshape(len(centres), centres.shape[1] - 1)
 
-    def up_to(self, far: float) -> "Nearby":
+    def up_to(self, far: float) -> "BroadPhase":
         """The same, exact only below another bound; [m]."""
         return replace(self, far=far)
 
 
-def nearby(problem: PlanningProblem, clearance: LinkClearance) -> Nearby:
+def broad_phase(problem: PlanningProblem, clearance: LinkClearance) -> BroadPhase:
     """The clearance function of a problem with its boxes."""
     obstacles = problem.scene.obstacles
     solid = tuple(one for one in obstacles if not isinstance(one, Mesh))
@@ -101,7 +101,7 @@ def nearby(problem: PlanningProblem, clearance: LinkClearance) -> Nearby:
         for piece in obstacle.pieces
         if isinstance(piece, HalfSpacePiece)
     ]
-    return Nearby(
+    return BroadPhase(
         clearance,
         np.concatenate([np.zeros((0, 2, 3)), *covers]),
         np.array(flat).reshape(-1, 4),

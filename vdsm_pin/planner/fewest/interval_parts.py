@@ -6,12 +6,12 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.poses import parts_of_pieces
+from vdsm_pin.planner.fewest.pose_kernels import parts_of_pieces
 
 MOST_PARTS: Final = 8
 """Parts of one cut. More at once takes fewer turns, but looks at more where the first
 would have shown that the way is blocked."""
-LONG_WAY: Final = 0.064
+LONG_TRAVEL: Final = 0.064
 """Way of a piece, over the arm's length, above which the middle is looked at whatever
 the clearance; [-]."""
 
@@ -36,8 +36,8 @@ class Parts:
     high: FloatArray
     centres: FloatArray
     next_centres: FloatArray
-    room: FloatArray
-    next_room: FloatArray
+    clearances: FloatArray
+    next_clearances: FloatArray
 
     def counts(
         self, knees: BoolArray, need: FloatArray, finest: float, length: float
@@ -53,8 +53,8 @@ class Parts:
             length: Of the arm; [m].
         """
         return parts_of_pieces(
-            self.centres, self.next_centres, self.room, self.next_room,
-            knees, self.interval, need, finest, LONG_WAY * length, MOST_PARTS,
+            self.centres, self.next_centres, self.clearances, self.next_clearances,
+            knees, self.interval, need, finest, LONG_TRAVEL * length, MOST_PARTS,
         )  # fmt: skip
 
     def inner(self, counts: IntArray) -> Inner:
@@ -69,7 +69,7 @@ class Parts:
         """Some of the parts."""
         return Parts(*(getattr(self, one.name)[kept] for one in fields(self)))
 
-    def cut(self, inner: Inner, centres: FloatArray, room: FloatArray) -> "Parts":
+    def cut(self, inner: Inner, centres: FloatArray, clearances: FloatArray) -> "Parts":
         """The parts between the places, every place of each part in order."""
         number = np.arange(len(self.interval))
         # Part by part: its begin, then its places; its places, then its end.
@@ -81,6 +81,6 @@ class Parts:
             np.append(inner.share, self.high)[ends],
             np.concatenate([self.centres, centres])[begins],
             np.concatenate([centres, self.next_centres])[ends],
-            np.concatenate([self.room, room])[begins],
-            np.concatenate([room, self.next_room])[ends],
+            np.concatenate([self.clearances, clearances])[begins],
+            np.concatenate([clearances, self.next_clearances])[ends],
         )

@@ -41,10 +41,10 @@ def tied_in(
     every, places = np.concatenate(offsets), np.concatenate(tips)
     links.append(_ties(judge, roadmap, places, every))
     positions = route.tips[places]
-    room, _, _ = judge.look(positions, every)
+    clearances, _, _ = judge.look(positions, every)
     bends = judge.bends(positions, every)
     return extended(
-        roadmap, judge.pricing(weights), places, bends, room,
+        roadmap, judge.pricing(weights), places, bends, clearances,
         shapes.with_grown(every, np.vstack(links)),
     )  # fmt: skip
 
@@ -100,7 +100,7 @@ def fill(
     Args:
         judge: Says what is clear.
         roadmap: The graph before.
-        lengths: Of the way from home to each node, inf if none, shape (v,).
+        lengths: Of the way from the start to each node, inf if none, shape (v,).
         skipped: Layers k whose stretch from layer k - 1 is not drawn.
         rng: Source of chance.
         weights: What the strategy prefers.

@@ -1,4 +1,4 @@
-"""Shorter motions: stretches of knots replaced by straight lines in the chart."""
+"""Shorter motions: stretches of corners replaced by straight lines in the chart."""
 
 import itertools
 from dataclasses import dataclass, replace
@@ -7,50 +7,60 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.motion import Knots
-from vdsm_pin.planner.fewest.poses import farthest_apart, on_line
+from vdsm_pin.planner.fewest.motion import Corners
+from vdsm_pin.planner.fewest.pose_kernels import farthest_apart, on_line
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.tolerances import TOLERANCES
 
 
 @dataclass(frozen=True)
 class _State:
-    """What a replacement is held against, knot by knot."""
+    """What a replacement is held against, corner by corner."""
 
     changed: IntArray
     bend: FloatArray
-    room: FloatArray
+    clearances: FloatArray
 
     def taken(self, other: "_State", rows: BoolArray) -> "_State":
         """The other's values in some rows."""
         return _State(
             np.where(rows, other.changed, self.changed),
             np.where(rows, other.bend, self.bend),
-            np.where(rows, other.room, self.room),
+            np.where(rows, other.clearances, self.clearances),
         )
 
 
-def _runs(knots: Knots) -> list[tuple[int, int]]:
-    """Maximal runs of intervals of one kind, as first and last knot."""
-    change = np.flatnonzero(np.diff(knots.drawn.astype(int))) + 1
-    marks = [0, *change.tolist(), len(knots.drawn)]
+def _runs(corners: Corners) -> list[tuple[int, int]]:
+    """Maximal runs of intervals of one kind, as first and last corner."""
+    change = np.flatnonzero(np.diff(corners.drawn.astype(int))) + 1
+    marks = [0, *change.tolist(), len(corners.drawn)]
     return list(itertools.pairwise(marks))
 
 
-def _flattened(judge: Judge, knots: Knots, spans: list[tuple[int, int]]) -> Knots:
-    """Knots with every span's inner knots on the line between its ends."""
-    tips, offsets, edges = knots.tips.copy(), knots.offsets.copy(), knots.edges.copy()
-    unit = knots.unit(judge.problem.manipulator)
+def _flattened(judge: Judge, corners: Corners, spans: list[tuple[int, int]]) -> Corners:
+    """Corners with every span's inner corners on the line between its ends."""
+    tips, offsets, edges = (
+        corners.tips.copy(),
+        corners.offsets.copy(),
+        corners.edges.copy(),
+    )
+    unit = corners.unit(judge.problem.manipulator)
     for a, b in spans:
-        now = knots.tips, knots.offsets, knots.stations, bool(knots.drawn[a]), unit
+        now = (
+            corners.tips,
+            corners.offsets,
+            corners.stations,
+            bool(corners.drawn[a]),
+            unit,
+        )
         on_line(*now, a, b, tips, offsets)
         edges[a:b] = -1
-    return replace(knots, tips=tips, offsets=offsets, edges=edges)
+    return replace(corners, tips=tips, offsets=offsets, edges=edges)
 
 
-def _spans(knots: Knots, stride: int, phase: int) -> list[tuple[int, int]]:
+def _spans(corners: Corners, stride: int, phase: int) -> list[tuple[int, int]]:
     spans = []
-    for begin, end in _runs(knots):
+    for begin, end in _runs(corners):
         marks = list(range(begin + phase, end, stride))
         marks = [m for m in (begin, *marks, end) if begin <= m <= end]
         marks = sorted(set(marks))
@@ -66,61 +76,63 @@ def _allowed(state: _State, new: _State, span: tuple[int, int], drawn: bool) -> 
     return int(new.changed[a + 1 : b].sum()) <= int(state.changed[a + 1 : b].sum())
 
 
-def smooth(judge: Judge, knots: Knots, weights: CostWeights) -> Knots:
-    """Knots pulled straight wherever that keeps clearance, limits and sparsity.
+def shortcut(judge: Judge, corners: Corners, weights: CostWeights) -> Corners:
+    """Corners pulled straight wherever that keeps clearance, limits and sparsity.
 
     Long stretches are tried first, then ever shorter ones, all of one length at once.
     """
-    longest = max(b - a for a, b in _runs(knots))
+    longest = max(b - a for a, b in _runs(corners))
     stride = 1 << max(1, int(np.ceil(np.log2(max(longest, 2)))))
-    room, changed, bend = judge.look(knots.tips, knots.offsets)
-    state = _State(changed, bend, room)
+    clearances, changed, bend = judge.look(corners.tips, corners.offsets)
+    state = _State(changed, bend, clearances)
     while stride >= 2:
         for phase in (0, stride // 2):
-            spans = _spans(knots, stride, phase)
+            spans = _spans(corners, stride, phase)
             if spans:
-                knots, state = _round(judge, knots, state, weights, spans)
+                corners, state = _round(judge, corners, state, weights, spans)
         stride //= 2
-    return knots
+    return corners
 
 
 def _round(
     judge: Judge,
-    knots: Knots,
+    corners: Corners,
     state: _State,
     weights: CostWeights,
     spans: list[tuple[int, int]],
-) -> tuple[Knots, _State]:
-    trial = _flattened(judge, knots, spans)
-    change = farthest_apart(knots.tips, knots.offsets, trial.tips, trial.offsets)
+) -> tuple[Corners, _State]:
+    trial = _flattened(judge, corners, spans)
+    change = farthest_apart(corners.tips, corners.offsets, trial.tips, trial.offsets)
     moved = change > TOLERANCES.joint_centre
     spans = [(a, b) for a, b in spans if moved[a : b + 1].any()]
     if not spans:
-        return knots, state
+        return corners, state
     picked = np.concatenate([np.arange(a, b) for a, b in spans])
-    new = _State(state.changed.copy(), state.bend.copy(), state.room.copy())
+    new = _State(state.changed.copy(), state.bend.copy(), state.clearances.copy())
     bends = judge.bends(trial.tips[picked], trial.offsets[picked])
     new.changed[picked] = (bends > TOLERANCES.changed_angle).sum(axis=1)
     new.bend[picked] = bends.max(axis=1)
-    need, bend = _guards(judge, knots, state, weights, spans)
-    good, new.room[picked] = judge.measured(judge.lines(trial, picked), need, bend)
+    need, bend = _guards(judge, corners, state, weights, spans)
+    good, new.clearances[picked] = judge.measured(
+        judge.lines(trial, picked), need, bend
+    )
     kept = []
     place = 0
-    taken = np.zeros(len(knots.tips), dtype=np.bool_)
+    taken = np.zeros(len(corners.tips), dtype=np.bool_)
     for span in spans:
         a, b = span
         if good[place : place + b - a].all() and _allowed(
-            state, new, span, bool(knots.drawn[a])
+            state, new, span, bool(corners.drawn[a])
         ):
             kept.append(span)
             taken[a + 1 : b] = True
         place += b - a
-    return _flattened(judge, knots, kept), state.taken(new, taken)
+    return _flattened(judge, corners, kept), state.taken(new, taken)
 
 
 def _guards(
     judge: Judge,
-    knots: Knots,
+    corners: Corners,
     state: _State,
     weights: CostWeights,
     spans: list[tuple[int, int]],
@@ -129,66 +141,66 @@ def _guards(
     need, bend = [], []
     wanted = weights.clearance * judge.problem.manipulator.total_length
     for a, b in spans:
-        room = float(state.room[a : b + 1].min())
-        room = max(min(room, judge.required + wanted / 2.0), judge.required)
+        clearances = float(state.clearances[a : b + 1].min())
+        clearances = max(min(clearances, judge.required + wanted / 2.0), judge.required)
         most = max(float(state.bend[a : b + 1].max()), weights.easy_bend)
-        need += [room] * (b - a)
+        need += [clearances] * (b - a)
         bend += [most] * (b - a)
     return np.array(need), np.array(bend)
 
 
-def straightened(judge: Judge, knots: Knots) -> Knots:
-    """Ways without the knots that lie on the line between their neighbours."""
-    kept = np.ones(len(knots.tips), dtype=np.bool_)
-    tips, offsets = knots.tips.copy(), knots.offsets.copy()
-    unit, a = knots.unit(judge.problem.manipulator), 0
-    for k in range(1, len(knots.tips) - 1):
-        if not (knots.drawn[k - 1] or knots.drawn[k]):
-            now = knots.tips, knots.offsets, knots.stations, False, unit
+def straightened(judge: Judge, corners: Corners) -> Corners:
+    """Ways without the corners that lie on the line between their neighbours."""
+    kept = np.ones(len(corners.tips), dtype=np.bool_)
+    tips, offsets = corners.tips.copy(), corners.offsets.copy()
+    unit, a = corners.unit(judge.problem.manipulator), 0
+    for k in range(1, len(corners.tips) - 1):
+        if not (corners.drawn[k - 1] or corners.drawn[k]):
+            now = corners.tips, corners.offsets, corners.stations, False, unit
             on_line(*now, a, k + 1, tips, offsets)
             span = slice(a + 1, k + 1)
             gap = farthest_apart(
-                knots.tips[span], knots.offsets[span], tips[span], offsets[span]
+                corners.tips[span], corners.offsets[span], tips[span], offsets[span]
             )
             kept[k] = gap.max() > TOLERANCES.joint_centre
         a = k if kept[k] else a
-    return knots.take(np.flatnonzero(kept))
+    return corners.take(np.flatnonzero(kept))
 
 
-def lifted(judge: Judge, knots: Knots) -> Knots:
+def lifted(judge: Judge, corners: Corners) -> Corners:
     """Ways with the tip stepping back along -X, where there is room for it.
 
     The step grows with the distance from the ends of the way, up to the problem's
     retreat; half and a quarter of it are tried too.
     """
     retreat = judge.problem.path.retreat
-    for begin, end in reversed(_runs(knots)):
-        if knots.drawn[begin] or not retreat > 0.0:
+    for begin, end in reversed(_runs(corners)):
+        if corners.drawn[begin] or not retreat > 0.0:
             continue
-        tips = knots.tips[begin : end + 1]
+        tips = corners.tips[begin : end + 1]
         if tips[:, 0].min() < min(tips[0, 0], tips[-1, 0]) - TOLERANCES.joint_centre:
             continue
         for part in (1.0, 0.5, 0.25):
-            trial = _stepped_back(knots, begin, end, part * retreat)
-            count = end - begin + len(trial.tips) - len(knots.tips)
+            trial = _stepped_back(corners, begin, end, part * retreat)
+            count = end - begin + len(trial.tips) - len(corners.tips)
             if judge.clear(judge.lines(trial, np.arange(begin, begin + count))).all():
-                knots = trial
+                corners = trial
                 break
-    return knots
+    return corners
 
 
-def _stepped_back(knots: Knots, begin: int, end: int, depth: float) -> Knots:
-    """One way stepped back by at most `depth`, with knots where the slope changes."""
-    tips = knots.tips[begin : end + 1]
+def _stepped_back(corners: Corners, begin: int, end: int, depth: float) -> Corners:
+    """One way stepped back by at most `depth`, with corners where the slope changes."""
+    tips = corners.tips[begin : end + 1]
     along = np.linalg.norm(np.diff(tips, axis=0), axis=1)
     length = np.concatenate([[0.0], np.cumsum(along)])
     total = float(length[-1])
     if not total > 0.0:
-        return knots
+        return corners
     ramp = min(depth, total / 2.0)
     marks = distinct(np.array([ramp, total - ramp]))
     new = (marks[:, None] != length).all(axis=1)
-    # Knots where only the shape changes share a length: keep every one of them.
+    # Corners where only the shape changes share a length: keep every one of them.
     values = np.concatenate([length, marks[new]])
     order = np.argsort(values)
     values = values[order]
@@ -204,24 +216,28 @@ def _stepped_back(knots: Knots, begin: int, end: int, depth: float) -> Knots:
     t = share[:, None]
     new_tips = (1 - t) * tips[low] + t * tips[high]
     new_tips[:, 0] -= np.minimum(np.minimum(values, total - values), ramp)
-    shapes = knots.offsets[begin : end + 1]
+    shapes = corners.offsets[begin : end + 1]
     t = t[..., None]
     new_shapes = (1 - t) * shapes[low] + t * shapes[high]
     count = len(values) - 1
-    return Knots(
-        np.concatenate([knots.tips[:begin], new_tips, knots.tips[end + 1 :]]),
-        np.concatenate([knots.offsets[:begin], new_shapes, knots.offsets[end + 1 :]]),
+    return Corners(
+        np.concatenate([corners.tips[:begin], new_tips, corners.tips[end + 1 :]]),
+        np.concatenate(
+            [corners.offsets[:begin], new_shapes, corners.offsets[end + 1 :]]
+        ),
         np.concatenate(
             [
-                knots.stations[:begin],
-                np.append(np.full(count, knots.stations[begin]), knots.stations[end]),
-                knots.stations[end + 1 :],
+                corners.stations[:begin],
+                np.append(
+                    np.full(count, corners.stations[begin]), corners.stations[end]
+                ),
+                corners.stations[end + 1 :],
             ]
         ),
         np.concatenate(
-            [knots.drawn[:begin], np.zeros(count, np.bool_), knots.drawn[end:]]
+            [corners.drawn[:begin], np.zeros(count, np.bool_), corners.drawn[end:]]
         ),
         np.concatenate(
-            [knots.edges[:begin], np.full((count, 2), -1), knots.edges[end:]]
+            [corners.edges[:begin], np.full((count, 2), -1), corners.edges[end:]]
         ),
     )

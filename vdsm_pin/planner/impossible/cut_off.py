@@ -15,7 +15,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.planner.feasibility import curled_reach
-from vdsm_pin.planner.fewest.cells import (
+from vdsm_pin.planner.impossible.octree import (
     DEPTH,
     DOUBTFUL,
     OPEN,
@@ -212,12 +212,12 @@ def _decided(
     cells = _Cells(problem, deadline)
     while True:
         deadline.check()
-        home, goals = cells.holders(problem.path.start[None]), cells.holders(tips)
+        start_node, goals = cells.holders(problem.path.start[None]), cells.holders(tips)
         # A cell whose centre is clear hardly ever ends a way.
         light = np.where(cells.middle < 0.0, 1.0, LIGHT)
         doubt = np.where(cells.state == DOUBTFUL, cells.sizes() * light, 0.0)
         first, neighbours = adjoining(cells.codes, cells.levels, cells.state != SHUT)
-        there = doubt_to(home, first, neighbours, doubt)
+        there = doubt_to(start_node, first, neighbours, doubt)
         need = np.where(goals >= 0, there[goals], 0.0)
         closed = ~np.isfinite(need)
         open_ = np.unique(goals[(need > 0.0) & ~closed])
@@ -245,20 +245,23 @@ def narrowest(
     cells, _ = _decided(problem, tip[None], deadline)
     place = 0
     for _ in range(CLOSER):
-        home, goal = cells.holders(problem.path.start[None]), cells.holders(tip[None])
+        start_node, goal = (
+            cells.holders(problem.path.start[None]),
+            cells.holders(tip[None]),
+        )
         within = np.isfinite(cells.middle)
         lack = np.maximum(0.0, cells.middle / cells.inside)
         # The fourth power makes the worst place on a way count for nearly all of it.
         cost = np.where(within, cells.sizes() * (lack**4 + LIGHT**4), 0.0)
         first, neighbours = adjoining(cells.codes, cells.levels, within)
-        through = doubt_to(home, first, neighbours, cost)
+        through = doubt_to(start_node, first, neighbours, cost)
         through += doubt_to(goal, first, neighbours, cost) - cost
-        on_way = np.flatnonzero(through <= DETOUR * through[goal[0]])
-        place = int(on_way[np.argmin(cells.middle[on_way])])
+        on_route = np.flatnonzero(through <= DETOUR * through[goal[0]])
+        place = int(on_route[np.argmin(cells.middle[on_route])])
         # Clear centres tell little of a cell that is larger than what it must keep.
         large = (cells.sizes() > -cells.inside) & (cells.state == DOUBTFUL)
         large |= (cells.sizes() > cells.fine) & (cells.middle < 0.0)
-        if not large[on_way].any() or cells.codes.size > MOST_CELLS:
+        if not large[on_route].any() or cells.codes.size > MOST_CELLS:
             break
-        cells.split(cells.closest(on_way[large[on_way]]))
+        cells.split(cells.closest(on_route[large[on_route]]))
     return cells.centre(place) if cells.middle[place] < 0.0 else None

@@ -16,7 +16,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.feasibility import curled_reach
-from vdsm_pin.planner.fewest.cells import (
+from vdsm_pin.planner.impossible.octree import (
     DEPTH,
     adjoining,
     doubt_to,
@@ -75,7 +75,7 @@ class _Cells:
         count = 8**FIRST_LEVEL
         self.codes = np.arange(count) << (3 * (DEPTH - FIRST_LEVEL))
         self.levels = np.full(count, FIRST_LEVEL)
-        self.room = self._rooms(self.codes, self.levels)
+        self.clearances = self._clearances(self.codes, self.levels)
         self.avoided: list[FloatArray] = []
 
     def boxes(self, codes: IntArray, levels: IntArray) -> tuple[FloatArray, FloatArray]:
@@ -84,27 +84,29 @@ class _Cells:
         low = self.corner + self.side / 2.0**DEPTH * places(codes)
         return np.asarray(low + half[:, None]), np.asarray(half)
 
-    def _rooms(self, codes: IntArray, levels: IntArray) -> FloatArray:
+    def _clearances(self, codes: IntArray, levels: IntArray) -> FloatArray:
         """What the tip has to spare at the centre of each cell, shape (n,); [m]."""
         centre, half = self.boxes(codes, levels)
-        room = self.clearance(np.stack([centre, centre], axis=1))[:, 0] - self.required
+        clearances = (
+            self.clearance(np.stack([centre, centre], axis=1))[:, 0] - self.required
+        )
         # From within a solid a tip that is clear is at least so far away.
-        room = np.maximum(room, -self.radius - self.required)
+        clearances = np.maximum(clearances, -self.radius - self.required)
         out = np.hypot(centre[:, 1], centre[:, 2]) - self.reach
-        room[out > np.sqrt(2.0) * half] = -np.inf
-        return np.asarray(room)
+        clearances[out > np.sqrt(2.0) * half] = -np.inf
+        return np.asarray(clearances)
 
     def costs(self) -> tuple[FloatArray, BoolArray]:
         """Cost of passing each cell, inf where it is shut; whether it is in doubt."""
         centre, half = self.boxes(self.codes, self.levels)
         radius = np.sqrt(3.0) * half
-        shut = self.room + radius < 0.0
-        doubt = ~shut & (self.room < half) & (half > LEAST * self.radius)
-        shut |= ~doubt & (self.room < 0.0)
+        shut = self.clearances + radius < 0.0
+        doubt = ~shut & (self.clearances < half) & (half > LEAST * self.radius)
+        shut |= ~doubt & (self.clearances < 0.0)
         # A cell in doubt is taken for as wide as it may be.
-        room = np.where(doubt, self.room + radius, self.room)
+        clearances = np.where(doubt, self.clearances + radius, self.clearances)
         narrow = NARROW * self.radius
-        cost = 2.0 * half * (1.0 + (narrow / np.maximum(room, CAP * narrow)) ** 2)
+        cost = 2.0 * half * (1.0 + (narrow / np.maximum(clearances, CAP * narrow)) ** 2)
         for place in self.avoided:
             near = np.linalg.norm(centre - place, axis=1) < 2.0 * self.radius + half
             cost[near & ~doubt] *= AVOIDED
@@ -121,15 +123,16 @@ class _Cells:
         count[chosen] = 8
         begin = np.cumsum(count) - count
         kids = (begin[chosen, None] + np.arange(8)).ravel()
-        codes, levels, room = (
-            np.repeat(values, count) for values in (self.codes, self.levels, self.room)
+        codes, levels, clearances = (
+            np.repeat(values, count)
+            for values in (self.codes, self.levels, self.clearances)
         )
         levels[kids] += 1
         codes[kids] += np.tile(np.arange(8), len(chosen)) << (
             3 * (DEPTH - levels[kids])
         )
-        room[kids] = self._rooms(codes[kids], levels[kids])
-        self.codes, self.levels, self.room = codes, levels, room
+        clearances[kids] = self._clearances(codes[kids], levels[kids])
+        self.codes, self.levels, self.clearances = codes, levels, clearances
 
     def cheapest(self, start: FloatArray, goal: FloatArray) -> FloatArray | None:
         """Points on the cheapest way that is clear, shape (k, 3); None without one."""
@@ -148,16 +151,16 @@ class _Cells:
             # The more cells there are, the more are halved at once.
             wide = 1.0 + DETOUR * (1.0 + MORE * self.codes.size / self.most)
             good = doubt & (there + back <= wide * best + cost)
-            way = self._traced(int(ends[1]), int(ends[0]), there, first, neighbours)
-            if not doubt[way].any():
-                return np.vstack([start, self._through(way), goal])
+            route = self._traced(int(ends[1]), int(ends[0]), there, first, neighbours)
+            if not doubt[route].any():
+                return np.vstack([start, self._through(route), goal])
             if self.codes.size > self.most:
                 return None
             self.split(np.flatnonzero(good))
 
-    def _through(self, way: IntArray) -> FloatArray:
+    def _through(self, route: IntArray) -> FloatArray:
         """Centres of the faces that a way passes, shape (k - 1, 3); [m]."""
-        centre, half = self.boxes(self.codes[way], self.levels[way])
+        centre, half = self.boxes(self.codes[route], self.levels[route])
         low = np.maximum((centre - half[:, None])[:-1], (centre - half[:, None])[1:])
         high = np.minimum((centre + half[:, None])[:-1], (centre + half[:, None])[1:])
         return np.asarray((low + high) / 2.0)
@@ -167,11 +170,11 @@ class _Cells:
         at: int, to: int, there: FloatArray, first: IntArray, neighbours: IntArray
     ) -> IntArray:
         """Cells of the way that a search found, from its source on."""
-        way = [at]
-        while way[-1] != to:
-            near = neighbours[first[way[-1]] : first[way[-1] + 1]]
-            way.append(int(near[np.argmin(there[near])]))
-        return np.array(way[::-1])
+        route = [at]
+        while route[-1] != to:
+            near = neighbours[first[route[-1]] : first[route[-1] + 1]]
+            route.append(int(near[np.argmin(there[near])]))
+        return np.array(route[::-1])
 
 
 class TipSpace:
@@ -199,7 +202,7 @@ class TipSpace:
         self.known: dict[bytes, list[FloatArray]] = {}
         self.searches: dict[bytes, Iterator[FloatArray]] = {}
 
-    def ways(self, goal: FloatArray, most: int) -> Iterator[FloatArray]:
+    def routes(self, goal: FloatArray, most: int) -> Iterator[FloatArray]:
         """Ways of the tip from the start to a goal, the best first.
 
         Args:
@@ -226,10 +229,10 @@ class TipSpace:
             yield start[None]
             return
         cells = self._cells(np.stack([start, goal]))
-        while (way := cells.cheapest(start, goal)) is not None:
-            way = self._pulled(resampled(way, self.spacing))
-            yield resampled(way, self.spacing)
-            cells.avoided.append(self._narrowest(way))
+        while (route := cells.cheapest(start, goal)) is not None:
+            route = self._pulled(resampled(route, self.spacing))
+            yield resampled(route, self.spacing)
+            cells.avoided.append(self._narrowest(route))
 
     def _cells(self, ends: FloatArray) -> _Cells:
         """Cells over the places a tip can be that may be worth a way between these."""
@@ -246,36 +249,36 @@ class TipSpace:
 
     def _spare(self, points: FloatArray) -> FloatArray:
         """What the tip has to spare at points, shape (n,); [m]."""
-        room = self.clearance(np.stack([points, points], axis=1))[:, 0]
-        return np.asarray(room - self.required)
+        clearances = self.clearance(np.stack([points, points], axis=1))[:, 0]
+        return np.asarray(clearances - self.required)
 
-    def _narrowest(self, way: FloatArray) -> FloatArray:
-        """The place of a way, its ends left out, with the least room, shape (3,)."""
-        inner = way[1:-1] if len(way) > 2 else way
+    def _narrowest(self, route: FloatArray) -> FloatArray:
+        """The inner place of a route with the least clearance, shape (3,)."""
+        inner = route[1:-1] if len(route) > 2 else route
         return np.asarray(inner[int(np.argmin(self._spare(inner)))])
 
-    def _pulled(self, way: FloatArray) -> FloatArray:
+    def _pulled(self, route: FloatArray) -> FloatArray:
         """A way straightened, and in the middle where it is narrow (elastic band).
 
         Args:
-            way: Shape (k, 3), its ends stay; [m].
+            route: Shape (k, 3), its ends stay; [m].
         """
-        rng, way = np.random.default_rng(len(way)), way.copy()
+        rng, route = np.random.default_rng(len(route)), route.copy()
         for round_ in range(PULLS):
             size = self.arm.most_radius * SIZES[round_ % len(SIZES)]
             for parity in (1, 2):
-                inner = np.arange(parity, len(way) - 1, 2)
+                inner = np.arange(parity, len(route) - 1, 2)
                 if len(inner):
                     shifts = rng.normal(size=(len(inner), SHIFTS, 3)) * size
-                    way[inner] = self._better(way, inner, shifts)
-        return way
+                    route[inner] = self._better(route, inner, shifts)
+        return route
 
     def _better(
-        self, way: FloatArray, inner: IntArray, shifts: FloatArray
+        self, route: FloatArray, inner: IntArray, shifts: FloatArray
     ) -> FloatArray:
         """The best of some places for every other point of a way, shape (n, 3)."""
-        middle = (way[inner - 1] + way[inner + 1])[:, None] / 2.0
-        own, radius = way[inner][:, None], self.arm.most_radius
+        middle = (route[inner - 1] + route[inner + 1])[:, None] / 2.0
+        own, radius = route[inner][:, None], self.arm.most_radius
         tried = np.concatenate([own, (own + middle) / 2.0, middle, own + shifts], 1)
         spare = self._spare(tried.reshape(-1, 3)).reshape(tried.shape[:2])
         wide = np.minimum(spare / (NARROW * radius), 1.0)
@@ -284,11 +287,11 @@ class TipSpace:
         return np.asarray(tried[np.arange(len(inner)), score.argmax(axis=1)])
 
 
-def resampled(way: FloatArray, spacing: float) -> FloatArray:
+def resampled(route: FloatArray, spacing: float) -> FloatArray:
     """Points along a polyline, evenly at most `spacing` apart, ends kept; [m]."""
-    way = way[np.append(True, np.linalg.norm(np.diff(way, axis=0), axis=1) > 0.0)]
-    if len(way) < 2:
-        return way
-    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1)))
+    route = route[np.append(True, np.linalg.norm(np.diff(route, axis=0), axis=1) > 0.0)]
+    if len(route) < 2:
+        return route
+    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(route, axis=0), axis=1)))
     marks = np.linspace(0.0, along[-1], 1 + max(1, int(np.ceil(along[-1] / spacing))))
-    return np.stack([np.interp(marks, along, column) for column in way.T], axis=1)
+    return np.stack([np.interp(marks, along, column) for column in route.T], axis=1)

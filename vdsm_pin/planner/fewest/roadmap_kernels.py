@@ -57,15 +57,15 @@ class Weights(NamedTuple):
     Args:
         turn: Cost of a radian of turning.
         still: Cost of a step at rest.
-        visit: Cost of a visit home.
-        way: Cost of a length of way.
+        visit: Cost of a visit to the start.
+        connection: Cost of a length of a connection.
         skip: Cost of a length not drawn.
     """
 
     turn: float
     still: float
     visit: float
-    way: float
+    connection: float
     skip: float
 
 
@@ -76,8 +76,8 @@ class Labels(NamedTuple):
     parent: IntArray
 
 
-FROM_HOME = -2
-"""Stands for the node before where that is home."""
+FROM_START = -2
+"""Stands for the node before where that is the start."""
 
 
 @compiled
@@ -107,9 +107,9 @@ def pose_shapes(
         node numbers tip * n + shape, ascending, shape (v,); the ends of both straight
         pieces, shape (v, 3, 3) [m]; psi of joint 1 and of the knee, (v, 2) [rad].
     """
-    room = tips.shape[0] + whole.sum() * (knees.shape[0] - 1)
-    node = np.zeros(room, dtype=np.int64)
-    ends, bends = np.zeros((room, 3, 3)), np.zeros((room, 2))
+    size = tips.shape[0] + whole.sum() * (knees.shape[0] - 1)
+    node = np.zeros(size, dtype=np.int64)
+    ends, bends = np.zeros((size, 3, 3)), np.zeros((size, 2))
     tried = (tips, whole, knees, slopes, stations)
     count = _pose_all(tried, limit, base_low, base_high, (node, ends, bends))
     return node[:count], ends[:count], bends[:count]
@@ -269,11 +269,11 @@ def stage_programme(
     layers: IntArray,
     gap: FloatArray,
     node_cost: FloatArray,
-    home: FloatArray,
+    from_start: FloatArray,
     weights: Weights,
     barred: Barred,
 ) -> tuple[Labels, FloatArray, IntArray]:
-    """Cheapest way to draw all layers in order, with visits home in between.
+    """Cheapest way to draw all layers in order, with visits to the start in between.
 
     Args:
         graph: The roadmap.
@@ -281,38 +281,39 @@ def stage_programme(
         gap: Path length from the layer before to this one over the arm's length, shape
             (l,); [-].
         node_cost: What a length drawn with this node costs, shape (v,).
-        home: Length of the way from the start to each node, inf if none, (v,); [-].
+        from_start: Length of the way from the start to each node, inf if none, shape
+            (v,); [-].
         weights: What moves cost.
         barred: Blocked edges.
 
     Returns:
-        cost and parent of every node; cost of being at home after each layer and the
-        node left from (-1: was at home already), shape (l,).
+        cost and parent of every node; cost of being at the start after each layer and
+        the node left from (-1: was there already), shape (l,).
     """
     graph, barred = borrowed(graph), borrowed(barred)
     count = graph.node.size
     labels = Labels(np.full(count, np.inf), np.full(count, -1))
-    home_cost, home_from = np.full(layers.size, np.inf), np.full(layers.size, -1)
+    start_cost, left_from = np.full(layers.size, np.inf), np.full(layers.size, -1)
     # The first way to the path costs nothing but its length.
-    at_home = -weights.visit
+    at_start = -weights.visit
     for k in range(layers.size):
         tip = layers[k]
         if k > 0:
             _draw(graph, layers[k - 1], tip, weights.turn, labels, barred)
             for v in range(graph.tip_nodes[tip], graph.tip_nodes[tip + 1]):
                 labels.cost[v] += node_cost[v] * gap[k]
-            at_home += weights.skip * gap[k]
+            at_start += weights.skip * gap[k]
         _settle(graph, tip, weights, labels, barred)
         entered = False
         for v in range(graph.tip_nodes[tip], graph.tip_nodes[tip + 1]):
-            value = labels.cost[v] + weights.way * home[v]
-            if value < at_home:
-                at_home, home_from[k] = value, v
-        home_cost[k] = at_home
+            value = labels.cost[v] + weights.connection * from_start[v]
+            if value < at_start:
+                at_start, left_from[k] = value, v
+        start_cost[k] = at_start
         for v in range(graph.tip_nodes[tip], graph.tip_nodes[tip + 1]):
-            value = at_home + weights.visit + weights.way * home[v]
+            value = at_start + weights.visit + weights.connection * from_start[v]
             if value < labels.cost[v]:
-                labels.cost[v], labels.parent[v], entered = value, FROM_HOME, True
+                labels.cost[v], labels.parent[v], entered = value, FROM_START, True
         if entered:
             _settle(graph, tip, weights, labels, barred)
-    return labels, home_cost, home_from
+    return labels, start_cost, left_from

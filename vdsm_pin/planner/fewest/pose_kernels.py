@@ -142,11 +142,13 @@ def pieces_of(
 
 
 @compiled
-def room_along(room: FloatArray, knees: BoolArray, others: BoolArray) -> FloatArray:
+def clearances_along(
+    clearances: FloatArray, knees: BoolArray, others: BoolArray
+) -> FloatArray:
     """Clearance of an arm's pieces where it is cut at other knees.
 
     Args:
-        room: Clearance of the pieces, shape (n, N); [m].
+        clearances: Clearance of the pieces, shape (n, N); [m].
         knees: Where they are cut, shape (n, N + 1).
         others: Where the others are cut, shape (n, N + 1).
 
@@ -154,7 +156,7 @@ def room_along(room: FloatArray, knees: BoolArray, others: BoolArray) -> FloatAr
         The least of the pieces that each of the others shares, inf where none ends,
         shape (n, N); [m].
     """
-    n_rows, n_links = room.shape
+    n_rows, n_links = clearances.shape
     result = np.full((n_rows, n_links), np.inf)
     for r in range(n_rows):
         begin = 0
@@ -162,7 +164,7 @@ def room_along(room: FloatArray, knees: BoolArray, others: BoolArray) -> FloatAr
             if not others[r, i + 1]:
                 continue
             for k in range(begin, n_links):
-                result[r, i] = min(result[r, i], room[r, k])
+                result[r, i] = min(result[r, i], clearances[r, k])
                 if k >= i and knees[r, k + 1]:
                     break
             begin = i + 1
@@ -173,8 +175,8 @@ def room_along(room: FloatArray, knees: BoolArray, others: BoolArray) -> FloatAr
 def parts_of_pieces(
     centres: FloatArray,
     next_centres: FloatArray,
-    room: FloatArray,
-    next_room: FloatArray,
+    clearances: FloatArray,
+    next_clearances: FloatArray,
     knees: BoolArray,
     interval: IntArray,
     need: FloatArray,
@@ -190,8 +192,8 @@ def parts_of_pieces(
     Args:
         centres: Joint centres, shape (r, N + 1, 3); [m].
         next_centres: The same at the other end; [m].
-        room: Clearance of the pieces, inf where none ends, shape (r, N); [m].
-        next_room: The same at the other end; [m].
+        clearances: Clearance of the pieces, inf where none ends, shape (r, N); [m].
+        next_clearances: The same at the other end; [m].
         knees: Of each interval, shape (n, N + 1).
         interval: Interval of both configurations, shape (r,).
         need: Clearance to keep in each interval, shape (n,); [m].
@@ -202,7 +204,7 @@ def parts_of_pieces(
     Returns:
         Shape (r, N), 0 where a piece is clear all the way.
     """
-    n_rows, n_links = room.shape
+    n_rows, n_links = clearances.shape
     parts = np.zeros((n_rows, n_links), dtype=np.int64)
     for r in range(n_rows):
         before = 0.0
@@ -216,7 +218,11 @@ def parts_of_pieces(
             way, before = max(before, here), here
             if i == 0 or not way > finest:
                 continue
-            spare = room[r, i - 1] + next_room[r, i - 1] - 2.0 * need[interval[r]]
+            spare = (
+                clearances[r, i - 1]
+                + next_clearances[r, i - 1]
+                - 2.0 * need[interval[r]]
+            )
             if spare >= way and way <= long_way:
                 continue
             parts[r, i - 1] = 2
@@ -238,7 +244,7 @@ def on_line(
     line_tips: FloatArray,
     line_offsets: FloatArray,
 ) -> None:
-    """Knots between two knots, moved onto the straight line between them.
+    """Corners between two corners, moved onto the straight line between them.
 
     Where the tip draws, each keeps its station and its tip; elsewhere they are spread
     as far apart as they are now.
@@ -249,7 +255,7 @@ def on_line(
         stations: Arc length along the desired path, shape (n,); [m].
         drawn: Whether the tip draws here.
         unit: Way of the tip that one of these counts for; [m] or [-].
-        a: The first knot.
+        a: The first corner.
         b: The last one.
         line_tips: Result in rows a + 1 to b - 1, shape (n, 3); [m].
         line_offsets: Result likewise, shape (n, N + 1, 2); [m].
@@ -280,7 +286,7 @@ def farthest_apart(
     other_tips: FloatArray,
     other_offsets: FloatArray,
 ) -> FloatArray:
-    """Largest difference of a coordinate, knot by knot, shape (n,); [m]."""
+    """Largest difference of a coordinate, corner by corner, shape (n,); [m]."""
     result = np.zeros(len(tips))
     for k in range(len(tips)):
         gap = np.abs(tips[k] - other_tips[k]).max()

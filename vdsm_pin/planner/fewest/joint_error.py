@@ -23,7 +23,7 @@ def levers(arm: Manipulator) -> FloatArray:
     return np.asarray(np.cumsum(arm.link_lengths * joints))
 
 
-def kept_by_links(arm: Manipulator, error: float) -> FloatArray | None:
+def link_margins(arm: Manipulator, error: float) -> FloatArray | None:
     """What each link keeps for an error of all joints, None for no error.
 
     Args:

@@ -7,7 +7,13 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.compiled import borrowed, compiled
-from vdsm_pin.planner.fewest.kernels import NEAR, Barred, Graph, Labels, is_blocked
+from vdsm_pin.planner.fewest.roadmap_kernels import (
+    NEAR,
+    Barred,
+    Graph,
+    Labels,
+    is_blocked,
+)
 
 
 class TipLinks(NamedTuple):
@@ -35,7 +41,7 @@ def _expand(
     labels: Labels,
     barred: Barred,
 ) -> None:
-    """Every move from node u; arguments as in `shortest_ways`."""
+    """Every move from node u; arguments as in `shortest_paths`."""
     cost, parent = labels.cost, labels.parent
     tip, c = graph.node[u] // graph.n_shapes, graph.node[u] % graph.n_shapes
     corner, begin = tip * graph.n_shapes, graph.first[c]
@@ -72,7 +78,7 @@ def _expand(
 
 
 @compiled
-def shortest_ways(
+def shortest_paths(
     source: int,
     target: int,
     graph: Graph,

@@ -163,8 +163,8 @@ def _shut(problem: PlanningProblem, links: FloatArray, turned: FloatArray) -> Bo
         ends = links[left]
         ends[:, 1] = ends[:, 0] + part * (ends[:, 1] - ends[:, 0])
         moved = part * problem.manipulator.link_lengths[-1] * turned[left]
-        room = upper_clearance(problem, ends).min(axis=1, initial=np.inf)
-        shut[left] = room + moved < need
+        clearances = upper_clearance(problem, ends).min(axis=1, initial=np.inf)
+        shut[left] = clearances + moved < need
     return shut
 
 

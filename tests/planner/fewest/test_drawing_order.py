@@ -8,7 +8,7 @@ import pytest
 from scenes_for_fewest import problem
 
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.planner.fewest.order import shortest_tour, tour_length
+from vdsm_pin.planner.fewest.sequence import shortest_tour, tour_length
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem import Order, PlanningProblem

@@ -1,0 +1,1 @@
+"""Proofs that there is no plan: tips that no arm reaches, angles none can spare."""
