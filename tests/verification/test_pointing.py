@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.manipulator import built_in
@@ -158,3 +159,63 @@ def test_angles_are_those_of_arccos() -> None:
     expected = np.arccos((one * other).sum(axis=1) / sizes)
     np.testing.assert_allclose(angles_between(one, other), expected, atol=1e-7)
     assert np.isnan(angles_between(np.zeros((1, 3)), one[:1])[0])
+
+
+def with_errors(
+    rng: np.random.Generator, task: PlanningProblem, told: Trajectory, box: ErrorBox
+) -> float:
+    """The largest angle at rows under errors at the ends of the box; [rad]."""
+    largest, joints = 0.0, box.angles(ARM.n_links)
+    for k in range(300):
+        signs = rng.choice((-1.0, 1.0), (2, ARM.n_links))
+        if k < 4:
+            signs = np.full((2, ARM.n_links), 1.0 if k % 2 else -1.0)
+            signs[0] *= 1.0 if k < 2 else -1.0
+        alpha, theta = told.alpha + signs[0] * joints[:, 0], told.theta
+        centres = joint_centres(ARM, told.x0, alpha, theta + signs[1] * joints[:, 1])
+        centres += box.base * (lambda v: v / np.linalg.norm(v))(rng.normal(size=3))
+        turn = rng.normal(size=3)
+        turn /= np.linalg.norm(turn)
+        cos, sin = np.cos(box.base_turn), np.sin(box.base_turn)
+        along = (centres @ turn)[..., None] * turn
+        centres = along + cos * (centres - along) + sin * np.cross(turn, centres)
+        aims = task.path.aims(centres[:, -1], told.path_m)
+        largest = max(
+            largest, float(angles_between(centres[:, -1] - centres[:, -2], aims).max())
+        )
+    return largest
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_within_errors_the_cone_is_proved_or_undecided(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    told, tips = motion(rng, 12, 0.05, 0.01)
+    box = ErrorBox(joint=0.002, base=0.003, base_turn=0.001, joints=((0.004, 0.001),))
+    for pointing in pointings(rng, tips):
+        task = asked(tips, pointing)
+        nominal = float(sampled(task, told, 50).max())
+        met = with_errors(rng, task, told, box)
+        assert met > nominal
+        for cone in (nominal + 0.005, met - 1e-4):
+            narrow = replace(task.path, pointing=replace(pointing, cone=cone))
+            (row,) = check_pointing(replace(task, tip_path=narrow), told, errors=box)
+            assert row.verdict is Verdict.UNDECIDED
+            assert row.worst > cone
+        wide = replace(task.path, pointing=replace(pointing, cone=nominal + 0.25))
+        (row,) = check_pointing(replace(task, tip_path=wide), told, errors=box)
+        assert row.verdict is Verdict.CERTIFIED
+        assert met <= row.worst <= nominal + 0.25
+        past = replace(task.path, pointing=replace(pointing, cone=nominal - 0.01))
+        (row,) = check_pointing(replace(task, tip_path=past), told, errors=box)
+        assert row.verdict is Verdict.REFUTED
+
+
+def test_a_target_within_reach_of_the_errors_is_never_green() -> None:
+    told, tips = motion(np.random.default_rng(3), 6, 0.05, 0.01)
+    centres = joint_centres(ARM, told.x0, told.alpha, told.theta)
+    ahead = tips[-1] + 2.0 * (centres[-1, -1] - centres[-1, -2])
+    task = asked(tips, Pointing(1.5, target=ahead))
+    (row,) = check_pointing(task, told)
+    assert row.verdict is Verdict.CERTIFIED
+    (row,) = check_pointing(task, told, errors=ErrorBox(base=1.0))
+    assert row.verdict is Verdict.UNDECIDED

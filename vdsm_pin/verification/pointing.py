@@ -5,6 +5,11 @@ point of its derivative says. The axis turns no faster than all joints before
 it together, and the cone's axis no faster than the tip or the station moves. So the
 angle between the two is at most the mean of the angles at both ends of a slice and half
 of what both turn in it. Slices are halved until that is within the cone.
+
+Errors turn the axis by at most the sum of what they turn joints and base by. They move
+the tip by at most s, so that an aim of length d towards a target turns by at most
+s / (d - s). What the nominal motion keeps is then proved for every motion within the
+errors, or undecided.
 """
 
 from collections.abc import Iterator
@@ -13,6 +18,7 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry import bernstein
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.kinematics import joint_centres
@@ -31,6 +37,7 @@ ROUNDS: Final = 24
 """Halvings of a slice at which it is left undecided."""
 NARROW: Final = 1e-3
 """Width to which the largest angle is told; [rad]."""
+NO_ERRORS: Final = ErrorBox()
 ROUNDING: Final = 1e-12
 """Bound of all rounding in an angle to a vector of a metre; [rad m]."""
 
@@ -59,6 +66,7 @@ class _Motion:
         trajectory: The motion.
         first: First row of each interval, shape (k,).
         after: Its last row; the first one again where that stands alone, shape (k,).
+        errors: What the angles of `seen` and `bounds` allow for.
     """
 
     def __init__(
@@ -67,6 +75,7 @@ class _Motion:
         trajectory: Trajectory,
         first: IntArray,
         after: IntArray,
+        errors: ErrorBox,
     ) -> None:
         self.arm, self.path = problem.manipulator, problem.path
         moves = after > first
@@ -85,6 +94,21 @@ class _Motion:
         levers = self.arm.total_length - self.arm.stations[:-1]
         self.speed = rates[:, 0] + turns @ levers
         self.swerve = self._steepest() * np.abs(self.run)
+        joints = errors.angles(self.arm.n_links).sum(axis=1)
+        self.axis_error = float(joints.sum()) + errors.base_turn
+        far = float(np.abs(self.pieces[..., 0]).max()) + self.arm.total_length
+        self.tip_error = errors.base + float(joints @ levers) + errors.base_turn * far
+
+    def _spread(self, size: FloatArray) -> FloatArray:
+        """How much errors widen the angle to aims of some length; [rad]."""
+        moved = 0.0
+        pointing = self.path.pointing
+        assert pointing is not None
+        if pointing.target is not None:
+            moved = self.tip_error
+        left = size - moved
+        turned = np.where(left > 0.0, moved / np.where(left > 0.0, left, 1.0), np.pi)
+        return np.asarray(np.minimum(self.axis_error + turned, np.pi))
 
     def _steepest(self) -> float:
         """Largest change of the directions per length of path; [1/m]."""
@@ -99,13 +123,14 @@ class _Motion:
     def seen(
         self, interval: IntArray, share: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Angles to the aims, NaN where one has no length, and the aims' lengths."""
+        """Angles to the aims with errors (NaN: no aim), and the aims' lengths."""
         rows = bernstein.value(self.pieces[interval], share)
         centres = joint_centres(self.arm, rows[:, 0], rows[:, 1::2], rows[:, 2::2])
         station = self.station[interval] + share * self.run[interval]
         aims = self.path.aims(centres[:, -1], wrapped(self.path, station))
         axes = centres[:, -1] - centres[:, -2]
-        return angles_between(axes, aims), np.linalg.norm(aims, axis=1)
+        size = np.linalg.norm(aims, axis=1)
+        return angles_between(axes, aims) + self._spread(size), size
 
     def bounds(self, slices: _Slices) -> FloatArray:
         """Largest angle within slices, from above; inf where none is known; [rad]."""
@@ -119,6 +144,8 @@ class _Motion:
         nearest = np.where(clear, nearest, 1.0)
         turned = self.turning[k] * width + moved / nearest
         middle = (slices.angle + slices.next_angle) / 2.0
+        ends = self._spread(slices.size) + self._spread(slices.next_size)
+        middle += self._spread(nearest) - ends / 2.0
         bound = middle + turned / 2.0 + ROUNDING * (1.0 + 1.0 / nearest)
         return np.where(clear & np.isfinite(bound), bound, np.inf)
 
@@ -190,7 +217,10 @@ def _intervals(trajectory: Trajectory) -> Iterator[tuple[IntArray, IntArray]]:
 
 
 def check_pointing(
-    problem: PlanningProblem, trajectory: Trajectory, deadline: Deadline = NO_LIMIT
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    deadline: Deadline = NO_LIMIT,
+    errors: ErrorBox = NO_ERRORS,
 ) -> tuple[Check, ...]:
     """The row of evidence, none where the last link may look anywhere.
 
@@ -198,6 +228,7 @@ def check_pointing(
         problem: Arm and path.
         trajectory: What is judged.
         deadline: When to give up.
+        errors: What it is proved for besides the motion itself.
 
     Raises:
         OutOfTime: If the time is over.
@@ -205,16 +236,18 @@ def check_pointing(
     if problem.tip_path is None or problem.tip_path.pointing is None:
         return ()
     limit = problem.tip_path.pointing.cone + TOLERANCES.joint_limit
-    worst, count = _Worst(), 0
-    for first, after in _intervals(trajectory):
-        count += first.size
-        motion = _Motion(problem, trajectory, first, after)
-        _look(motion, first, limit, worst, deadline)
+    worst, count = _largest(problem, trajectory, NO_ERRORS, deadline)
     refuted, kept = worst.seen > limit, worst.bound <= limit
+    if count and kept and not refuted and errors != NO_ERRORS:
+        # Past the cone with errors is no counterexample: the bound of them is not met.
+        worst, _ = _largest(problem, trajectory, errors, deadline)
+        kept = worst.bound <= limit and worst.seen <= limit
     verdict = Verdict.UNDECIDED
     if count and (refuted or kept):
         verdict = Verdict.REFUTED if refuted else Verdict.CERTIFIED
-    value, moment = (worst.seen, worst.at) if refuted else (worst.bound, worst.bound_at)
+    value, moment = worst.bound, worst.bound_at
+    if worst.seen > limit:
+        value, moment = worst.seen, worst.at
     return (
         Check(
             name=NAME,
@@ -226,6 +259,23 @@ def check_pointing(
             moment=moment if count else float("nan"),
         ),
     )
+
+
+def _largest(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    errors: ErrorBox,
+    deadline: Deadline,
+) -> tuple[_Worst, int]:
+    """The largest angle on the path with errors, and the number of intervals."""
+    assert problem.tip_path is not None and problem.tip_path.pointing is not None
+    limit = problem.tip_path.pointing.cone + TOLERANCES.joint_limit
+    worst, count = _Worst(), 0
+    for first, after in _intervals(trajectory):
+        count += first.size
+        motion = _Motion(problem, trajectory, first, after, errors)
+        _look(motion, first, limit, worst, deadline)
+    return worst, count
 
 
 def _look(

@@ -162,7 +162,7 @@ def verify(
         *tip.checks,
         *_guarded(
             pointing.NAME,
-            lambda: pointing.check_pointing(problem, trajectory, deadline),
+            lambda: pointing.check_pointing(problem, trajectory, deadline, box),
         ),
         *check_inside(located),
         *enclosed_checks(
