@@ -144,7 +144,7 @@ def test_results_show_themselves_in_a_few_lines() -> None:
     [
         ("obs1", "paper", -61.5),
         ("obs2", "paper", -40.2),
-        ("obs2-small", "paper", -16.0),
+        ("obs2-small", "paper", -28.4),
         ("obs3", "paper", -27.7),
         ("obs3", "fewest", -12.2),
     ],

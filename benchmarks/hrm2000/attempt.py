@@ -178,7 +178,7 @@ def measured(problem: PlanningProblem, judged: Judged) -> Outcome:
     changed = changed_angles(angles)[trajectory.on_path]
     near = [item.lower for item in verification.approaches if item.pair.obstacle]
     failed = [
-        f"{c.name} ({in_mm(c.worst)})" if c.unit == "m" else c.name
+        f"{c.name} ({in_mm(c.worst)})" if c.unit == "m" and c.worst > 0.0 else c.name
         for c in verification.checks
         if c.verdict is not Verdict.CERTIFIED
     ]
