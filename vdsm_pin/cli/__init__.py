@@ -20,6 +20,7 @@ from vdsm_pin.cli import (
     export,
     formats,
     plan,
+    repair,
     simulate,
     start,
     verify,
@@ -40,7 +41,7 @@ app = typer.Typer(
     epilog="Exit status: 0 certified; 1 incomplete, refuted, undecided or infeasible; "
     "2 bad input.",
 )
-for module in (plan, verify, batch, view, export, start, formats, certificate):
+for module in (plan, verify, repair, batch, view, export, start, formats, certificate):
     app.add_typer(module.commands)
 for module in (simulate, explain, convert, diff):
     app.add_typer(module.commands)

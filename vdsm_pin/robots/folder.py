@@ -1,7 +1,7 @@
 """The judgement of a robot's trajectory on a terminal and in a folder."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,10 +15,11 @@ from vdsm_pin.report.facts import check_row
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.terminal import plain_checks, show_facts
 from vdsm_pin.report.words import outcome
-from vdsm_pin.robots.judgement import JudgedPair, RobotVerification, verify_robot
+from vdsm_pin.robots.judgement import Asked, JudgedPair, RobotVerification, verify_robot
 from vdsm_pin.robots.model import Robot
+from vdsm_pin.robots.repair import Repaired, repair_robot
 from vdsm_pin.robots.scene_files import read_scene
-from vdsm_pin.robots.trajectory_files import read_path
+from vdsm_pin.robots.trajectory_files import path_text, read_path
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.scene import Scene
 from vdsm_pin.text import printable
@@ -26,6 +27,8 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.units import MM_PER_M
 
 FILE: Final = "verification.json"
+TRAJECTORY: Final = "trajectory.csv"
+REPAIR: Final = "repair.json"
 NEAREST: Final = 5
 """Pairs that the terminal tells."""
 
@@ -86,6 +89,42 @@ def verify_robot_to_folder(order: RobotOrder) -> RobotVerification:
     text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
     with staged(order.folder) as aside:
         (aside / FILE).write_text(text + "\n", encoding="utf-8")
+    return found
+
+
+def repair_to_folder(order: RobotOrder, pinned: tuple[int, ...] = ()) -> Repaired:
+    """Repair a robot's trajectory; trajectory.csv, repair.json, verification.json.
+
+    The verification is of trajectory.csv as it was written.
+
+    Raises:
+        InvalidInput: If a file is bad or the folder cannot be written.
+        Infeasible: If no certified motion was found near the given one.
+    """
+    inputs = [order.urdf, order.trajectory, *filter(None, (order.srdf, order.scene))]
+    check_output_folder(order.folder)
+    check_kept([order.folder / name for name in (FILE, TRAJECTORY, REPAIR)], inputs)
+    robot = read_robot(order.urdf, order.srdf, order.package_dirs, _locks(order.lock))
+    scene = Scene() if order.scene is None else read_scene(order.scene, _size(robot))
+    path = read_path(order.trajectory, robot)
+    asked = Asked(robot, scene, order.required, order.required_self)
+    found = repair_robot(asked, path, pinned, order.deadline)
+    rows = zip(found.given.tolist(), found.moved.tolist(), strict=True)
+    content = {
+        "vdsm_repair": 1,
+        "vdsm_pin": __version__,
+        "command": order.command,
+        "sha256": {str(file): sha256_of_file(file) for file in inputs},
+        "waypoints": [
+            {"given": given if given >= 0 else None, "moved": moved}
+            for given, moved in rows
+        ],
+    }
+    with staged(order.folder) as aside:
+        text = path_text(found.verification.path, robot)
+        (aside / TRAJECTORY).write_text(text, encoding="utf-8")
+        (aside / REPAIR).write_text(json.dumps(content, indent=1) + "\n", "utf-8")
+    verify_robot_to_folder(replace(order, trajectory=order.folder / TRAJECTORY))
     return found
 
 

@@ -1,6 +1,7 @@
 """The judgement of a robot's trajectory: every check, one row each."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import inf, nan
 from typing import Final
 
@@ -101,6 +102,81 @@ class RobotVerification:
         return combine(tuple(check.verdict for check in self.checks))
 
 
+@dataclass(frozen=True)
+class Asked:
+    """What motions of a robot are held to.
+
+    Args:
+        robot: The robot.
+        scene: Obstacles in its base frame.
+        required: Least clearance from obstacles; [m].
+        required_self: Least clearance between links that are held apart; [m].
+
+    Raises:
+        InvalidInput: If a clearance is negative or not finite.
+    """
+
+    robot: Robot
+    scene: Scene
+    required: float = 0.0
+    required_self: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the clearances."""
+        for value in (self.required, self.required_self):
+            if not 0.0 <= value < inf:
+                millimetres = value * MM_PER_M
+                message = (
+                    f"required clearance is {millimetres:g} mm, expected 0 or more"
+                )
+                raise InvalidInput(message)
+
+    @cached_property
+    def bodies(self) -> list[Body]:
+        """Links first, then obstacles."""
+        resting = (Body(WORLD, o.pieces, o.name) for o in self.scene.obstacles)
+        return [*self.robot.bodies, *resting]
+
+    @cached_property
+    def pairs(self) -> list[Pair]:
+        """All that are held apart; the obstacle first, which may have many pieces."""
+        n = len(self.robot.bodies)
+        outer = range(n, len(self.bodies))
+        pairs = [Pair(k, b, self.required) for k in outer for b in range(n)]
+        return pairs + [Pair(i, k, self.required_self) for i, k in self.robot.held]
+
+    @cached_property
+    def coal(self) -> "CoalPairs":
+        """Coal's distances of them."""
+        return CoalPairs(self.robot, self.scene)
+
+    def names(self, pair: Pair) -> str:
+        """Both bodies of a pair in words, a link first."""
+        one, other = self.bodies[pair.one], self.bodies[pair.other]
+        if one.frame == WORLD:
+            one, other = other, one
+        return f"{one.name} and {other.name}"
+
+    def verified(self, path: Path, deadline: Deadline = NO_LIMIT) -> RobotVerification:
+        """The judgement of a motion; what is not judged by then is undecided."""
+        robot, n = self.robot, len(self.robot.bodies)
+        budget = Budget(until=deadline.end)
+        proof = prove(robot.tree, self.bodies, path, self.pairs, budget=budget)
+        judged = tuple(
+            _met(one, pair, (robot.tree, path), self.coal)
+            for one, pair in zip(
+                _judged(proof, self.pairs, self.bodies, n), self.pairs, strict=True
+            )
+        )
+        checks = [
+            _poses(robot, path),
+            *_limits(robot, path),
+            *_clearances(judged, self.required, self.required_self),
+            _coal(self.coal, robot.tree, path, proof, self.pairs),
+        ]
+        return RobotVerification(robot, self.scene, path, tuple(checks), judged)
+
+
 def verify_robot(
     robot: Robot,
     scene: Scene,
@@ -109,7 +185,7 @@ def verify_robot(
     required_self: float = 0.0,
     deadline: Deadline = NO_LIMIT,
 ) -> RobotVerification:
-    """Judge a trajectory of a robot in a scene.
+    """Judge a trajectory of a robot in a scene; arguments as of `Asked`.
 
     Args:
         robot: The robot.
@@ -122,32 +198,7 @@ def verify_robot(
     Raises:
         InvalidInput: If a clearance is negative or not finite.
     """
-    for value in (required, required_self):
-        if not 0.0 <= value < inf:
-            message = (
-                f"required clearance is {value * MM_PER_M:g} mm, expected 0 or more"
-            )
-            raise InvalidInput(message)
-    bodies = [*robot.bodies, *(Body(WORLD, o.pieces, o.name) for o in scene.obstacles)]
-    n = len(robot.bodies)
-    pairs = [
-        Pair(k, b, required) for k in range(n, len(bodies)) for b in range(n)
-    ]  # at rest the obstacle, which may have a million pieces
-    pairs += [Pair(i, k, required_self) for i, k in robot.held]
-    proof = prove(robot.tree, bodies, path, pairs, budget=Budget(until=deadline.end))
-    coal = _Coal(robot, scene)
-    judged = _judged(proof, pairs, bodies, n)
-    judged = tuple(
-        _met(one, pair, (robot.tree, path), coal)
-        for one, pair in zip(judged, pairs, strict=True)
-    )
-    checks = [
-        _poses(robot, path),
-        *_limits(robot, path),
-        *_clearances(judged, required, required_self),
-        _coal(coal, robot.tree, path, proof, pairs),
-    ]
-    return RobotVerification(robot, scene, path, tuple(checks), judged)
+    return Asked(robot, scene, required, required_self).verified(path, deadline)
 
 
 def _judged(
@@ -176,7 +227,7 @@ def _judged(
 
 
 def _met(
-    one: JudgedPair, pair: Pair, motion: tuple[Tree, Path], coal: "_Coal"
+    one: JudgedPair, pair: Pair, motion: tuple[Tree, Path], coal: "CoalPairs"
 ) -> JudgedPair:
     """The same, refuted where a ball is proved to lie in both bodies."""
     if one.verdict is not Verdict.UNDECIDED or not one.upper <= MEETING:
@@ -289,7 +340,7 @@ def at_moment(path: Path, interval: int, share: float) -> FloatArray:
     return np.asarray(points[0])
 
 
-class _Coal:
+class CoalPairs:
     """Coal's distances of the pairs of a robot and a scene.
 
     Poses are those of all frames at one configuration, shape (n_frames, 4, 4).
@@ -333,7 +384,7 @@ class _Coal:
 
 
 def _coal(
-    coal: "_Coal", tree: Tree, path: Path, proof: Proof, pairs: list[Pair]
+    coal: "CoalPairs", tree: Tree, path: Path, proof: Proof, pairs: list[Pair]
 ) -> Check:
     """Coal's distance of each pair at its witness, which the bracket must hold."""
     off = np.full(len(pairs), nan)

@@ -217,3 +217,10 @@ def _second(whole: Any, part: Any) -> float | None:
     if type(whole) not in (int, float) or type(part) not in (int, float):
         return None
     return float(whole + 1e-9 * part)
+
+
+def path_text(path: Path, robot: Robot) -> str:
+    """Waypoints as CSV, which `read_path` reads back to the same numbers."""
+    names = [f"{j.name}_{'rad' if j.turns else 'm'}" for j in robot.joints]
+    rows = [",".join(map(repr, row)) for row in path.knots.tolist()]
+    return "\n".join([",".join(names), *rows]) + "\n"

@@ -1,0 +1,127 @@
+"""Motions of a planar robot past a post: repaired, or refused with the reason."""
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from vdsm_pin.cli import app
+from vdsm_pin.errors import Infeasible, InvalidInput
+from vdsm_pin.proof.paths import Path as Motion
+from vdsm_pin.robots.judgement import Asked
+from vdsm_pin.robots.repair import repair_robot
+from vdsm_pin.robots.trajectory_files import path_text, read_path
+from vdsm_pin.robots.urdf import read_robot
+from vdsm_pin.scene import Scene, Sphere
+
+URDF = """<robot name="two"><link name="foot"/>
+<link name="upper"><collision><origin xyz="0.2 0 0"/>
+<geometry><box size="0.4 0.04 0.04"/></geometry></collision></link>
+<link name="fore"><collision><origin xyz="0.2 0 0"/>
+<geometry><box size="0.4 0.04 0.04"/></geometry></collision></link>
+<joint name="a" type="revolute"><parent link="foot"/><child link="upper"/>
+<axis xyz="0 0 1"/><limit lower="-3" upper="3" velocity="1" effort="1"/></joint>
+<joint name="b" type="revolute"><parent link="upper"/><child link="fore"/>
+<origin xyz="0.4 0 0"/><axis xyz="0 0 1"/>
+<limit lower="-3" upper="3" velocity="1" effort="1"/></joint></robot>"""
+
+OVER = np.array([[0.0, 0.3], [1.2, 0.3]])
+"""A sweep whose tip passes a ball just inside of its reach."""
+
+
+def asked(folder: Path, *balls: tuple[float, float, float]) -> Asked:
+    """Balls at (x, y) of a radius, in the plane; [m]."""
+    file = folder / "two.urdf"
+    file.write_text(URDF)
+    solids = [
+        Sphere(f"ball{k}", np.array([x, y, 0.0]), r)
+        for k, (x, y, r) in enumerate(balls)
+    ]
+    return Asked(read_robot(file), Scene(tuple(solids)), required=1e-3)
+
+
+def tip_at(a: float, b: float) -> tuple[float, float]:
+    """The end of the forearm; [m]."""
+    x = 0.4 * np.cos(a) + 0.4 * np.cos(a + b)
+    return float(x), float(0.4 * np.sin(a) + 0.4 * np.sin(a + b))
+
+
+def test_grazing_motion_is_repaired(tmp_path: Path) -> None:
+    """The repaired motion keeps its ends, and dense samples by Coal keep clearance."""
+    x, y = tip_at(0.6, 0.3)
+    this = asked(tmp_path, (1.04 * x, 1.04 * y, 0.03))
+    assert this.verified(Motion(OVER)).verdict == "refuted"
+    found = repair_robot(this, Motion(OVER))
+    assert found.verification.verdict == "certified"
+    rows = found.verification.path.knots
+    assert rows[[0, -1]].tolist() == OVER.tolist()
+    assert found.given[[0, -1]].tolist() == [0, 1]
+    assert 0.0 < found.moved.max() < 0.2
+    for a, b in pairwise(rows):
+        for share in np.linspace(0.0, 1.0, 40):
+            poses = this.robot.tree.poses((a + share * (b - a))[None])[0]
+            distances = [
+                this.coal.measured(pair, poses).distance for pair in this.pairs
+            ]
+            assert min(distances) >= 1e-3 - 5e-6
+
+
+def test_certified_motion_stays(tmp_path: Path) -> None:
+    """Nothing is changed where nothing is wrong."""
+    found = repair_robot(asked(tmp_path, (5.0, 5.0, 0.1)), Motion(OVER))
+    assert found.verification.path.knots.tolist() == OVER.tolist()
+    assert not found.moved.any()
+
+
+def test_pinned_waypoint_in_the_way_is_named(tmp_path: Path) -> None:
+    """Start, goal and pinned rows are not moved, whatever lies there."""
+    x, y = tip_at(0.6, 0.3)
+    rows = np.array([[0.0, 0.3], [0.6, 0.3], [1.2, 0.3]])
+    this = asked(tmp_path, (x, y, 0.03))
+    with pytest.raises(Infeasible, match="waypoint 1 stays, and there fore and ball0"):
+        repair_robot(this, Motion(rows), pinned=(1,))
+    with pytest.raises(InvalidInput, match="pinned waypoint is 3, expected 0 to 2"):
+        repair_robot(this, Motion(rows), pinned=(3,))
+
+
+def test_wall_that_no_small_change_leads_round_is_refused(tmp_path: Path) -> None:
+    """A column of balls across the whole reach."""
+    wall = [(r * np.cos(0.8), r * np.sin(0.8), 0.05) for r in np.arange(0.1, 0.9, 0.06)]
+    with pytest.raises(Infeasible):
+        repair_robot(asked(tmp_path, *wall), Motion(OVER))
+
+
+def test_path_text_is_read_back_to_the_same_numbers(tmp_path: Path) -> None:
+    """Bit by bit."""
+    robot = asked(tmp_path).robot
+    rows = np.random.default_rng(1).uniform(-3.0, 3.0, (20, 2))
+    file = tmp_path / "t.csv"
+    file.write_text(path_text(Motion(rows), robot))
+    assert read_path(file, robot).knots.tolist() == rows.tolist()
+
+
+def test_command_writes_what_verify_certifies(tmp_path: Path) -> None:
+    """`vdsm repair`, then `vdsm verify` of what it wrote."""
+    this = asked(tmp_path)
+    x, y = tip_at(0.6, 0.3)
+    (tmp_path / "scene.yaml").write_text(
+        "length_unit: m\nobstacles:\n"
+        f"- {{name: ball, shape: sphere, center: [{1.04 * x}, {1.04 * y}, 0], "
+        "radius: 0.03}\n"
+    )
+    (tmp_path / "t.csv").write_text(path_text(Motion(OVER), this.robot))
+    common = ["--urdf", str(tmp_path / "two.urdf"), "--scene"]
+    common += [str(tmp_path / "scene.yaml"), "--trajectory"]
+    out = tmp_path / "out"
+    given = ["repair", *common, str(tmp_path / "t.csv"), "--out", str(out)]
+    ended = CliRunner().invoke(app, given, obj="vdsm repair")
+    assert ended.exit_code == 0, ended.output
+    assert "certified with" in ended.output
+    moved = json.loads((out / "repair.json").read_text())["waypoints"]
+    assert moved[0] == {"given": 0, "moved": 0.0}
+    again = ["verify", *common, str(out / "trajectory.csv"), "--out"]
+    ended = CliRunner().invoke(app, [*again, str(tmp_path / "v")], obj="vdsm verify")
+    assert ended.exit_code == 0, ended.output

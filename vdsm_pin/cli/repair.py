@@ -1,0 +1,77 @@
+"""`vdsm repair`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vdsm_pin.cli.options import OutFolder, TimeLimit, Trajectory, examples, family
+from vdsm_pin.time_limit import Deadline, enforced
+
+commands = family()
+
+
+@commands.command(
+    epilog=examples(
+        "vdsm repair --urdf ur5.urdf --srdf ur5.srdf --scene scene.yaml "
+        "--trajectory plan.csv --out out/ur5",
+    )
+)
+def repair(
+    context: typer.Context,
+    trajectory: Trajectory,
+    out: OutFolder,
+    urdf: Annotated[Path, typer.Option(help="The robot.")],
+    srdf: Annotated[
+        Path | None, typer.Option(help="Its links that need not be held apart.")
+    ] = None,
+    scene: Annotated[
+        Path | None, typer.Option(help="Its obstacles: ours or a PlanningScene.")
+    ] = None,
+    package_dir: Annotated[
+        list[Path] | None, typer.Option(help="Where package:// is looked for.")
+    ] = None,
+    lock: Annotated[
+        list[str] | None,
+        typer.Option(metavar="JOINT=VALUE", help="A joint that stands still [rad, m]."),
+    ] = None,
+    required_clearance_mm: Annotated[
+        float, typer.Option(min=0.0, help="From obstacles [mm].")
+    ] = 0.0,
+    required_self_clearance_mm: Annotated[
+        float, typer.Option(min=0.0, help="Between links [mm].")
+    ] = 0.0,
+    pin: Annotated[
+        list[int] | None,
+        typer.Option(metavar="ROW", help="A waypoint, from 0, that stays."),
+    ] = None,
+    time_limit: TimeLimit = None,
+) -> None:
+    """Change a robot's trajectory a little, so that it is certified.
+
+    Writes trajectory.csv, repair.json (how far each waypoint moved) and
+    verification.json; where no such trajectory is found, nothing, and says why.
+    """
+    from vdsm_pin.robots.folder import RobotOrder, repair_to_folder
+    from vdsm_pin.units import MM_PER_M
+
+    order = RobotOrder(
+        urdf=urdf,
+        trajectory=trajectory,
+        folder=out,
+        command=context.obj,
+        srdf=srdf,
+        scene=scene,
+        package_dirs=tuple(package_dir or ()),
+        lock=tuple(lock or ()),
+        required=required_clearance_mm / MM_PER_M,
+        required_self=required_self_clearance_mm / MM_PER_M,
+        deadline=Deadline.after(time_limit),
+    )
+    with enforced(order.deadline):
+        found = repair_to_folder(order, tuple(pin or ()))
+    new = int((found.given < 0).sum())
+    typer.echo(
+        f"certified with {len(found.moved)} waypoints, {new} of them new; moved by "
+        f"{found.moved.max():.6f} rad (m) at most; wrote {out}"
+    )
