@@ -4,21 +4,24 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from math import inf, nan
 from typing import Final
 
 import numpy as np
 
 from benchmarks.foreign_plans.sampled import Sampled
+from vdsm_pin.errors import Infeasible
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.robots.judgement import (
     LINKS,
     OBSTACLES,
+    Asked,
     RobotVerification,
     at_moment,
-    verify_robot,
 )
 from vdsm_pin.robots.model import Robot
+from vdsm_pin.robots.repair import repair_robot
 from vdsm_pin.scene import Scene
 from vdsm_pin.verification.records import Verdict, combine
 
@@ -62,6 +65,8 @@ class Judged:
         caught: Which densities of samples meet a collision.
         depth: The deepest that samples each 1 mm and the witness find; [m].
         fault: Where judges contradict each other; empty where not.
+        repair_s: Processor time of its repair; inf where there is none, NaN where none
+            is asked for; [s].
     """
 
     plan: Plan
@@ -70,6 +75,7 @@ class Judged:
     caught: list[bool]
     depth: float
     fault: str
+    repair_s: float
 
 
 def judge(plan: Plan, sampled: Sampled, robot: Robot, scene: Scene) -> Judged:
@@ -83,9 +89,10 @@ def judge(plan: Plan, sampled: Sampled, robot: Robot, scene: Scene) -> Judged:
     """
     rows = np.array(plan.waypoints)
     motion = Motion(rows)
-    verify_robot(robot, scene, Motion(rows[:1]), 0.0)  # compiled, nothing kept
+    Asked(robot, scene).verified(Motion(rows[:1]))  # compiled, nothing kept
     begin = time.process_time()
-    found = verify_robot(robot, scene, motion, 0.0)
+    asked = Asked(robot, scene)
+    found = asked.verified(motion)
     spent = 1e3 * (time.process_time() - begin)
     about = [one.verdict for one in found.checks if one.name in (OBSTACLES, LINKS)]
     verdict = combine(tuple(about))
@@ -94,14 +101,29 @@ def judge(plan: Plan, sampled: Sampled, robot: Robot, scene: Scene) -> Judged:
     hits = [[q for q in some if sampled.collides(q)] for some in states]
     least = min((sampled.clearance(q) for q in hits[-1]), default=0.0)
     near = sampled.clearance(_witness(found, motion))
+    seconds, fault = nan, _fault(sampled, rows, verdict, bool(hits[-1]), near)
+    if verdict is Verdict.REFUTED:
+        seconds, repaired = _repair(asked, motion)
+        fault += _fault(sampled, repaired, Verdict.CERTIFIED, hit=False, near=0.0)
     return Judged(
         plan=plan,
         verdict=verdict.value,
         milliseconds=spent,
         caught=[bool(some) for some in hits],
         depth=-min(least, near, 0.0),
-        fault=_fault(sampled, rows, verdict, bool(hits[-1]), near),
+        fault=fault,
+        repair_s=seconds,
     )
+
+
+def _repair(asked: Asked, motion: Motion) -> tuple[float, FloatArray]:
+    """Processor time of a repair, inf where there is none, and its waypoints."""
+    begin = time.process_time()
+    try:
+        repaired = repair_robot(asked, motion).verification.path.knots
+    except Infeasible:
+        return inf, np.zeros((0, motion.knots.shape[1]))
+    return time.process_time() - begin, repaired
 
 
 def _counts(

@@ -25,6 +25,8 @@ HEAD = (
     "undecided",
     "median [ms]",
     "p99 [ms]",
+    "repaired within 1 s",
+    "repair, median [s]",
 )
 
 
@@ -43,7 +45,8 @@ def document(judged: Sequence[Judged], unplanned: Sequence[Problem]) -> str:
         "made with. Missed: plans that collide and in which samples of that density "
         "(part of the space's extent, the fastest joint, the fastest frame) meet no "
         "collision. Deepest: by Coal. Times: processor time of a whole verification, "
-        "Pinocchio and Coal included. `python -m benchmarks.foreign_plans.run`.",
+        "Pinocchio and Coal included. Repaired: of what collides. "
+        "`python -m benchmarks.foreign_plans.run`.",
         table,
         f"Verdicts that Coal contradicts: {len(faults)}. Problems and resolutions "
         f"without a plan: {len(unplanned)}"
@@ -74,6 +77,7 @@ def _row(judged: Sequence[Judged]) -> tuple[str, ...]:
     lost = [one for one in judged if one.verdict == Verdict.REFUTED.value]
     depth = [MM_PER_M * one.depth for one in lost]
     spent = [one.milliseconds for one in judged]
+    repairs = [one.repair_s for one in lost]
     missed = [sum(not one.caught[k] for one in lost) for k in range(len(DENSITIES))]
     return (
         judged[0].plan.robot,
@@ -86,6 +90,8 @@ def _row(judged: Sequence[Judged]) -> tuple[str, ...]:
         str(sum(one.verdict == Verdict.UNDECIDED.value for one in judged)),
         f"{np.median(spent):.1f}",
         f"{np.percentile(spent, 99):.1f}",
+        f"{sum(second <= 1.0 for second in repairs)} of {len(repairs)}",
+        f"{np.median(repairs) if repairs else np.nan:.2f}",
     )
 
 
