@@ -23,9 +23,9 @@ from vdsm_pin.planner.fewest.sparsify import sparser
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.tip_routes import TipSpace, resampled
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem import DesiredPath, PlanningProblem
 from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Box, Cylinder, Obstacle, Sphere
+from vdsm_pin.scene import Box, Cylinder, Obstacle, Scene, Sphere
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
@@ -398,3 +398,20 @@ def plan_and_judge(task: PlanningProblem) -> Plan:
     assert result.verdict is Verdict.CERTIFIED
     assert result.coverage == pytest.approx(1.0, abs=1e-9)
     return plan
+
+
+def test_a_short_rail_is_served_by_a_swing_round_it() -> None:
+    rail = replace(ARM, base_range=(-0.04, 0.1))
+    goal = np.array([1.9, 0.3, 1.9])
+    points = np.stack([goal, goal + 0.1])
+    path = DesiredPath(np.array([3.126, 0.0, 0.0]), points)
+    task = PlanningProblem("swing", rail, Scene(()), path, 0.0035, np.eye(4))
+    space = space_of(task)
+    (route,) = space.swing(goal)
+    np.testing.assert_array_equal(route[[0, -1]], [path.start, goal])
+    steps = np.linalg.norm(np.diff(route, axis=0), axis=1)
+    assert steps.max() <= 1.5 * space.spacing
+    far = np.linalg.norm(route - [0.03, 0.0, 0.0], axis=1)
+    assert (np.diff(far) * np.sign(far[-1] - far[0]) >= -1e-12).all()
+    long = replace(task, manipulator=replace(ARM, base_range=(-3.0, 1.0)))
+    assert not list(space_of(long).swing(goal))

@@ -222,6 +222,7 @@ class _Search:
         Who comes from there arrives in a posture that goes on to there.
         """
         yield from self.space.routes(path[0], self.effort.routes)
+        yield from self.space.swing(path[0])
         for ahead in AHEAD:
             if ahead < len(path):
                 for route in self.space.routes(path[ahead], 1):

@@ -24,7 +24,9 @@ from vdsm_pin.planner.impossible.octree import (
     places,
 )
 from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.pointing import angles_between
 from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.tolerances import TOLERANCES
 
 FIRST_LEVEL: Final = 4
 """Level of the cells begun with."""
@@ -233,6 +235,37 @@ class TipSpace:
             route = self._pulled(resampled(route, self.spacing))
             yield resampled(route, self.spacing)
             cells.avoided.append(self._narrowest(route))
+
+    def swing(self, goal: FloatArray) -> Iterator[FloatArray]:
+        """The route round the rail, no straighter than a base with a short rail lets.
+
+        Direction and distance from the middle of the rail change steadily. Obstacles
+        are not looked at: the arm is.
+
+        Args:
+            goal: Where it ends, shape (3,); [m].
+
+        Yields:
+            Points, shape (k, 3), both ends included; none for a rail as long as the
+            arm; [m].
+        """
+        low, high = self.arm.base_range
+        if high - low >= self.arm.total_length:
+            return
+        pivot = np.array([(low + high) / 2.0, 0.0, 0.0])
+        sides = np.stack([self.start, goal]) - pivot
+        far = np.linalg.norm(sides, axis=1)
+        angle = float(angles_between(sides[:1], sides[1:])[0])
+        if not 0.0 < angle < np.pi - TOLERANCES.joint_limit:
+            return
+        count = int(np.ceil(far.max() * angle / self.spacing))
+        part = np.linspace(0.0, 1.0, count + 1)[:, None]
+        ends = sides / far[:, None]
+        turned = np.sin((1.0 - part) * angle) * ends[0] + np.sin(part * angle) * ends[1]
+        size = (1.0 - part) * far[0] + part * far[1]
+        points = pivot + size * turned / np.sin(angle)
+        points[0], points[-1] = self.start, goal
+        yield points
 
     def _cells(self, ends: FloatArray) -> _Cells:
         """Cells over the places a tip can be that may be worth a way between these."""
