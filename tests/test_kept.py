@@ -41,6 +41,21 @@ def test_content_comes_back(folder: Path) -> None:
     assert (folder / "name").stat().st_mode & 0o777 == 0o644
 
 
+def test_nothing_is_read_from_a_folder_that_others_can_write(folder: Path) -> None:
+    mask = os.umask(0)
+    try:
+        kept.keep("name", b"one")
+    finally:
+        os.umask(mask)
+    assert kept.read("name") == b"one"
+    for mode in (0o757, 0o777, 0o775):
+        folder.chmod(mode)
+        kept.keep("name", b"two")
+        assert kept.read("name") is None
+    folder.chmod(0o755)
+    assert kept.read("name") == b"one"
+
+
 @given(data=st.data())
 def test_every_damage_is_noticed(
     data: st.DataObject, tmp_path_factory: pytest.TempPathFactory

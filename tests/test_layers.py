@@ -24,6 +24,7 @@ LAYERS = {
     "text": 0,
     "notebook": 1,
     "error_boxes": 1.5,
+    "compiled": 0.5,
     "geometry": 1,
     "proof": 1.5,
     "scene": 2,
@@ -129,7 +130,7 @@ def test_the_proof_imports_numpy_geometry_and_tolerances_only() -> None:
     for path in (PACKAGE / "proof").rglob("*.py"):
         for name in imported(path):
             if name.startswith("vdsm_pin."):
-                assert owner(name) in ("proof", "geometry", "tolerances"), (
+                assert owner(name) in ("proof", "geometry", "compiled", "tolerances"), (
                     f"{path}: {name}"
                 )
             else:

@@ -9,6 +9,7 @@ from functools import cache
 from typing import Final
 
 from vdsm_pin import kept
+from vdsm_pin.compiled import plain_numba
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.report.browser import find_browser
 from vdsm_pin.report.film import find_encoder
@@ -18,6 +19,7 @@ USES: Final = {
     "cluster": "vdsm batch --scheduler: many machines",
     "parquet": "rows.parquet beside the folders of a batch",
     "simulation": "vdsm simulate: a plan in closed loop",
+    "ompl": "benchmark of foreign plans",
     "references": "benchmarks beside other planners",
 }
 """What the extras are for."""
@@ -83,6 +85,9 @@ def _machine_code() -> Finding:
     if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
         what = "switched off by NUMBA_DISABLE_JIT: everything takes much longer"
         return Finding("machine code", what, False, True, "unset NUMBA_DISABLE_JIT")
+    if plain_numba():
+        what = "compiled and kept by numba as it comes, see VDSM_PLAIN_NUMBA"
+        return Finding("machine code", what, True, True)
     for folder in kept.folders():
         count = kept.functions(folder)
         try:

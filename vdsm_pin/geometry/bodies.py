@@ -12,8 +12,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import apart, compiled
 
 ALIGNED: Final = 1e-14
 """Sine below which a direction counts as that of a disc's or cylinder's axis; [-]."""

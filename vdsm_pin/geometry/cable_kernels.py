@@ -16,8 +16,8 @@ from math import cos, sin, sqrt
 
 import numpy as np
 
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.compiled import compiled
 
 
 @compiled

@@ -3,8 +3,8 @@
 from math import ceil, floor, isnan, log10
 from typing import Final
 
+from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import ByteArray, FloatArray, IntArray
-from vdsm_pin.geometry.compiled import apart, compiled
 
 WORD: Final = -1
 """In place of a number of decimals: the column holds numbers of words."""

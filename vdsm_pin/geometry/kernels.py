@@ -10,9 +10,9 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import ALIGNED, Body, body_support
-from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.pieces import CYLINDER, HALF_SPACE, PackedPieces
 from vdsm_pin.geometry.simplex import nearest
 

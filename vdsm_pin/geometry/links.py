@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vdsm_pin.compiled import apart, borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.bodies import Body, new_body
-from vdsm_pin.geometry.compiled import apart, borrowed, compiled
 from vdsm_pin.geometry.kernels import BRACKET, LOWER, NORMAL, SCRATCH_ROWS
 from vdsm_pin.geometry.obstacles import (
     STACK,

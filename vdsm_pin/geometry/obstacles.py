@@ -5,10 +5,10 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.bodies import RADIUS, Body, body_reach
 from vdsm_pin.geometry.closed_meshes import SIGNED, SINGLE, SOLID
-from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import (
     LOWER,
     NEAR,

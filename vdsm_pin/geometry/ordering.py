@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import compiled
 
 
 @compiled

@@ -1,7 +1,7 @@
 """Two nearest points of two segments, as near as rounding lets them be."""
 
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.compiled import compiled
 
 
 @compiled

@@ -4,8 +4,8 @@ A simplex is the first m <= 4 rows of an array; the result is written as weights
 Nothing here has to be exact: it only proposes a plane and two witness points.
 """
 
+from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.compiled import apart, compiled
 
 
 @compiled

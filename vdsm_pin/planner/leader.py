@@ -12,9 +12,9 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.cables import cable_lengths
+from vdsm_pin.compiled import compiled
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.kinematics import joint_angles, link_angles
 from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.fewest.follow_the_leader import beyond

@@ -2,8 +2,8 @@
 
 from math import sqrt
 
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.compiled import compiled
 
 
 @compiled

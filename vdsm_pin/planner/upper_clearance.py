@@ -4,9 +4,9 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.compiled import borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import new_body
-from vdsm_pin.geometry.compiled import borrowed, clock, compiled
 from vdsm_pin.geometry.kernels import BRACKET, NORMAL, SCRATCH_ROWS, UPPER
 from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces

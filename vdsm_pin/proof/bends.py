@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.proof.packed_tree import (
     PRISMATIC,
     REVOLUTE,

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from vdsm_pin.compiled import apart, borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
-from vdsm_pin.geometry.compiled import apart, borrowed, clock, compiled
 from vdsm_pin.proof.broad_phase import BroadPhase, settle_far
 from vdsm_pin.proof.cached_planes import bound_above, bound_below, served
 from vdsm_pin.proof.layouts import OWN_POINT, UP, WIDTH

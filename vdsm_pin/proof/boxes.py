@@ -8,9 +8,9 @@ from math import sqrt
 
 import numpy as np
 
+from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
-from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.proof.error_growth import crude_growth
 from vdsm_pin.proof.rows import Rows
 from vdsm_pin.proof.terms import Task

@@ -6,9 +6,9 @@ What one walk proved serves the rows around it (conservative advancement).
 
 from math import sqrt
 
+from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import Body
-from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE
 from vdsm_pin.proof.rows import Tracks
 from vdsm_pin.proof.terms import Mover

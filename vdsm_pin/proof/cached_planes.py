@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
-from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.proof.cached_clearances import raise_to_held
 from vdsm_pin.proof.error_growth import grow_corners, set_direction
 from vdsm_pin.proof.layouts import (

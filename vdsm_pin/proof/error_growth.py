@@ -7,9 +7,9 @@ axis. Shifts cost every plane the same and are not added here.
 
 from math import sqrt
 
+from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
-from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.proof.packed_tree import PRISMATIC, PackedTree
 from vdsm_pin.proof.rows import Rows, blend, carry
 from vdsm_pin.proof.terms import WORLD, Mover, Task

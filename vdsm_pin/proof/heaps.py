@@ -1,7 +1,7 @@
 """Slices of intervals in a heap, the one of the least bound first."""
 
+from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.proof.layouts import KEY
 
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from vdsm_pin.compiled import apart, borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import apart, borrowed, clock, compiled
 from vdsm_pin.proof.heaps import push
 from vdsm_pin.proof.layouts import (
     AT_UPPER,

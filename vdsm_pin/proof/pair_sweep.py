@@ -9,8 +9,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from vdsm_pin.compiled import apart, clock, compiled
 from vdsm_pin.geometry.bodies import RADIUS
-from vdsm_pin.geometry.compiled import apart, clock, compiled
 from vdsm_pin.geometry.kernels import BRACKET, FAR, LOWER, NEAR, NORMAL
 from vdsm_pin.geometry.obstacles import node_support
 from vdsm_pin.proof.cached_clearances import hold

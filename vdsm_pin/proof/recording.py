@@ -5,8 +5,8 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.compiled import apart, borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.compiled import apart, borrowed, clock, compiled
 from vdsm_pin.geometry.kernels import NEAR, NORMAL
 from vdsm_pin.geometry.pieces import HALF_SPACE
 from vdsm_pin.proof.layouts import (

@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
+from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.proof.cached_planes import Runs
 from vdsm_pin.proof.layouts import (
     AT_LOWER,

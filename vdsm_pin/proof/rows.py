@@ -9,8 +9,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.proof.packed_tree import (
     PRISMATIC,
     REVOLUTE,

@@ -4,8 +4,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from vdsm_pin.compiled import apart, clock, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import apart, clock, compiled
 from vdsm_pin.geometry.kernels import BRACKET, LOWER, NEAR, UPPER
 from vdsm_pin.proof.bends import bend_between
 from vdsm_pin.proof.heaps import pop, push

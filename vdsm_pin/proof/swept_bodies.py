@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS, Body
-from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.proof.bends import Bends, new_bends
 from vdsm_pin.proof.error_growth import second_order
 from vdsm_pin.proof.packed_tree import PRISMATIC, PackedTree, Pose, new_pose

@@ -8,8 +8,8 @@ against pieces at rest.
 
 from typing import Final, NamedTuple
 
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.proof.packed_tree import PackedTree
 from vdsm_pin.proof.ways import WayErrors, Ways

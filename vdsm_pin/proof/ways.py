@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.proof.packed_tree import PRISMATIC, REVOLUTE, PackedTree
 
 

@@ -4,8 +4,8 @@ from math import sqrt
 
 import numpy as np
 
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.proof.layouts import AT_UPPER, OWN, TIME, UP
 from vdsm_pin.proof.packed_tree import (
     Motion,

@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
-from vdsm_pin.geometry.compiled import apart, compiled
 from vdsm_pin.proof.cached_planes import Runs, new_runs
 from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE, SLICE, SUPPORT
 from vdsm_pin.proof.packed_tree import Pose

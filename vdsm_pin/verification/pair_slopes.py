@@ -9,9 +9,9 @@ from math import sqrt
 
 import numpy as np
 
+from vdsm_pin.compiled import apart, borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import new_body
-from vdsm_pin.geometry.compiled import apart, borrowed, compiled
 from vdsm_pin.geometry.kernels import BRACKET, FAR, NEAR, NORMAL, SCRATCH_ROWS, UPPER
 from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
 from vdsm_pin.proof.packed_tree import PRISMATIC, REVOLUTE, Pose, new_pose, place_tree

@@ -10,8 +10,8 @@ from math import sqrt
 
 import numpy as np
 
+from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import borrowed, compiled
 
 ROUNDS = 30
 """Newton steps at which a configuration is given up."""

@@ -9,8 +9,8 @@ from math import sqrt
 
 import numpy as np
 
+from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.geometry.compiled import borrowed, compiled
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
 from vdsm_pin.geometry.segments import squared_gap
 from vdsm_pin.scene import Obstacle

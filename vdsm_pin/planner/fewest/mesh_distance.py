@@ -12,8 +12,8 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.compiled import borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.compiled import borrowed, clock, compiled
 from vdsm_pin.geometry.obstacles import STACK, encloses, has_inside
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.compiled import borrowed, compiled
 
 
 @compiled

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vdsm_pin.compiled import apart, borrowed, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.compiled import apart, borrowed, compiled
 from vdsm_pin.tolerances import TOLERANCES
 
 NEAR = 0.26

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import borrowed, compiled
 from vdsm_pin.planner.fewest.roadmap_kernels import (
     NEAR,
     Barred,

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.tolerances import TOLERANCES
 
 COPIED, AT_KNEE, STRAIGHTENED = 0.05, 0.3, 0.45

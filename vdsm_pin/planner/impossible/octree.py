@@ -9,8 +9,8 @@ import heapq
 
 import numpy as np
 
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.compiled import compiled
 
 DEPTH = 18
 """Level of the finest cells; three coordinates of so many bits fit an integer."""

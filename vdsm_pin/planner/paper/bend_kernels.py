@@ -6,8 +6,8 @@ them, or the two at the ends of a link that is laid past the obstacle.
 
 import numpy as np
 
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.planner.paper.region_kernels import keeps_out
 
 

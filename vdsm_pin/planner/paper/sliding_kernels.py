@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.planner.paper.region_kernels import (
     keeps_out,
     leave_along,

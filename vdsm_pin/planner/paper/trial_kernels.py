@@ -4,8 +4,8 @@ from typing import TypeAlias
 
 import numpy as np
 
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.planner.paper.region_kernels import sides_of
 from vdsm_pin.planner.paper.sliding_kernels import extent_of, slide_chain
 

@@ -7,8 +7,8 @@ from math import sqrt
 
 import numpy as np
 
+from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.geometry.compiled import compiled
 from vdsm_pin.planner.paper.region_kernels import point_to_core, sides_of, wrapped
 
 

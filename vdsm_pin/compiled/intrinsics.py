@@ -1,32 +1,17 @@
-"""numba, asked for machine code where there is none yet.
+"""What kernels call that numba does not have, and how every kernel is compiled."""
 
-Imported only then.
-
-Left to itself numba optimises and translates each function with all that it calls, even
-where only compiled code calls it: with functions ten deep everything is done ten times
-over. Here that is done for what Python calls, once.
-"""
-
-from collections.abc import Callable
-from functools import cache
 from time import CLOCK_MONOTONIC
 from typing import Any, Final, cast
 
-import numba
 from llvmlite import ir
-from numba._dynfunc import make_function
 from numba.core import cgutils, types
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
-from numba.core.imputils import lower_getattr_generic
-from numba.core.typing.templates import (
-    AttributeTemplate,
+from numba.core.typing.templates import AttributeTemplate, make_intrinsic_template
+from numba.extending import (
     infer_getattr,
-    make_intrinsic_template,
+    lower_getattr_generic,
+    models,
+    register_model,
 )
-from numba.extending import models, register_model
-
-from vdsm_pin.geometry.machine_code import MachineCode
 
 OPTIONS: Final = {"nogil": True, "fastmath": False, "error_model": "numpy"}
 """No fast-math: the bounds rest on every operation being rounded once, as written.
@@ -34,103 +19,11 @@ OPTIONS: Final = {"nogil": True, "fastmath": False, "error_model": "numpy"}
 The GIL is released, divisions by zero give inf or nan as numpy's do."""
 
 
-class _PartLibrary(JITCodeLibrary):
-    """A function's code as other compiled functions use it: to link, not to run."""
+def by_type(made: Any) -> Any:
+    """A numba function that is compiled once for each type of its arguments.
 
-    def finalize(self) -> None:
-        """Leave optimising and translating to whoever is called from Python."""
-        self._finalized = True
-
-
-class _WholeLibrary(JITCodeLibrary):
-    """The code of a function with that of all that it calls."""
-
-    def finalize(self) -> None:
-        """Link every part once, then optimise and translate.
-
-        Callers come before what they call: the linker leaves out what nobody asks for.
-        """
-        order: list[Any] = []
-
-        def visit(libraries: list[Any]) -> None:
-            for library in libraries:
-                if library not in seen:
-                    seen.add(library)
-                    if isinstance(library, _PartLibrary):
-                        visit(library._linking_libraries)
-                    order.append(library)
-
-        seen: set[Any] = set()
-        visit(self._linking_libraries)
-        self._linking_libraries = order[::-1]
-        super().finalize()  # type: ignore[no-untyped-call]
-
-
-def _not_executable(library: Any, description: Any, environment: Any) -> Any:
-    """What stands for a part's entry point; numba knows it by its identity."""
-    name = description.qualname
-    return make_function(description.lookup_module(), name, name, 0, environment, ())
-
-
-class _PartCompiler(Compiler):
-    """numba's own steps, with a part as their result."""
-
-    def __init__(self, *arguments: Any) -> None:
-        super().__init__(*arguments)  # type: ignore[no-untyped-call]
-        library: Any = _PartLibrary
-        self.state.library = library(self.state.targetctx.codegen(), "part")
-        self.state.targetctx.get_executable = _not_executable
-
-
-class _WholeCompiler(Compiler):
-    """numba's own steps, with parts brought together."""
-
-    def __init__(self, *arguments: Any) -> None:
-        super().__init__(*arguments)  # type: ignore[no-untyped-call]
-        library: Any = _WholeLibrary
-        self.state.library = library(self.state.targetctx.codegen(), "whole")
-        self.state.library.enable_object_caching()
-
-
-def machine_code(
-    function: Callable[..., Any], arguments: tuple[Any, ...]
-) -> MachineCode:
-    """Compile a function for arguments such as these.
-
-    Raises:
-        NumbaError: If the function cannot be compiled for them.
+    Left to itself numba compiles it again for every constant it is given.
     """
-    njit: Any = numba.njit
-    typeof: Any = numba.typeof
-    whole = njit(pipeline_class=_WholeCompiler, no_cfunc_wrapper=True, **OPTIONS)(
-        function
-    )
-    signature = tuple(typeof(argument) for argument in arguments)
-    whole.compile(signature)
-    result = whole.overloads[signature]
-    return MachineCode(
-        content=result.library._get_compiled_object(),
-        entry=result.fndesc.llvm_cpython_wrapper_name,
-        environment=result.fndesc.env_name,
-        constants=tuple(result.environment.consts),
-        needs=tuple(
-            name.name
-            for name in result.library._final_module.functions
-            if name.is_declaration and not name.name.startswith("llvm.")
-        ),
-    )
-
-
-@cache
-def part(function: Callable[..., Any]) -> Any:
-    """A function for other functions being compiled, in numba's form."""
-    njit: Any = numba.njit
-    made = njit(
-        pipeline_class=_PartCompiler,
-        no_cpython_wrapper=True,
-        no_cfunc_wrapper=True,
-        **OPTIONS,
-    )(function)
     choose = made.get_call_template
 
     def choose_by_type(arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
@@ -138,7 +31,6 @@ def part(function: Callable[..., Any]) -> Any:
         types_of_named = {name: plain(one) for name, one in named.items()}
         return choose(tuple(map(plain, arguments)), types_of_named)
 
-    # Left to itself numba compiles a function again for every constant it is given.
     made.get_call_template = choose_by_type
     return made
 

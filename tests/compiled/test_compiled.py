@@ -1,5 +1,6 @@
 """Machine code kept on disk: found again, never stale, never for other arguments."""
 
+import importlib
 import itertools
 import subprocess
 import sys
@@ -14,15 +15,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from vdsm_pin import kept
+from vdsm_pin import compiled, kept
+from vdsm_pin.compiled import compiling, machine_code
+from vdsm_pin.compiled.machine_code import MachineCode, Unusable
 from vdsm_pin.errors import OutOfTime
-from vdsm_pin.geometry import compiled, compiling, machine_code
-from vdsm_pin.geometry.machine_code import MachineCode, Unusable
 
 SOURCE = """
 from typing import NamedTuple
 import numpy as np
-from vdsm_pin.geometry.compiled import clock, compiled
+from vdsm_pin.compiled import clock, compiled
 
 class Pair(NamedTuple):
     first: np.ndarray
@@ -121,7 +122,6 @@ def kernels(
 
     def make(source: str = SOURCE) -> ModuleType:
         path.write_text(source, encoding="utf-8")
-        compiled._sources.cache_clear()
         spec = spec_from_file_location("kernels", path)
         assert spec is not None
         assert spec.loader is not None
@@ -219,14 +219,57 @@ def test_changed_import_is_another_file(
     kernels: Callable[..., ModuleType],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(compiled, "PACKAGE", tmp_path)
+    """Constants and functions of other modules, whatever way they are imported."""
+    monkeypatch.syspath_prepend(str(tmp_path))
     inner = tmp_path / "inner.py"
+    use = """
+import inner
+from inner import B, outer
+@compiled
+def use(value):
+    return outer(value) + B
+"""
+    body = """
+from vdsm_pin.compiled import compiled
+A, B = {}, {}
+@compiled
+def deep(value):
+    return value + A
+@compiled
+def outer(value):
+    return deep(value)
+"""
+    names = []
+    for values in ((1, 2), (3, 2), (1, 3), (1.0, 2), (1, 2)):
+        inner.write_text(body.format(*values), encoding="utf-8")
+        sys.modules.pop("inner", None)
+        importlib.invalidate_caches()
+        module = kernels(SOURCE + use)
+        names.append(compiled._file_name(module.use._function, (float,)))
+    assert len(set(names)) == 4
+    assert names[0] == names[-1]
+
+
+def test_comments_and_places_change_nothing(
+    kernels: Callable[..., ModuleType],
+) -> None:
     names = set()
-    for content in ("A = 1", "A = 2", "A = 1"):
-        inner.write_text(content, encoding="utf-8")
-        module = kernels(f'{SOURCE}"""\nfrom vdsm_pin.inner import A\n"""\n')
-        names.add(compiled._file_name(module.twice._function, (float,)))
-    assert len(names) == 2
+    for source in (
+        SOURCE,
+        f"# above\n\n{SOURCE}",
+        SOURCE.replace("+= 1", "+= 1  # one"),
+    ):
+        module = kernels(source)
+        names.add(compiled._file_name(module.count_until._function, (float,)))
+    assert len(names) == 1
+
+
+def test_what_cannot_be_told_apart_is_refused(
+    kernels: Callable[..., ModuleType],
+) -> None:
+    module = kernels(SOURCE.replace("FACTOR = 2.0", "FACTOR = object()"))
+    with pytest.raises(TypeError, match="cannot depend on"):
+        compiled._file_name(module.twice._function, (float,))
 
 
 def test_other_processor_or_version_is_another_file(

@@ -3,19 +3,17 @@
 `@compiled` looks for the code of a function on disk and asks numba for it where there
 is none: numba is imported in the first run after a change, and never again.
 
-The code belongs to the content of a module and of all that it imports. Modules with
-compiled functions therefore import little.
+The code belongs to the bytecode of a function and of all that it calls, with the values
+of the globals that they name (`digests`).
 """
 
 import hashlib
 import inspect
 import os
-import re
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache, cached_property, update_wrapper
-from pathlib import Path
+from functools import cached_property, update_wrapper
 from threading import RLock
 from typing import Any, Final, TypeVar, cast
 
@@ -23,9 +21,6 @@ import numpy as np
 
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
-
-IMPORT: Final = re.compile(rb"^from vdsm_pin\.([\w.]+) import", re.MULTILINE)
-PACKAGE: Final = Path(__file__).parents[1]
 
 _C, _FORTRAN, _ALIGNED, _WRITE = 0x1, 0x2, 0x100, 0x400
 """Bits of an array's flags, as numpy numbers them."""
@@ -72,28 +67,13 @@ def _words(kind: Any) -> str:
     return kind.str if isinstance(kind, np.dtype) else str(kind)
 
 
-@cache
-def _sources(path: str) -> dict[str, bytes]:
-    """A module and all of the package that it imports, with digests of their content.
-
-    Paths are text: hundreds of them are compared and joined.
-    """
-    content = Path(path).read_bytes()
-    found = {path: hashlib.sha256(content).digest()}
-    for name in IMPORT.findall(content):
-        other = f"{PACKAGE}/{name.decode().replace('.', '/')}.py"
-        if Path(other).is_file():
-            found |= _sources(other)
-    return found
-
-
 def _file_name(function: Callable[..., Any], kind: Any) -> str:
     """The file of a function's code for one kind of arguments."""
-    from vdsm_pin.geometry.machine_code import platform
+    from vdsm_pin.compiled.digests import digest_of
+    from vdsm_pin.compiled.machine_code import platform
 
     digest = hashlib.sha256(platform())
-    for _, content in sorted(_sources(function.__code__.co_filename).items()):
-        digest.update(content)
+    digest.update(digest_of(function))
     digest.update(_words(kind).encode())
     return f"{function.__module__}.{function.__qualname__}-{digest.hexdigest()[:32]}"
 
@@ -126,25 +106,47 @@ class _Compiled:
 
     def _entry(self, kind: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
         """The machine code for a kind of arguments, made if it is not there."""
-        from vdsm_pin.geometry.machine_code import Unusable, load, read, write
+        from vdsm_pin.compiled.machine_code import Unusable, load, read, write
 
+        if plain_numba():
+            return _plain(self._function)
         name = _file_name(self._function, kind)
         with suppress(Unusable):
             return load(read(name), self._function)
         # Only now: there is no code for too few or too many arguments.
         inspect.signature(self._function).bind(*arguments)
-        from vdsm_pin.geometry.compiling import machine_code
+        from vdsm_pin.compiled.choice import compiler
 
-        code = machine_code(self._function, arguments)
+        keeping = compiler()
+        if keeping is None:
+            return _plain(self._function)
+        code = keeping.machine_code(self._function, arguments)
         write(name, code)
         return load(code, self._function)
 
     @property
     def _numba_type_(self) -> Any:
         """What numba asks for where compiled code calls this function."""
-        from vdsm_pin.geometry.compiling import part
+        from vdsm_pin.compiled.choice import compiler
 
-        return part(self._function)._numba_type_
+        keeping = compiler()
+        if keeping is None:
+            made: Any = _plain(self._function)
+            return made._numba_type_
+        return keeping.part(self._function)._numba_type_
+
+
+def plain_numba() -> bool:
+    """Whether VDSM_PLAIN_NUMBA asks for numba as it comes."""
+    return os.environ.get("VDSM_PLAIN_NUMBA", "0") != "0"
+
+
+def _plain(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function compiled by numba as it comes."""
+    from vdsm_pin.compiled.plain import part
+
+    made: Callable[..., Any] = part(function)
+    return made
 
 
 class _Apart:
@@ -159,7 +161,7 @@ class _Apart:
 
     @cached_property
     def _numba_type_(self) -> Any:
-        from vdsm_pin.geometry.compiling import apart
+        from vdsm_pin.compiled.intrinsics import apart
 
         return apart()
 
@@ -173,7 +175,7 @@ class _Clock:
 
     @cached_property
     def _numba_type_(self) -> Any:
-        from vdsm_pin.geometry.compiling import clock
+        from vdsm_pin.compiled.intrinsics import clock
 
         return clock()
 
@@ -195,7 +197,7 @@ class _Borrowed:
 
     @cached_property
     def _numba_type_(self) -> Any:
-        from vdsm_pin.geometry.compiling import borrowed
+        from vdsm_pin.compiled.intrinsics import borrowed
 
         return borrowed()
 
@@ -208,7 +210,8 @@ def compiled(function: F) -> F:
     so that no array is ever taken for another.
 
     With NUMBA_DISABLE_JIT=1, as numba has it, functions stay as they stand: for
-    debuggers and for coverage.
+    debuggers and for coverage. With VDSM_PLAIN_NUMBA=1, and where the installed numba
+    lacks what `compiling` steps into, numba compiles and keeps them in its own way.
     """
     if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
         return function

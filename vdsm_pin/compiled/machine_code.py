@@ -57,8 +57,8 @@ class Unusable(Exception):
 @cache
 def platform() -> bytes:
     """All that decides on machine code besides the source."""
-    here, version = Path(__file__), _extensions_folder() / "_version.py"
-    sources = (here, here.with_name("compiling.py"), version)
+    ours = sorted(Path(__file__).parent.glob("*.py"))
+    sources = (*ours, _extensions_folder() / "_version.py")
     settings = sorted(
         f"{name}={value}"
         for name, value in os.environ.items()
