@@ -9,13 +9,15 @@ import pytest
 
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile, VdsmError
+from vdsm_pin.geometry.arrays import rotation_from_rpy
+from vdsm_pin.robots.cell import read_cell
 from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.scene_files import read_scene
 from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.robots.urdf import read_robot
-from vdsm_pin.scene import Cylinder, HalfSpace
+from vdsm_pin.scene import Cylinder, HalfSpace, Sphere
 from vdsm_pin.verification.records import Verdict
 
 URDF = """<robot name="two">
@@ -40,6 +42,10 @@ URDF = """<robot name="two">
 SCENE = """length_unit: mm
 obstacles:
   - {name: ball, shape: sphere, center: [0, 1300, 500], radius: 50}
+"""
+CELL = """vdsm_problem: 1
+robot: {urdf: two.urdf}
+required_clearance: 149
 """
 ROWS = "turn_rad,slide_m\n0,0\n3,0\n"
 MOVEIT = """world:
@@ -218,7 +224,10 @@ def test_damaged_files_never_end_in_a_traceback(tmp_path: Path, robot: Robot) ->
             }
         }
     )
+    cell = CELL + SCENE + "base: {position: [0, 0, 1], rpy_deg: [0, 0, 90]}\n"
+    write(tmp_path, "two.urdf", URDF)
     readers: list[tuple[str, str, Callable[[Path], object]]] = [
+        ("cell.yaml", cell, read_cell),
         ("a.urdf", URDF, read_robot),
         ("s.yaml", SCENE, lambda path: read_scene(path, 1.0)),
         ("m.yaml", MOVEIT, lambda path: read_scene(path, 1.0)),
@@ -261,6 +270,51 @@ def test_the_command_ends_with_the_verdict(
     assert "PROBLEM has no meaning with --urdf" in capsys.readouterr().err
     assert run("verify", "--trajectory", rows, "--out", out) == 2
     assert run("verify", "paper/obs1", "--lock", "a=1", *asked[5:], "--out", out) == 2
+
+
+def test_a_problem_file_names_a_robot(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The same verdicts and brackets as by options; planning refuses it."""
+    urdf, rows = write(tmp_path, "two.urdf", URDF), write(tmp_path, "t.csv", ROWS)
+    scene, out = write(tmp_path, "s.yaml", SCENE), tmp_path / "out"
+    problem = write(tmp_path, "cell.yaml", CELL + SCENE)
+    pairs = []
+    for asked in (("verify", "--urdf", urdf, "--scene", scene), ("verify", problem)):
+        assert run(*asked, "--trajectory", rows, "--out", out) == 0
+        pairs.append(json.loads((out / "verification.json").read_text())["pairs"])
+    assert pairs[0] == pairs[1]
+    for required, status in ((151, 1), (149, 0)):
+        write(tmp_path, "cell.yaml", CELL.replace("149", str(required)) + SCENE)
+        assert run("verify", problem, "--trajectory", rows, "--out", out) == status
+    capsys.readouterr()
+    for words in (
+        ("plan", problem),
+        ("verify", problem, "--trajectory", rows, "--joint-error-deg", 1),
+        ("verify", problem, "--trajectory", rows, "--lock", "a=1"),
+    ):
+        assert run(*words, "--out", out) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert "robot (line" in said[0]
+    assert "expected manipulator" in said[0]
+    assert "--joint-error-deg has no meaning with a robot" in said[1]
+    assert "--lock has no meaning with a problem" in said[2]
+
+
+def test_a_base_moves_the_robot_in_the_scene(tmp_path: Path) -> None:
+    """Moving base and obstacles together changes no clearance."""
+    write(tmp_path, "two.urdf", URDF)
+    rng = np.random.default_rng(4)
+    for _ in range(10):
+        rpy, position, center = rng.uniform(-1.0, 1.0, (3, 3))
+        R = rotation_from_rpy(rpy)
+        turn, place = np.degrees(rpy).tolist(), (1e3 * position).tolist()
+        there = (1e3 * (R @ center + position)).tolist()
+        text = CELL + SCENE.replace("[0, 1300, 500]", str(there))
+        text += f"base: {{position: {place}, rpy_deg: {turn}}}\n"
+        (ball,) = read_cell(write(tmp_path, "cell.yaml", text)).asked.scene.obstacles
+        assert isinstance(ball, Sphere)
+        np.testing.assert_allclose(ball.centre, center, atol=1e-12)
 
 
 OF_ARM = ("joint-error-deg", "base-error-mm", "base-error-deg", "obstacle-error-mm")

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from vdsm_pin.cli.options import OutFolder, TimeLimit, Trajectory, examples, family
+from vdsm_pin.cli.robot import RobotOptions
 from vdsm_pin.time_limit import Deadline, enforced
 
 commands = family()
@@ -13,6 +14,7 @@ commands = family()
 
 @commands.command(
     epilog=examples(
+        "vdsm repair cell.yaml --trajectory plan.csv --out out/cell",
         "vdsm repair --urdf ur5.urdf --srdf ur5.srdf --scene scene.yaml "
         "--trajectory plan.csv --out out/ur5",
     )
@@ -21,7 +23,15 @@ def repair(
     context: typer.Context,
     trajectory: Trajectory,
     out: OutFolder,
-    urdf: Annotated[Path, typer.Option(help="The robot.")],
+    problem: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[PROBLEM]", help="A problem file with robot; none with --urdf."
+        ),
+    ] = None,
+    urdf: Annotated[
+        Path | None, typer.Option(help="The robot, in place of a problem.")
+    ] = None,
     srdf: Annotated[
         Path | None, typer.Option(help="Its links that need not be held apart.")
     ] = None,
@@ -36,11 +46,13 @@ def repair(
         typer.Option(metavar="JOINT=VALUE", help="A joint that stands still [rad, m]."),
     ] = None,
     required_clearance_mm: Annotated[
-        float, typer.Option(min=0.0, help="From obstacles [mm].")
-    ] = 0.0,
+        float | None,
+        typer.Option(min=0.0, help="With --urdf: from obstacles [mm]; 0 by default."),
+    ] = None,
     required_self_clearance_mm: Annotated[
-        float, typer.Option(min=0.0, help="Between links [mm].")
-    ] = 0.0,
+        float | None,
+        typer.Option(min=0.0, help="With --urdf: between links [mm]; 0 by default."),
+    ] = None,
     pin: Annotated[
         list[int] | None,
         typer.Option(metavar="ROW", help="A waypoint, from 0, that stays."),
@@ -53,22 +65,20 @@ def repair(
     verification.json; where no such trajectory is found, nothing, and says why.
     """
     from vdsm_pin.robots.folder import RobotOrder, repair_to_folder
-    from vdsm_pin.units import MM_PER_M
 
-    order = RobotOrder(
-        urdf=urdf,
-        trajectory=trajectory,
-        folder=out,
-        command=context.obj,
-        srdf=srdf,
-        scene=scene,
-        package_dirs=tuple(package_dir or ()),
-        lock=tuple(lock or ()),
-        required=required_clearance_mm / MM_PER_M,
-        required_self=required_self_clearance_mm / MM_PER_M,
-        deadline=Deadline.after(time_limit),
+    deadline = Deadline.after(time_limit)
+    options = RobotOptions(
+        urdf,
+        srdf,
+        scene,
+        tuple(package_dir or ()),
+        tuple(lock or ()),
+        required_clearance_mm,
+        required_self_clearance_mm,
     )
-    with enforced(order.deadline):
+    with enforced(deadline):
+        cell = options.cell(problem)
+        order = RobotOrder(cell, trajectory, out, context.obj, deadline)
         found = repair_to_folder(order, tuple(pin or ()))
     new = int((found.given < 0).sum())
     typer.echo(

@@ -1,9 +1,8 @@
 """`vdsm verify`: of an arm by a problem, of any other robot by its URDF."""
 
-from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple, NoReturn
 
 import typer
 
@@ -24,12 +23,13 @@ from vdsm_pin.cli.options import (
     examples,
     family,
 )
+from vdsm_pin.cli.robot import RobotOptions, refuse_beside
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.time_limit import Deadline, enforced
 
 if TYPE_CHECKING:
     from vdsm_pin.app.workflow import VerifyOrder
-    from vdsm_pin.robots.folder import RobotOrder
+    from vdsm_pin.robots.cell import Cell
 
 commands = family()
 
@@ -125,18 +125,19 @@ def verify(
     """Verify a trajectory of any planner.
 
     Writes report.html, verification.json, clearance.csv, link_angles.csv, centres.csv
-    and cables.csv; of a robot by --urdf verification.json alone.
+    and cables.csv; of a robot (problem with robot, or --urdf) verification.json
+    alone.
     """
-    of_robot = {
-        "--srdf": srdf,
-        "--scene": scene,
-        "--package-dir": package_dir,
-        "--lock": lock,
-        "--required-clearance-mm": required_clearance_mm,
-        "--required-self-clearance-mm": required_self_clearance_mm,
-    }
-    of_arm = {
-        "PROBLEM": problem,
+    of_robot = RobotOptions(
+        urdf,
+        srdf,
+        scene,
+        tuple(package_dir or ()),
+        tuple(lock or ()),
+        required_clearance_mm,
+        required_self_clearance_mm,
+    )
+    of_arm: dict[str, object] = {
         "--joint-error-deg": joint_error_deg != "0",
         "--base-error-mm": base_error_mm,
         "--base-error-deg": base_error_deg,
@@ -150,30 +151,16 @@ def verify(
     said = Said(quiet, as_json)
     deadline = Deadline.after(time_limit)
     if urdf is not None:
-        _refuse_beside("--urdf", of_arm)
-        from vdsm_pin.robots.folder import RobotOrder
-        from vdsm_pin.units import MM_PER_M
-
-        robot = RobotOrder(
-            urdf=urdf,
-            trajectory=trajectory,
-            folder=out,
-            command=context.obj,
-            srdf=srdf,
-            scene=scene,
-            package_dirs=tuple(package_dir or ()),
-            lock=tuple(lock or ()),
-            required=(required_clearance_mm or 0.0) / MM_PER_M,
-            required_self=(required_self_clearance_mm or 0.0) / MM_PER_M,
-            deadline=deadline,
-        )
-        raise typer.Exit(PASSED if _robot_passes(robot, said) else NOT_PASSED)
-    _refuse_beside("a problem", of_robot)
+        refuse_beside("--urdf", {"PROBLEM": problem, **of_arm})
+        with enforced(deadline):
+            cell = of_robot.cell(None)
+        _end_robot(cell, trajectory, out, context.obj, said, deadline)
+    refuse_beside("a problem", of_robot.named())
     if problem is None:
         message = "expected a PROBLEM, or --urdf for any other robot"
         raise InvalidInput(message)
     from vdsm_pin.app.workflow import VerifyOrder
-    from vdsm_pin.io.problem_file import read_problem
+    from vdsm_pin.io.problem_file import RobotProblem, read_problem
     from vdsm_pin.report.run_record import now
 
     errors = errors_of(
@@ -183,9 +170,17 @@ def verify(
         obstacle_error_mm,
         obstacle_error_deg,
     )
+    try:
+        with enforced(deadline):
+            source = read_problem(problem)
+    except RobotProblem as error:
+        refuse_beside("a robot", of_arm)
+        with enforced(deadline):
+            cell = of_robot.cell(Path(error.file))
+        _end_robot(cell, trajectory, out, context.obj, said, deadline)
     with enforced(deadline):
         arm = VerifyOrder(
-            source=read_problem(problem).under(errors),
+            source=source.under(errors),
             trajectory=trajectory,
             folder=out,
             command=context.obj,
@@ -197,18 +192,6 @@ def verify(
             interpolation=interpolation,
         )
     raise typer.Exit(PASSED if _arm_passes(arm, said) else NOT_PASSED)
-
-
-def _refuse_beside(what: str, options: Mapping[str, object]) -> None:
-    """Refuse options that mean nothing beside another one.
-
-    Raises:
-        InvalidInput: If one is given.
-    """
-    for name, value in options.items():
-        if value:
-            message = f"{name} has no meaning with {what}"
-            raise InvalidInput(message)
 
 
 def _arm_passes(order: "VerifyOrder", said: Said) -> bool:
@@ -234,14 +217,27 @@ def _arm_passes(order: "VerifyOrder", said: Said) -> bool:
     return outcome(verified.file.verdict).passed and complete
 
 
-def _robot_passes(order: "RobotOrder", said: Said) -> bool:
-    """Verify the motion of a robot, and say what was found."""
-    from vdsm_pin.robots.folder import FILE, show_robot, verify_robot_to_folder
+def _end_robot(
+    cell: "Cell",
+    trajectory: Path,
+    out: Path,
+    command: str,
+    said: Said,
+    deadline: Deadline,
+) -> NoReturn:
+    """Verify the motion of a robot, say what was found, and end by the verdict."""
+    from vdsm_pin.robots.folder import (
+        FILE,
+        RobotOrder,
+        show_robot,
+        verify_robot_to_folder,
+    )
 
-    with enforced(order.deadline), said.progress():
+    with enforced(deadline), said.progress():
+        order = RobotOrder(cell, trajectory, out, command, deadline)
         found = verify_robot_to_folder(order)
     if said.as_json:
-        typer.echo((order.folder / FILE).read_text("utf-8"), nl=False)
+        typer.echo((out / FILE).read_text("utf-8"), nl=False)
     elif not said.quiet:
-        show_robot(found, order.folder)
-    return found.verdict == "certified"
+        show_robot(found, out)
+    raise typer.Exit(PASSED if found.verdict == "certified" else NOT_PASSED) from None

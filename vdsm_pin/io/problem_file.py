@@ -65,6 +65,10 @@ class ProblemFile:
         return self.source.sha256
 
 
+class RobotProblem(InvalidFile):
+    """The problem is about a robot of a URDF, which `robots.cell` reads."""
+
+
 def read_problem(name_or_path: str | Path) -> ProblemFile:
     """The problem of a built-in name or a file.
 
@@ -76,10 +80,16 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
 
     Raises:
         InvalidFile: If the file or its content breaks the contract.
+        RobotProblem: If it has `robot` in place of `manipulator`.
     """
     path = find_problem(name_or_path)
     content = read_bytes(path, limit=MAX_PROBLEM_BYTES)
     document = read_yaml(decode(content, path), file=path)
+    if isinstance(document.data, dict) and "robot" in document.data:
+        line = document.line(("robot",))
+        where = "robot" if line is None else f"robot (line {line})"
+        what = "is for verify and repair only; expected manipulator"
+        raise RobotProblem(file=path, where=where, problem=what)
     try:
         model = ProblemModel.model_validate(document.data)
     except ValidationError as error:

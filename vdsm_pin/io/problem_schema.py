@@ -43,7 +43,7 @@ Lengths: TypeAlias = Annotated[
 ]
 
 
-def _not_bool(value: Any) -> Any:
+def not_bool(value: Any) -> Any:
     """True equals 1 in Python; in a file it is another value."""
     return str(value).lower() if isinstance(value, bool) else value
 
@@ -381,7 +381,7 @@ class ErrorsModel(FileModel):
 class ProblemModel(FileModel):
     """A planning problem for a hyper-redundant manipulator."""
 
-    vdsm_problem: Annotated[Literal[1], BeforeValidator(_not_bool)] = Field(
+    vdsm_problem: Annotated[Literal[1], BeforeValidator(not_bool)] = Field(
         description="Version of this format."
     )
     name: Name | None = Field(

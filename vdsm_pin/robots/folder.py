@@ -9,19 +9,15 @@ import numpy as np
 import typer
 
 from vdsm_pin import __version__
-from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.report.facts import check_row
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.terminal import plain_checks, show_facts
 from vdsm_pin.report.words import outcome
-from vdsm_pin.robots.judgement import Asked, JudgedPair, RobotVerification, verify_robot
-from vdsm_pin.robots.model import Robot
+from vdsm_pin.robots.cell import Cell
+from vdsm_pin.robots.judgement import JudgedPair, RobotVerification
 from vdsm_pin.robots.repair import Repaired, repair_robot
-from vdsm_pin.robots.scene_files import read_scene
 from vdsm_pin.robots.trajectory_files import path_text, read_path
-from vdsm_pin.robots.urdf import read_robot
-from vdsm_pin.scene import Scene
 from vdsm_pin.text import printable
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.units import MM_PER_M
@@ -38,30 +34,23 @@ class RobotOrder:
     """What to verify.
 
     Args:
-        urdf: The robot.
+        cell: The robot, its obstacles, the clearances asked for.
         trajectory: Its motion.
         folder: Where the result goes.
         command: The exact command line.
-        srdf: Pairs that are not held apart; None: neighbours are not.
-        scene: The obstacles; None for none.
-        package_dirs: Where `package://` is looked for.
-        lock: NAME=VALUE of joints that stand still; [rad] or [m].
-        required: Least clearance from obstacles; [m].
-        required_self: Least clearance between links; [m].
         deadline: When to stop.
     """
 
-    urdf: Path
+    cell: Cell
     trajectory: Path
     folder: Path
     command: str
-    srdf: Path | None = None
-    scene: Path | None = None
-    package_dirs: tuple[Path, ...] = ()
-    lock: tuple[str, ...] = ()
-    required: float = 0.0
-    required_self: float = 0.0
     deadline: Deadline = NO_LIMIT
+
+    @property
+    def inputs(self) -> list[Path]:
+        """The files that it is made from."""
+        return [self.cell.files[0], self.trajectory, *self.cell.files[1:]]
 
 
 def verify_robot_to_folder(order: RobotOrder) -> RobotVerification:
@@ -70,20 +59,16 @@ def verify_robot_to_folder(order: RobotOrder) -> RobotVerification:
     Raises:
         InvalidInput: If a file is bad or the folder cannot be written.
     """
-    inputs = [order.urdf, order.trajectory, *filter(None, (order.srdf, order.scene))]
     check_output_folder(order.folder)
-    check_kept([order.folder / FILE], inputs)
-    robot = read_robot(order.urdf, order.srdf, order.package_dirs, _locks(order.lock))
-    scene = Scene() if order.scene is None else read_scene(order.scene, _size(robot))
-    path = read_path(order.trajectory, robot)
-    found = verify_robot(
-        robot, scene, path, order.required, order.required_self, order.deadline
-    )
+    check_kept([order.folder / FILE], order.inputs)
+    asked = order.cell.asked
+    path = read_path(order.trajectory, asked.robot)
+    found = asked.verified(path, order.deadline)
     content = {
         "vdsm_robot_verification": 1,
         "vdsm_pin": __version__,
         "command": order.command,
-        "sha256": {str(file): sha256_of_file(file) for file in inputs},
+        "sha256": {str(file): sha256_of_file(file) for file in order.inputs},
         **_facts(found, order),
     }
     text = json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)
@@ -101,51 +86,29 @@ def repair_to_folder(order: RobotOrder, pinned: tuple[int, ...] = ()) -> Repaire
         InvalidInput: If a file is bad or the folder cannot be written.
         Infeasible: If no certified motion was found near the given one.
     """
-    inputs = [order.urdf, order.trajectory, *filter(None, (order.srdf, order.scene))]
+    names = (FILE, TRAJECTORY, REPAIR)
     check_output_folder(order.folder)
-    check_kept([order.folder / name for name in (FILE, TRAJECTORY, REPAIR)], inputs)
-    robot = read_robot(order.urdf, order.srdf, order.package_dirs, _locks(order.lock))
-    scene = Scene() if order.scene is None else read_scene(order.scene, _size(robot))
-    path = read_path(order.trajectory, robot)
-    asked = Asked(robot, scene, order.required, order.required_self)
+    check_kept([order.folder / name for name in names], order.inputs)
+    asked = order.cell.asked
+    path = read_path(order.trajectory, asked.robot)
     found = repair_robot(asked, path, pinned, order.deadline)
     rows = zip(found.given.tolist(), found.moved.tolist(), strict=True)
     content = {
         "vdsm_repair": 1,
         "vdsm_pin": __version__,
         "command": order.command,
-        "sha256": {str(file): sha256_of_file(file) for file in inputs},
+        "sha256": {str(file): sha256_of_file(file) for file in order.inputs},
         "waypoints": [
             {"given": given if given >= 0 else None, "moved": moved}
             for given, moved in rows
         ],
     }
     with staged(order.folder) as aside:
-        text = path_text(found.verification.path, robot)
+        text = path_text(found.verification.path, asked.robot)
         (aside / TRAJECTORY).write_text(text, encoding="utf-8")
         (aside / REPAIR).write_text(json.dumps(content, indent=1) + "\n", "utf-8")
     verify_robot_to_folder(replace(order, trajectory=order.folder / TRAJECTORY))
     return found
-
-
-def _locks(words: tuple[str, ...]) -> dict[str, float]:
-    found = {}
-    for word in words:
-        name, _, value = word.partition("=")
-        try:
-            found[name] = float(value)
-        except ValueError:
-            found[name] = np.nan
-        if not name or not np.isfinite(found[name]):
-            message = f"--lock is {word!r}, expected JOINT=VALUE in radians or metres"
-            raise InvalidInput(message)
-    return found
-
-
-def _size(robot: Robot) -> float:
-    """How far the robot reaches at most, roughly; [m]."""
-    shifts = [np.linalg.norm(joint.placement[:3, 3]) for joint in robot.tree.joints]
-    return float(sum(shifts)) or 1.0
 
 
 def _facts(found: RobotVerification, order: RobotOrder) -> dict[str, Any]:
@@ -157,8 +120,8 @@ def _facts(found: RobotVerification, order: RobotOrder) -> dict[str, Any]:
         "waypoints": len(path.knots),
         "interpolation": {1: "linear", 3: "cubic", 5: "quintic"}[path.degree],
         "bodies": "hulls of meshes; boxes, cylinders and spheres as they are",
-        "required_clearance_m": order.required,
-        "required_self_clearance_m": order.required_self,
+        "required_clearance_m": order.cell.asked.required,
+        "required_self_clearance_m": order.cell.asked.required_self,
         "checks": [check_row(check).model_dump(mode="json") for check in found.checks],
         "pairs": [_pair(pair) for pair in _nearest_first(found)],
         "left_out": [[one.one, one.other, one.reason] for one in robot.left_out],

@@ -59,6 +59,16 @@ def read_scene(path: Path, robot_size: float) -> Scene:
         scene = _moveit(document)
     else:
         scene = _ours(document, path, robot_size)
+    check_judged(document, scene)
+    return scene
+
+
+def check_judged(document: YamlDocument, scene: Scene) -> None:
+    """Refuse obstacles that are not judged for robots.
+
+    Raises:
+        InvalidFile: If one moves or may have an inside.
+    """
     for k, obstacle in enumerate(scene.obstacles):
         if isinstance(obstacle, Moving):
             problem = "moves its obstacle, which is not judged for robots yet"
@@ -69,7 +79,6 @@ def read_scene(path: Path, robot_size: float) -> Scene:
                 "yet; expected solid: false, where its surface is all that is meant"
             )
             raise document.invalid(("obstacles", k, "solid"), problem)
-    return scene
 
 
 def _ours(document: YamlDocument, path: Path, robot_size: float) -> Scene:
