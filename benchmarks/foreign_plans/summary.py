@@ -1,7 +1,7 @@
 """The page of the benchmark."""
 
 from collections.abc import Sequence
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
@@ -51,9 +51,17 @@ def document(judged: Sequence[Judged], unplanned: Sequence[Problem]) -> str:
         f"Verdicts that Coal contradicts: {len(faults)}. Problems and resolutions "
         f"without a plan: {len(unplanned)}"
         f"{_where(unplanned)}.",
-        described(surroundings()).rstrip(".") + f", ompl {version('ompl')}.",
+        described(surroundings()).rstrip(".") + f", {_ompl()}.",
     ]
     return "\n\n".join(lines) + "\n"
+
+
+def _ompl() -> str:
+    """The planner's version; plans from a file need none to be judged."""
+    try:
+        return f"ompl {version('ompl')}"
+    except PackageNotFoundError:
+        return "ompl not installed"
 
 
 def _key(one: Judged) -> tuple[str, float]:
