@@ -6,7 +6,7 @@ A false `certified` is a pair proved clear that is not; a false `refuted` the re
 `undecided` far from the limit (1 um or more) must stay below 0.1 %. Exit 0 if all hold.
 
 Each query goes to the compiled sweep as the one pair it asks about. One scene in a
-hundred also goes through `prove_clearance` as a whole, culling included, which must
+hundred also goes through `prove_clearance` as a whole, broad phase included, which must
 not contradict the truth either. Queries about error boxes are certified falsely where a
 motion within the box is known, or found, to come too near; they are far from the limit
 where a known plane proves the whole box with 1 um to spare. The same seed gives the

@@ -77,7 +77,7 @@ def proofs_of(query: TreeQuery, box: ErrorBox, required: float) -> list[Any] | N
         return None
     records = np.zeros((ROOM, RECORD))
     n = query.path.n_intervals
-    count, reached, pair = record(made.task, made.motion, made.desk, 0, n, records)
+    count, reached, pair = record(made.task, made.motion, made.work, 0, n, records)
     if pair >= 0 or reached < n:
         return None
     proofs: list[Any] = [[] for _ in range(n)]

@@ -73,31 +73,31 @@ def random_case(rng: np.random.Generator, degree: int) -> Case:
     return Case(tree, path, box, task, corners, frame, rest)
 
 
-def at(case: Case, desk: Workspace, t: float) -> FloatArray:
+def at(case: Case, work: Workspace, t: float) -> FloatArray:
     """The nominal configuration at a time of the only interval."""
     q = np.zeros(case.tree.n_columns)
     interpolate(case.path.packed(), 0, t, q)
     return q
 
 
-def load_slice(case: Case, desk: Workspace, start: float, end: float) -> Space:
+def load_slice(case: Case, work: Workspace, start: float, end: float) -> Space:
     """The body over a slice, as subdivision loads it."""
-    task, motion, ends = case.task, case.path.packed(), desk.ends
-    place_tree(task.tree, at(case, desk, start), ends.start)
-    place_tree(task.tree, at(case, desk, end), ends.end)
+    task, motion, ends = case.task, case.path.packed(), work.ends
+    place_tree(task.tree, at(case, work, start), ends.start)
+    place_tree(task.tree, at(case, work, end), ends.end)
     way = int(task.pairs.way[0])
     bend_between(task, motion, ends.bends, way, 0, start, end)
-    load_body(task, mover_of(task, 0), ends, desk.space.body, end - start)
-    return desk.space
+    load_body(task, mover_of(task, 0), ends, work.space.body, end - start)
+    return work.space
 
 
-def load_block(case: Case, desk: Workspace) -> Space:
+def load_block(case: Case, work: Workspace) -> Space:
     """The body over the whole interval, as blocks load it."""
     task, mover = case.task, mover_of(case.task, 0)
-    fill_rows(task, case.path.packed(), desk.rows, 0, 1)
-    place_disc(mover, desk.rows, desk.runs, 1)
-    load_rows(task, mover, desk, 0, 1)
-    return desk.space
+    fill_rows(task, case.path.packed(), work.rows, 0, 1)
+    place_disc(mover, work.rows, work.runs, 1)
+    load_rows(task, mover, work, 0, 1)
+    return work.space
 
 
 def normals(rng: np.random.Generator, n: int) -> FloatArray:
@@ -111,15 +111,15 @@ def test_no_motion_of_the_box_leaves_the_body(degree: int, seed: int) -> None:
     rng = np.random.default_rng([degree, seed])
     for _ in range(60):
         case = random_case(rng, degree)
-        desk = new_workspace(case.task, case.tree.n_columns, 1)
+        work = new_workspace(case.task, case.tree.n_columns, 1)
         start, end = np.sort(rng.uniform(size=2))
         slices = [(0.0, 1.0, load_block), (0.0, 1.0, None), (start, end, None)]
         for first, last, load in [*slices, (start, start, None)]:
-            space = load(case, desk) if load else load_slice(case, desk, first, last)
+            space = load(case, work) if load else load_slice(case, work, first, last)
             directions = normals(rng, 20)
             reach = np.array([body_reach(space.body, *n) for n in directions])
             for t in np.append(rng.uniform(first, last, 12), [first, last]):
-                seen = case.seen(at(case, desk, t), rng)
+                seen = case.seen(at(case, work, t), rng)
                 most = (directions @ seen.T).max(axis=1)
                 assert (most <= reach + 1e-11).all()
 
@@ -154,14 +154,14 @@ def test_nine_tenths_of_the_curvature_would_be_caught(
     case: Case, share: float, caught: bool
 ) -> None:
     rng = np.random.default_rng(0)
-    desk, left = new_workspace(case.task, case.tree.n_columns, 1), False
-    space, x, along = load_slice(case, desk, 0.0, 1.0), np.eye(3)[0], np.eye(3)[2]
+    work, left = new_workspace(case.task, case.tree.n_columns, 1), False
+    space, x, along = load_slice(case, work, 0.0, 1.0), np.eye(3)[0], np.eye(3)[2]
     half = np.array([np.cos(0.1), np.sin(0.1), 0.0])  # where the turn is halfway
     directions = np.concatenate([[x, along, -along, half], normals(rng, 20)])
     space.body.balls[:] *= share
     reach = np.array([body_reach(space.body, *n) for n in directions])
     for t in np.linspace(0.0, 1.0, 21):
-        seen = case.seen(at(case, desk, t), rng)
+        seen = case.seen(at(case, work, t), rng)
         left |= bool(((directions @ seen.T).max(axis=1) > reach + 1e-11).any())
     assert left == caught
 
@@ -170,11 +170,11 @@ def test_blocks_and_slices_load_the_same_body() -> None:
     rng = np.random.default_rng(5)
     for _ in range(100):
         case = random_case(rng, int(rng.choice(DEGREES)))
-        desk = new_workspace(case.task, case.tree.n_columns, 1)
+        work = new_workspace(case.task, case.tree.n_columns, 1)
         directions = normals(rng, 20)
-        space = load_slice(case, desk, 0.0, 1.0)
+        space = load_slice(case, work, 0.0, 1.0)
         one = [body_reach(space.body, *n) for n in directions]
-        space = load_block(case, desk)
+        space = load_block(case, work)
         other = [body_reach(space.body, *n) for n in directions]
         np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12)
 
@@ -193,9 +193,9 @@ def test_the_body_is_as_small_as_the_first_order_allows(seed: int) -> None:
         case = Case(
             case.tree, case.path, case.box, task, case.points, case.frame, case.rest
         )
-        desk = new_workspace(task, case.tree.n_columns, 1)
-        space, n = load_slice(case, desk, 0.0, 0.0), normals(rng, 1)[0]
-        q = at(case, desk, 0.0)
+        work = new_workspace(task, case.tree.n_columns, 1)
+        space, n = load_slice(case, work, 0.0, 0.0), normals(rng, 1)[0]
+        q = at(case, work, 0.0)
 
         def reach(push: FloatArray, case: Case = case, q: FloatArray = q) -> FloatArray:
             joints = [
@@ -233,9 +233,9 @@ def test_the_crude_growth_is_above_every_exact_one(seed: int) -> None:
             task = with_errors(task, random_box(rng, arm))
             case = Case(arm, path, case.box, task, case.points, frame, 0)
         task, n = case.task, normals(rng, 1)[0]
-        desk = new_workspace(task, case.tree.n_columns, 1)
-        body = load_slice(case, desk, 0.0, 0.0).body
-        core = desk.space.core
+        work = new_workspace(task, case.tree.n_columns, 1)
+        body = load_slice(case, work, 0.0, 0.0).body
+        core = work.space.core
         mover = mover_of(task, 0)
         grown = body_reach(body, *n) - body_reach(core, *n)
         crude = [

@@ -14,10 +14,10 @@ from vdsm_pin.robot_model import load_robot
 from vdsm_pin.scene import Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Scene, Sphere
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
-from vdsm_pin.verification.hasty import is_certified
 from vdsm_pin.verification.inside import check_inside, locate_start
 from vdsm_pin.verification.records import ClearanceChunk, Verdict
 from vdsm_pin.verification.verify import verify
+from vdsm_pin.verification.yes_or_no import is_certified
 
 ARM = built_in("hrm8")
 NOMINAL = ErrorBox()

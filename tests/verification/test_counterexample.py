@@ -24,10 +24,10 @@ from vdsm_pin.scene import (
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.counterexample import find_counterexamples
-from vdsm_pin.verification.hasty import is_certified
 from vdsm_pin.verification.records import Counterexample, Verdict
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.verify import verify
+from vdsm_pin.verification.yes_or_no import is_certified
 
 ARM = built_in("hrm8")
 LENGTH = float(ARM.total_length)

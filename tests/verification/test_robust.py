@@ -16,8 +16,8 @@ from vdsm_pin.scene import Box, Cylinder, Obstacle, Scene, Sphere
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.hasty import HastyProof, is_certified
 from vdsm_pin.verification.robust import LARGEST, STRETCH, largest_joint_error
+from vdsm_pin.verification.yes_or_no import YesOrNoProof, is_certified
 
 ARM = built_in("hrm8")
 CENTRE, BALL = np.array([2.0, 0.45, 0.1]), 0.2
@@ -135,14 +135,14 @@ def test_many_obstacles_are_culled_and_change_nothing() -> None:
     crowded = replace(problem, scene=scene)
     found = largest_joint_error(problem, rows, ErrorBox())
     assert largest_joint_error(crowded, rows, ErrorBox()) == found
-    proof = HastyProof(crowded, rows)
+    proof = YesOrNoProof(crowded, rows)
     results = proof._proving.results
     assert (proof.n_intervals - 1) // results.stride < results.profile.shape[2]
 
 
 def test_what_is_asked_before_makes_no_question_harder() -> None:
     """The nominal motion takes as few slices after an error of 45 degrees as before."""
-    proof = HastyProof(asked(BALL), swaying(300))
+    proof = YesOrNoProof(asked(BALL), swaying(300))
 
     def slices(joint: float) -> int:
         before = int(proof._proving.results.tally[SLICES])

@@ -27,10 +27,10 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.hasty import is_certified
 from vdsm_pin.verification.records import ClearanceChunk, Verdict, Verification
 from vdsm_pin.verification.robust import largest_joint_error
 from vdsm_pin.verification.verify import verify
+from vdsm_pin.verification.yes_or_no import is_certified
 
 PASSED = Deadline(2.0, 0.0)
 """A limit of two seconds that was over when the machine started."""

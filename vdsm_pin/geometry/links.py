@@ -19,7 +19,7 @@ from vdsm_pin.geometry.obstacles import (
 from vdsm_pin.geometry.pieces import PackedPieces
 
 
-class _Desk(NamedTuple):
+class _Work(NamedTuple):
     """Working space of `obstacle_bracket`, and the last n of each obstacle and link."""
 
     body: Body
@@ -55,12 +55,12 @@ def link_clearances(
     """
     n_samples, n_links = centres.shape[0], centres.shape[1] - 1
     result = np.full((n_samples, n_links), np.inf)
-    desk = _Desk(
+    work = _Work(
         new_body(2, 2, 0), np.zeros((2, 3)), np.zeros((SCRATCH_ROWS + 2, 3)),
         np.zeros(STACK, np.int64), np.zeros(BRACKET + 4), np.zeros(BRACKET + 4),
         np.ones((pieces.root.size, n_links, 3)),
     )  # fmt: skip
-    _measure(pieces, covers, centres, radius + pad, goal, desk, result)
+    _measure(pieces, covers, centres, radius + pad, goal, work, result)
     return result
 
 
@@ -71,13 +71,13 @@ def _measure(
     centres: FloatArray,
     off: float,
     goal: float,
-    desk: _Desk,
+    work: _Work,
     result: FloatArray,
 ) -> None:
     """Write what is left of each distance where `off` is taken off it; [m]."""
     apart()
-    pieces, desk = borrowed(pieces), borrowed(desk)
-    body, box, out = desk.body, desk.box, desk.out
+    pieces, work = borrowed(pieces), borrowed(work)
+    body, box, out = work.body, work.box, work.out
     for link in range(result.shape[1]):
         for sample in range(result.shape[0]):
             body.points[:] = centres[sample, link : link + 2]
@@ -86,11 +86,11 @@ def _measure(
             for o in range(pieces.root.size):
                 if box_distance(pieces, pieces.root[o], box[0], box[1]) >= best:
                     continue
-                out[NORMAL : NORMAL + 3] = desk.normals[o, link]
+                out[NORMAL : NORMAL + 3] = work.normals[o, link]
                 obstacle_bracket(
-                    pieces, o, body, goal, desk.scratch, desk.stack, desk.trial, out
+                    pieces, o, body, goal, work.scratch, work.stack, work.trial, out
                 )
-                desk.normals[o, link] = out[NORMAL : NORMAL + 3]
+                work.normals[o, link] = out[NORMAL : NORMAL + 3]
                 gap = out[LOWER]
                 # Asked first: a call with the whole scene costs more than a link.
                 if gap > 0.0 and has_inside(pieces, covers, o):

@@ -17,17 +17,17 @@ from vdsm_pin.proof.workspace import Workspace
 
 @compiled
 def _serves(
-    task: Task, desk: Workspace, results: Results, pair: int, stretch: Stretch
+    task: Task, work: Workspace, results: Results, pair: int, stretch: Stretch
 ) -> bool:
     """Whether a pair's cached plane serves a whole block; its bounds are written.
 
     The quick way out, of segments under errors that cost the same everywhere: most
     blocks of most pairs end here.
     """
-    mover, plane, runs = mover_of(task, pair), desk.planes[pair], desk.runs
+    mover, plane, runs = mover_of(task, pair), work.planes[pair], work.runs
     rules, count, group = task.rules, stretch.size, task.pairs.group[pair]
-    bound_below(mover, desk.rows.tracks, runs, plane, 0, count)
-    bound_above(mover, desk.rows.tracks, runs, plane, 0, count)
+    bound_below(mover, work.rows.tracks, runs, plane, 0, count)
+    bound_above(mover, work.rows.tracks, runs, plane, 0, count)
     bar = task.pairs.required[pair]
     if stretch.closely:
         bar = max(bar, results.limit[group] - rules.gap)
@@ -46,7 +46,7 @@ def _serves(
 def _sweep_block(
     task: Task,
     motion: Motion,
-    desk: Workspace,
+    work: Workspace,
     results: Results,
     near: IntArray,
     stretch: Stretch,
@@ -54,7 +54,7 @@ def _sweep_block(
 ) -> bool:
     """All near pairs over a block whose rows are filled, as `sweep`."""
     apart()
-    runs, pairs, count = desk.runs, task.pairs, stretch.size
+    runs, pairs, count = work.runs, task.pairs, stretch.size
     quick = task.rules.steady and results.dense.verdict.shape[0] == 0
     for pair in near:
         closely = settled[pairs.group[pair]]
@@ -62,8 +62,8 @@ def _sweep_block(
             stretch.start, stretch.offset, count, closely, stretch.yes_or_no
         )
         segment = task.bodies.inverse[pairs.body[pair]] >= 0.0
-        if not (quick and segment and _serves(task, desk, results, pair, asked)):
-            if not sweep_pair(task, motion, desk, results, pair, asked):
+        if not (quick and segment and _serves(task, work, results, pair, asked)):
+            if not sweep_pair(task, motion, work, results, pair, asked):
                 return False
         if stretch.yes_or_no:  # all that is asked is whether everything is proved
             continue
@@ -76,7 +76,7 @@ def _sweep_block(
 def sweep(
     task: Task,
     motion: Motion,
-    desk: Workspace,
+    work: Workspace,
     results: Results,
     broad: BroadPhase,
     span: tuple[int, int],
@@ -91,7 +91,7 @@ def sweep(
     Args:
         task: The scene, pairs and rules.
         motion: Rows of joint values.
-        desk: Working space; what the pairs remember is carried on.
+        work: Working space; what the pairs remember is carried on.
         results: Where to write.
         broad: For the pairs that are far.
         span: First interval, row 0 of the dense results, and one past the last.
@@ -99,12 +99,12 @@ def sweep(
     """
     task = borrowed(task)
     motion = borrowed(motion)
-    desk = borrowed(desk)
+    work = borrowed(work)
     results = borrowed(results)
     broad = borrowed(broad)
     if task.rules.steady:
         # Whoever asks about several error boxes leaves here what the last one added.
-        desk.runs.growth[:] = 0.0
+        work.runs.growth[:] = 0.0
     limit, settled = results.limit, np.zeros(2, np.bool_)
     before, (first, last) = limit.copy(), span
     for start in range(first, last, BLOCK):
@@ -117,9 +117,9 @@ def sweep(
             before[group] = limit[group]
         count = min(BLOCK, last - start)
         stretch = Stretch(start, start - first, count, False, yes_or_no)
-        fill_rows(task, motion, desk.rows, start, count)
-        n_near = settle_far(task, desk, results, broad, stretch)
+        fill_rows(task, motion, work.rows, start, count)
+        n_near = settle_far(task, work, results, broad, stretch)
         near = broad.near[:n_near]
-        if not _sweep_block(task, motion, desk, results, near, stretch, settled):
+        if not _sweep_block(task, motion, work, results, near, stretch, settled):
             return False
     return True

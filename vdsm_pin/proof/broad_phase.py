@@ -132,21 +132,21 @@ def _keep_least(values: FloatArray, least: FloatArray, at: IntArray, k: int) -> 
 
 
 @compiled
-def _nearest_upper(task: Task, desk: Workspace, broad: BroadPhase, body: int) -> float:
+def _nearest_upper(task: Task, work: Workspace, broad: BroadPhase, body: int) -> float:
     """Upper bound of the clearance of a body and of the obstacle whose box is nearest.
 
     At the first row of a block; inf for a body without pairs.
     """
     apart()
-    pair, least, space = -1, np.inf, desk.space
+    pair, least, space = -1, np.inf, work.space
     for o in range(broad.number.shape[1]):
         if broad.number[body, o] >= 0 and broad.gap[body, o] < least:
             pair, least = broad.number[body, o], broad.gap[body, o]
     if pair < 0:
         return np.inf
     mover = mover_of(task, pair)
-    place_disc(mover, desk.rows, desk.runs, 1)
-    load_rows(task, mover, desk, 0, 0)
+    place_disc(mover, work.rows, work.runs, 1)
+    load_rows(task, mover, work, 0, 0)
     space.out[NORMAL : NORMAL + 3] = 1.0
     obstacle_bracket(
         task.pieces,
@@ -278,7 +278,7 @@ def _profile_far(
 @compiled
 def settle_far(
     task: Task,
-    desk: Workspace,
+    work: Workspace,
     results: Results,
     broad: BroadPhase,
     stretch: Stretch,
@@ -287,7 +287,7 @@ def settle_far(
 
     Args:
         task: The scene, pairs and rules.
-        desk: Working space; its rows are filled.
+        work: Working space; its rows are filled.
         results: Where to write.
         broad: Where to write; `near` lists the pairs that need a closer look.
         stretch: The block.
@@ -299,7 +299,7 @@ def settle_far(
     n_bodies, n_obstacles = broad.gap.shape
     if n_obstacles <= FEW:
         return broad.near.size
-    rules, rows, n_near = task.rules, desk.rows, 0
+    rules, rows, n_near = task.rules, work.rows, 0
     start, count = stretch.start, stretch.size
     low, high, lost = np.zeros(3), np.zeros(3), task.pairs.lost
     for body in range(n_bodies):
@@ -314,7 +314,7 @@ def settle_far(
         for o in range(n_obstacles):
             pair = broad.number[body, o]
             gap[o] -= lost[pair] if pair >= 0 else 0.0
-        upper = _nearest_upper(task, desk, broad, body)
+        upper = _nearest_upper(task, work, broad, body)
         if rules.nominal:
             results.limit[OBSTACLES] = min(results.limit[OBSTACLES], upper)
         n_near = _settle_body(task, results, broad, body, upper, n_near)

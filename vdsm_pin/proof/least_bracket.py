@@ -29,7 +29,7 @@ from vdsm_pin.proof.workspace import Workspace
 def _look_again(
     task: Task,
     motion: Motion,
-    desk: Workspace,
+    work: Workspace,
     results: Results,
     group: int,
     order: IntArray,
@@ -42,7 +42,7 @@ def _look_again(
         since links and obstacles meet, is left in `results.overflow`.
     """
     apart()
-    held, lower, count = results.candidates, desk.runs.lower, 0
+    held, lower, count = results.candidates, work.runs.lower, 0
     row, beyond = np.zeros(SLICE), results.overflow
     row[END], filled = 1.0, -1
     for c in order:
@@ -55,10 +55,10 @@ def _look_again(
             continue
         start, size, pair = held.first[c], held.size[c], held.pair[c]
         if start != filled:
-            fill_rows(task, motion, desk.rows, start, size)
+            fill_rows(task, motion, work.rows, start, size)
             filled = start
         stretch = Stretch(start, 0, size, True, False)
-        sweep_pair(task, motion, desk, results, pair, stretch)
+        sweep_pair(task, motion, work, results, pair, stretch)
         for local in range(size):
             if not lower[local] < results.limit[group] - task.rules.gap:
                 continue
@@ -74,7 +74,7 @@ def _look_again(
 def narrow(
     task: Task,
     motion: Motion,
-    desk: Workspace,
+    work: Workspace,
     results: Results,
     order: IntArray,
     heap: FloatArray,
@@ -85,7 +85,7 @@ def narrow(
     Args:
         task: The scene, pairs and rules.
         motion: Rows of joint values.
-        desk: Working space.
+        work: Working space.
         results: Holds the candidates; best upper bounds and the limit are improved. Its
             counts are spoilt: every candidate is counted again.
         order: Candidates of one group, those of one block together.
@@ -98,13 +98,13 @@ def narrow(
     """
     task = borrowed(task)
     motion = borrowed(motion)
-    desk = borrowed(desk)
+    work = borrowed(work)
     results = borrowed(results)
     order = borrowed(order)
     heap = borrowed(heap)
     found = borrowed(found)
     group = task.pairs.group[results.candidates.pair[order[0]]]
-    count = _look_again(task, motion, desk, results, group, order, heap)
+    count = _look_again(task, motion, work, results, group, order, heap)
     found = Witnesses(
         found.upper,
         found.interval,
@@ -113,7 +113,7 @@ def narrow(
         found.instant,
         results.limit[group],
     )
-    count = tighten(task, motion, desk.ends, desk.space, heap, count, found)
+    count = tighten(task, motion, work.ends, work.space, heap, count, found)
     for pair in range(found.upper.size):
         if found.upper[pair] < results.best[pair, UP]:
             best = results.best[pair]

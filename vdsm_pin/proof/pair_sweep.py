@@ -76,7 +76,7 @@ class Stretch(NamedTuple):
 def _renew(
     task: Task,
     mover: Mover,
-    desk: Workspace,
+    work: Workspace,
     local: int,
     pair: int,
     goal: float,
@@ -87,7 +87,7 @@ def _renew(
     Args:
         task: The scene, pairs and rules.
         mover: The body of the pair.
-        desk: Working space, its rows filled.
+        work: Working space, its rows filled.
         local: The interval.
         pair: The pair.
         goal: Width of a distance bracket at which to stop; [m].
@@ -98,10 +98,10 @@ def _renew(
         needs more than one plane, else -inf; [m].
     """
     apart()
-    pieces, space, plane = task.pieces, desk.space, desk.planes[pair]
+    pieces, space, plane = task.pieces, work.space, work.planes[pair]
     root, proved = pieces.root[task.pairs.obstacle[pair]], -np.inf
     p, last = pieces.node_range[root]
-    load_rows(task, mover, desk, local, local + 1)
+    load_rows(task, mover, work, local, local + 1)
     space.out[NORMAL:NEAR] = plane[:3]
     if last - p == 1:
         leaf_bracket(pieces, space, p, goal, True, space.out)
@@ -114,36 +114,36 @@ def _renew(
     n, stack, point = plane[:3], space.stack, space.scratch[0]
     plane[SUPPORT] = node_support(pieces, root, n, stack, point)
     if mover.inverse < 0.0:
-        _renew_witness(task, mover, desk, local, pair)
+        _renew_witness(task, mover, work, local, pair)
     return proved
 
 
 @compiled
 def _renew_witness(
-    task: Task, mover: Mover, desk: Workspace, local: int, pair: int
+    task: Task, mover: Mover, work: Workspace, local: int, pair: int
 ) -> None:
     """Witnesses on a body that is no segment and on its partner, both at one row."""
-    load_rows(task, mover, desk, local, local)
-    plane, space, rows = desk.planes[pair], desk.space, desk.rows
+    load_rows(task, mover, work, local, local)
+    plane, space, rows = work.planes[pair], work.space, work.rows
     space.out[NORMAL:NEAR] = plane[:3]
     loaded_bound(task, space, pair, True, np.inf)
     plane[POINT:WIDTH] = space.out[FAR:BRACKET]
     own = plane[OWN_POINT:POINT]
     own[:] = space.out[NEAR:FAR]
-    take_row(rows, local, desk.ends.start)
-    to_body(mover, desk.ends.start, own)
-    place_own(mover, rows, desk.runs, plane, rows.ways.shape[2])
+    take_row(rows, local, work.ends.start)
+    to_body(mover, work.ends.start, own)
+    place_own(mover, rows, work.runs, plane, rows.ways.shape[2])
 
 
 @compiled
 def _look_at_row(
-    task: Task, mover: Mover, desk: Workspace, results: Results, local: int, pair: int
+    task: Task, mover: Mover, work: Workspace, results: Results, local: int, pair: int
 ) -> None:
     """Lower the limit to what can be proved at a row at all, within the error box."""
     apart()
-    load_rows(task, mover, desk, local, local)
-    space = desk.space
-    space.out[NORMAL:NEAR] = desk.planes[pair, :3]
+    load_rows(task, mover, work, local, local)
+    space = work.space
+    space.out[NORMAL:NEAR] = work.planes[pair, :3]
     loaded_bound(task, space, pair, False, np.inf)
     group = task.pairs.group[pair]
     results.limit[group] = min(results.limit[group], space.out[LOWER])
@@ -153,7 +153,7 @@ def _look_at_row(
 def _subdivide(
     task: Task,
     motion: Motion,
-    desk: Workspace,
+    work: Workspace,
     results: Results,
     pair: int,
     stretch: Stretch,
@@ -162,14 +162,14 @@ def _subdivide(
     """Decide one interval of a block by subdivision; its verdict."""
     apart()
     row, witness = np.zeros(SLICE), new_witness()
-    k, ends, space = stretch.start + local, desk.ends, desk.space
+    k, ends, space = stretch.start + local, work.ends, work.space
     row[INTERVAL], row[PAIR], row[END] = k, pair, 1.0
-    verdict, count = resolve(task, motion, ends, space, desk.heap, row, witness)
+    verdict, count = resolve(task, motion, ends, space, work.heap, row, witness)
     results.tally[SLICES] += count
     lower, upper, time = row[KEY], witness.value[MET], witness.value[WHEN]
     group = task.pairs.group[pair]
     results.limit[group] = min(results.limit[group], witness.value[INSTANT])
-    desk.runs.lower[local], desk.runs.upper[local] = lower, upper
+    work.runs.lower[local], work.runs.upper[local] = lower, upper
     results.counts[pair, verdict] += 1
     best = results.best[pair]
     if upper < best[UP]:
@@ -188,14 +188,14 @@ def _subdivide(
             mover_of(task, pair),
         )
         witness_at(mover, ends.start, witness.points, own, other)
-    desk.planes[pair, SUPPORT] = desk.planes[pair, HELD_CLEARANCE] = -np.inf
+    work.planes[pair, SUPPORT] = work.planes[pair, HELD_CLEARANCE] = -np.inf
     return verdict
 
 
 @compiled
 def _dense_stretch(
     mover: Mover,
-    desk: Workspace,
+    work: Workspace,
     results: Results,
     pair: int,
     offset: int,
@@ -204,14 +204,14 @@ def _dense_stretch(
 ) -> None:
     """Write intervals that one plane and witness bound to the dense results."""
     apart()
-    runs, dense, pose = desk.runs, results.dense, desk.ends.start
-    at_rows, points = runs.at_rows, desk.planes[pair, OWN_POINT:WIDTH]
+    runs, dense, pose = work.runs, results.dense, work.ends.start
+    at_rows, points = runs.at_rows, work.planes[pair, OWN_POINT:WIDTH]
     for r in range(first, last):
         m, later = offset + r, 1 if at_rows[r + 1] < at_rows[r] else 0
         dense.lower[m, pair], dense.upper[m, pair] = runs.lower[r], runs.upper[r]
         dense.time[m, pair], dense.verdict[m, pair] = float(later), CERTIFIED
         for frame in (mover.rest, mover.frame):
-            take_frame(desk.rows, r + later, frame, pose)
+            take_frame(work.rows, r + later, frame, pose)
         witness_at(mover, pose, points, dense.own[m, pair], dense.other[m, pair])
 
 
@@ -219,7 +219,7 @@ def _dense_stretch(
 def _note_stretch(
     task: Task,
     mover: Mover,
-    desk: Workspace,
+    work: Workspace,
     results: Results,
     pair: int,
     stretch: Stretch,
@@ -227,21 +227,21 @@ def _note_stretch(
 ) -> None:
     """Count and record the intervals, first to below last, that one plane proves."""
     local, done = span
-    runs, best, group = desk.runs, results.best[pair], task.pairs.group[pair]
+    runs, best, group = work.runs, results.best[pair], task.pairs.group[pair]
     results.counts[pair, CERTIFIED] += done - local
-    points = desk.planes[pair, OWN_POINT:WIDTH]
+    points = work.planes[pair, OWN_POINT:WIDTH]
     note_upper(best, runs, points, stretch.start, local, done)
     if task.rules.nominal:
         results.limit[group] = min(results.limit[group], best[UP])
     if results.dense.verdict.shape[0] > 0:
-        _dense_stretch(mover, desk, results, pair, stretch.offset, local, done)
+        _dense_stretch(mover, work, results, pair, stretch.offset, local, done)
 
 
 @compiled
 def sweep_pair(
     task: Task,
     motion: Motion,
-    desk: Workspace,
+    work: Workspace,
     results: Results,
     pair: int,
     stretch: Stretch,
@@ -255,13 +255,13 @@ def sweep_pair(
     Args:
         task: The scene, pairs and rules.
         motion: Rows of joint values.
-        desk: Working space, its rows filled; its runs are written.
+        work: Working space, its rows filled; its runs are written.
         results: Where to write.
         pair: The pair.
         stretch: The intervals.
     """
     apart()
-    rules, rows, runs, plane = task.rules, desk.rows, desk.runs, desk.planes[pair]
+    rules, rows, runs, plane = task.rules, work.rows, work.runs, work.planes[pair]
     required, group = task.pairs.required[pair], task.pairs.group[pair]
     goal, count, yes_or_no = rules.goal, stretch.size, stretch.yes_or_no
     if not stretch.closely:
@@ -282,11 +282,11 @@ def sweep_pair(
             done += runs.lower[local] >= required
         if done > local:
             span = local, done
-            _note_stretch(task, mover, desk, results, pair, stretch, span)
+            _note_stretch(task, mover, work, results, pair, stretch, span)
         elif fresh:
             if yes_or_no and runs.upper[local] < required:
                 return False
-            verdict = _subdivide(task, motion, desk, results, pair, stretch, local)
+            verdict = _subdivide(task, motion, work, results, pair, stretch, local)
             if yes_or_no and verdict != CERTIFIED:
                 return False
             done = local + 1
@@ -296,9 +296,9 @@ def sweep_pair(
         if done == last:
             tried *= 2
             continue
-        proved = _renew(task, mover, desk, local, pair, goal, bar)
+        proved = _renew(task, mover, work, local, pair, goal, bar)
         results.tally[RENEWED] += 1
         if not (rules.nominal or yes_or_no):
-            _look_at_row(task, mover, desk, results, local, pair)
+            _look_at_row(task, mover, work, results, local, pair)
         fresh, tried = True, FIRST_TRIED
     return False

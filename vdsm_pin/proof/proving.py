@@ -90,7 +90,7 @@ class Proving:
 
     task: Task
     motion: Motion
-    desk: Workspace
+    work: Workspace
     results: Results
     broad: BroadPhase
     budget: Budget
@@ -111,7 +111,7 @@ class Proving:
     def sweep(self, first: int, last: int) -> bool:
         """Judge some intervals; whether there was time for all."""
         span = first, last
-        args = self.task, self.motion, self.desk, self.results, self.broad
+        args = self.task, self.motion, self.work, self.results, self.broad
         return bool(sweep(*args, span, False))
 
     def run(self) -> bool:
@@ -128,7 +128,7 @@ class Proving:
                 self._narrow(group)
         best = self.results.best
         order = np.lexsort((best[:, TIME], best[:, AT_UPPER]))
-        place_best(self.task, self.motion, self.desk.ends, best, order)
+        place_best(self.task, self.motion, self.work.ends, best, order)
         return in_time
 
     def _own_up(self) -> None:
@@ -170,7 +170,7 @@ class Proving:
         found = _no_witnesses(len(mine))
         heap = np.zeros((self.budget.candidates + self.budget.slices, SLICE))
         again = results._replace(counts=np.zeros_like(results.counts))
-        count = narrow(task, self.motion, self.desk, again, order, heap, found)
+        count = narrow(task, self.motion, self.work, again, order, heap, found)
         if count < 0:
             return  # not all was looked at again: what was proved before holds
         proved = np.full(len(mine), results.limit[group] - task.rules.gap)
@@ -228,7 +228,7 @@ def new_proving(
     return Proving(
         task=task,
         motion=motion,
-        desk=new_workspace(
+        work=new_workspace(
             task, motion.knots.shape[1], budget.slices, min(BLOCK, n_intervals)
         ),
         results=new_results(task.pairs.body.size, columns, n_intervals, budget),

@@ -33,22 +33,22 @@ LOSS: Final = 1e-5
 
 @compiled
 def _claim(
-    task: Task, desk: Workspace, row: FloatArray, node: int, n: FloatArray
+    task: Task, work: Workspace, row: FloatArray, node: int, n: FloatArray
 ) -> float:
     """Clearance that one plane proves of the pieces of a node over a slice; [m]."""
     lost = task.pairs.lost[int(row[PAIR])]
-    return plane_bound(task.pieces, desk.space, node, lost, n)
+    return plane_bound(task.pieces, work.space, node, lost, n)
 
 
 @compiled
 def _shortened(
-    task: Task, desk: Workspace, row: FloatArray, node: int, n: FloatArray
+    task: Task, work: Workspace, row: FloatArray, node: int, n: FloatArray
 ) -> float:
     """Take the whole numbers of few digits for n that prove nearly as much.
 
     Args:
         task: The scene, pairs and rules.
-        desk: Its space holds the body over the slice.
+        work: Its space holds the body over the slice.
         row: The slice.
         node: The pieces.
         n: Of unit length; on return of any length, [-].
@@ -58,7 +58,7 @@ def _shortened(
     """
     apart()
     claim, needed = (
-        _claim(task, desk, row, node, n),
+        _claim(task, work, row, node, n),
         task.pairs.required[int(row[PAIR])],
     )
     if task.pieces.kind[task.pieces.node_range[node, 0]] == HALF_SPACE:
@@ -73,7 +73,7 @@ def _shortened(
             continue
         for c in range(3):
             tried[c] = whole[c] / sqrt(squared)
-        found = _claim(task, desk, row, node, tried)
+        found = _claim(task, work, row, node, tried)
         if found >= needed and found >= claim - LOSS:
             n[:] = whole
             return found
@@ -106,11 +106,11 @@ def _write(
 
 @compiled
 def _write_ranges(
-    task: Task, desk: Workspace, row: FloatArray, records: FloatArray, count: int
+    task: Task, work: Workspace, row: FloatArray, records: FloatArray, count: int
 ) -> int:
     """Write planes for ranges of pieces, as few as the hierarchy allows."""
     apart()
-    pieces, space, pair = task.pieces, desk.space, int(row[PAIR])
+    pieces, space, pair = task.pieces, work.space, int(row[PAIR])
     lost, needed = task.pairs.lost[pair], task.pairs.required[pair]
     n, nodes = np.zeros(3), space.nodes
     waiting = 1
@@ -121,12 +121,12 @@ def _write_ranges(
         if pieces.node_range[node, 1] - pieces.node_range[node, 0] == 1:
             leaf_bound(task, space, node, lost, False, space.trial)
             n[:] = space.trial[NORMAL:NEAR]
-            claim = _shortened(task, desk, row, node, n)
+            claim = _shortened(task, work, row, node, n)
             count = _write(task, row, node, n, claim, records, count)
             continue
         bound = node_bound(pieces, space, node, lost, n)
         if bound >= needed:
-            claim = _shortened(task, desk, row, node, n)
+            claim = _shortened(task, work, row, node, n)
             count = _write(task, row, node, n, claim, records, count)
             continue
         nodes[waiting], nodes[waiting + 1] = pieces.node_right[node], node + 1
@@ -138,7 +138,7 @@ def _write_ranges(
 def _write_slice(
     task: Task,
     motion: Motion,
-    desk: Workspace,
+    work: Workspace,
     row: FloatArray,
     records: FloatArray,
     count: int,
@@ -148,24 +148,24 @@ def _write_slice(
     The slice is one that `bound_between` proves.
     """
     apart()
-    bound_between(task, motion, desk.ends, desk.space, row)
+    bound_between(task, motion, work.ends, work.space, row)
     pair = int(row[PAIR])
     root = task.pieces.root[task.pairs.obstacle[pair]]
-    n = desk.space.out[NORMAL:NEAR].copy()
-    claim = _claim(task, desk, row, root, n)
+    n = work.space.out[NORMAL:NEAR].copy()
+    claim = _claim(task, work, row, root, n)
     first, last = task.pieces.node_range[root]
     if last - first == 1 or claim >= task.pairs.required[pair]:
-        claim = _shortened(task, desk, row, root, n)
+        claim = _shortened(task, work, row, root, n)
         return _write(task, row, root, n, claim, records, count)
-    desk.space.trial[NORMAL:NEAR] = n
-    return _write_ranges(task, desk, row, records, count)
+    work.space.trial[NORMAL:NEAR] = n
+    return _write_ranges(task, work, row, records, count)
 
 
 @compiled
 def _record_pair(
     task: Task,
     motion: Motion,
-    desk: Workspace,
+    work: Workspace,
     row: FloatArray,
     records: FloatArray,
     count: int,
@@ -178,20 +178,20 @@ def _record_pair(
     apart()
     pair = int(row[PAIR])
     row[START], row[END] = 0.0, 1.0
-    desk.space.out[NORMAL:NEAR] = desk.planes[pair, :3]
-    bound_between(task, motion, desk.ends, desk.space, row)
-    desk.planes[pair, :3] = desk.space.out[NORMAL:NEAR]
+    work.space.out[NORMAL:NEAR] = work.planes[pair, :3]
+    bound_between(task, motion, work.ends, work.space, row)
+    work.planes[pair, :3] = work.space.out[NORMAL:NEAR]
     if row[KEY] >= task.pairs.required[pair]:
-        return _write_slice(task, motion, desk, row, records, count), True
+        return _write_slice(task, motion, work, row, records, count), True
     verdict, n_slices = resolve(
-        task, motion, desk.ends, desk.space, desk.heap, row, new_witness()
+        task, motion, work.ends, work.space, work.heap, row, new_witness()
     )
     if verdict != CERTIFIED:
         return count, False
     for k in range(n_slices):
         if count >= 0:
-            row[:] = desk.heap[k]
-            count = _write_slice(task, motion, desk, row, records, count)
+            row[:] = work.heap[k]
+            count = _write_slice(task, motion, work, row, records, count)
     return count, True
 
 
@@ -199,7 +199,7 @@ def _record_pair(
 def record(
     task: Task,
     motion: Motion,
-    desk: Workspace,
+    work: Workspace,
     first: int,
     last: int,
     records: FloatArray,
@@ -209,7 +209,7 @@ def record(
     Args:
         task: The scene, pairs and rules.
         motion: Rows of joint values.
-        desk: Working space; what the pairs remember is carried on.
+        work: Working space; what the pairs remember is carried on.
         first: First interval.
         last: One past the last interval.
         records: Result, shape (room, RECORD).
@@ -222,7 +222,7 @@ def record(
     apart()
     task = borrowed(task)
     motion = borrowed(motion)
-    desk = borrowed(desk)
+    work = borrowed(work)
     records = borrowed(records)
     row, count = np.zeros(SLICE), 0
     for k in range(first, last):
@@ -231,7 +231,7 @@ def record(
             if clock() > task.rules.until:
                 return before, k, -1
             row[INTERVAL], row[PAIR] = k, pair
-            count, proved = _record_pair(task, motion, desk, row, records, count)
+            count, proved = _record_pair(task, motion, work, row, records, count)
             if not proved:
                 return before, k, pair
             if count < 0:

@@ -87,13 +87,13 @@ def take_row(rows: Rows, row: int, pose: Pose) -> None:
 
 
 @compiled
-def load_rows(task: Task, mover: Mover, desk: Workspace, first: int, last: int) -> None:
+def load_rows(task: Task, mover: Mover, work: Workspace, first: int, last: int) -> None:
     """Load a body between two rows of a block; `last` is `first` or next.
 
     Of the ends only what errors ask for is written.
     """
     apart()
-    rows, runs, loaded, ends = desk.rows, desk.runs, desk.space.body, desk.ends
+    rows, runs, loaded, ends = work.rows, work.runs, work.space.body, work.ends
     corners, tracks = mover.slots.size, rows.tracks
     loaded.used[0], loaded.used[1] = 2 * corners, corners
     for k in range(corners):

@@ -259,11 +259,11 @@ def _lines(
 ) -> Iterator[str]:
     """One line per interval."""
     n_intervals = max(1, len(motion.knots) - 1)
-    desk = new_workspace(task, motion.knots.shape[1], Budget().slices)
+    work = new_workspace(task, motion.knots.shape[1], Budget().slices)
     records, first = np.zeros((ROOM, RECORD)), 0
     while first < n_intervals:
         last = min(first + CHUNK, n_intervals)
-        count, reached, pair = record(task, motion, desk, first, last, records)
+        count, reached, pair = record(task, motion, work, first, last, records)
         deadline.check()
         if pair >= 0:
             message = (

@@ -25,9 +25,9 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.counterexample import Search, moments_of
-from vdsm_pin.verification.hasty import HastyProof, is_certified
 from vdsm_pin.verification.proving import prove_problem
 from vdsm_pin.verification.task import all_pairs, obstacle_growth
+from vdsm_pin.verification.yes_or_no import YesOrNoProof, is_certified
 
 LARGEST: Final = float(np.deg2rad(45.0))
 """Errors beyond this are not looked at; [rad]."""
@@ -133,7 +133,7 @@ def _largest_of_all(
     deadline: Deadline,
 ) -> float:
     """As `largest_joint_error`, but not above `most`."""
-    proof = HastyProof(problem, trajectory, deadline)
+    proof = YesOrNoProof(problem, trajectory, deadline)
     end, largest = proof.n_intervals, most
     for first in _shuffled(range(0, end, STRETCH)):
         last = min(first + STRETCH, end)
@@ -171,7 +171,7 @@ def sturdiest(
 
 
 def _holds(
-    proof: HastyProof, errors: ErrorBox, first: int, last: int, joint: float
+    proof: YesOrNoProof, errors: ErrorBox, first: int, last: int, joint: float
 ) -> bool:
     return proof.holds(errors.with_joint(joint), first, last)
 
@@ -230,7 +230,7 @@ def refuted_joint_error(
             return problem
         return within_reach(problem, clearances, errors.with_joint(joint))
 
-    proof = HastyProof(near(above), trajectory, deadline)
+    proof = YesOrNoProof(near(above), trajectory, deadline)
     lost = _first_lost(partial(_holds, proof, errors, joint=above), proof.n_intervals)
     if lost is None:
         return nan

@@ -44,7 +44,6 @@ from vdsm_pin.verification.enclosed import (
     enclosed_profile,
 )
 from vdsm_pin.verification.first_contact import FirstContact, TooClose, first_contacts
-from vdsm_pin.verification.hasty import is_certified
 from vdsm_pin.verification.inside import (
     arm_inside,
     check_inside,
@@ -67,6 +66,7 @@ from vdsm_pin.verification.records import (
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.task import ArmPairs, all_pairs, ball_of
 from vdsm_pin.verification.tip import check_tip
+from vdsm_pin.verification.yes_or_no import is_certified
 
 T = TypeVar("T")
 

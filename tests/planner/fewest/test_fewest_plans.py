@@ -21,10 +21,10 @@ from vdsm_pin.robot_model import load_robot
 from vdsm_pin.scene import Box, HalfSpace, Sphere
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.hasty import is_certified
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.verify import verify
+from vdsm_pin.verification.yes_or_no import is_certified
 
 ARM = built_in("hrm8")
 

@@ -23,7 +23,7 @@ it misses nothing that is held here by whichever plane.
 """
 
 
-class HastyProof:
+class YesOrNoProof:
     """Asks whether the proof goes through, for stretches of a motion and error boxes.
 
     Args:
@@ -59,10 +59,10 @@ class HastyProof:
         """
         known, task = self._proving, with_errors(self._task, self._problem, errors)
         # Pairs that remember nothing: the answer depends on the question alone.
-        forget(known.desk.planes)
+        forget(known.work.planes)
         # No least clearance is asked for: whatever is proved may be culled.
         known.results.limit[:] = -np.inf
-        args = task, known.motion, known.desk, known.results, known.broad
+        args = task, known.motion, known.work, known.results, known.broad
         proved = bool(sweep(*args, (self._first[first], self._first[last]), True))
         self._deadline.check()
         return proved
@@ -79,5 +79,5 @@ def is_certified(
     Raises:
         OutOfTime: If the time is over.
     """
-    proof = HastyProof(problem, trajectory, deadline)
+    proof = YesOrNoProof(problem, trajectory, deadline)
     return proof.holds(errors, 0, proof.n_intervals)
