@@ -161,6 +161,9 @@ def say_drawn(problem: PlanningProblem, outcome: Outcome) -> None:
     corners = outcome.found.corners
     on = np.flatnonzero(corners.drawn)
     _, changed, _ = outcome.judge.look(corners.tips[on], corners.offsets[on])
+    if length == 0.0:
+        say("reaches the goal, bending at most %d joints", int(changed.max()))
+        return
     say(
         "draws %s of %s of the path, up to %s along it, bending at most %d joints",
         in_mm(drawn), in_mm(length), in_mm(float(corners.stations[1:][on].max())),
