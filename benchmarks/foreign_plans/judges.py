@@ -18,7 +18,6 @@ from vdsm_pin.robots.judgement import (
     OBSTACLES,
     Asked,
     RobotVerification,
-    at_moment,
 )
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.repair import repair_robot
@@ -153,7 +152,8 @@ def _witness(found: RobotVerification, motion: Motion) -> FloatArray:
     """The configuration at which the proof finds two bodies nearest; [rad]."""
     worst = min(found.pairs, key=lambda pair: pair.upper)
     interval = min(int(worst.moment), motion.n_intervals - 1)
-    return at_moment(motion, interval, worst.moment - interval)
+    share = worst.moment - interval
+    return motion.within(np.array([interval]), np.array([share]))[0]
 
 
 def _fault(

@@ -94,3 +94,20 @@ def test_paths_together_move_as_each_does_alone() -> None:
 def test_what_is_no_path_is_refused(make: object, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         make()  # type: ignore[operator]
+
+
+def test_rows_within_intervals_are_those_at_their_times() -> None:
+    """Also at the ends, and of a single row."""
+    rng = np.random.default_rng(7)
+    times = np.cumsum(rng.uniform(0.1, 1.0, 6))
+    path = cubic_path(rng.normal(size=(6, 3)), rng.normal(size=(6, 3)), times=times)
+    intervals = rng.integers(0, 5, 200)
+    shares = np.concatenate([np.zeros(20), np.ones(20), rng.uniform(size=160)])
+    moments = times[intervals] + shares * np.diff(times)[intervals]
+    np.testing.assert_allclose(
+        path.within(intervals, shares), path.at(moments), atol=1e-12
+    )
+    one = Path(path.knots[:1])
+    np.testing.assert_array_equal(
+        one.within(intervals[:2], shares[:2])[1], one.knots[0]
+    )

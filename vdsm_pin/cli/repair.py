@@ -6,7 +6,16 @@ from typing import Annotated
 import typer
 
 from vdsm_pin.cli.options import OutFolder, TimeLimit, Trajectory, examples, family
-from vdsm_pin.cli.robot import RobotOptions
+from vdsm_pin.cli.robot import (
+    Locks,
+    PackageDirs,
+    RequiredClearance,
+    RequiredSelfClearance,
+    RobotOptions,
+    SceneFile,
+    Srdf,
+    Urdf,
+)
 from vdsm_pin.time_limit import Deadline, enforced
 
 commands = family()
@@ -29,30 +38,13 @@ def repair(
             metavar="[PROBLEM]", help="A problem file with robot; none with --urdf."
         ),
     ] = None,
-    urdf: Annotated[
-        Path | None, typer.Option(help="The robot, in place of a problem.")
-    ] = None,
-    srdf: Annotated[
-        Path | None, typer.Option(help="Its links that need not be held apart.")
-    ] = None,
-    scene: Annotated[
-        Path | None, typer.Option(help="Its obstacles: ours or a PlanningScene.")
-    ] = None,
-    package_dir: Annotated[
-        list[Path] | None, typer.Option(help="Where package:// is looked for.")
-    ] = None,
-    lock: Annotated[
-        list[str] | None,
-        typer.Option(metavar="JOINT=VALUE", help="A joint that stands still [rad, m]."),
-    ] = None,
-    required_clearance_mm: Annotated[
-        float | None,
-        typer.Option(min=0.0, help="With --urdf: from obstacles [mm]; 0 by default."),
-    ] = None,
-    required_self_clearance_mm: Annotated[
-        float | None,
-        typer.Option(min=0.0, help="With --urdf: between links [mm]; 0 by default."),
-    ] = None,
+    urdf: Urdf = None,
+    srdf: Srdf = None,
+    scene: SceneFile = None,
+    package_dir: PackageDirs = None,
+    lock: Locks = None,
+    required_clearance_mm: RequiredClearance = None,
+    required_self_clearance_mm: RequiredSelfClearance = None,
     pin: Annotated[
         list[int] | None,
         typer.Option(metavar="ROW", help="A waypoint, from 0, that stays."),

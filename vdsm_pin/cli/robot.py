@@ -2,12 +2,38 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+import typer
 
 from vdsm_pin.errors import InvalidInput
 
 if TYPE_CHECKING:
     from vdsm_pin.robots.cell import Cell
+
+
+Urdf = Annotated[Path | None, typer.Option(help="Any robot, in place of a problem.")]
+Srdf = Annotated[
+    Path | None, typer.Option(help="Its links that need not be held apart.")
+]
+SceneFile = Annotated[
+    Path | None, typer.Option(help="Its obstacles: ours or a PlanningScene.")
+]
+PackageDirs = Annotated[
+    list[Path] | None, typer.Option(help="Where package:// is looked for.")
+]
+Locks = Annotated[
+    list[str] | None,
+    typer.Option(metavar="JOINT=VALUE", help="A joint that stands still [rad, m]."),
+]
+RequiredClearance = Annotated[
+    float | None,
+    typer.Option(min=0.0, help="With --urdf: from obstacles [mm]; 0 by default."),
+]
+RequiredSelfClearance = Annotated[
+    float | None,
+    typer.Option(min=0.0, help="With --urdf: between links [mm]; 0 by default."),
+]
 
 
 class RobotOptions(NamedTuple):

@@ -23,7 +23,17 @@ from vdsm_pin.cli.options import (
     examples,
     family,
 )
-from vdsm_pin.cli.robot import RobotOptions, refuse_beside
+from vdsm_pin.cli.robot import (
+    Locks,
+    PackageDirs,
+    RequiredClearance,
+    RequiredSelfClearance,
+    RobotOptions,
+    SceneFile,
+    Srdf,
+    Urdf,
+    refuse_beside,
+)
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.time_limit import Deadline, enforced
 
@@ -97,30 +107,13 @@ def verify(
     ] = "auto",
     quiet: Quiet = False,
     as_json: AsJson = False,
-    urdf: Annotated[
-        Path | None, typer.Option(help="Any robot, in place of a problem.")
-    ] = None,
-    srdf: Annotated[
-        Path | None, typer.Option(help="Its links that need not be held apart.")
-    ] = None,
-    scene: Annotated[
-        Path | None, typer.Option(help="Its obstacles: ours or a PlanningScene.")
-    ] = None,
-    package_dir: Annotated[
-        list[Path] | None, typer.Option(help="Where package:// is looked for.")
-    ] = None,
-    lock: Annotated[
-        list[str] | None,
-        typer.Option(metavar="JOINT=VALUE", help="A joint that stands still [rad, m]."),
-    ] = None,
-    required_clearance_mm: Annotated[
-        float | None,
-        typer.Option(min=0.0, help="With --urdf: from obstacles [mm]; 0 by default."),
-    ] = None,
-    required_self_clearance_mm: Annotated[
-        float | None,
-        typer.Option(min=0.0, help="With --urdf: between links [mm]; 0 by default."),
-    ] = None,
+    urdf: Urdf = None,
+    srdf: Srdf = None,
+    scene: SceneFile = None,
+    package_dir: PackageDirs = None,
+    lock: Locks = None,
+    required_clearance_mm: RequiredClearance = None,
+    required_self_clearance_mm: RequiredSelfClearance = None,
 ) -> None:
     """Verify a trajectory of any planner.
 

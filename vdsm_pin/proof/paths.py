@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.geometry.bernstein import hermite, part, raised, value
 from vdsm_pin.proof.packed_tree import Motion
 
@@ -96,12 +96,19 @@ class Path:
         """Rows of q at some times (m,), at rest outside of its own, (m, n_columns)."""
         own, times = self.own_times, np.asarray(times, dtype=np.float64)
         if len(own) == 1:
-            return np.repeat(self.knots, len(times), axis=0)
+            return self.within(np.zeros(len(times), np.int64), times)
         inside = np.clip(times, own[0], own[-1])
         k = np.clip(np.searchsorted(own, inside, side="right") - 1, 0, len(own) - 2)
         share = (inside - own[k]) / (own[k + 1] - own[k])
-        found = value(self.controls[k], share)
-        found[share == 1.0] = self.knots[k[share == 1.0] + 1]
+        return self.within(k, share)
+
+    def within(self, intervals: IntArray, shares: FloatArray) -> FloatArray:
+        """Rows of q at shares, 0 to 1, of intervals, both (m,): (m, n_columns)."""
+        if len(self.knots) == 1:
+            return np.repeat(self.knots, len(intervals), axis=0)
+        found = value(self.controls[intervals], shares)
+        at_end = shares == 1.0
+        found[at_end] = self.knots[intervals[at_end] + 1]
         return found
 
     def packed(self) -> Motion:

@@ -233,10 +233,11 @@ def _met(
     if one.verdict is not Verdict.UNDECIDED or not one.upper <= MEETING:
         return one
     tree, path = motion
-    for moment in one.moment + np.array(BESIDE):
-        interval = int(np.clip(np.floor(moment), 0, path.n_intervals - 1))
-        q = at_moment(path, interval, float(np.clip(moment - interval, 0.0, 1.0)))
-        bodies = coal.pieces(pair, tree.poses(q[None])[0])
+    moments = one.moment + np.array(BESIDE)
+    intervals = np.clip(np.floor(moments).astype(np.int64), 0, path.n_intervals - 1)
+    rows = path.within(intervals, np.clip(moments - intervals, 0.0, 1.0))
+    for moment, poses in zip(moments, tree.poses(rows), strict=True):
+        bodies = coal.pieces(pair, poses)
         radius, centre = common_ball(*bodies, 0.5 * (one.link_point + one.other_point))
         if radius > 0.0:
             return replace(
@@ -330,16 +331,6 @@ def _clearances(
     return rows
 
 
-def at_moment(path: Path, interval: int, share: float) -> FloatArray:
-    """The row of q at a share of an interval, shape (n_columns,); [rad], [m]."""
-    if len(path.knots) == 1:
-        return np.asarray(path.knots[0])
-    points = path.controls[interval]
-    while len(points) > 1:
-        points = points[:-1] + share * np.diff(points, axis=0)
-    return np.asarray(points[0])
-
-
 class CoalPairs:
     """Coal's distances of the pairs of a robot and a scene.
 
@@ -388,10 +379,9 @@ def _coal(
 ) -> Check:
     """Coal's distance of each pair at its witness, which the bracket must hold."""
     off = np.full(len(pairs), nan)
-    seen = np.flatnonzero(np.isfinite(proof.upper)).tolist()
-    rows = [at_moment(path, int(proof.interval[k]), proof.share[k]) for k in seen]
-    poses = tree.poses(np.reshape(rows, (-1, tree.n_columns)))
-    for row, k in enumerate(seen):
+    seen = np.flatnonzero(np.isfinite(proof.upper))
+    poses = tree.poses(path.within(proof.interval[seen], proof.share[seen]))
+    for row, k in enumerate(seen.tolist()):
         value = coal.measured(pairs[k], poses[row]).distance
         if np.isnan(value):
             continue
