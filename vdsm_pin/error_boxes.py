@@ -122,6 +122,21 @@ class ErrorBox:
         errors[: len(given)] = np.maximum(errors[: len(given)], given)
         return errors
 
+    def turns(self, n_links: int) -> FloatArray:
+        """Largest angle by which errors turn each link against the one before it.
+
+        Errors a of alpha and b of theta turn it about axes at right angles: by t in
+        all, with cos(t / 2) = cos(a / 2) cos(b / 2).
+
+        Returns:
+            Shape (N,); [rad].
+        """
+        halves = np.minimum(self.angles(n_links), np.pi) / 2.0
+        a, b = np.sin(halves).T
+        return np.asarray(
+            2.0 * np.arcsin(np.minimum(np.hypot(a, b * np.sqrt(1.0 - a * a)), 1.0))
+        )
+
     def of_obstacle(self, name: str) -> ObstacleError:
         """How far an obstacle may be off."""
         mine = [one for one in self.obstacles if one.name == name]

@@ -5,8 +5,10 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
+from vdsm_pin.manipulator import Manipulator
 
 WIDEST: Final = np.pi / 2.0
 """Cones are narrower than this; [rad]."""
@@ -75,6 +77,88 @@ class Pointing:
             return np.broadcast_to(directions[0], tips.shape).copy()
         columns = [np.interp(stations, corner_stations, one) for one in directions.T]
         return np.stack(columns, axis=-1)
+
+
+@dataclass(frozen=True)
+class AimError:
+    """How much errors widen the angle between the last link and where it shall look.
+
+    They turn the link by at most the sum of what they turn joints and base by. They
+    move the tip by at most s, and that turns an aim of length d towards a target by at
+    most s / (d - s).
+
+    Args:
+        axis: What the last link is turned by; [rad].
+        tip: What joints and a displaced base move the tip by; [m].
+        base_turn: What the base is turned by; [rad].
+        length: Of the arm; [m].
+        target: Whether aims are ways to a target, and not directions.
+    """
+
+    axis: float
+    tip: float
+    base_turn: float
+    length: float
+    target: bool
+
+    @classmethod
+    def of(cls, pointing: Pointing, arm: Manipulator, errors: ErrorBox) -> "AimError":
+        """What an error box comes to."""
+        turns = errors.turns(arm.n_links)
+        levers = arm.total_length - arm.stations[:-1]
+        return cls(
+            float(turns.sum()) + errors.base_turn,
+            errors.base + float(turns @ levers),
+            errors.base_turn,
+            arm.total_length,
+            pointing.target is not None,
+        )
+
+    def widening(self, sizes: FloatArray, base: FloatArray) -> FloatArray:
+        """The largest widening, at most pi, shape (n,); [rad].
+
+        Args:
+            sizes: Lengths of aims, shape (n,); [m].
+            base: How far from its origin the base is on its rail, shape (n,); [m].
+        """
+        turned = np.zeros(len(sizes))
+        if self.target:
+            moved = self.tip + self.base_turn * (np.abs(base) + self.length)
+            left = sizes - moved
+            turned = np.where(
+                left > 0.0, moved / np.where(left > 0.0, left, 1.0), np.pi
+            )
+        return np.asarray(np.minimum(self.axis + turned, np.pi))
+
+
+@dataclass(frozen=True)
+class LastLinkCone:
+    """Where last links may look, errors included.
+
+    Args:
+        half_angle: Largest angle to the aim; [rad].
+        error: How much errors widen it; None for no pointing at all.
+    """
+
+    half_angle: float = np.inf
+    error: AimError | None = None
+
+    def holds(self, base: FloatArray, axes: FloatArray, aims: FloatArray) -> BoolArray:
+        """Whether arms look where they shall, shape (n,).
+
+        Args:
+            base: Of x0, shape (n,); [m].
+            axes: Last links, shape (n, 3), of any length.
+            aims: See `Pointing.aims`, NaN for anywhere, shape (n, 3).
+        """
+        off = angles_between(axes, aims)
+        if self.error is not None:
+            off = off + self.error.widening(np.linalg.norm(aims, axis=1), base)
+        return np.asarray((off <= self.half_angle) | np.isnan(aims).any(axis=1))
+
+
+ANYWHERE: Final = LastLinkCone()
+"""No cone at all."""
 
 
 def angles_between(one: FloatArray, other: FloatArray) -> FloatArray:

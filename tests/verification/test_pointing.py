@@ -7,7 +7,7 @@ import pytest
 
 from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.kinematics import joint_centres, link_frames
 from vdsm_pin.manipulator import built_in
 from vdsm_pin.pointing import Pointing, angles_between
 from vdsm_pin.problem import DesiredPath, PlanningProblem
@@ -184,6 +184,23 @@ def with_errors(
             largest, float(angles_between(centres[:, -1] - centres[:, -2], aims).max())
         )
     return largest
+
+
+def test_no_error_of_a_joint_turns_its_link_by_more() -> None:
+    """By rotation matrices; at a corner of the box it is as much."""
+    rng = np.random.default_rng(8)
+    for _ in range(200):
+        box = ErrorBox(joints=(tuple(rng.uniform(0.0, 1.0, 2) ** 2),))
+        (most,) = box.turns(1)
+        alpha, theta = rng.uniform(-1.0, 1.0, (2, 1))
+        errors = box.angles(1)[0] * rng.uniform(-1.0, 1.0, (50, 2))
+        errors[0] = box.angles(1)[0]
+        nominal = link_frames(alpha[None], theta[None])[0, 0]
+        off = link_frames(alpha + errors[:, :1], theta + errors[:, 1:])[:, 0]
+        cosines = (np.einsum("nij,ij->n", off, nominal) - 1.0) / 2.0
+        turns = np.arccos(np.clip(cosines, -1.0, 1.0))
+        assert turns.max() <= most + 1e-7
+        assert turns[0] == pytest.approx(most, abs=1e-7)
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -6,10 +6,8 @@ it together, and the cone's axis no faster than the tip or the station moves. So
 angle between the two is at most the mean of the angles at both ends of a slice and half
 of what both turn in it. Slices are halved until that is within the cone.
 
-Errors turn the axis by at most the sum of what they turn joints and base by. They move
-the tip by at most s, so that an aim of length d towards a target turns by at most
-s / (d - s). What the nominal motion keeps is then proved for every motion within the
-errors, or undecided.
+Errors widen the angle by no more than `AimError` says. What the nominal motion keeps is
+then proved for every motion within them, or undecided.
 """
 
 from collections.abc import Iterator
@@ -22,7 +20,7 @@ from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry import bernstein
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.pointing import angles_between
+from vdsm_pin.pointing import AimError, angles_between
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
@@ -94,21 +92,13 @@ class _Motion:
         levers = self.arm.total_length - self.arm.stations[:-1]
         self.speed = rates[:, 0] + turns @ levers
         self.swerve = self._steepest() * np.abs(self.run)
-        joints = errors.angles(self.arm.n_links).sum(axis=1)
-        self.axis_error = float(joints.sum()) + errors.base_turn
-        far = float(np.abs(self.pieces[..., 0]).max()) + self.arm.total_length
-        self.tip_error = errors.base + float(joints @ levers) + errors.base_turn * far
+        assert self.path.pointing is not None
+        self.error = AimError.of(self.path.pointing, self.arm, errors)
+        self.far = np.abs(self.pieces[..., 0]).max(initial=0.0)
 
-    def _spread(self, size: FloatArray) -> FloatArray:
+    def _widening(self, size: FloatArray) -> FloatArray:
         """How much errors widen the angle to aims of some length; [rad]."""
-        moved = 0.0
-        pointing = self.path.pointing
-        assert pointing is not None
-        if pointing.target is not None:
-            moved = self.tip_error
-        left = size - moved
-        turned = np.where(left > 0.0, moved / np.where(left > 0.0, left, 1.0), np.pi)
-        return np.asarray(np.minimum(self.axis_error + turned, np.pi))
+        return self.error.widening(size, self.far)
 
     def _steepest(self) -> float:
         """Largest change of the directions per length of path; [1/m]."""
@@ -130,7 +120,7 @@ class _Motion:
         aims = self.path.aims(centres[:, -1], wrapped(self.path, station))
         axes = centres[:, -1] - centres[:, -2]
         size = np.linalg.norm(aims, axis=1)
-        return angles_between(axes, aims) + self._spread(size), size
+        return angles_between(axes, aims) + self._widening(size), size
 
     def bounds(self, slices: _Slices) -> FloatArray:
         """Largest angle within slices, from above; inf where none is known; [rad]."""
@@ -144,8 +134,8 @@ class _Motion:
         nearest = np.where(clear, nearest, 1.0)
         turned = self.turning[k] * width + moved / nearest
         middle = (slices.angle + slices.next_angle) / 2.0
-        ends = self._spread(slices.size) + self._spread(slices.next_size)
-        middle += self._spread(nearest) - ends / 2.0
+        ends = self._widening(slices.size) + self._widening(slices.next_size)
+        middle += self._widening(nearest) - ends / 2.0
         bound = middle + turned / 2.0 + ROUNDING * (1.0 + 1.0 / nearest)
         return np.where(clear & np.isfinite(bound), bound, np.inf)
 

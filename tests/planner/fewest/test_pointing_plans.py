@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem
 
+from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import built_in
+from vdsm_pin.manipulator import LinkBody, built_in
 from vdsm_pin.planner.fewest.charts import turned_towards
-from vdsm_pin.pointing import Pointing, angles_between
-from vdsm_pin.problem import Blocked, PlanningProblem
+from vdsm_pin.pointing import AimError, Pointing, angles_between
+from vdsm_pin.problem import Blocked, DesiredPath, PlanningProblem
 from vdsm_pin.refinement import Refinement, plan_and_verify
 from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Cylinder, Obstacle, Sphere
+from vdsm_pin.scene import Box, Cylinder, Obstacle, Scene, Sphere
 from vdsm_pin.verification.pointing import NAME
 from vdsm_pin.verification.records import Verdict
 
@@ -81,6 +83,56 @@ def test_the_last_link_looks_there_all_along_the_path(
     assert row.verdict is Verdict.CERTIFIED
     assert largest_angle(task, found) <= row.worst <= pointing.cone
     assert found.verification.coverage == pytest.approx(1.0)
+
+
+CAMERA = LinkBody(
+    8,
+    Box("camera", np.array([0.3, 0.0, 0.04]), np.eye(3), np.array([0.04, 0.02, 0.02])),
+)
+WINDOW = tuple(
+    Box(f"w{k}", np.array([2.6, y, z]), np.eye(3), np.array([0.03, *half]))
+    for k, (y, z, *half) in enumerate(
+        [
+            (-1.4, 0.2, 1.43, 3.0),
+            (1.9, 0.2, 1.43, 3.0),
+            (0.25, -1.6, 0.22, 1.62),
+            (0.25, 1.95, 0.22, 1.63),
+        ]
+    )
+)
+"""A wall with a window of 440 by 300 mm, round y = 250 and z = 170."""
+
+
+@pytest.mark.parametrize("joint_deg", [0.0, 0.1])
+@pytest.mark.parametrize("target", [np.array([3.6, 0.3, 0.2]), None])
+def test_a_camera_looks_through_a_window_within_the_errors(
+    target: FloatArray | None, joint_deg: float
+) -> None:
+    directions = None if target is not None else AHEAD
+    pointing = Pointing(float(np.deg2rad(4.0)), target, directions)
+    arm = replace(ARM, bodies=(CAMERA,), ignore_pairs=(("camera", "link 7"),))
+    path = DesiredPath(
+        np.array([2.4, 0.0, 0.0]),
+        np.array([[2.9, 0.2, 0.15], [2.9, 0.3, 0.15]]),
+        pointing=pointing, blocked=Blocked.FAIL,
+    )  # fmt: skip
+    errors = ErrorBox(joint=float(np.deg2rad(joint_deg)))
+    task = PlanningProblem(
+        "look", arm, Scene(WINDOW), path, 0.0035, np.eye(4), errors=errors
+    )
+    found = planned(task)
+    assert found.verification.verdict is Verdict.CERTIFIED
+    (row,) = [check for check in found.verification.checks if check.name == NAME]
+    reserve = AimError.of(pointing, arm, errors).axis
+    assert largest_angle(task, found) <= pointing.cone - reserve
+    assert row.worst <= pointing.cone
+
+
+def test_a_cone_that_errors_use_up_is_refused_with_both_numbers() -> None:
+    pointing = Pointing(float(np.deg2rad(3.0)), directions=AHEAD)
+    task = replace(looking(pointing), errors=ErrorBox(joint=float(np.deg2rad(0.3))))
+    with pytest.raises(NoPlanFound, match=r"by 3\.394 deg .* cone has 3\.000 deg"):
+        planned(task)
 
 
 def test_the_wish_makes_a_difference_and_the_same_plan_comes_again() -> None:

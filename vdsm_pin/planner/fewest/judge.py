@@ -11,13 +11,14 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.interval_parts import Parts
 from vdsm_pin.planner.fewest.motion import Corners, Intervals
 from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along, pieces_of
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Pricing, link_limit
 from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.pointing import angles_between
+from vdsm_pin.pointing import ANYWHERE, AimError, LastLinkCone
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -33,17 +34,42 @@ THIRDS: Final = 40
 """Times the place where the base is farthest back is looked for in two thirds."""
 
 
-def _cone(problem: PlanningProblem, slack: float) -> float:
-    """What a plan uses of the cone in which the last link looks; [rad].
+def _cone(problem: PlanningProblem, slack: float) -> LastLinkCone:
+    """What a plan uses of the cone in which the last link looks.
 
     The rest is for what happens between two rows, where joint centres stray by up to
-    `slack` [m].
+    `slack` [m]: half of what errors leave of the cone at most.
     """
-    pointing = problem.path.pointing
+    pointing, arm = problem.path.pointing, problem.manipulator
     if pointing is None:
-        return np.inf
-    reserve = 2.0 * slack / problem.manipulator.link_lengths[-1] + STEADY
-    return max(pointing.cone - float(reserve), pointing.cone / 2.0)
+        return ANYWHERE
+    error = AimError.of(pointing, arm, problem.errors)
+    left = max(pointing.cone - error.axis, 0.0)
+    reserve = 2.0 * slack / float(arm.link_lengths[-1]) + STEADY
+    return LastLinkCone(pointing.cone - min(reserve, left / 2.0), error)
+
+
+def check_cone(problem: PlanningProblem) -> None:
+    """Refuse a cone that errors leave nothing of, wherever the tip is on the path.
+
+    Raises:
+        NoPlanFound: With what errors may turn the last link by.
+    """
+    pointing, path = problem.path.pointing, problem.path
+    if pointing is None:
+        return
+    aims = path.aims(path.corners, path.corner_stations)
+    sizes = np.linalg.norm(aims, axis=1)
+    error = AimError.of(pointing, problem.manipulator, problem.errors)
+    least = float(error.widening(sizes, np.zeros(1)).min())
+    if least >= pointing.cone:
+        message = (
+            f"errors may turn the last link by {np.rad2deg(least):.3f} deg against "
+            f"where it shall look, and its cone has {np.rad2deg(pointing.cone):.3f} "
+            "deg: no motion can be proved to look there; try smaller errors or a "
+            "wider cone"
+        )
+        raise NoPlanFound(message)
 
 
 class Judge:
@@ -129,8 +155,8 @@ class Judge:
 
     def _aimed(self, centres: FloatArray, aims: FloatArray) -> BoolArray:
         """Whether last links look where they shall, shape (n,)."""
-        off = angles_between(centres[:, -1] - centres[:, -2], aims)
-        return np.asarray((off <= self.cone) | np.isnan(aims).any(axis=1))
+        axes = centres[:, -1] - centres[:, -2]
+        return self.cone.holds(centres[:, 0, 0], axes, aims)
 
     def bends(self, tips: FloatArray, offsets: FloatArray) -> FloatArray:
         """Link angles of configurations, shape (n, N); [rad]."""

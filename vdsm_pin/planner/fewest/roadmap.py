@@ -12,7 +12,7 @@ from vdsm_pin.planner.fewest.roadmap_kernels import Barred, Graph, pose_shapes
 from vdsm_pin.planner.fewest.route import TipRoute
 from vdsm_pin.planner.fewest.shapes import Shapes
 from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.pointing import angles_between
+from vdsm_pin.pointing import ANYWHERE, LastLinkCone
 from vdsm_pin.problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -54,14 +54,14 @@ class Pricing:
         limit: Largest link angle; [rad].
         length: Of the arm; [m].
         weights: What the strategy prefers.
-        cone: Largest angle between the last link and where it shall look; [rad].
+        cone: Where last links may look.
     """
 
     required: float
     limit: float
     length: float
     weights: CostWeights
-    cone: float = np.inf
+    cone: LastLinkCone = ANYWHERE
 
     def prices(
         self, bends: FloatArray, clearances: FloatArray
@@ -176,9 +176,8 @@ def build_roadmap(
             *arm.base_range,
         )  # fmt: skip
         if aims is not None:
-            there = aims[node // shapes.size]
-            looks = np.isnan(there).any(axis=1)
-            looks |= angles_between(ends[:, 2] - ends[:, 1], there) <= pricing.cone
+            there, axes = aims[node // shapes.size], ends[:, 2] - ends[:, 1]
+            looks = pricing.cone.holds(ends[:, 0, 0], axes, there)
             node, ends, bends = node[looks], ends[looks], bends[looks]
         if kept is not None:
             ends = link_by_link(ends, arm.stations)

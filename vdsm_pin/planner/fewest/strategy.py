@@ -22,6 +22,7 @@ from vdsm_pin.planner.fewest.explain import (
 )
 from vdsm_pin.planner.fewest.explore import Outcome, explore
 from vdsm_pin.planner.fewest.joint_error import levers
+from vdsm_pin.planner.fewest.judge import check_cone
 from vdsm_pin.planner.fewest.largest_margin import drawn_length, widest
 from vdsm_pin.planner.fewest.levels import FULL, LEANING, QUICK, Effort, pointed
 from vdsm_pin.planner.fewest.motion import Corners, Rows, dense_rows
@@ -196,6 +197,7 @@ def _plan(
     effort: Effort = FULL,
 ) -> Plan:
     check_start(problem, clearance)
+    check_cone(problem)
     if not leans_ahead(problem):
         try:
             rows = unbend(problem, clearance, margin)
