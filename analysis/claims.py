@@ -22,19 +22,19 @@ from paper_table import touching_error
 
 from benchmarks.hrm1000.families import FAMILIES
 from benchmarks.hrm1000.generate import VERSION, generate
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.impossible.bounds import least_changed
 from vdsm_pin.planner.paper import pipeline, side_rules
 from vdsm_pin.planner.paper.online import OnlineRule
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.report.facts import changed_angles, motion_facts
-from vdsm_pin.robot_model import load_robot
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "claims.md"

@@ -16,14 +16,14 @@ from paper_figures import style
 from result_files import output_folder, write_table
 
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.robot_model import load_robot
 from vdsm_pin.simulation.closed_loop import Simulation, simulate
 from vdsm_pin.simulation.folder import Cleared, SimulationFile, summary
 from vdsm_pin.simulation.settings import Kick, Settings
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.robot_model import load_robot
 
 SCENES = ("free", "obs1", "obs2", "obs2-small", "obs3")
 STRATEGIES = ("paper", "fewest", "sturdiest")

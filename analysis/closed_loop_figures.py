@@ -7,8 +7,8 @@ from paper_figures import style
 from paper_figures.scenery import draw_arm, draw_obstacles
 from paper_figures.views import oblique
 
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.simulation.closed_loop import Simulation
 from vdsm_pin.simulation.folder import BAND
 

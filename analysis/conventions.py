@@ -13,8 +13,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import built_in
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import built_in
 
 TARGET: Final = Path(__file__).parents[1] / "docs" / "conventions.svg"
 ANGLE: Final = np.deg2rad(25.0)

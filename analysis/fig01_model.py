@@ -11,8 +11,8 @@ from paper_figures import style
 from paper_figures.runs import Runs
 from paper_figures.style import save_all
 
+from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.manipulator import Manipulator, built_in
 from vdsm_pin.units import MM_PER_M
 
 NAME: Final = "fig01"

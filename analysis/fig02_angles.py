@@ -8,8 +8,8 @@ from paper_figures import style
 from paper_figures.runs import Runs
 from paper_figures.style import save_all
 
+from vdsm_pin.arm.kinematics import link_angles, link_frames, position_angles
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import link_angles, link_frames, position_angles
 
 NAME: Final = "fig02"
 ALPHA, THETA = np.deg2rad(38.0), np.deg2rad(-30.0)

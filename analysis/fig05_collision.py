@@ -18,7 +18,7 @@ from paper_figures.views import OBLIQUE, SIDE, TOP
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.paper.lift import lift
 from vdsm_pin.planner.paper.scale import scale
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.verification.link_clearance import link_clearance
 
 NAME = "fig05"

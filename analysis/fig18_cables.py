@@ -10,7 +10,7 @@ from paper_figures.runs import Run, Runs
 from paper_figures.style import save_all
 from paper_figures.views import thin
 
-from vdsm_pin.cables import cable_lengths
+from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.report.palette import oklch
 from vdsm_pin.units import MM_PER_M

@@ -18,12 +18,12 @@ import yaml
 from result_files import output_folder, write_table
 
 from vdsm_pin.io.problem_file import built_in_text, read_problem
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 SCENES: Final = ("obs1", "obs2-small", "obs3")

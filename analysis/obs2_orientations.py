@@ -14,12 +14,13 @@ from typing import Final
 import numpy as np
 from result_files import output_folder, write_table
 
+from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.errors import Infeasible
+from vdsm_pin.geometry.solids import Prism
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.paper.pipeline import plan_paper
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scene import Prism, Scene
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.link_clearance import link_clearance
 

@@ -12,16 +12,16 @@ from typing import Final
 import numpy as np
 from result_files import output_folder, write_table
 
+from vdsm_pin.arm.kinematics import link_angles
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.kinematics import link_angles
-from vdsm_pin.manipulator import built_in
 from vdsm_pin.planner.feasibility import curled_reach, straight_reach
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import Refinement, plan_and_verify
-from vdsm_pin.robot_model import load_robot
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.robust import largest_joint_error
 
 SCENES: Final = ("free", "obs1", "obs2", "obs2-small", "obs3")

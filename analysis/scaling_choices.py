@@ -26,14 +26,19 @@ import numpy as np
 from result_files import output_folder, write_table
 
 from benchmarks.hrm1000.generate import generate
+from vdsm_pin.arm.kinematics import joint_angles, link_angles
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.kinematics import joint_angles, link_angles
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.paper.pipeline import plan_paper
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scaling import OtherRatios, ProjectionCylinder, Scaling, ScalingCentre
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scaling import (
+    OtherRatios,
+    ProjectionCylinder,
+    Scaling,
+    ScalingCentre,
+)
 from vdsm_pin.verification.link_clearance import link_clearance
 
 PAPER = ("obs1", "obs2", "obs2-small", "obs3")

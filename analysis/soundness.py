@@ -48,12 +48,14 @@ from oracles.adversarial_truth import exact_bracket
 from oracles.tree_queries import at as tree_rows
 from oracles.tree_queries import clearances, make_query, random_box, wrong_poses
 
-from vdsm_pin.arm_bodies import arm_bodies
-from vdsm_pin.arm_tree import arm_tree, link_frame
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.bodies import arm_bodies
+from vdsm_pin.arm.tree import arm_tree, link_frame
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
-from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.budget import Budget, rounding_pad
 from vdsm_pin.proof.packing import pack_task
@@ -61,8 +63,6 @@ from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove
 from vdsm_pin.proof.proving import new_proving
 from vdsm_pin.proof.terms import WORLD
-from vdsm_pin.scene import Scene
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.records import ClearanceChunk
 from vdsm_pin.verification.task import with_growth

@@ -15,15 +15,15 @@ from paper_figures.runs import Runs
 from result_files import output_folder, write_table
 
 from vdsm_pin.app.explanation.cross import DIRECTIONS, leave
+from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.paper import side_rules
 from vdsm_pin.planner.paper.along_rail import AlongRail
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.robot_model import load_robot
 from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.robot_model import load_robot
 
 SCENES: Final = ("obs1", "obs2", "obs2-small")
 GROWTHS: Final = (0.0, 0.02, 0.04, 0.08)

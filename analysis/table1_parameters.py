@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from paper_figures.style import subscript
 
+from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.manipulator import Manipulator, built_in
 from vdsm_pin.units import MM_PER_M
 
 QUARTER = np.pi / 2.0

@@ -12,8 +12,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import Manipulator, built_in
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import Manipulator, built_in
 
 FOLDER: Final = Path(__file__).parents[1] / "docs"
 INK, PALE, ARM, PLANE = "#1f2733", "#b6bfcb", "#d9480f", "#1c7ed6"

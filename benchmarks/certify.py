@@ -21,13 +21,14 @@ import coal
 import numpy as np
 
 from benchmarks.common import surroundings, timed
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import Manipulator, built_in
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.scene import Cylinder, Mesh, Obstacle, Scene, Sphere
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.geometry.solids import Cylinder, Mesh, Sphere
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Obstacle, Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 
 ARM = built_in("hrm8")

@@ -19,17 +19,17 @@ import numpy as np
 
 from benchmarks.certify import ARM, NEAR, beside, certify_growth, problem_of, sway
 from benchmarks.common import MILLI, Results, command, timed
-from vdsm_pin.cables import angles_from_cables, cable_lengths
-from vdsm_pin.error_boxes import ErrorBox
-from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
-from vdsm_pin.kinematics import joint_angles, joint_centres
-from vdsm_pin.manipulator import (
+from vdsm_pin.arm.cables import angles_from_cables, cable_lengths
+from vdsm_pin.arm.kinematics import joint_angles, joint_centres
+from vdsm_pin.arm.manipulator import (
     CableLayout,
     paper_hole_angles,
 )
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.planner.paper.pipeline import plan_paper
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.robust import largest_joint_error
 

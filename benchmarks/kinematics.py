@@ -16,15 +16,15 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from benchmarks.common import MICRO, Results, command, timed
-from vdsm_pin.cables import angles_from_cables, cable_lengths
+from vdsm_pin.arm.cables import angles_from_cables, cable_lengths
+from vdsm_pin.arm.kinematics import joint_angles, joint_centres
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.kinematics import joint_angles, joint_centres
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.cable_check import check_cables
 from vdsm_pin.verification.coal_clearance import check_coal
 from vdsm_pin.verification.fk import check_fk
+from vdsm_pin.verification.robot_model import load_robot
 
 PROBLEM = "paper/obs1"
 

@@ -21,7 +21,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import write_trajectory
 from vdsm_pin.planner.strategies import strategy
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.link_clearance import link_clearance
 
 PROBLEM = "paper/obs1"

@@ -24,9 +24,9 @@ from vdsm_pin.errors import VdsmError
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.planner.strategies import strategy
-from vdsm_pin.robot_model import load_robot
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 PROBLEMS = ("free", "obs1", "obs2", "obs3")

@@ -3,7 +3,7 @@
 import numpy as np
 
 import vdsm_pin as vp
-from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.arm.kinematics import joint_centres
 
 problem = vp.read_problem("paper/obs1")
 arm, path = problem.manipulator, problem.tip_path

@@ -2,21 +2,21 @@
 
 import numpy as np
 
-from vdsm_pin.error_boxes import ErrorBox
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.report.run_record import RunRecord
-from vdsm_pin.scene import (
+from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.geometry.solids import (
     Box,
     Capsule,
     Cylinder,
     HalfSpace,
     Mesh,
     Prism,
-    Scene,
     Sphere,
 )
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.report.run_record import RunRecord
 from vdsm_pin.verification.records import (
     Check,
     ClearanceChunk,

@@ -13,9 +13,9 @@ from oracles.certificate_cases import certificate_lines
 
 import vdsm_pin as vp
 from vdsm_pin import api
+from vdsm_pin.arm.manipulator import paper_hole_angles
 from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.errors import VerificationFailed
-from vdsm_pin.manipulator import paper_hole_angles
 
 
 def test_every_name_is_there_and_is_what_type_checkers_see() -> None:

@@ -35,14 +35,14 @@ from oracles.certificate_oracle import (
     sha256,
 )
 
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.certificate_checker import check_certificate, main
 from vdsm_pin.certificate_checker.path import Drawing
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.convex import HalfSpacePiece
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.scene import Scene
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.drawing import check_order
 from vdsm_pin.verification.records import Verdict
 

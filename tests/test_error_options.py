@@ -7,10 +7,10 @@ import pytest
 from typer.testing import CliRunner
 
 import vdsm_pin as vp
-from vdsm_pin import error_boxes
 from vdsm_pin.cli import app
 from vdsm_pin.cli.options import errors_of
 from vdsm_pin.errors import InvalidInput
+from vdsm_pin.problem import error_boxes
 
 TEXT = """vdsm_problem: 1
 name: errors

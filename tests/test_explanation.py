@@ -11,13 +11,13 @@ from lxml import etree
 from vdsm_pin.app.explanation.canvas import Canvas
 from vdsm_pin.app.explanation.cross import DIRECTIONS, crosses
 from vdsm_pin.app.explanation.folder import explain_to_folder
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.errors import InvalidInput, NoPlanFound
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.planner.paper.along_rail import AlongRail
 from vdsm_pin.planner.paper.steps import PaperSteps
 from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.robot_model import load_robot
+from vdsm_pin.verification.robot_model import load_robot
 
 
 def steps_of(name: str) -> PaperSteps:

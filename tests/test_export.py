@@ -16,14 +16,14 @@ from PIL import Image
 from problem_files import NEAR, write_problem
 
 from vdsm_pin.app.export import ExportOrder, export
+from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.kinematics import joint_centres, link_frames
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.film import Shot, pictures
 from vdsm_pin.report.gltf import glb, play_times
 from vdsm_pin.report.html import view_page
-from vdsm_pin.trajectory import Trajectory
 
 Y_UP = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
 

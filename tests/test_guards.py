@@ -16,19 +16,19 @@ import pytest
 from numba.core import event
 from problem_files import NEAR, write_problem
 
-from vdsm_pin.cables import angles_from_cables, cable_lengths
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.cables import angles_from_cables, cable_lengths
+from vdsm_pin.arm.kinematics import joint_angles, joint_centres
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
-from vdsm_pin.kinematics import joint_angles, joint_centres
 from vdsm_pin.planner.strategies import strategy
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification import coal_clearance
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.link_clearance import link_clearance
+from vdsm_pin.verification.robot_model import load_robot
 
 COUNTED = """
 import sys

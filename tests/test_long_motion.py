@@ -9,8 +9,8 @@ import pytest
 
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import write_trajectory
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.files import VerificationFile
-from vdsm_pin.trajectory import Trajectory
 
 PROGRAM = """
 import sys

@@ -7,8 +7,8 @@ import time
 import pytest
 from made_up import trajectory
 
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.progress import say, shown, step, watched
 from vdsm_pin.verification.proving import prove_problem
 

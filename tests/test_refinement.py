@@ -10,21 +10,22 @@ import pytest
 import trimesh
 
 import vdsm_pin.refinement as refinement
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import Infeasible, InsideUnknown, NoPlanFound
+from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
-from vdsm_pin.problem import Approach, PlanningProblem
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Mesh, Scene
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import Approach, PlanningProblem
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.time_limit import NO_LIMIT
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_clearance, coal_missing
 from vdsm_pin.verification.coal_clearance import CoalDistances, coal_distances
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.robust import largest_joint_error
 
 

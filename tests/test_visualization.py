@@ -19,10 +19,10 @@ import numpy as np
 import pytest
 
 from vdsm_pin.app.visualization import ViewServer, page, write_page
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.problem_file import built_in_text, read_problem
 from vdsm_pin.io.trajectory_file import write_trajectory
-from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.report.postures import at_start
 
 TETRAHEDRON = """v 0 0 900

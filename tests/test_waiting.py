@@ -9,11 +9,7 @@ from typer.testing import CliRunner
 from vdsm_pin.cli import app
 from vdsm_pin.errors import InvalidInput, NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
-from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import (
+from vdsm_pin.geometry.solids import (
     Box,
     Capsule,
     Cylinder,
@@ -24,10 +20,13 @@ from vdsm_pin.scene import (
     Solid,
     Sphere,
     Voxels,
-    placed,
 )
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 
 TEXT = """vdsm_problem: 1
 name: door
@@ -127,7 +126,7 @@ def test_a_placed_solid_is_the_solid_elsewhere(solid: Solid) -> None:
     pose[:3, :3] = rotation_from_rpy(np.array([0.3, -0.7, 2.0]))
     pose[:3, 3] = 0.4, -0.5, 0.6
     moved = corners(solid) @ pose[:3, :3].T + pose[:3, 3]
-    np.testing.assert_allclose(corners(placed(solid, pose)), moved, atol=1e-12)
+    np.testing.assert_allclose(corners(solid.placed(pose)), moved, atol=1e-12)
 
 
 def test_a_placed_half_space_has_its_points() -> None:
@@ -135,7 +134,7 @@ def test_a_placed_half_space_has_its_points() -> None:
     pose[:3, :3] = rotation_from_rpy(np.array([0.3, -0.7, 2.0]))
     pose[:3, 3] = 0.4, -0.5, 0.6
     solid = HalfSpace("p", np.array([0.0, 0.0, 0.5]), np.array([0.0, 0.6, 0.8]))
-    moved = placed(solid, pose)
+    moved = solid.placed(pose)
     points = np.random.default_rng(0).normal(size=(50, 3))
     heights = (points - solid.point) @ solid.normal
     there = points @ pose[:3, :3].T + pose[:3, 3]

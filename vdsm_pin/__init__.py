@@ -23,8 +23,7 @@ if TYPE_CHECKING:
         write_report,
         write_trajectory,
     )
-    from vdsm_pin.errors import Infeasible, InvalidInput, VdsmError
-    from vdsm_pin.manipulator import (
+    from vdsm_pin.arm.manipulator import (
         CableLayout,
         Feed,
         LinkBody,
@@ -32,19 +31,20 @@ if TYPE_CHECKING:
         Tool,
         built_in,
     )
-    from vdsm_pin.problem import DesiredPath
-    from vdsm_pin.problem import PlanningProblem as Problem
-    from vdsm_pin.scene import (
+    from vdsm_pin.errors import Infeasible, InvalidInput, VdsmError
+    from vdsm_pin.geometry.solids import (
         Box,
         Capsule,
         Cylinder,
         HalfSpace,
         Mesh,
         Prism,
-        Scene,
         Sphere,
     )
-    from vdsm_pin.trajectory import Trajectory
+    from vdsm_pin.problem.planning_problem import DesiredPath
+    from vdsm_pin.problem.planning_problem import PlanningProblem as Problem
+    from vdsm_pin.problem.scene import Scene
+    from vdsm_pin.problem.trajectory import Trajectory
     from vdsm_pin.verification.records import Verdict
 
 __version__ = "0.2.0"
@@ -83,15 +83,15 @@ __all__ = [
 
 _HOMES: Final = {
     "errors": ("Infeasible", "InvalidInput", "VdsmError"),
-    "manipulator": (
+    "arm.manipulator": (
         *("CableLayout", "Feed", "LinkBody", "Manipulator", "Tool", "built_in"),
     ),
-    "problem": ("DesiredPath",),
-    "scene": (
-        *("Box", "Capsule", "Cylinder", "HalfSpace", "Mesh", "Prism"),
-        *("Scene", "Sphere"),
+    "geometry.solids": (
+        *("Box", "Capsule", "Cylinder", "HalfSpace", "Mesh", "Prism", "Sphere"),
     ),
-    "trajectory": ("Trajectory",),
+    "problem.planning_problem": ("DesiredPath",),
+    "problem.scene": ("Scene",),
+    "problem.trajectory": ("Trajectory",),
     "verification.records": ("Verdict",),
 }
 """Where names live that are not in `api`."""
@@ -106,7 +106,7 @@ def __getattr__(name: str) -> Any:
     homes = (home for home, names in _HOMES.items() if name in names)
     module, wanted = next(homes, "api"), name
     if name == "Problem":
-        module, wanted = "problem", "PlanningProblem"
+        module, wanted = "problem.planning_problem", "PlanningProblem"
     return getattr(import_module(f"{__name__}.{module}"), wanted)
 
 

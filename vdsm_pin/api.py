@@ -15,17 +15,17 @@ from typing import Literal
 
 import numpy as np
 
-from vdsm_pin.error_boxes import NOTHING
-from vdsm_pin.error_boxes import ErrorBox as Box
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io import problem_file, trajectory_file
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import load_robot
+from vdsm_pin.problem.error_boxes import NOTHING
+from vdsm_pin.problem.error_boxes import ErrorBox as Box
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import Deadline
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import Verification
+from vdsm_pin.verification.robot_model import load_robot
 
 PYTHON = "from Python"
 """What a report names as command and problem file where there is none."""

@@ -13,7 +13,6 @@ from typing import Final, Literal
 
 import numpy as np
 
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.goals import with_ends, with_path
@@ -22,15 +21,16 @@ from vdsm_pin.planner.start import with_known_insides
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.planner.time_limit import within_time
 from vdsm_pin.planner.waiting import waited
-from vdsm_pin.problem import Approach, PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import Approach, PlanningProblem
 from vdsm_pin.progress import say
-from vdsm_pin.robot_model import RobotModel
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
 from vdsm_pin.verification.coal_missing import coal_missing
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.robot_model import RobotModel
 from vdsm_pin.verification.robust import (
     largest_joint_error,
     refuted_joint_error,

@@ -68,14 +68,14 @@ GROUPS: Final = (
     Group(
         "arm",
         (
-            "vdsm_pin/kinematics.py",
-            "vdsm_pin/cables.py",
+            "vdsm_pin/arm/kinematics.py",
+            "vdsm_pin/arm/cables.py",
             "vdsm_pin/geometry/cable_kernels.py",
             "vdsm_pin/geometry/joint_kernels.py",
         ),
         (
-            "tests/test_kinematics.py",
-            "tests/test_cables.py",
+            "tests/arm/test_kinematics.py",
+            "tests/arm/test_cables.py",
             "tests/verification/test_cable_check.py",
         ),
     ),

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import table1_parameters
 
-from vdsm_pin.manipulator import built_in
+from vdsm_pin.arm.manipulator import built_in
 
 TEMPLATE: Final = Path(__file__).with_name("page.md")
 """The words, with the places of the numbers."""

@@ -5,16 +5,16 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import Refinement, plan_and_verify
-from vdsm_pin.robot_model import RobotModel, load_robot
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import Verification
+from vdsm_pin.verification.robot_model import RobotModel, load_robot
 
 SCENES: Final = ("obs1", "obs2", "obs2-small", "obs3", "free")
 """The paper's environments; obs2 in both readings."""

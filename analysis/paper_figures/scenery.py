@@ -13,12 +13,13 @@ from matplotlib.ticker import MultipleLocator
 
 from paper_figures import style
 from paper_figures.views import View, thin
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.geometry.solids import HalfSpace
 from vdsm_pin.planner.paper.sections import VIEWS, section_along
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.report.solids import surface
-from vdsm_pin.scene import HalfSpace, Obstacle
 from vdsm_pin.units import MM_PER_M
 
 ROOM: Final = np.array([[-0.25, -0.70, -0.40], [3.35, 1.20, 1.50]])

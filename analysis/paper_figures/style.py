@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 from result_files import REPORTS
 
-from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.report.palette import oklch
 
 WIDTH: Final = 7.2

@@ -12,6 +12,7 @@ import numpy as np
 from benchmarks.foreign_plans.sampled import Sampled
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.robots.judgement import (
     LINKS,
@@ -21,7 +22,6 @@ from vdsm_pin.robots.judgement import (
 )
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.repair import repair_robot
-from vdsm_pin.scene import Scene
 from vdsm_pin.verification.records import Verdict, combine
 
 DENSITIES: Final = ("0.01", "0.005", "1 deg", "1 mm")

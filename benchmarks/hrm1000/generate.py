@@ -12,9 +12,9 @@ import numpy as np
 import yaml
 
 from benchmarks.hrm1000.families import CLEARANCE, FAMILIES, TIP, Draft
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.verification.link_clearance import link_clearance
 
 VERSION: Final = 2

@@ -5,13 +5,13 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.manipulator import (
+from vdsm_pin.arm.manipulator import (
     CableLayout,
     Manipulator,
     built_in,
     paper_hole_angles,
 )
+from vdsm_pin.geometry.arrays import FloatArray
 
 PAPER: Final = built_in("hrm8")
 

@@ -10,20 +10,20 @@ import numpy as np
 
 from benchmarks.hrm2000.references import REFERENCES, reference
 from benchmarks.hrm2000.sampling import sample
+from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.planner.time_limit import within_time
-from vdsm_pin.problem import Blocked, PlanningProblem
+from vdsm_pin.problem.planning_problem import Blocked, PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.report.facts import changed_angles, motion_facts
-from vdsm_pin.robot_model import RobotModel, load_robot
 from vdsm_pin.time_limit import Deadline
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import in_mm
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.robot_model import RobotModel, load_robot
 from vdsm_pin.verification.verify import verify
 
 WALL: Final = 6.0

@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.manipulator import Manipulator
 
 HALVINGS: Final = 60
 """Bisections that find a joint centre on the curve: to the last bit."""

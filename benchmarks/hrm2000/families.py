@@ -19,7 +19,7 @@ from benchmarks.hrm2000.passages import Hook, duct, pocket
 from benchmarks.hrm2000.sweeps import Rng, sweep
 from benchmarks.hrm2000.twins import twin
 from benchmarks.hrm2000.walls import Windows, blades, port
-from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.arm.manipulator import Manipulator
 
 
 def dense_clutter(rng: Rng, arm: Manipulator) -> Draft:

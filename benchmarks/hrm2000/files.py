@@ -12,10 +12,10 @@ from benchmarks.hrm2000.arms import PAPER
 from benchmarks.hrm2000.drafts import Draft
 from benchmarks.hrm2000.motions import Witness
 from benchmarks.hrm2000.sweeps import required_clearance, scale
-from vdsm_pin import scene
+from vdsm_pin.arm.manipulator import Manipulator
+from vdsm_pin.geometry import solids
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.trajectory_file import write_trajectory
-from vdsm_pin.manipulator import Manipulator
 
 MM: Final = 1e3
 
@@ -30,7 +30,7 @@ def write(folder: Path, name: str, draft: Draft) -> Path:
     obstacles = []
     for obstacle in draft.obstacles:
         fields = solid(obstacle)
-        if isinstance(obstacle, scene.Mesh):
+        if isinstance(obstacle, solids.Mesh):
             fields["file"] = f"{name}-{obstacle.name}.stl"
             corners = MM * np.asarray(obstacle.vertices)
             mesh = trimesh.Trimesh(corners, obstacle.triangles, process=False)
@@ -118,7 +118,7 @@ def solid(obstacle: object) -> dict[str, Any]:
 
 
 @solid.register
-def _(obstacle: scene.Sphere) -> dict[str, Any]:
+def _(obstacle: solids.Sphere) -> dict[str, Any]:
     return {
         "shape": "sphere",
         "center": MM * obstacle.centre,
@@ -127,7 +127,7 @@ def _(obstacle: scene.Sphere) -> dict[str, Any]:
 
 
 @solid.register
-def _(obstacle: scene.Box) -> dict[str, Any]:
+def _(obstacle: solids.Box) -> dict[str, Any]:
     return {
         "shape": "box",
         "center": MM * obstacle.centre,
@@ -136,9 +136,9 @@ def _(obstacle: scene.Box) -> dict[str, Any]:
     }
 
 
-@solid.register(scene.Cylinder)
-@solid.register(scene.Capsule)
-def _(obstacle: scene.Cylinder | scene.Capsule) -> dict[str, Any]:
+@solid.register(solids.Cylinder)
+@solid.register(solids.Capsule)
+def _(obstacle: solids.Cylinder | solids.Capsule) -> dict[str, Any]:
     return {
         "shape": type(obstacle).__name__.lower(),
         "axis": obstacle.axis,
@@ -149,13 +149,13 @@ def _(obstacle: scene.Cylinder | scene.Capsule) -> dict[str, Any]:
 
 
 @solid.register
-def _(obstacle: scene.HalfSpace) -> dict[str, Any]:
+def _(obstacle: solids.HalfSpace) -> dict[str, Any]:
     point, normal = MM * obstacle.point, obstacle.normal
     return {"shape": "half_space", "point": point, "normal": normal}
 
 
 @solid.register
-def _(obstacle: scene.Mesh) -> dict[str, Any]:
+def _(obstacle: solids.Mesh) -> dict[str, Any]:
     return {"shape": "mesh", "check_size": False}
 
 

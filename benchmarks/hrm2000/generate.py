@@ -19,8 +19,8 @@ from benchmarks.hrm2000.files import write
 from benchmarks.hrm2000.motions import DraftRejected
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
-from vdsm_pin.robot_model import load_robot
 from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 VERSION: Final = 3

@@ -9,7 +9,8 @@ import numpy as np
 from benchmarks.hrm2000.motions import DraftRejected
 from benchmarks.hrm2000.sweeps import Rng, Sweep
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.scene import Box, Capsule, Cylinder, Obstacle, Sphere
+from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, Sphere
+from vdsm_pin.problem.scene import Obstacle
 
 
 def _rotation(rng: Rng) -> FloatArray:

@@ -13,10 +13,10 @@ import numpy as np
 from benchmarks.hrm2000.drafts import Draft
 from benchmarks.hrm2000.motions import DraftRejected, Witness
 from benchmarks.hrm2000.sweeps import Rng
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.pointing import Pointing, angles_between
-from vdsm_pin.problem import DesiredPath
+from vdsm_pin.problem.planning_problem import DesiredPath
+from vdsm_pin.problem.pointing import Pointing, angles_between
 
 WIDEST: Final = np.deg2rad(15.0)
 """A witness whose last link looks about by more is of no use; [rad]."""

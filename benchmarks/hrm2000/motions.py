@@ -10,12 +10,12 @@ from typing import Final
 import numpy as np
 
 from benchmarks.hrm2000.curves import TipCurve, follow_the_leader
+from vdsm_pin.arm.kinematics import joint_angles, joint_centres, link_angles
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_angles, joint_centres, link_angles
-from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.pointing import Pointing
-from vdsm_pin.problem import DesiredPath
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.planning_problem import DesiredPath
+from vdsm_pin.problem.pointing import Pointing
+from vdsm_pin.problem.trajectory import Trajectory
 
 ROW: Final = 1.6e-3
 """Travel of the tip per row; lengths of the arm."""

@@ -11,9 +11,10 @@ from benchmarks.hrm2000.litter import Litter, ball, rod, scattered
 from benchmarks.hrm2000.motions import DraftRejected, Witness
 from benchmarks.hrm2000.solids import Tube
 from benchmarks.hrm2000.sweeps import Rng, Sweep, least_bore, sweep
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.scene import Cylinder, HalfSpace, Obstacle
+from vdsm_pin.geometry.solids import Cylinder, HalfSpace
+from vdsm_pin.problem.scene import Obstacle
 
 WIDEST: Final = 2.2
 """Bore of a tube at most; body radii."""

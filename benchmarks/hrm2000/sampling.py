@@ -14,12 +14,13 @@ import coal
 import numpy as np
 import shapely
 
-from vdsm_pin import scene
+from vdsm_pin.arm.manipulator import Manipulator
+from vdsm_pin.geometry import solids
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem import scene
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 
 STEP: Final = 1e-3
 """Way of a joint centre from sample to sample; lengths of the arm."""
@@ -108,7 +109,7 @@ def chain(arm: Manipulator, joints: FloatArray) -> FloatArray:
 
 def clearance(obstacle: scene.Obstacle, arm: Manipulator, centres: FloatArray) -> float:
     """From the links' surfaces to an obstacle, over all samples; [m]."""
-    if isinstance(obstacle, scene.Mesh):
+    if isinstance(obstacle, solids.Mesh):
         return _to_mesh(obstacle, arm, centres)
     least = np.inf
     for i, length in enumerate(arm.link_lengths):
@@ -120,7 +121,7 @@ def clearance(obstacle: scene.Obstacle, arm: Manipulator, centres: FloatArray) -
     return least - arm.link_radius
 
 
-def _to_mesh(mesh: scene.Mesh, arm: Manipulator, centres: FloatArray) -> float:
+def _to_mesh(mesh: solids.Mesh, arm: Manipulator, centres: FloatArray) -> float:
     """By Coal, link by link; a body inside a mesh is not seen."""
     surface = coal.BVHModelOBBRSS()
     surface.beginModel(len(mesh.triangles), len(mesh.vertices))
@@ -148,7 +149,7 @@ def _to_mesh(mesh: scene.Mesh, arm: Manipulator, centres: FloatArray) -> float:
 
 
 def _between_boxes(
-    mesh: scene.Mesh, begins: FloatArray, ends: FloatArray
+    mesh: solids.Mesh, begins: FloatArray, ends: FloatArray
 ) -> FloatArray:
     """Gaps between the boxes about links' axes and a mesh, shape (n,); [m]."""
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
@@ -163,12 +164,12 @@ def outside(obstacle: object, points: FloatArray) -> FloatArray:
 
 
 @outside.register
-def _(ball: scene.Sphere, points: FloatArray) -> FloatArray:
+def _(ball: solids.Sphere, points: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.norm(points - ball.centre, axis=1) - ball.radius)
 
 
 @outside.register
-def _(rod: scene.Capsule, points: FloatArray) -> FloatArray:
+def _(rod: solids.Capsule, points: FloatArray) -> FloatArray:
     off = points - rod.centre
     along = np.clip(off @ rod.axis, -rod.half_length, rod.half_length)
     return np.asarray(np.linalg.norm(off - np.outer(along, rod.axis), axis=1)
@@ -176,7 +177,7 @@ def _(rod: scene.Capsule, points: FloatArray) -> FloatArray:
 
 
 @outside.register
-def _(pipe: scene.Cylinder, points: FloatArray) -> FloatArray:
+def _(pipe: solids.Cylinder, points: FloatArray) -> FloatArray:
     off = points - pipe.centre
     along = off @ pipe.axis
     aside = np.linalg.norm(off - np.outer(along, pipe.axis), axis=1) - pipe.radius
@@ -184,17 +185,17 @@ def _(pipe: scene.Cylinder, points: FloatArray) -> FloatArray:
 
 
 @outside.register
-def _(box: scene.Box, points: FloatArray) -> FloatArray:
+def _(box: solids.Box, points: FloatArray) -> FloatArray:
     return _beyond(np.abs((points - box.centre) @ box.rotation) - box.half_size)
 
 
 @outside.register
-def _(half: scene.HalfSpace, points: FloatArray) -> FloatArray:
+def _(half: solids.HalfSpace, points: FloatArray) -> FloatArray:
     return np.asarray((points - half.point) @ half.normal)
 
 
 @outside.register
-def _(prism: scene.Prism, points: FloatArray) -> FloatArray:
+def _(prism: solids.Prism, points: FloatArray) -> FloatArray:
     local = (points - prism.origin) @ prism.rotation
     section = shapely.Polygon(prism.polygon)
     flat = shapely.points(local[:, :2])

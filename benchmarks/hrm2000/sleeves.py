@@ -19,14 +19,15 @@ import numpy as np
 
 from benchmarks.hrm2000.arms import NINE, USUAL
 from benchmarks.hrm2000.sweeps import Rng, required_clearance, scale
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.geometry.solids import Box
 from vdsm_pin.planner.impossible.bounds import prove_tips
 from vdsm_pin.planner.impossible.cut_off import cut_off
 from vdsm_pin.planner.impossible.last_link import hemmed_in
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.scene import Box, Scene
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.verification.link_clearance import link_clearance
 
 SHARE: Final = 0.999

@@ -9,7 +9,8 @@ import trimesh
 from benchmarks.hrm2000.curves import TipCurve
 from benchmarks.hrm2000.sweeps import Sweep
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.scene import Box, Mesh, Obstacle
+from vdsm_pin.geometry.solids import Box, Mesh
+from vdsm_pin.problem.scene import Obstacle
 
 
 @dataclass(frozen=True)

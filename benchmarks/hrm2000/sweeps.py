@@ -8,10 +8,10 @@ import numpy as np
 
 from benchmarks.hrm2000.curves import TipCurve
 from benchmarks.hrm2000.motions import ROW, DraftRejected, Witness
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scene import Obstacle, Scene
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.verification.link_clearance import link_clearance
 
 Rng: TypeAlias = np.random.Generator

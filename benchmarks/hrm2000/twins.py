@@ -19,8 +19,8 @@ from benchmarks.hrm2000.motions import DraftRejected, Witness
 from benchmarks.hrm2000.solids import Tube, least_hole, plate_with_hole
 from benchmarks.hrm2000.sweeps import LENGTH, Rng, required_clearance, scale, sweep
 from benchmarks.hrm2000.walls import REACH, openings, walls
-from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.scene import Sphere
+from vdsm_pin.arm.manipulator import Manipulator
+from vdsm_pin.geometry.solids import Sphere
 
 MARGINS_MM: Final = (0.05, 0.1, 0.2, 0.5, 1.0)
 """By how much each is too tight, for an arm of 3.126 m; [mm]."""

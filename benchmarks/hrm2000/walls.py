@@ -17,9 +17,10 @@ from benchmarks.hrm2000.solids import (
     wall,
 )
 from benchmarks.hrm2000.sweeps import Rng, Sweep, scale, sweep
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.scene import Cylinder, Mesh, Obstacle
+from vdsm_pin.geometry.solids import Cylinder, Mesh
+from vdsm_pin.problem.scene import Obstacle
 
 REACH: Final = 2.6
 """From the rail to the edges of a wall: round them the arm is too short; [m]."""

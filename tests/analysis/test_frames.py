@@ -11,8 +11,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "analysis"))
 
 import table1_parameters as tables
 
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.robot_model import load_robot
+from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.verification.robot_model import load_robot
 
 HRM8 = built_in("hrm8")
 

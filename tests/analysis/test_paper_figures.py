@@ -31,7 +31,7 @@ from paper_figures.style import (  # noqa: E402
 from paper_figures.views import SIDE  # noqa: E402
 from PIL import Image  # noqa: E402
 
-from vdsm_pin.manipulator import built_in  # noqa: E402
+from vdsm_pin.arm.manipulator import built_in  # noqa: E402
 
 COARSE = 0.04
 """Spacing of the waypoints in these tests; [m]."""

@@ -23,12 +23,12 @@ from benchmarks.hrm2000.solids import (
 )
 from benchmarks.hrm2000.sweeps import required_clearance, sweep
 from benchmarks.hrm2000.twins import TWINS
+from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
-from vdsm_pin.problem import DesiredPath
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Mesh
+from vdsm_pin.problem.planning_problem import DesiredPath
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 CURVE = tip_curve([Bend(0.2, 0.4, 0.9, 0.3), Bend(0.1, 0.5, 0.8, 2.5)])

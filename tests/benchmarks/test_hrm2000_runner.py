@@ -15,11 +15,20 @@ from benchmarks.hrm2000.generate import generate, witness_of
 from benchmarks.hrm2000.sampling import chain, clearance, outside, sample
 from benchmarks.hrm2000.summary import bad_plan, document, false_proof, solved
 from tests.made_up import every_shape, problem
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
+from vdsm_pin.geometry.solids import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Prism,
+    Sphere,
+)
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Prism, Scene, Sphere
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.verification.link_clearance import link_clearance
 
 GOOD = Outcome("port-0000", "port", 0, "fewest", "certified", "", 1.0, 2.0, 1.0, 2.0, 3)

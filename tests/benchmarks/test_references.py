@@ -9,13 +9,13 @@ from benchmarks.hrm2000.references import REFERENCES, reference
 from benchmarks.hrm2000.references.follow_the_leader import behind
 from benchmarks.hrm2000.references.multi_directional import _turned
 from benchmarks.hrm2000.references.neural_network import Network
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.robot_model import load_robot
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 FREE = read_problem("paper/free").problem

@@ -7,15 +7,15 @@ import pytest
 
 from benchmarks.hrm2000.attempt import ProcessorTime, answer_of
 from benchmarks.hrm2000.sleeves import ARMS, PROOFS, SHARE, Sleeved, fuzz, sleeved
+from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.errors import Infeasible, OutOfTime
-from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.planner.time_limit import within_time
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 

@@ -9,15 +9,15 @@ import pytest
 from oracles.certificate_cases import certificate_lines
 from oracles.certificate_oracle import sealed, sha256
 
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
 from vdsm_pin.verification.pointing import NAME
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 ARM = built_in("hrm8")

@@ -6,14 +6,15 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.closed_meshes import SIGNED, SOLID
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.obstacles import encloses
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.scene import Mesh, Scene
+from vdsm_pin.geometry.solids import Mesh
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.verification.link_clearance import link_clearance
 
 

@@ -22,11 +22,11 @@ import yaml
 from mutations import changed_bytes
 from problem_texts import binary_stl
 
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.trajectory_file import column_names, read_trajectory
 from vdsm_pin.io.yaml_reader import read_yaml
-from vdsm_pin.manipulator import built_in
 
 Rng = np.random.Generator
 ENDS = ("\n", "\r\n", "\r")

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from vdsm_pin.errors import InvalidFile
+from vdsm_pin.geometry.solids import PointCloud, Voxels
 from vdsm_pin.io.clouds import RawCloud, read_cloud
 from vdsm_pin.io.pcd import _from_lzf
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.inputs import assumed_sizes, input_notes
-from vdsm_pin.scene import PointCloud, Voxels
-from vdsm_pin.trajectory import Trajectory
 
 POINTS = np.array([[0.5, -1.25, 3.0], [1e-3, 2.0, -7.5], [100.0, 0.0, 0.125]])
 SINGLE = POINTS.astype(np.float32)

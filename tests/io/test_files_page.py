@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 from problem_texts import edited
 
-from vdsm_pin.cables import cable_lengths
+from vdsm_pin.arm.cables import cable_lengths
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import built_in, paper_hole_angles
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import write_trajectory
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import built_in, paper_hole_angles
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.trajectory import Trajectory
 
 PAGE = Path(__file__).parents[2] / "docs" / "files.md"
 EXAMPLE, OTHERS, ARM, ENDS, CURVES = re.findall(

@@ -13,12 +13,12 @@ import trimesh
 from mutations import changed_bytes, changed_data
 from problem_texts import EVERYTHING, TETRAHEDRON, binary_stl, write_everything
 
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.problem_file import built_in_names, built_in_text, read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.trajectory import Trajectory
 
 MESHES = ("stl", "text.stl", "obj", "ply", "binary.ply", "glb", "dae")
 TEXTS = [EVERYTHING.replace("1e3", "1000"), *map(built_in_text, built_in_names())]

@@ -8,10 +8,10 @@ import yaml
 from problem_texts import TETRAHEDRON, binary_stl
 
 from vdsm_pin.errors import InvalidFile
+from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.inputs import assumed_sizes, assumption, input_notes
-from vdsm_pin.scene import Mesh
-from vdsm_pin.trajectory import Trajectory
 
 
 def problem(folder: Path, size: float, unit: str = "mm", **fields: object) -> Path:

@@ -5,13 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import InvalidFile
+from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
-from vdsm_pin.manipulator import built_in
+from vdsm_pin.problem.scene import Moving
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.robots.scene_files import read_scene
-from vdsm_pin.scene import Moving, Sphere
-from vdsm_pin.trajectory import Trajectory
 
 HEAD = """vdsm_problem: 1
 length_unit: mm

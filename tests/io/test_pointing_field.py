@@ -7,8 +7,8 @@ import pytest
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.pointing import Pointing
-from vdsm_pin.problem import DesiredPath
+from vdsm_pin.problem.planning_problem import DesiredPath
+from vdsm_pin.problem.pointing import Pointing
 
 TEXT = """
 vdsm_problem: 1

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from problem_texts import EVERYTHING, TETRAHEDRON, edited, write_everything
 
-from vdsm_pin import scene
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import paper_hole_angles
 from vdsm_pin.errors import UnknownName
+from vdsm_pin.geometry import solids
 from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.io.problem_file import (
     built_in_names,
@@ -18,9 +20,7 @@ from vdsm_pin.io.problem_file import (
     problem_schema,
     read_problem,
 )
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import paper_hole_angles
-from vdsm_pin.problem import Approach, Blocked, Order, PlanningProblem
+from vdsm_pin.problem.planning_problem import Approach, Blocked, Order, PlanningProblem
 
 MINIMAL = """\
 vdsm_problem: 1
@@ -66,8 +66,8 @@ def test_built_in_problems_share_the_papers_task(name: str) -> None:
 def test_the_axes_of_obs1_and_obs3_are_the_papers() -> None:
     (pillar,) = read_problem("paper/obs1").problem.scene.obstacles
     (column,) = read_problem("paper/obs3").problem.scene.obstacles
-    assert isinstance(pillar, scene.Cylinder)
-    assert isinstance(column, scene.Cylinder)
+    assert isinstance(pillar, solids.Cylinder)
+    assert isinstance(column, solids.Cylinder)
     assert pillar.axis.tolist() == [1, 0, 0]
     assert column.axis.tolist() == [0, 0, 1]
     assert pillar.centre[1:].tolist() == [0.7, 0.6]
@@ -83,7 +83,7 @@ def test_prisms_of_obs2_are_equilateral_about_the_papers_axis(
     name: str, inscribed: float, circumscribed: float
 ) -> None:
     (prism,) = read_problem(name).problem.scene.obstacles
-    assert isinstance(prism, scene.Prism)
+    assert isinstance(prism, solids.Prism)
     arms = prism.polygon - [0.4, 0.4]
     np.testing.assert_allclose(np.linalg.norm(arms, axis=1), circumscribed, atol=1e-9)
     middles = (arms + np.roll(arms, 1, axis=0)) / 2.0
@@ -180,33 +180,33 @@ def test_scene_is_carried_into_the_base_frame(tmp_path: Path) -> None:
 
     close = {"rtol": 0.0, "atol": 1e-14}
     pillar, bar, ball, rod, crate, wall, part = problem.scene.obstacles
-    assert isinstance(pillar, scene.Cylinder)
+    assert isinstance(pillar, solids.Cylinder)
     np.testing.assert_allclose(pillar.centre, base([1563, 700, 600])[0], **close)
     np.testing.assert_allclose(pillar.axis, rotate([1, 0, 0]), **close)
     assert (pillar.radius, pillar.half_length) == (0.2, 0.45)
-    assert isinstance(bar, scene.Prism)
+    assert isinstance(bar, solids.Prism)
     (piece,) = bar.pieces
     # Across axis y the polygon is [z, x].
     ends = [
         [x, y, z] for y in (-1000, 500) for z, x in ((0, 900), (100, 900), (100, 1000))
     ]
     np.testing.assert_allclose(piece.points, base(*ends), **close)
-    assert isinstance(ball, scene.Sphere)
+    assert isinstance(ball, solids.Sphere)
     np.testing.assert_allclose(ball.centre, base([900, 900, 900])[0], **close)
     assert ball.radius == 0.015
-    assert isinstance(rod, scene.Capsule)
+    assert isinstance(rod, solids.Capsule)
     np.testing.assert_allclose(rod.axis, rotate([0, 0.5**0.5, 0.5**0.5]), **close)
     assert (rod.half_length, rod.radius) == (0.025, 0.01)
-    assert isinstance(crate, scene.Box)
+    assert isinstance(crate, solids.Box)
     turn = rotation_from_rpy(np.deg2rad([0, 0, 45]))
     np.testing.assert_allclose(crate.rotation, inverse[:3, :3] @ turn, **close)
     assert crate.half_size.tolist() == [0.005, 0.01, 0.015]
-    assert isinstance(wall, scene.HalfSpace)
+    assert isinstance(wall, solids.HalfSpace)
     np.testing.assert_allclose(wall.normal, rotate([0, 0, 1]), **close)
     assert wall.normal @ base([7, 8, -2000])[0] == pytest.approx(
         wall.normal @ wall.point, abs=1e-14
     )
-    assert isinstance(part, scene.Mesh)
+    assert isinstance(part, solids.Mesh)
     assert part.closed_mesh.closed
     placed = 500 * TETRAHEDRON.reshape(-1, 3)[:, [2, 1, 0]] * [1, 1, -1] + [0, 900, 0]
     corners = part.vertices[part.triangles].reshape(-1, 3)
@@ -231,7 +231,7 @@ def test_prism_sections_read_y_z_then_z_x_then_x_y(
     bar = {"name": "b", "shape": "prism", "axis": axis, "polygon": polygon}
     text = edited(MINIMAL, ("obstacles",), [bar | {"from": 7, "to": 9}])
     (prism,) = read_text(tmp_path, text).scene.obstacles
-    assert isinstance(prism, scene.Prism)
+    assert isinstance(prism, solids.Prism)
     assert np.linalg.det(prism.rotation) == 1.0
     (piece,) = prism.pieces
     assert piece.points.min(axis=0).tolist() == low

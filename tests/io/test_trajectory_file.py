@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io import tables, trajectory_file
 from vdsm_pin.io.trajectory_file import column_names, read_trajectory, write_trajectory
-from vdsm_pin.manipulator import Manipulator, built_in
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.trajectory import Trajectory
 
 HRM8 = built_in("hrm8")
 FIELDS = ("on_path", "path_m", "x0", "alpha", "theta")

@@ -15,13 +15,14 @@ from flint import ctx
 from oracles import ball_reader
 from problem_texts import TETRAHEDRON, binary_stl, edited, write_everything
 
-from vdsm_pin import scene
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.certificate_checker.balls import column
+from vdsm_pin.geometry import solids
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull
 from vdsm_pin.io.problem_file import built_in_names, find_problem, read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem import scene
+from vdsm_pin.problem.trajectory import Trajectory
 
 CLOSE = 1e-13
 """Rounding of a few products of numbers of some metres; [m]."""
@@ -40,7 +41,7 @@ def numbers(balls: Any) -> np.ndarray:
 
 
 def assert_same_solid(ours: scene.Obstacle, theirs: Any) -> None:
-    if isinstance(ours, scene.Mesh):
+    if isinstance(ours, solids.Mesh):
         places = [
             numbers(theirs.linear * column(*corner) + theirs.shift)
             for corner in theirs.corners.reshape(-1, 3).tolist()
@@ -49,7 +50,7 @@ def assert_same_solid(ours: scene.Obstacle, theirs: Any) -> None:
         np.testing.assert_allclose(found, places, rtol=0, atol=CLOSE)
         return
     if isinstance(theirs, ball_reader.SweptPolygon):
-        assert isinstance(ours, scene.Prism)
+        assert isinstance(ours, solids.Prism)
         ends = [
             np.column_stack([ours.polygon, np.full(len(ours.polygon), s)])
             for s in ours.span

@@ -7,11 +7,16 @@ import pytest
 import yaml
 
 import vdsm_pin as vp
+from vdsm_pin.arm.manipulator import (
+    CableLayout,
+    Manipulator,
+    built_in,
+    paper_hole_angles,
+)
+from vdsm_pin.arm.urdf_writer import urdf_text
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.urdf_arm import read_urdf_arm
-from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
-from vdsm_pin.urdf_writer import urdf_text
 
 
 def random_arm(rng: np.random.Generator) -> Manipulator:

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.manipulator import CableLayout, Manipulator, paper_hole_angles
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.waypoint_tables import read_cables, read_centres
-from vdsm_pin.manipulator import CableLayout, Manipulator, paper_hole_angles
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.tables import write_cables, write_centres
-from vdsm_pin.trajectory import Trajectory
 
 FREE = read_problem("paper/free").problem
 

@@ -28,8 +28,8 @@ from oracles.adversarial_bodies import (
     small_angles,
 )
 
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import CableLayout, Manipulator, paper_hole_angles
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import CableLayout, Manipulator, paper_hole_angles
 
 MOTIONS: Final = ("none", "still", "rail", "away", "base_turn", "pierce")
 LINK_MOTIONS: Final = ("links_none", "links_still", "links_swing")

@@ -26,9 +26,9 @@ from oracles.adversarial import (
     make_link_batch,
 )
 
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.geometry.row_bounds import link_gaps, row_brackets
+from vdsm_pin.problem.error_boxes import ErrorBox
 
 INSIDE: Final = ("none", "still", "rail", "away", "pierce", *LINK_MOTIONS)
 """Motions of which one within the box is known."""

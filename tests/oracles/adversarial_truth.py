@@ -15,8 +15,8 @@ from oracles.adversarial import (
 )
 from oracles.adversarial_bodies import SHAPES, Bodies
 
+from vdsm_pin.arm.manipulator import CableLayout, Manipulator, paper_hole_angles
 from vdsm_pin.geometry.convex import HalfSpacePiece, Hull
-from vdsm_pin.manipulator import CableLayout, Manipulator, paper_hole_angles
 
 
 def exact_bracket(batch: Batch, k: int) -> tuple[Any, Any]:

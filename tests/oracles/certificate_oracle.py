@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull
+from vdsm_pin.geometry.solids import Prism
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
-from vdsm_pin.scene import FlatCylinder, HalfSpacePiece, Hull, Prism
 
 PAD = 1e-11
 SMALLEST_SLICE = 2.0**-5

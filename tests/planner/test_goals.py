@@ -6,17 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import InvalidFile, NoPlanFound, UnknownName
+from vdsm_pin.geometry.solids import Box, Sphere
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import built_in
 from vdsm_pin.planner.joint_lines import clear_line
-from vdsm_pin.problem import DesiredPath, PlanningProblem, Posture
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem, Posture
+from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.refinement import Refinement, plan_and_verify
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Box, Obstacle, Scene, Sphere
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 
 ARM = built_in("hrm8")
 START = Posture(np.array([0.0, 0.0, 0.0]))

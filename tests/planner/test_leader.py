@@ -5,14 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.geometry.solids import Sphere
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Scene, Sphere
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 
 ARM = built_in("hrm8")
 NAME = "follow-the-leader"

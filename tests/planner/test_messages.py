@@ -9,8 +9,8 @@ import pytest
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.robot_model import load_robot
 from vdsm_pin.units import in_mm
+from vdsm_pin.verification.robot_model import load_robot
 
 PROBLEM = """
 vdsm_problem: 1

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import StartBlocked
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import built_in
+from vdsm_pin.geometry.solids import Cylinder
 from vdsm_pin.planner.start import start_centres
 from vdsm_pin.planner.strategies import STRATEGIES, strategy
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.scene import Cylinder, Scene
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.verification.link_clearance import link_clearance
 
 ARM = built_in("hrm8")

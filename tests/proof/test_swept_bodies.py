@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from oracles.tree_queries import random_box, random_path, random_tree, wrong_poses
 
-from vdsm_pin.arm_tree import arm_tree
+from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.arm.tree import arm_tree
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import body_reach
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
-from vdsm_pin.manipulator import built_in
 from vdsm_pin.proof.bends import bend_between
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.cached_planes import place_disc

@@ -5,9 +5,9 @@ import pinocchio
 import pytest
 from oracles.tree_queries import random_tree
 
+from vdsm_pin.arm.kinematics import joint_centres, link_frames
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
-from vdsm_pin.kinematics import joint_centres, link_frames
-from vdsm_pin.manipulator import built_in
 from vdsm_pin.proof.tree import Joint, Kind, Tree, free_tree, shifted
 
 SEEDS = range(40)

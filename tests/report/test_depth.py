@@ -6,14 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vdsm_pin.geometry.solids import Box
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.facts import min_clearance, reason, verification_file
 from vdsm_pin.report.html import write_report
 from vdsm_pin.report.run_record import RunRecord
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Box, Scene
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import Verification
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 

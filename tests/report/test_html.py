@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from vdsm_pin import kept
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.report import html
 from vdsm_pin.report.facts import batch_row, verification_file
 from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.html import message_page, view_page, write_index, write_report
-from vdsm_pin.scene import Scene
 from vdsm_pin.verification.records import Verdict, Verification
 
 

@@ -6,6 +6,7 @@ import made_up
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.errors import (
     CutOff,
     HemmedIn,
@@ -16,7 +17,6 @@ from vdsm_pin.errors import (
     StartBlocked,
     VdsmError,
 )
-from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.report.html import write_no_plan
 from vdsm_pin.report.impasse import Impasse, impasse_of
 from vdsm_pin.report.run_record import PlanRun

@@ -7,11 +7,12 @@ import made_up
 import numpy as np
 import pytest
 
+from vdsm_pin.geometry.solids import Mesh
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.report.facts import batch_row, verification_file
 from vdsm_pin.report.html import write_report
 from vdsm_pin.report.inputs import BEHIND
 from vdsm_pin.report.terminal import show_verification
-from vdsm_pin.scene import Mesh, Scene
 from vdsm_pin.verification.records import Verification
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from watched_pages import NEEDS_CHROMIUM, Watched, pixels
 
-from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.report.facts import batch_row, verification_file
 from vdsm_pin.report.html import write_index, write_report
 from vdsm_pin.report.picture import picture

@@ -11,6 +11,8 @@ import pytest
 
 from vdsm_pin.errors import UnknownName
 from vdsm_pin.planner.records import Plan, TipPath
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import Adjustment, Refinement, Round
 from vdsm_pin.report.facts import (
     batch_row,
@@ -25,8 +27,6 @@ from vdsm_pin.report.files import (
     VerificationFile,
     schema,
 )
-from vdsm_pin.scene import Scene
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import Check, Pair, Verdict, Verification
 
 

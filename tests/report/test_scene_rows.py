@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from problem_files import NEAR, write_problem
 
+from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.report.facts import verification_file
 from vdsm_pin.report.html import write_report
 from vdsm_pin.report.run_record import now
 from vdsm_pin.report.scene_rows import CHANGED, MOST_LISTED, SceneRow, scene_rows
-from vdsm_pin.scene import Mesh, Scene
 
 TETRAHEDRON = """\
 v 1 2 1

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from made_up import X, Y, every_shape
 
+from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Mesh, Sphere
+from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.report.solids import Surface, detail, surface
-from vdsm_pin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Sphere
 
 
 def volume(skin: Surface) -> float:

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from watched_pages import NEEDS_CHROMIUM, Watched, pixels
 
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.errors import NoPlanFound, Reached
-from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.report.facts import verification_file
 from vdsm_pin.report.html import write_no_plan, write_report
 from vdsm_pin.report.run_record import PlanRun
-from vdsm_pin.scene import Scene
 
 pytestmark = NEEDS_CHROMIUM
 

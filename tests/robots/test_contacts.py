@@ -5,8 +5,8 @@ import pytest
 
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
+from vdsm_pin.geometry.solids import BOX_CORNERS
 from vdsm_pin.robots.contacts import common_ball, in_world
-from vdsm_pin.scene import BOX_CORNERS
 
 BALL = Hull(np.zeros((1, 3)), 0.1)
 CAPSULE = Hull(np.array([[0.0, 0.0, -0.2], [0.0, 0.0, 0.2]]), 0.1)

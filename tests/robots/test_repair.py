@@ -10,12 +10,13 @@ from typer.testing import CliRunner
 
 from vdsm_pin.cli import app
 from vdsm_pin.errors import Infeasible, InvalidInput
+from vdsm_pin.geometry.solids import Sphere
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.robots.judgement import Asked
 from vdsm_pin.robots.repair import repair_robot
 from vdsm_pin.robots.trajectory_files import path_text, read_path
 from vdsm_pin.robots.urdf import read_robot
-from vdsm_pin.scene import Scene, Sphere
 
 URDF = """<robot name="two"><link name="foot"/>
 <link name="upper"><collision><origin xyz="0.2 0 0"/>

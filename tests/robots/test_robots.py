@@ -10,6 +10,7 @@ import pytest
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile, VdsmError
 from vdsm_pin.geometry.arrays import rotation_from_rpy
+from vdsm_pin.geometry.solids import Cylinder, HalfSpace, Sphere
 from vdsm_pin.robots.cell import read_cell
 from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.model import Robot
@@ -17,7 +18,6 @@ from vdsm_pin.robots.scene_files import read_scene
 from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.robots.urdf import read_robot
-from vdsm_pin.scene import Cylinder, HalfSpace, Sphere
 from vdsm_pin.verification.records import Verdict
 
 URDF = """<robot name="two">

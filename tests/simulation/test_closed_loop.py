@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import vdsm_pin as vp
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import InvalidInput, VerificationFailed
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.manipulator import built_in
 from vdsm_pin.simulation.closed_loop import Simulation, simulate
 from vdsm_pin.simulation.folder import SUMMARY, SimulationOrder, simulate_to_folder
 from vdsm_pin.simulation.settings import Controller, Kick, Sensors, Settings, Speed

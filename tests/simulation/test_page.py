@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from vdsm_pin.manipulator import built_in
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.simulation.closed_loop import Simulation
 from vdsm_pin.simulation.feed_forward import Statics
 from vdsm_pin.simulation.page import assumptions, plots

@@ -14,29 +14,30 @@ import yaml
 from oracles.certificate_cases import certificate_lines
 from oracles.certificate_oracle import sealed, sha256
 
-from vdsm_pin import scene
-from vdsm_pin.arm_bodies import arm_bodies, convex_cover, self_pairs
-from vdsm_pin.certificate_checker import check_certificate
-from vdsm_pin.error_boxes import ErrorBox
-from vdsm_pin.errors import InvalidFile
-from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
-from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.io.trajectory_file import write_trajectory
-from vdsm_pin.kinematics import joint_centres, link_frames
-from vdsm_pin.manipulator import (
+from vdsm_pin.arm.bodies import arm_bodies, convex_cover, self_pairs
+from vdsm_pin.arm.kinematics import joint_centres, link_frames
+from vdsm_pin.arm.manipulator import (
     CableLayout,
     LinkBody,
     Manipulator,
     Tool,
     paper_hole_angles,
 )
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.geometry import solids
+from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.io.trajectory_file import write_trajectory
+from vdsm_pin.problem import scene
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_bodies import coal_bodies, distance_request, measure
 from vdsm_pin.verification.records import ClearanceChunk, Pair, Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 LENGTHS = np.array([0.5, 0.4, 0.4, 0.45])
@@ -57,8 +58,8 @@ def problem_with(
 ) -> PlanningProblem:
     tip = np.array([arm.total_length, 0.0, 0.0])
     path = DesiredPath(tip, tip[None])
-    solids = scene.Scene(obstacles)
-    return PlanningProblem("p", arm, solids, path, required, np.eye(4))
+    shapes = scene.Scene(obstacles)
+    return PlanningProblem("p", arm, shapes, path, required, np.eye(4))
 
 
 def rows_of(rng: np.random.Generator, size: float, n: int = 12) -> Trajectory:
@@ -68,17 +69,17 @@ def rows_of(rng: np.random.Generator, size: float, n: int = 12) -> Trajectory:
     return Trajectory(blank > 0.0, blank, rng.uniform(-0.2, 0.2, n), *angles)
 
 
-def solids(rng: np.random.Generator, offset: FloatArray) -> list[Any]:
+def carried(rng: np.random.Generator, offset: FloatArray) -> list[Any]:
     """One solid of every kind that may ride on a link, near a point of its frame."""
     turn = rotation_from_rpy(rng.uniform(-3.0, 3.0, 3))
     size, axis = rng.uniform(0.02, 0.08, 3), turn[:, 0]
     notched = np.array([[0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]])
     return [
-        scene.Sphere("ball", offset, size[0]),
-        scene.Capsule("rod", offset, axis, size[1], size[0]),
-        scene.Cylinder("can", offset, axis, size[1], size[0]),
-        scene.Box("box", offset, turn, size),
-        scene.Prism("fork", offset, turn, 0.03 * notched, (0.0, float(size[0]))),
+        solids.Sphere("ball", offset, size[0]),
+        solids.Capsule("rod", offset, axis, size[1], size[0]),
+        solids.Cylinder("can", offset, axis, size[1], size[0]),
+        solids.Box("box", offset, turn, size),
+        solids.Prism("fork", offset, turn, 0.03 * notched, (0.0, float(size[0]))),
     ]
 
 
@@ -113,7 +114,7 @@ def test_a_wrong_tool_is_refuted_where_it_touches(field: str) -> None:
         "radius": np.array([tip - 0.05, room + off, 0.0]),
         "length": np.array([tip + room + off, 0.0, 0.0]),
     }
-    ball = scene.Sphere("ball", places[field], off)
+    ball = solids.Sphere("ball", places[field], off)
     still = Trajectory(
         np.zeros(1, bool), np.zeros(1), np.zeros(1), *np.zeros((2, 1, 4))
     )
@@ -143,14 +144,14 @@ def test_coal_agrees_with_every_bracket_of_every_solid(seed: int) -> None:
     rng = np.random.default_rng(seed)
     ride = [
         LinkBody(int(rng.integers(1, 5)), solid)
-        for solid in solids(rng, rng.uniform(-0.1, 0.3, 3))
+        for solid in carried(rng, rng.uniform(-0.1, 0.3, 3))
     ]
     arm = arm_with(tool=TOOL, bodies=tuple(ride))
     around = [
-        scene.Sphere("s", np.array([0.9, 0.5, 0.3]), 0.2),
-        scene.Cylinder("c", np.array([0.6, -0.6, 0.0]), np.eye(3)[2], 0.5, 0.1),
-        scene.Box("b", np.array([1.2, 0.0, 0.7]), np.eye(3), np.full(3, 0.15)),
-        scene.HalfSpace("h", np.array([0.0, 0.0, -0.8]), np.eye(3)[2]),
+        solids.Sphere("s", np.array([0.9, 0.5, 0.3]), 0.2),
+        solids.Cylinder("c", np.array([0.6, -0.6, 0.0]), np.eye(3)[2], 0.5, 0.1),
+        solids.Box("b", np.array([1.2, 0.0, 0.7]), np.eye(3), np.full(3, 0.15)),
+        solids.HalfSpace("h", np.array([0.0, 0.0, -0.8]), np.eye(3)[2]),
     ]
     problem, rows = problem_with(arm, *around), rows_of(rng, 0.4)
     box = ErrorBox(joint=float(rng.choice([0.0, 0.01])), base=0.003, base_turn=0.004)
@@ -200,7 +201,7 @@ def distances(
             ends = body.corners
             middle, axis = ends.mean(axis=0), np.eye(3)[0]
             half = float(ends[1, 0] - ends[0, 0]) / 2.0
-            solid = scene.Capsule(body.name, middle, axis, half, body.ball)
+            solid = solids.Capsule(body.name, middle, axis, half, body.ball)
         (one,) = coal_bodies(solid)
         placed[body.name] = one.geometry, composed(one.pose, frames[k], centres[k])
     others = {one.name: coal_bodies(one) for one in problem.scene.obstacles}
@@ -252,7 +253,7 @@ def test_a_mesh_is_covered_by_the_hulls_of_its_own_triangles() -> None:
     corners = rng.normal(size=(400, 3)) * 0.1
     faces = rng.integers(0, 400, (500, 3))
     faces = faces[(np.diff(np.sort(faces, axis=1), axis=1) > 0).all(axis=1)]
-    mesh = scene.Mesh("shell", corners, faces)
+    mesh = solids.Mesh("shell", corners, faces)
     for parts in (1, 5):
         cover = convex_cover(LinkBody(2, mesh, parts))
         assert len(cover) == parts

@@ -17,20 +17,20 @@ import pytest
 from oracles.certificate_cases import write_rows
 from oracles.certificate_oracle import sealed, sha256
 
-from vdsm_pin.arm_bodies import ArmBody, arm_bodies
+from vdsm_pin.arm.bodies import ArmBody, arm_bodies
+from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.certificate_checker import Outcome, check_certificate
-from vdsm_pin.error_boxes import ErrorBox, ObstacleError
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
-from vdsm_pin.kinematics import joint_centres, link_frames
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.error_boxes import ErrorBox, ObstacleError
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 LENGTHS = [400.0, 300.0, 300.0]

@@ -3,10 +3,15 @@
 import numpy as np
 import pytest
 
-from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.scene import Scene
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.arm.manipulator import (
+    CableLayout,
+    Manipulator,
+    built_in,
+    paper_hole_angles,
+)
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification import cable_check
 from vdsm_pin.verification.cable_check import check_cables
 from vdsm_pin.verification.records import Verdict

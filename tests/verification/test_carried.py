@@ -11,16 +11,16 @@ import yaml
 from oracles.certificate_cases import certificate_lines, write_cube
 from oracles.certificate_oracle import sealed, sha256
 
+from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.io.problem_file import ProblemFile, read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
-from vdsm_pin.kinematics import joint_centres, link_frames
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
 from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 ARM = {

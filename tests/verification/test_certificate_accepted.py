@@ -11,13 +11,13 @@ from oracles.certificate_mutations import forged
 from oracles.certificate_oracle import sha256
 
 from vdsm_pin.certificate_checker import check_certificate
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
-from vdsm_pin.robot_model import load_robot
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.verification.certificate_file import certificate_schema
 from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.robust import largest_joint_error
 from vdsm_pin.verification.verify import verify
 

@@ -5,17 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Scene, Sphere
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.geometry.solids import Capsule, Cylinder, HalfSpace, Mesh, Sphere
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Obstacle, Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.inside import check_inside, locate_start
 from vdsm_pin.verification.records import ClearanceChunk, Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 from vdsm_pin.verification.yes_or_no import is_certified
 

@@ -15,20 +15,21 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from vdsm_pin import scene
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.manipulator import CableLayout, Manipulator, paper_hole_angles
+from vdsm_pin.geometry import solids
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.manipulator import CableLayout, Manipulator, paper_hole_angles
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.robot_model import RobotModel, load_robot
+from vdsm_pin.problem import scene
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_bodies import coal_bodies, distance_request, measure
 from vdsm_pin.verification.coal_clearance import capsule_transforms
 from vdsm_pin.verification.counterexample import find_counterexamples
 from vdsm_pin.verification.records import ClearanceChunk
+from vdsm_pin.verification.robot_model import RobotModel, load_robot
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 
 N_LINKS, RADIUS, SAMPLES = 3, 0.05, 1000
@@ -77,28 +78,28 @@ def obstacle_of(shape: str, rng: np.random.Generator) -> scene.Obstacle:
     size = 10.0 ** rng.uniform(-3.0, -0.7)
     match shape:
         case "sphere":
-            return scene.Sphere(shape, centre, size)
+            return solids.Sphere(shape, centre, size)
         case "capsule":
-            return scene.Capsule(
+            return solids.Capsule(
                 shape, centre, axis_of(rng), rng.uniform(0.01, 1.0), size
             )
         case "cylinder":
-            return scene.Cylinder(
+            return solids.Cylinder(
                 shape, centre, axis_of(rng), rng.uniform(0.01, 1.0), size
             )
         case "box":
-            return scene.Box(shape, centre, turn, 10.0 ** rng.uniform(-3.0, -0.5, 3))
+            return solids.Box(shape, centre, turn, 10.0 ** rng.uniform(-3.0, -0.5, 3))
         case "prism":
             corners = size * rng.uniform(-1.0, 1.0, (3, 2))
-            return scene.Prism(shape, centre, turn, corners, (-0.3, 0.5))
+            return solids.Prism(shape, centre, turn, corners, (-0.3, 0.5))
         case "notched":
             corners = 0.3 * size * (np.array(NOTCHED) - 1.5)
-            return scene.Prism(shape, centre, turn, corners, (-0.3, 0.2))
+            return solids.Prism(shape, centre, turn, corners, (-0.3, 0.2))
         case "wall":
             normal = axis_of(rng)
-            return scene.HalfSpace(shape, np.array([0.6, 0, 0]) - normal, normal)
+            return solids.HalfSpace(shape, np.array([0.6, 0, 0]) - normal, normal)
     corners = centre + size * (1.0 + rng.normal(size=(4, 3)))
-    return scene.Mesh(shape, corners, TETRAHEDRON)
+    return solids.Mesh(shape, corners, TETRAHEDRON)
 
 
 def problem_of(*obstacles: scene.Obstacle, required: float = 0.0) -> PlanningProblem:
@@ -203,14 +204,14 @@ def test_refining_a_trajectory_never_worsens_the_verdict(shape: str, seed: int) 
 def grown(obstacle: scene.Obstacle, much: float) -> scene.Obstacle:
     """An obstacle that holds the given one."""
     match obstacle:
-        case scene.Sphere() | scene.Capsule() | scene.Cylinder():
+        case solids.Sphere() | solids.Capsule() | solids.Cylinder():
             return replace(obstacle, radius=obstacle.radius + much)
-        case scene.Box():
+        case solids.Box():
             return replace(obstacle, half_size=obstacle.half_size + much)
-        case scene.Prism():
+        case solids.Prism():
             low, high = obstacle.span
             return replace(obstacle, span=(low - much, high + much))
-        case scene.HalfSpace():
+        case solids.HalfSpace():
             return replace(obstacle, point=obstacle.point + much * obstacle.normal)
     middle = obstacle.vertices.mean(axis=0)
     away = obstacle.vertices - middle
@@ -266,11 +267,11 @@ def in_file(obstacle: scene.Obstacle, folder: Path) -> dict[str, Any]:
     """An obstacle as a problem file has it, in metres; rotations as matrices."""
     name = {"name": obstacle.name}
     match obstacle:
-        case scene.Sphere():
+        case solids.Sphere():
             return name | {
                 "shape": "sphere", "center": obstacle.centre, "radius": obstacle.radius
             }  # fmt: skip
-        case scene.Capsule() | scene.Cylinder():
+        case solids.Capsule() | solids.Cylinder():
             return name | {
                 "shape": type(obstacle).__name__.lower(),
                 "center": obstacle.centre,
@@ -278,20 +279,20 @@ def in_file(obstacle: scene.Obstacle, folder: Path) -> dict[str, Any]:
                 "length": 2.0 * obstacle.half_length,
                 "radius": obstacle.radius,
             }
-        case scene.Box():
+        case solids.Box():
             return name | {
                 "shape": "box",
                 "center": obstacle.centre,
                 "size": 2.0 * obstacle.half_size,
                 "rpy_deg": obstacle.rotation,
             }
-        case scene.HalfSpace():
+        case solids.HalfSpace():
             return name | {
                 "shape": "half_space",
                 "point": obstacle.point,
                 "normal": obstacle.normal,
             }
-    assert isinstance(obstacle, scene.Mesh)
+    assert isinstance(obstacle, solids.Mesh)
     corners = [f"v {x!r} {y!r} {z!r}" for x, y, z in obstacle.vertices.tolist()]
     faces = [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in obstacle.triangles]
     (folder / "part.obj").write_text("\n".join([*corners, *faces]))
@@ -372,7 +373,7 @@ def test_turning_everything_about_the_rail_changes_nothing_for_prisms(
     rng = np.random.default_rng(turns)
     obstacle, c, s = obstacle_of(shape, rng), *[(1, 0), (0, 1), (-1, 0), (0, -1)][turns]
     R = np.array([[1, 0, 0], [0, c, -s], [0, s, c]], float)
-    assert isinstance(obstacle, scene.Prism)
+    assert isinstance(obstacle, solids.Prism)
     turned = replace(
         obstacle, origin=R @ obstacle.origin, rotation=R @ obstacle.rotation
     )

@@ -9,19 +9,20 @@ import pytest
 from problem_files import NEAR
 
 from vdsm_pin.app.workflow import VerifyOrder, plan_to_folder, verify_to_folder
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.certificate_checker import main as check_certificate
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.solids import Box, PointCloud, Sphere, Voxels
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Obstacle, Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import LOW, UP
 from vdsm_pin.report.solids import detail, surface
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Box, Obstacle, PointCloud, Scene, Sphere, Voxels
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_clearance import check_coal
 from vdsm_pin.verification.records import ErrorBox, Verdict
+from vdsm_pin.verification.robot_model import load_robot
 
 ARM = built_in("hrm8")
 TURN = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])

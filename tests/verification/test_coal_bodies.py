@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 import trimesh
 
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Cylinder, Mesh, Prism, Scene, Sphere
+from vdsm_pin.geometry.solids import Cylinder, Mesh, Prism, Sphere
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification import coal_clearance
 from vdsm_pin.verification.coal_bodies import (
     CoalBody,
@@ -28,6 +28,7 @@ from vdsm_pin.verification.coal_bodies import (
 from vdsm_pin.verification.coal_clearance import check_coal
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 
 RADIUS, HALF = 0.06, 0.24
 X_TO_Z = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 import trimesh
 
-from vdsm_pin import scene
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.geometry import solids
 from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem import scene
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.robot_model import load_robot
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification import coal_clearance
 from vdsm_pin.verification.coal_bodies import Measured
 from vdsm_pin.verification.coal_clearance import (
@@ -25,6 +25,7 @@ from vdsm_pin.verification.coal_clearance import (
     reach_of,
 )
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import CLOSEST, verify
 
 HRM8 = built_in("hrm8")
@@ -43,25 +44,27 @@ def obstacle_of(shape: str, rng: np.random.Generator) -> scene.Obstacle:
     size = rng.uniform(0.05, 0.4)
     match shape:
         case "sphere":
-            return scene.Sphere(shape, centre, size)
+            return solids.Sphere(shape, centre, size)
         case "capsule":
-            return scene.Capsule(shape, centre, unit(rng), rng.uniform(0.1, 2.0), size)
+            return solids.Capsule(shape, centre, unit(rng), rng.uniform(0.1, 2.0), size)
         case "cylinder":
-            return scene.Cylinder(shape, centre, unit(rng), rng.uniform(0.1, 4.0), size)
+            return solids.Cylinder(
+                shape, centre, unit(rng), rng.uniform(0.1, 4.0), size
+            )
         case "box":
-            return scene.Box(shape, centre, turn, rng.uniform(0.05, 0.5, 3))
+            return solids.Box(shape, centre, turn, rng.uniform(0.05, 0.5, 3))
         case "half_space":
             normal = unit(rng)
-            return scene.HalfSpace(shape, -normal * rng.uniform(0.3, 1.5), normal)
+            return solids.HalfSpace(shape, -normal * rng.uniform(0.3, 1.5), normal)
         case "prism":
             triangle = rng.uniform(-0.4, 0.4, (3, 2))
-            return scene.Prism(shape, centre, turn, triangle, (-1.5, 2.0))
+            return solids.Prism(shape, centre, turn, triangle, (-1.5, 2.0))
         case "angle iron":
             corners = [[0, 0], [0.5, 0], [0.5, 0.1], [0.1, 0.1], [0.1, 0.4], [0, 0.4]]
-            return scene.Prism(shape, centre, turn, np.array(corners), (-1.0, 1.0))
+            return solids.Prism(shape, centre, turn, np.array(corners), (-1.0, 1.0))
         case _:
             part = trimesh.creation.icosphere(subdivisions=2, radius=size)
-            return scene.Mesh(shape, part.vertices + centre, part.faces)
+            return solids.Mesh(shape, part.vertices + centre, part.faces)
 
 
 SHAPES = [
@@ -173,7 +176,7 @@ def ball_near_link_4(gap: float) -> PlanningProblem:
     """A ball beside the middle of link 4 of the straight arm."""
     middle = HRM8.stations[3] + HRM8.link_lengths[3] / 2.0
     centre = np.array([middle, 0.1 + HRM8.link_radius + gap, 0.0])
-    return problem_with(scene.Sphere("ball", centre, 0.1))
+    return problem_with(solids.Sphere("ball", centre, 0.1))
 
 
 STRAIGHT = Trajectory(
@@ -269,7 +272,7 @@ def test_poses_come_from_pinocchio_and_match_the_centres() -> None:
     centres = joint_centres(HRM8, trajectory.x0, trajectory.alpha, trajectory.theta)
     for i in range(8):
         outward = centres[0, i] + np.array([0.0, 0.0, 5.0])
-        problem = problem_with(scene.Sphere("far", outward, 0.1))
+        problem = problem_with(solids.Sphere("far", outward, 0.1))
         (chunk,) = coal_distances(ROBOT, problem, trajectory, np.inf)
         expected = np.linalg.norm(
             centres[0, :-1]
@@ -336,7 +339,7 @@ def test_a_lie_of_coal_at_a_closest_approach_is_seen(
 
 def test_of_a_mesh_around_the_arm_coal_knows_no_clearance() -> None:
     shell = trimesh.creation.box((20.0, 20.0, 20.0))
-    problem = problem_with(scene.Mesh("shell", shell.vertices, shell.faces))
+    problem = problem_with(solids.Mesh("shell", shell.vertices, shell.faces))
     still = Trajectory([0], [0], [0], np.zeros((1, 8)), np.zeros((1, 8)))
     judged = verify(problem, still, ROBOT)
     assert judged.coal is not None

@@ -3,20 +3,25 @@
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import (
+    CableLayout,
+    Manipulator,
+    built_in,
+    paper_hole_angles,
+)
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import link_gaps, row_brackets
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Scene
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification import coal_links
 from vdsm_pin.verification.coal_bodies import Measured
 from vdsm_pin.verification.coal_links import check_coal_links, link_distances
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 
 
 def coiling_arm(n_links: int) -> Manipulator:

@@ -6,25 +6,22 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from vdsm_pin.error_boxes import ErrorBox
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import (
-    Box,
-    Capsule,
-    Cylinder,
-    HalfSpace,
-    Mesh,
-    Obstacle,
-    Scene,
-    Sphere,
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import (
+    CableLayout,
+    Manipulator,
+    built_in,
+    paper_hole_angles,
 )
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Mesh, Sphere
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Obstacle, Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.counterexample import find_counterexamples
 from vdsm_pin.verification.records import Counterexample, Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.verify import verify
 from vdsm_pin.verification.yes_or_no import is_certified

@@ -3,16 +3,22 @@
 import numpy as np
 import pytest
 
-from vdsm_pin.error_boxes import ErrorBox
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import HalfSpace, Scene, Sphere
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import (
+    CableLayout,
+    Manipulator,
+    built_in,
+    paper_hole_angles,
+)
+from vdsm_pin.geometry.solids import HalfSpace, Sphere
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.first_contact import first_contacts
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 ARM = built_in("hrm8")

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import Manipulator, built_in
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Scene
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import Manipulator, built_in
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification import fk
 from vdsm_pin.verification.fk import CHUNK, check_fk, check_planned
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 HRM8 = built_in("hrm8")

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.certificate_checker.balls import column
 from vdsm_pin.certificate_checker.path import Drawing
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.problem import DesiredPath
+from vdsm_pin.problem.planning_problem import DesiredPath
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.drawing import exact_length, runs
 
 PRECISION = 128

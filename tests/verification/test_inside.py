@@ -21,18 +21,18 @@ from oracles.closed_solids import (
 )
 
 from vdsm_pin.certificate_checker import check_certificate, main
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import InsideUnknown, InvalidFile, StartInside
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import ProblemFile, read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.planner.start import check_start
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.report.inputs import input_notes
-from vdsm_pin.robot_model import load_robot
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import ClearanceChunk, Verdict, Verification
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 RADIUS = 0.002

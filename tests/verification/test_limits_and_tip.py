@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vdsm_pin.kinematics import joint_angles, joint_centres
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.problem import DesiredPath, Order, PlanningProblem
-from vdsm_pin.scene import Scene
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.arm.kinematics import joint_angles, joint_centres
+from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.problem.planning_problem import DesiredPath, Order, PlanningProblem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.drawing import check_order, coverage
 from vdsm_pin.verification.limits import check_limits, extremes
 from vdsm_pin.verification.records import Check, Verdict

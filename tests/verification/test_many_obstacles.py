@@ -8,20 +8,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import rotation_from_rpy
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.geometry.solids import Box
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Obstacle, Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import LOW
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Box, Obstacle, Scene
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification import coal_clearance, robust
 from vdsm_pin.verification.clearance import least_clearances, prove_clearance
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import ClearanceChunk, Verdict
+from vdsm_pin.verification.robot_model import load_robot
 
 ARM = built_in("hrm8")
 REACH = 0.3

@@ -3,16 +3,17 @@
 import numpy as np
 import pytest
 
-from vdsm_pin.error_boxes import ErrorBox, ObstacleError
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import CableLayout, Manipulator, paper_hole_angles
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import CableLayout, Manipulator, paper_hole_angles
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.geometry.solids import Sphere
+from vdsm_pin.problem.error_boxes import ErrorBox, ObstacleError
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Carrier, Moving, Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.tree import free_tree
-from vdsm_pin.scene import Carrier, Moving, Scene, Sphere
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 
 SAMPLES = 4000

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Scene, placed, solid_of
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Scene, solid_of
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.records import Check, ClearanceChunk, Verdict, Verification
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 HEAD = """
@@ -129,7 +129,7 @@ def problem_at(problem: PlanningProblem, pose: FloatArray) -> PlanningProblem:
     """The problem whose only solid stands at T_base_solid, whatever its shape."""
     (solid,) = problem.scene.obstacles
     base = problem.T_world_base  # the solid was read in the base's frame
-    there = placed(placed(solid_of(solid), base), pose)
+    there = solid_of(solid).placed(base).placed(pose)
     return replace(problem, scene=Scene((there,)))
 
 

@@ -5,14 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.problem import DesiredPath, PlanningProblem, Posture
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Scene, Sphere
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.geometry.solids import Sphere
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem, Posture
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.records import Check, Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.tip import check_tip
 from vdsm_pin.verification.verify import verify
 

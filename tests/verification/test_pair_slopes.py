@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import link_gaps, row_brackets
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.scene import Box, Capsule, HalfSpace, Mesh, Obstacle, Scene, Sphere
+from vdsm_pin.geometry.solids import Box, Capsule, HalfSpace, Mesh, Sphere
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.verification.pair_slopes import pair_slopes
 from vdsm_pin.verification.records import Pair
 from vdsm_pin.verification.task import all_pairs, make_task

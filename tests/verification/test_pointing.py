@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.kinematics import joint_centres, link_frames
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_centres, link_frames
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.pointing import Pointing, angles_between
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.scene import Scene
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.pointing import Pointing, angles_between
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.pointing import check_pointing
 from vdsm_pin.verification.records import Check, Verdict
 

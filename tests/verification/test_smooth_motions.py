@@ -5,16 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.records import Check, Verdict, Verification
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.tip import check_tip
 from vdsm_pin.verification.verify import verify
 

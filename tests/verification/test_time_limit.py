@@ -10,24 +10,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.impossible.cut_off import cut_off
 from vdsm_pin.planner.upper_clearance import upper_bounds
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import LOW, UP
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.report.facts import verification_file
 from vdsm_pin.report.html import write_report
 from vdsm_pin.report.run_record import RunRecord
-from vdsm_pin.robot_model import load_robot
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.records import ClearanceChunk, Verdict, Verification
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.robust import largest_joint_error
 from vdsm_pin.verification.verify import verify
 from vdsm_pin.verification.yes_or_no import is_certified

@@ -9,9 +9,9 @@ from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.io.waypoint_tables import read_cables, read_centres
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.tables import write_cables, write_centres
-from vdsm_pin.trajectory import Trajectory
 
 CONVERTED: Final = TRAJECTORY, CENTRES, CABLES
 """What a conversion writes to its folder."""

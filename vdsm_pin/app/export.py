@@ -11,7 +11,8 @@ from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.io.problem_file import ProblemFile
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.film import (
     FRAMES_PER_SECOND,
     Shot,
@@ -22,7 +23,6 @@ from vdsm_pin.report.film import (
 from vdsm_pin.report.folder import check_kept, check_output_file
 from vdsm_pin.report.gltf import glb, play_times
 from vdsm_pin.report.html import view_page
-from vdsm_pin.trajectory import Trajectory
 
 ENDINGS: Final = (".glb", ".png", ".mp4")
 SECONDS: Final = 10.0

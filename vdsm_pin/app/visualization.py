@@ -18,11 +18,11 @@ from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
 from vdsm_pin.io.atomic import write_text
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.folder import check_kept, check_output_file
 from vdsm_pin.report.html import message_page, view_page
 from vdsm_pin.report.postures import at_start
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.moving import untimed
 
 HOST: Final = "127.0.0.1"

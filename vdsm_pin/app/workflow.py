@@ -36,11 +36,11 @@ from vdsm_pin.report.tables import (
     write_centres,
     write_link_angles,
 )
-from vdsm_pin.robot_model import RobotModel, load_robot
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.coal_clearance import reach_of
 from vdsm_pin.verification.moving import untimed
 from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.robot_model import RobotModel, load_robot
 from vdsm_pin.verification.task import all_pairs
 from vdsm_pin.verification.verify import verify
 

@@ -22,7 +22,6 @@ from vdsm_pin.app.workflow import (
     plan_to_folder,
     verify_to_folder,
 )
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import (
     Infeasible,
     InvalidFile,
@@ -32,6 +31,7 @@ from vdsm_pin.errors import (
 )
 from vdsm_pin.io.problem_file import ProblemFile, read_problem
 from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.refinement import HANDED_OUT
 from vdsm_pin.report.facts import batch_row
 from vdsm_pin.report.files import BatchRow, ManifestFile, TimingFile

@@ -11,13 +11,13 @@ from typing import Any, Final
 import numpy as np
 from flint import arb
 
-from vdsm_pin import scene
 from vdsm_pin.certificate_checker.balls import Ball, claim, number
 from vdsm_pin.certificate_checker.motion import Branch, Path
 from vdsm_pin.certificate_checker.solids import Body, Pair, Solid, solid
 from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Tree
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem import scene
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 
 ERRORS: Final = "joints_rad", "base_m", "base_rad", "obstacle_m", "obstacles"
 

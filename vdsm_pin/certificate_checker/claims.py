@@ -15,8 +15,8 @@ from vdsm_pin.certificate_checker.motion import Interval
 from vdsm_pin.certificate_checker.rows import Rows
 from vdsm_pin.certificate_checker.solids import Mesh, Pair
 from vdsm_pin.certificate_checker.tree import Pose, Tree
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 
 PER_METRE: Final = 10**10  # a clearance that is whole counts these parts of a metre
 KEYS: Final = set(

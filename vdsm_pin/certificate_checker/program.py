@@ -22,8 +22,8 @@ from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.source import bounded_lines, check_is_file, sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.text import printable, show_everything
-from vdsm_pin.trajectory import Trajectory
 
 VERSION: Final = 5
 PRECISION: Final = 128

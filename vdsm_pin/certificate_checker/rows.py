@@ -21,8 +21,8 @@ from vdsm_pin.certificate_checker.balls import (
 )
 from vdsm_pin.certificate_checker.motion import Interval, part
 from vdsm_pin.certificate_checker.path import Drawing
-from vdsm_pin.problem import Order, Posture
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.planning_problem import Order, Posture
+from vdsm_pin.problem.trajectory import Trajectory
 
 PARTS: Final = 32  # of a smooth piece, whose control points hold what lies between
 HALVINGS: Final = 24

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from flint import arb
 
-from vdsm_pin import scene
 from vdsm_pin.certificate_checker.balls import (
     ROUNDING,
     Ball,
@@ -25,6 +24,8 @@ from vdsm_pin.certificate_checker.balls import (
     unit,
 )
 from vdsm_pin.certificate_checker.inside import Surface
+from vdsm_pin.geometry import solids
+from vdsm_pin.problem import scene
 
 
 class Solid:
@@ -140,7 +141,7 @@ def boundary(loops: Iterable[Sequence[int]]) -> dict[tuple[int, int], int]:
 class Mesh(Solid):
     """Triangles; of a surface only the problem says that it has no inside."""
 
-    def __init__(self, mesh: scene.Mesh) -> None:
+    def __init__(self, mesh: solids.Mesh) -> None:
         super().__init__(mesh.name, mesh.vertices[mesh.triangles])
         self.surface, self.surface_only = Surface(self.points), mesh.solid is False
         self.assumed_size = mesh.assumed_size
@@ -162,38 +163,38 @@ def solid(obstacle: Any) -> Solid:
         obstacle = obstacle.solid
     name = obstacle.name
     match obstacle:
-        case scene.Sphere():
+        case solids.Sphere():
             found = Solid(name, [[obstacle.centre]], radius=obstacle.radius)
-        case scene.Capsule() | scene.Cylinder():
+        case solids.Capsule() | solids.Cylinder():
             half, radius = obstacle.half_length * obstacle.axis, arb(obstacle.radius)
             found = Solid(name, [[obstacle.centre - half, obstacle.centre + half]])
-            if isinstance(obstacle, scene.Capsule):
+            if isinstance(obstacle, solids.Capsule):
                 found.radius = radius
             else:
                 found.disc_axis = unit(column(*obstacle.axis.tolist()))
                 found.disc_radius = radius
-        case scene.Box():
+        case solids.Box():
             corners = np.array([*product((-1, 1), repeat=3)]) * obstacle.half_size
             corners = obstacle.centre + corners @ obstacle.rotation.T
             found = Solid(name, [corners], origin=obstacle.centre)
-        case scene.Prism():
+        case solids.Prism():
             flat = [[[*uv, s] for uv in obstacle.polygon] for s in obstacle.span]
             both = obstacle.origin + np.array(flat) @ obstacle.rotation.T
             corners = both.reshape(1, -1, 3)
             found = Solid(name, corners, origin=obstacle.origin)
             found.ends = both
-        case scene.HalfSpace():
+        case solids.HalfSpace():
             normal = unit(column(*obstacle.normal.tolist()))
             foot = normal * dot(normal, column(*obstacle.point.tolist()))
             found = Solid(name, [[[float(entry) for entry in foot.entries()]]])
             found.normal = normal
-        case scene.PointCloud():
+        case solids.PointCloud():
             found = Solid(name, obstacle.points[:, None], radius=obstacle.radius)
-        case scene.Voxels():
+        case solids.Voxels():
             corners = np.array([*product((-1, 1), repeat=3)]) * obstacle.half_size
             corners = obstacle.centres[:, None] + corners @ obstacle.rotation.T
             found = Solid(name, corners, origin=obstacle.centres)
-        case scene.Mesh():
+        case solids.Mesh():
             return Mesh(obstacle)
     return found
 

@@ -38,12 +38,12 @@ def urdf(
     out: Annotated[Path, typer.Option("--out", help="The URDF file.")],
 ) -> None:
     """Write the URDF of an arm."""
+    from vdsm_pin.arm.manipulator import BUILT_IN, built_in
+    from vdsm_pin.arm.urdf_writer import mesh_names, urdf_text
     from vdsm_pin.io.atomic import atomic_path
     from vdsm_pin.io.problem_file import built_in_names, read_problem
-    from vdsm_pin.manipulator import BUILT_IN, built_in
     from vdsm_pin.report.folder import check_output_file
     from vdsm_pin.report.solids import obj_text
-    from vdsm_pin.urdf_writer import mesh_names, urdf_text
 
     known = name in BUILT_IN or name in built_in_names() or Path(name).exists()
     if not known:

@@ -12,7 +12,7 @@ from vdsm_pin.errors import InvalidInput
 from vdsm_pin.planner.strategies import STRATEGIES
 
 if TYPE_CHECKING:
-    from vdsm_pin.error_boxes import ErrorBox
+    from vdsm_pin.problem.error_boxes import ErrorBox
 
 PASSED: Final = 0
 NOT_PASSED: Final = 1
@@ -99,7 +99,7 @@ def errors_of(
     Raises:
         InvalidInput: If one is no number, or negative, or has no name and needs one.
     """
-    from vdsm_pin.error_boxes import ErrorBox
+    from vdsm_pin.problem.error_boxes import ErrorBox
 
     joints = [_number("--joint-error-deg", word) for word in joint_deg.split(",")]
     shifts = _by_name("--obstacle-error-mm", obstacles_mm or ())

@@ -6,15 +6,7 @@ from typing import Final, TypeAlias, cast
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io import problem_schema as schema
-from vdsm_pin.io.frames import Frame, radians
-from vdsm_pin.io.obstacle_builder import ObstacleBuilder
-from vdsm_pin.io.source import Digest
-from vdsm_pin.io.urdf_arm import read_urdf_arm
-from vdsm_pin.io.yaml_reader import Location, YamlDocument
-from vdsm_pin.manipulator import (
+from vdsm_pin.arm.manipulator import (
     BUILT_IN,
     FEED,
     TOOL,
@@ -27,6 +19,14 @@ from vdsm_pin.manipulator import (
     built_in,
     paper_hole_angles,
 )
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io import problem_schema as schema
+from vdsm_pin.io.frames import Frame, radians
+from vdsm_pin.io.obstacle_builder import ObstacleBuilder
+from vdsm_pin.io.source import Digest
+from vdsm_pin.io.urdf_arm import read_urdf_arm
+from vdsm_pin.io.yaml_reader import Location, YamlDocument
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import UNITS_PER_METRE
 

@@ -4,9 +4,9 @@ from typing import Annotated, TypeAlias
 
 from pydantic import Field
 
+from vdsm_pin.arm.manipulator import MAX_LINKS
 from vdsm_pin.io import obstacle_schema as shapes
 from vdsm_pin.io.schema_types import FileModel
-from vdsm_pin.manipulator import MAX_LINKS
 
 MAX_PARTS = 256
 """Most hulls that a mesh is covered by."""

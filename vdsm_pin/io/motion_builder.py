@@ -9,8 +9,8 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.motion_schema import MotionModel
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
+from vdsm_pin.problem.scene import Carrier
 from vdsm_pin.proof.tree import Tree, free_tree
-from vdsm_pin.scene import Carrier
 
 FLOATING = 6
 """The frame of `free_tree` that has all six joints before it."""

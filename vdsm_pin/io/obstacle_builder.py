@@ -9,8 +9,9 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-from vdsm_pin import scene
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.geometry import solids
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import obstacle_schema as schema
 from vdsm_pin.io.clouds import RawCloud, read_cloud
@@ -21,7 +22,7 @@ from vdsm_pin.io.motion_builder import FLOATING, rigid_carrier
 from vdsm_pin.io.motion_schema import MotionModel, MovableModel
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
-from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.problem import scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import UNITS_PER_METRE
 
@@ -140,29 +141,29 @@ class ObstacleBuilder:
             raise self.document.invalid(at, problem)
 
     @singledispatchmethod
-    def build(self, model: object, at: Location) -> scene.Solid:
+    def build(self, model: object, at: Location) -> solids.Solid:
         """One obstacle, in the frame of the base."""
         raise NotImplementedError(type(model))
 
     @build.register
-    def _(self, model: schema.SphereModel, at: Location) -> scene.Solid:
+    def _(self, model: schema.SphereModel, at: Location) -> solids.Solid:
         radius = float(self.frame.metres(model.radius))
-        return scene.Sphere(model.name, self.frame.point(model.center), radius)
+        return solids.Sphere(model.name, self.frame.point(model.center), radius)
 
     @build.register
-    def _(self, model: schema.CylinderModel, at: Location) -> scene.Solid:
-        return self._round(scene.Cylinder, model, at)
+    def _(self, model: schema.CylinderModel, at: Location) -> solids.Solid:
+        return self._round(solids.Cylinder, model, at)
 
     @build.register
-    def _(self, model: schema.CapsuleModel, at: Location) -> scene.Solid:
-        return self._round(scene.Capsule, model, at)
+    def _(self, model: schema.CapsuleModel, at: Location) -> solids.Solid:
+        return self._round(solids.Capsule, model, at)
 
     def _round(
         self,
-        make: Callable[..., scene.Solid],
+        make: Callable[..., solids.Solid],
         model: schema.CylinderModel | schema.CapsuleModel,
         at: Location,
-    ) -> scene.Solid:
+    ) -> solids.Solid:
         if isinstance(model.axis, str):
             vector = np.eye(3)[AXES[model.axis]]
         else:
@@ -176,13 +177,13 @@ class ObstacleBuilder:
         )
 
     @build.register
-    def _(self, model: schema.BoxModel, at: Location) -> scene.Solid:
+    def _(self, model: schema.BoxModel, at: Location) -> solids.Solid:
         centre, half_size = self.frame.point(model.center), np.array(model.size) / 2.0
         rotation = self.frame.orientation(model.rpy_deg)
-        return scene.Box(model.name, centre, rotation, self.frame.metres(half_size))
+        return solids.Box(model.name, centre, rotation, self.frame.metres(half_size))
 
     @build.register
-    def _(self, model: schema.PrismModel, at: Location) -> scene.Solid:
+    def _(self, model: schema.PrismModel, at: Location) -> solids.Solid:
         if not model.from_ < model.to:
             problem = f"is {model.to:g}, expected above from = {model.from_:g}"
             raise self.document.invalid((*at, "to"), problem)
@@ -195,7 +196,7 @@ class ObstacleBuilder:
         if not low < high:
             problem = f"is {model.to!r}, too near to from = {model.from_!r}"
             raise self.document.invalid((*at, "to"), problem)
-        return scene.Prism(
+        return solids.Prism(
             model.name,
             np.zeros(3),
             self.frame.rotation.T[:, order],
@@ -216,17 +217,17 @@ class ObstacleBuilder:
             raise self.document.invalid(at, problem)
 
     @build.register
-    def _(self, model: schema.HalfSpaceModel, at: Location) -> scene.Solid:
+    def _(self, model: schema.HalfSpaceModel, at: Location) -> solids.Solid:
         unit = self._unit(model.normal, (*at, "normal"))
         normal = self.frame.direction(unit)
         foot = self.frame.height(model.point, model.normal) * normal
-        return scene.HalfSpace(model.name, foot, normal)
+        return solids.HalfSpace(model.name, foot, normal)
 
     @build.register
-    def _(self, model: schema.MeshModel, at: Location) -> scene.Solid:
+    def _(self, model: schema.MeshModel, at: Location) -> solids.Solid:
         mesh = self._read(read_mesh, model, at)
         size = MeshSize.of(mesh.vertices, model, self.frame, mesh.unit)
-        found = scene.Mesh(
+        found = solids.Mesh(
             model.name,
             self._placed(mesh.vertices, size, at),
             mesh.triangles,
@@ -240,13 +241,13 @@ class ObstacleBuilder:
         return found
 
     @build.register
-    def _(self, model: schema.PointsModel, at: Location) -> scene.Solid:
+    def _(self, model: schema.PointsModel, at: Location) -> solids.Solid:
         cloud = self._read(read_cloud, model, at)
         if cloud.grid:
             problem = f"{model.file!r} is a grid of cells; expected points, or "
             raise self.document.invalid((*at, "file"), problem + "shape: voxels")
         size = MeshSize.of(cloud.points, model, self.frame)
-        return scene.PointCloud(
+        return solids.PointCloud(
             model.name,
             self._placed(cloud.points, size, at),
             float(self.frame.metres(model.radius)),
@@ -255,7 +256,7 @@ class ObstacleBuilder:
         )
 
     @build.register
-    def _(self, model: schema.VoxelsModel, at: Location) -> scene.Solid:
+    def _(self, model: schema.VoxelsModel, at: Location) -> solids.Solid:
         cloud = self._read(read_cloud, model, at)
         points, edges = cloud.points, np.array(model.size)
         stray = [
@@ -268,7 +269,7 @@ class ObstacleBuilder:
             raise self.document.invalid((*at, stray[0]), problem)
         points = points * edges if cloud.grid else points
         size = MeshSize.of(points, model, self.frame, self._unit_of_grid(cloud))
-        return scene.Voxels(
+        return solids.Voxels(
             model.name,
             self._placed(points, size, at),
             self.frame.orientation(model.rpy_deg),

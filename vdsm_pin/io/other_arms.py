@@ -5,19 +5,20 @@ from pathlib import Path
 
 import numpy as np
 
-from vdsm_pin.arm_tree import RAIL, arm_tree, link_frame
+from vdsm_pin.arm.manipulator import Manipulator
+from vdsm_pin.arm.tree import RAIL, arm_tree, link_frame
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.geometry.solids import Capsule, Solid
 from vdsm_pin.io.arm_builder import ArmBuilder
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.problem_schema import OtherModel
 from vdsm_pin.io.source import Digest, read_bytes
 from vdsm_pin.io.trajectory_file import TIME, read_trajectory
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
-from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.problem.scene import Carrier, Moving
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.tree import Tree
-from vdsm_pin.scene import Capsule, Carrier, Moving, Solid
-from vdsm_pin.trajectory import Trajectory
 
 MAX_BYTES = 1 << 30
 """Of a trajectory file."""

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry import curves
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
@@ -23,11 +24,10 @@ from vdsm_pin.io.points_file import read_points
 from vdsm_pin.io.posture_builder import PostureBuilder
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import YamlDocument
-from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.pointing import Pointing
-from vdsm_pin.problem import Approach, Blocked, DesiredPath, Order
+from vdsm_pin.problem.planning_problem import Approach, Blocked, DesiredPath, Order
+from vdsm_pin.problem.pointing import Pointing
+from vdsm_pin.problem.trajectory import MAX_ROWS
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import MAX_ROWS
 from vdsm_pin.units import UNITS_PER_METRE
 
 CURVE_TOLERANCE: Final = 0.00005

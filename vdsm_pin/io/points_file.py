@@ -10,7 +10,7 @@ from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.source import Digest, read_bytes
 from vdsm_pin.io.tables import Table, as_text
-from vdsm_pin.trajectory import MAX_ROWS
+from vdsm_pin.problem.trajectory import MAX_ROWS
 
 MAX_BYTES: Final = 1 << 29
 """Some hundred bytes for each of the rows that a motion may have."""

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vdsm_pin.arm.kinematics import joint_centres, link_angles
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
-from vdsm_pin.kinematics import joint_centres, link_angles
-from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.problem import Posture
+from vdsm_pin.problem.planning_problem import Posture
 from vdsm_pin.tolerances import TOLERANCES
 
 

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from vdsm_pin.error_boxes import ErrorBox, JointErrors, ObstacleError
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.geometry.solids import HalfSpace
 from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.arm_builder import ArmBuilder
 from vdsm_pin.io.frames import Frame, radians
@@ -16,15 +17,15 @@ from vdsm_pin.io.path_builder import PathBuilder, spacing_of
 from vdsm_pin.io.posture_builder import PostureBuilder
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import YamlDocument
-from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scaling import (
+from vdsm_pin.problem.error_boxes import ErrorBox, JointErrors, ObstacleError
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scaling import (
     OtherRatios,
     ProjectionCylinder,
     Scaling,
     ScalingCentre,
 )
-from vdsm_pin.scene import HalfSpace, Moving, Scene, solid_of
+from vdsm_pin.problem.scene import Moving, Scene, solid_of
 from vdsm_pin.tolerances import TOLERANCES
 
 

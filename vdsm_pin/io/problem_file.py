@@ -7,7 +7,6 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import InvalidFile, UnknownName
 from vdsm_pin.io.obstacle_schema import FromFileModel
 from vdsm_pin.io.path_schema import FilePart
@@ -20,7 +19,8 @@ from vdsm_pin.io.problem_schema import (
 )
 from vdsm_pin.io.source import check_is_file, decode, read_bytes
 from vdsm_pin.io.yaml_reader import read_yaml
-from vdsm_pin.problem import PlanningProblem, ProblemSource
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem, ProblemSource
 
 MAX_PROBLEM_BYTES: Final = 32 << 20
 

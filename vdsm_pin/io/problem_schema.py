@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
+from vdsm_pin.arm.manipulator import MAX_LINKS
 from vdsm_pin.io.body_schema import BodyModel
 from vdsm_pin.io.motion_schema import MovableModel
 from vdsm_pin.io.path_schema import PathPart
@@ -21,7 +22,6 @@ from vdsm_pin.io.schema_types import (
     Vector,
     text_or_not,
 )
-from vdsm_pin.manipulator import MAX_LINKS
 
 Radii: TypeAlias = Annotated[
     Annotated[Positive, Tag("one")]

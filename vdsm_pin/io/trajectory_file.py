@@ -19,14 +19,14 @@ from typing import Final, Literal, TextIO, TypeAlias
 import numpy as np
 import pydantic_core
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.io.source import check_is_file
 from vdsm_pin.io.tables import CHUNK_ROWS, Table, listed, open_text
-from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.problem.trajectory import MAX_ROWS, Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import MAX_ROWS, Trajectory
 
 Interpolation: TypeAlias = Literal["linear", "cubic", "quintic", "auto"]
 """What joins the rows: straight lines; cubic pieces, by their velocities; quintic ones,

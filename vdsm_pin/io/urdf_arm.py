@@ -13,11 +13,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.source import decode, read_bytes
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.urdf_validator import validate_urdf
 
 MAX_BYTES: Final = 16 << 20
 X, Y, Z = np.eye(3)

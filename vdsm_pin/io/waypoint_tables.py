@@ -12,15 +12,15 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.cables import angles_from_cables
+from vdsm_pin.arm.cables import angles_from_cables
+from vdsm_pin.arm.kinematics import joint_angles
 from vdsm_pin.errors import InconsistentCables, InvalidFile, LinkTooShort
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.io.source import check_is_file
 from vdsm_pin.io.tables import Table, open_text
-from vdsm_pin.kinematics import joint_angles
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import MAX_ROWS, Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import MAX_ROWS, Trajectory
 from vdsm_pin.units import MM_PER_M
 
 NUMBER: Final = ("waypoint",)

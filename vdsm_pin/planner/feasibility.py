@@ -9,10 +9,10 @@ paper's test and breaks the limit of psi_1 in its method. Both are tested.
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import OutOfReach
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.problem import DesiredPath
+from vdsm_pin.problem.planning_problem import DesiredPath
 from vdsm_pin.units import in_mm
 
 

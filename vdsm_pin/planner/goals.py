@@ -12,15 +12,20 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.cables import cable_lengths
+from vdsm_pin.arm.cables import cable_lengths
+from vdsm_pin.arm.kinematics import joint_centres, straight_joints
 from vdsm_pin.errors import Infeasible, NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.kinematics import joint_centres, straight_joints
 from vdsm_pin.planner.joint_lines import clear_line
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan, TipPath
 from vdsm_pin.planner.strategies import Strategy
-from vdsm_pin.problem import Blocked, DesiredPath, PlanningProblem, Posture
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.planning_problem import (
+    Blocked,
+    DesiredPath,
+    PlanningProblem,
+    Posture,
+)
+from vdsm_pin.problem.trajectory import Trajectory
 
 JOINS: Final = 8
 """Rows of a motion from which a line to its other end is tried, evenly spread."""

@@ -4,10 +4,10 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 
 FEWEST: Final = 16
 """Intervals a straight line is begun to be looked at with."""

@@ -11,19 +11,19 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.cables import cable_lengths
+from vdsm_pin.arm.cables import cable_lengths
+from vdsm_pin.arm.kinematics import joint_angles, link_angles
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.compiled import compiled
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.kinematics import joint_angles, link_angles
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.fewest.follow_the_leader import beyond
 from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan, TipPath
 from vdsm_pin.planner.start import check_start, start_centres
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 
 FINEST: Final = 64
 """Parts into which a step is cut at most so that no joint turns too far in one."""

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
 from vdsm_pin.notebook import Summarised
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from vdsm_pin.planner.paper.steps import PaperSteps

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, read_only
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.row_kernels import steps_between
 from vdsm_pin.tolerances import TOLERANCES
 

@@ -5,14 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.errors import InsideUnknown, StartBlocked, StartInside
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.geometry.winding import Location, Side, locate
-from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.upper_clearance import culprit, upper_clearance
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scene import Mesh, Scene, with_hulls
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Scene, with_hulls
 
 
 def start_centres(problem: PlanningProblem) -> FloatArray:

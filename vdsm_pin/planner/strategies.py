@@ -12,7 +12,7 @@ from vdsm_pin.errors import UnknownName
 
 if TYPE_CHECKING:
     from vdsm_pin.planner.records import LinkClearance, Margin, Plan
-    from vdsm_pin.problem import PlanningProblem
+    from vdsm_pin.problem.planning_problem import PlanningProblem
 
 Strategy: TypeAlias = "Callable[[PlanningProblem, LinkClearance, Margin], Plan]"
 """(problem, clearance, margin) -> plan. `margin` is what the strategy shall keep beyond

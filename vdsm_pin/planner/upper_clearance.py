@@ -10,7 +10,7 @@ from vdsm_pin.geometry.bodies import new_body
 from vdsm_pin.geometry.kernels import BRACKET, NORMAL, SCRATCH_ROWS, UPPER
 from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
 GOAL: Final = TOLERANCES.bracket_gap

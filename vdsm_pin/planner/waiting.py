@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vdsm_pin.planner.records import Plan, TipPath
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.units import in_mm
 
 TURNING: Final = float(np.deg2rad(20.0))

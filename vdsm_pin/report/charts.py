@@ -6,9 +6,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from vdsm_pin.cables import cable_lengths
+from vdsm_pin.arm.cables import cable_lengths
+from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import link_angles
 from vdsm_pin.report.facts import cables, changed_angles, min_clearance
 from vdsm_pin.report.palette import link_colours, obstacle_colours
 from vdsm_pin.report.postures import straight_arm

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from vdsm_pin.cables import cable_lengths
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.cables import cable_lengths
+from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.files import (
     AdjustmentRow,
     BatchRow,
@@ -34,7 +35,6 @@ from vdsm_pin.report.inputs import assumed_sizes, assumption, input_notes
 from vdsm_pin.report.run_record import RunRecord, machine, versions
 from vdsm_pin.report.words import check_title, depth, percent, place, quantity
 from vdsm_pin.tolerances import TOLERANCES, UNITS
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.fk import PLANNED
 from vdsm_pin.verification.inside import NAME as INSIDE
 from vdsm_pin.verification.inside import surfaces

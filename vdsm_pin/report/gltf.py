@@ -10,15 +10,16 @@ from typing import Any, Final
 
 import numpy as np
 
+from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.kinematics import joint_centres, link_frames
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.geometry.solids import Capsule
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Moving, solid_of
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.moves import quaternion, told_moments
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import FINE, Surface, detail, surface
 from vdsm_pin.report.thinning import thinned
-from vdsm_pin.scene import Capsule, Moving, solid_of
-from vdsm_pin.trajectory import Trajectory
 
 _BINARY: Final = 0x4E4F534A, 0x004E4942  # the chunks JSON and BIN
 _FLOATS, _NUMBERS = 5126, 5125

@@ -14,7 +14,8 @@ from markupsafe import Markup
 
 from vdsm_pin import __version__, kept
 from vdsm_pin.errors import NoPlanFound, OutOfTime, VdsmError, VerificationFailed
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.facts import failing, left_out_words, nearest_to_obstacle
 from vdsm_pin.report.files import BatchRow, PlanFile, Point, VerificationFile
 from vdsm_pin.report.impasse import impasse_of
@@ -40,7 +41,6 @@ from vdsm_pin.report.words import (
     survived,
     term,
 )
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.records import Verification
 

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vdsm_pin.arm.kinematics import joint_angles, straight_joints
 from vdsm_pin.errors import Reached, VdsmError
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_angles, straight_joints
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.postures import at_start, one_row
-from vdsm_pin.trajectory import Trajectory
 
 
 @dataclass(frozen=True)

@@ -3,10 +3,11 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from vdsm_pin.arm_bodies import convex_cover
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scene import FromFile, Mesh, solid_of
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.arm.bodies import convex_cover
+from vdsm_pin.geometry.solids import FromFile, Mesh
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import solid_of
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.inside import mesh_notes
 
 _NAMED: Final = 3

@@ -5,9 +5,9 @@ from typing import Any, Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.problem.scene import Moving, Obstacle
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.charts import packed
-from vdsm_pin.scene import Moving, Obstacle
-from vdsm_pin.trajectory import Trajectory
 
 _TURN: Final = np.deg2rad(5.0)
 """Between two poses that a page is told nothing turns farther; [rad]."""

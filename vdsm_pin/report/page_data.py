@@ -7,10 +7,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.geometry.solids import Solid
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Obstacle, solid_of
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.charts import charts, packed
 from vdsm_pin.report.facts import failing, finite
 from vdsm_pin.report.impasse import Impasse
@@ -23,8 +26,6 @@ from vdsm_pin.report.thinning import (
     nearest_obstacles,
     thinned,
 )
-from vdsm_pin.scene import Obstacle, Solid, solid_of
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import (
     ClosestApproach,
     Counterexample,

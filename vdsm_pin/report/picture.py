@@ -5,13 +5,14 @@ from typing import Final
 import numpy as np
 from shapely import MultiPoint, Polygon
 
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_centres
+from vdsm_pin.geometry.solids import HalfSpace
+from vdsm_pin.problem.scene import solid_of
 from vdsm_pin.report.moves import start_pose
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import surface
 from vdsm_pin.report.thinning import MOST_DRAWN, nearest_obstacles
-from vdsm_pin.scene import HalfSpace, solid_of
 from vdsm_pin.verification.records import Verification
 
 _WIDTH, _HEIGHT = 240.0, 160.0

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from vdsm_pin.arm.kinematics import straight_joints
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import straight_joints
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 
 
 def one_row(joints: FloatArray) -> Trajectory:

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.io.source import BLOCK
-from vdsm_pin.problem import PlanningProblem, ProblemSource
-from vdsm_pin.scene import Mesh, Moving, Obstacle, solid_of
+from vdsm_pin.problem.planning_problem import PlanningProblem, ProblemSource
+from vdsm_pin.problem.scene import Moving, Obstacle, solid_of
 
 MOST_LISTED: Final = 200
 """Obstacles that a page lists."""

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct
-from vdsm_pin.scene import (
+from vdsm_pin.geometry.solids import (
     BOX_CORNERS,
     Box,
     Capsule,

@@ -11,7 +11,8 @@ from typing import IO, Any, Final, Self
 
 import numpy as np
 
-from vdsm_pin.cables import cable_lengths
+from vdsm_pin.arm.cables import cable_lengths
+from vdsm_pin.arm.kinematics import joint_centres, link_angles, position_angles
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.decimals import WORD
 from vdsm_pin.io.waypoint_tables import (
@@ -20,11 +21,10 @@ from vdsm_pin.io.waypoint_tables import (
     cable_columns,
     centre_columns,
 )
-from vdsm_pin.kinematics import joint_centres, link_angles, position_angles
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.row_text import Form
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.coal_rows import NOTHING_MEASURED, CoalIndex
 from vdsm_pin.verification.records import (
     ClearanceChunk,

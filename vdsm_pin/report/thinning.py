@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.records import Verification
 from vdsm_pin.verification.task import ArmPairs
 

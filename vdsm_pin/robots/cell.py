@@ -19,11 +19,11 @@ from vdsm_pin.io.problem_schema import BasePoseModel, not_bool
 from vdsm_pin.io.schema_types import FileModel, Name, NotNegative, Number
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import read_yaml
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.robots.judgement import Asked
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.scene_files import MAX_BYTES, SceneModel, check_judged, read_scene
 from vdsm_pin.robots.urdf import read_robot
-from vdsm_pin.scene import Scene
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from vdsm_pin.arm_bodies import outer_points
+from vdsm_pin.arm.bodies import outer_points
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import pack_pieces

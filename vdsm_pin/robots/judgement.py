@@ -10,6 +10,7 @@ import numpy as np
 from vdsm_pin.errors import InvalidInput, VdsmError
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.geometry.convex import Piece
+from vdsm_pin.problem.scene import Scene, solid_of
 from vdsm_pin.proof.bodies import Body, Pair
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
@@ -19,7 +20,6 @@ from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.contacts import common_ball, in_world
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.second_opinion import link_shapes, placed, pose_difference
-from vdsm_pin.scene import Scene, solid_of
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M

@@ -10,6 +10,7 @@ from pydantic import Field, ValidationError
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.solids import Box, Cylinder, HalfSpace, Mesh, Sphere
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.motion_schema import MovableModel
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
@@ -17,16 +18,7 @@ from vdsm_pin.io.problem_errors import first_error
 from vdsm_pin.io.schema_types import FileModel
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import Location, YamlDocument, read_yaml
-from vdsm_pin.scene import (
-    Box,
-    Cylinder,
-    HalfSpace,
-    Mesh,
-    Moving,
-    Obstacle,
-    Scene,
-    Sphere,
-)
+from vdsm_pin.problem.scene import Moving, Obstacle, Scene
 
 MAX_BYTES: Final = 32 << 20
 UNIT_NORM: Final = 1e-3

@@ -13,9 +13,9 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.source import check_is_file, read_text
 from vdsm_pin.io.tables import Table, open_text
 from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
+from vdsm_pin.problem.trajectory import MAX_ROWS
 from vdsm_pin.proof.paths import Path, cubic_path, quintic_path
 from vdsm_pin.robots.model import Robot, RobotJoint
-from vdsm_pin.trajectory import MAX_ROWS
 from vdsm_pin.units import MM_PER_M
 
 MAX_BYTES: Final = 256 << 20

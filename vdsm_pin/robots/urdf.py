@@ -9,17 +9,17 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
+from vdsm_pin.geometry.solids import BOX_CORNERS
 from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.source import read_text
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.tree import Joint, Kind, Tree
 from vdsm_pin.robots.hulls import covering_hull
 from vdsm_pin.robots.model import LeftOut, Robot, RobotJoint
-from vdsm_pin.scene import BOX_CORNERS
-from vdsm_pin.urdf_validator import validate_urdf
 
 MAX_BYTES: Final = 16 << 20
 LARGEST_LINK: Final = 20.0

@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidInput, VerificationFailed
 from vdsm_pin.geometry.arrays import FloatArray, frozen
-from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.simulation.feed_forward import Statics
 from vdsm_pin.simulation.plant import free_ends, plant_xml, stiffnesses
 from vdsm_pin.simulation.settings import Kick, Settings
 from vdsm_pin.simulation.time_law import row_times
-from vdsm_pin.trajectory import Trajectory
 
 SLACK = 1.0
 """A cable with less tension counts as slack; [N]."""

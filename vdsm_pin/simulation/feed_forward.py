@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdsm_pin.cables import cable_lengths
+from vdsm_pin.arm.cables import cable_lengths
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.simulation.plant import stiffnesses
 from vdsm_pin.simulation.settings import Settings
 

@@ -7,27 +7,27 @@ from typing import Final, Literal
 import numpy as np
 from pydantic import Field
 
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.report.facts import finite
 from vdsm_pin.report.files import FileModel, VerdictWord
 from vdsm_pin.report.folder import check_output_folder, staged
 from vdsm_pin.report.run_record import versions
-from vdsm_pin.robot_model import load_robot
 from vdsm_pin.simulation.closed_loop import SLACK, Simulation, simulate
 from vdsm_pin.simulation.page import page
 from vdsm_pin.simulation.plant import cable_name
 from vdsm_pin.simulation.settings import Settings
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.clearance_check import check_clearance
 from vdsm_pin.verification.inside import arm_inside, check_inside, locate_arm
 from vdsm_pin.verification.records import combine
+from vdsm_pin.verification.robot_model import load_robot
 
 EXECUTED: Final = "executed.csv"
 RECORD: Final = "simulation.csv"

@@ -8,11 +8,11 @@ and Gibson 1985).
 
 import numpy as np
 
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.simulation.settings import Speed
-from vdsm_pin.trajectory import Trajectory
 
 LEAST_STEP = 1e-12
 """A row that moves less takes no time of its own."""

@@ -4,12 +4,12 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.cables import angles_from_cables, cable_lengths
+from vdsm_pin.arm.cables import angles_from_cables, cable_lengths
 from vdsm_pin.errors import InconsistentCables
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import Check, Verdict
 
 CHUNK: Final = 8192

@@ -19,20 +19,21 @@ from typing import IO, Any, Final, cast
 import numpy as np
 
 from vdsm_pin import __version__
-from vdsm_pin.arm_bodies import triangle_groups
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.bodies import triangle_groups
 from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.pieces import PackedPieces
+from vdsm_pin.geometry.solids import Mesh, Prism
 from vdsm_pin.io.atomic import atomic_path
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import solid_of, with_hulls
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import CLAIM, FIRST, LAST, PLANE_NORMAL, RECORD
 from vdsm_pin.proof.packed_tree import Motion
 from vdsm_pin.proof.recording import record
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.workspace import new_workspace
-from vdsm_pin.scene import Mesh, Prism, solid_of, with_hulls
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.certificate_file import (

@@ -12,10 +12,12 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.geometry.pieces import PackedPieces
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import step, watched
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import (
@@ -38,9 +40,7 @@ from vdsm_pin.proof.terms import (
     REFUTED,
     UNDECIDED,
 )
-from vdsm_pin.scene import Scene
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.moving import Knots
 from vdsm_pin.verification.proving import ProblemProof, prove_problem
 from vdsm_pin.verification.records import (

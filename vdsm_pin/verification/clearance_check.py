@@ -7,7 +7,7 @@ import numpy as np
 
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import IntArray
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.proof.layouts import AT_UPPER, LOW, TIME, UP
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline

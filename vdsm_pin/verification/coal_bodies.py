@@ -17,7 +17,7 @@ import numpy as np
 from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.geometry.ordering import coherent_order
-from vdsm_pin.scene import (
+from vdsm_pin.geometry.solids import (
     Box,
     Capsule,
     Cylinder,

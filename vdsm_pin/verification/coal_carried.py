@@ -12,12 +12,12 @@ from typing import Any, Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import RobotModel
-from vdsm_pin.scene import Mesh, Moving, solid_of
+from vdsm_pin.geometry.solids import Mesh
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Moving, solid_of
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.coal_bodies import (
     CoalBody,
@@ -30,6 +30,7 @@ from vdsm_pin.verification.coal_bodies import (
 from vdsm_pin.verification.coal_clearance import ProvedLowers
 from vdsm_pin.verification.coal_log import CoalLog
 from vdsm_pin.verification.records import Check, Pair, Verdict
+from vdsm_pin.verification.robot_model import RobotModel
 
 NAME: Final = "distances of feed, carried and moving bodies by Coal against the proof"
 """Name of the row."""

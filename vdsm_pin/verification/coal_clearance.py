@@ -17,16 +17,16 @@ from typing import Any, Final
 
 import numpy as np
 
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.pieces import PackedPieces, first_groups
 from vdsm_pin.geometry.row_bounds import coarse_bounds, row_brackets
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import LinkPoses, RobotModel
-from vdsm_pin.scene import Moving, Solid, solid_of
+from vdsm_pin.geometry.solids import Solid
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Moving, solid_of
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.coal_bodies import (
     CoalObstacle,
@@ -36,6 +36,7 @@ from vdsm_pin.verification.coal_bodies import (
 )
 from vdsm_pin.verification.coal_log import CoalLog
 from vdsm_pin.verification.records import Check, Verdict
+from vdsm_pin.verification.robot_model import LinkPoses, RobotModel
 from vdsm_pin.verification.task import ArmPairs
 
 CHUNK_BOUNDS: Final = 1 << 17

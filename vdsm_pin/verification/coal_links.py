@@ -10,19 +10,19 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.row_bounds import link_gaps
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.coal_bodies import CoalBody, distance_request, measure
 from vdsm_pin.verification.coal_clearance import capsule_transforms, in_turns
 from vdsm_pin.verification.coal_log import BETWEEN_LINKS, CoalLog
 from vdsm_pin.verification.records import Check, Verdict
+from vdsm_pin.verification.robot_model import RobotModel
 from vdsm_pin.verification.task import ArmPairs
 
 CHUNK_GAPS: Final = 1 << 20

@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import TOOL
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
-from vdsm_pin.manipulator import TOOL
 from vdsm_pin.verification.coal_rows import CoalRows
 from vdsm_pin.verification.records import ClosestApproach, Pair
 

@@ -9,11 +9,11 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.coal_clearance import CoalDistances, coal_distances
+from vdsm_pin.verification.robot_model import RobotModel
 
 NEAR: Final = 0.5
 """Pairs are measured up to this part of the body's radius past the required clearance;

@@ -12,15 +12,15 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray, frozen
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, TIME
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED
-from vdsm_pin.scene import Scene
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.moving import whole_rows
 from vdsm_pin.verification.pair_slopes import pair_slopes

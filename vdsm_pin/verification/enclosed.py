@@ -12,10 +12,10 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.records import (
     Check,
     ClearanceChunk,

@@ -7,13 +7,13 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import UP
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.records import ClearanceChunk, Pair
 from vdsm_pin.verification.task import pack_scene

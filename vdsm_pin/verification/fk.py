@@ -5,14 +5,14 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import Check, Verdict
+from vdsm_pin.verification.robot_model import RobotModel
 
 CHUNK: Final = 4096
 """Rows held in memory at a time."""

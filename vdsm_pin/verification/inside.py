@@ -13,18 +13,19 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm_bodies import arm_bodies
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.bodies import arm_bodies
+from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.geometry.winding import Location, Side, locate
-from vdsm_pin.kinematics import joint_centres, link_frames
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Moving, Scene, solid_of, with_hulls
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.terms import CERTIFIED
-from vdsm_pin.scene import Mesh, Moving, Scene, solid_of, with_hulls
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.records import Check, Verdict, combine

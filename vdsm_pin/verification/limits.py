@@ -12,12 +12,12 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
+from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.bernstein import part
-from vdsm_pin.kinematics import link_angles
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.records import Check, Verdict, combine
 
 CHUNK: Final = 65_536

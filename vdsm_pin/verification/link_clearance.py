@@ -11,9 +11,9 @@ from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.links import link_clearances
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import covers_of
 from vdsm_pin.proof.budget import rounding_pad
-from vdsm_pin.scene import covers_of
 from vdsm_pin.tolerances import TOLERANCES
 
 

@@ -9,17 +9,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdsm_pin.arm_tree import arm_tree
+from vdsm_pin.arm.tree import arm_tree
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Moving, Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, TIME
 from vdsm_pin.proof.packed_tree import Motion
 from vdsm_pin.proof.paths import Path, together
 from vdsm_pin.proof.terms import WORLD
 from vdsm_pin.proof.tree import Tree
-from vdsm_pin.scene import Moving, Scene
-from vdsm_pin.trajectory import Trajectory
 
 
 def whole_tree(problem: PlanningProblem) -> Tree:

@@ -16,15 +16,15 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.geometry import bernstein
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.pointing import AimError, angles_between
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.pointing import AimError, angles_between
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.drawing import drawn_intervals, runs, wrapped
 from vdsm_pin.verification.records import Check, Verdict
 

@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.pieces import PackedPieces
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.proving import Proving, new_proving
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.moving import Knots, whole_motion
 from vdsm_pin.verification.task import make_task
 

@@ -6,12 +6,12 @@ from enum import StrEnum
 from math import inf, nan
 from typing import TypeAlias
 
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.notebook import Summarised, in_percent
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import in_mm
 from vdsm_pin.verification.coal_rows import CoalRows
 

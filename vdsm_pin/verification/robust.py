@@ -14,16 +14,16 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.error_boxes import ErrorBox
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.proof.terms import UNDECIDED
-from vdsm_pin.scene import Scene
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.counterexample import Search, moments_of
 from vdsm_pin.verification.proving import prove_problem
 from vdsm_pin.verification.task import all_pairs, obstacle_growth

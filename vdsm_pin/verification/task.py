@@ -5,20 +5,21 @@ from functools import cached_property
 
 import numpy as np
 
-from vdsm_pin.arm_bodies import ArmBody, LeftOut, SelfPairs, arm_bodies, self_pairs
-from vdsm_pin.arm_tree import RAIL, link_frame
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.bodies import ArmBody, LeftOut, SelfPairs, arm_bodies, self_pairs
+from vdsm_pin.arm.tree import RAIL, link_frame
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.pieces import PackedPieces
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.geometry.solids import HalfSpace
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import solid_of
 from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.error_box import ErrorBox as ProofBox
 from vdsm_pin.proof.packing import pack_task
 from vdsm_pin.proof.packing import with_errors as with_box
 from vdsm_pin.proof.terms import Task
-from vdsm_pin.scene import HalfSpace, corners_of, solid_of
 from vdsm_pin.verification.link_clearance import arithmetic_pad
 from vdsm_pin.verification.moving import obstacle_frames, whole_tree
 from vdsm_pin.verification.records import Pair
@@ -138,7 +139,7 @@ def obstacle_growth(problem: PlanningProblem, errors: ErrorBox) -> list[float]:
             if isinstance(solid, HalfSpace):
                 message = f"obstacle {error.name!r}: a half-space cannot be turned"
                 raise InvalidInput(message)
-            points, grown = corners_of(solid)
+            points, grown = solid.corners, solid.grown
             middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
             reach = float(np.linalg.norm(points - middle, axis=1).max()) + grown
         found.append(error.shift + error.turn * reach)

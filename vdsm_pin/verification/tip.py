@@ -5,13 +5,13 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.geometry.bernstein import derivative
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.drawing import (
     check_coverage,
     check_order,

@@ -8,18 +8,17 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.errors import InvalidInput, OutOfTime, UnknownName, VdsmError
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.geometry.winding import Side
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import with_hulls
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import step
 from vdsm_pin.proof.layouts import AT_UPPER, LOW, OTHER, OWN, TIME, UP
-from vdsm_pin.robot_model import RobotModel
-from vdsm_pin.scene import with_hulls
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification import (
     cable_check,
     coal_carried,
@@ -63,6 +62,7 @@ from vdsm_pin.verification.records import (
     Verification,
     is_deepest,
 )
+from vdsm_pin.verification.robot_model import RobotModel
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.task import ArmPairs, all_pairs, ball_of
 from vdsm_pin.verification.tip import check_tip

@@ -4,14 +4,14 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.error_boxes import ErrorBox
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.blocks import sweep
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.workspace import forget
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.proving import prove_problem
 from vdsm_pin.verification.task import with_errors
 

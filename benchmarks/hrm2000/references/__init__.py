@@ -12,9 +12,9 @@ from types import MappingProxyType
 from typing import Any, Final, TypeAlias, cast
 
 from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import RobotModel
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.verification.robot_model import RobotModel
 
 Follow: TypeAlias = Callable[[PlanningProblem, RobotModel, LinkClearance], Trajectory]
 

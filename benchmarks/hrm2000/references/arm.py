@@ -9,16 +9,16 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.kinematics import joint_centres
 from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.verification.coal_bodies import coal_bodies
+from vdsm_pin.verification.robot_model import RobotModel
 
 BETWEEN = 5e-4
 """Kept beyond the required clearance for what happens between two rows; [m]."""

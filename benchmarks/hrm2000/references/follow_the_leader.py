@@ -3,14 +3,14 @@
 import numpy as np
 
 from benchmarks.hrm2000.references.arm import Arm, Rows, Wanted, wanted
+from vdsm_pin.arm.kinematics import joint_angles, link_angles
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_angles, link_angles
 from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import RobotModel
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.verification.robot_model import RobotModel
 
 FAR = 100.0
 """How far the rail goes on behind the start; [m]."""

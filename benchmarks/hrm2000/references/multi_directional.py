@@ -12,9 +12,9 @@ from benchmarks.hrm2000.references.follow_the_leader import lie_on
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import RobotModel
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.verification.robot_model import RobotModel
 
 STEP = 0.05  # m
 NODES = 4_000

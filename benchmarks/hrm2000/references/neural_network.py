@@ -11,9 +11,9 @@ import numpy as np
 from benchmarks.hrm2000.references.arm import Arm, along
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import RobotModel
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.verification.robot_model import RobotModel
 
 POSTURES, BATCH, STEPS, WIDTH = 40_000, 256, 6_000, 64
 BEND, SCATTER = np.deg2rad(12.0), np.deg2rad(1.0)

@@ -10,9 +10,9 @@ from benchmarks.hrm2000.references.arm import Arm, Rows, wanted
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import RobotModel
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.verification.robot_model import RobotModel
 
 CLOSE_ENOUGH = 2e-8  # m
 MOST_STEPS = 30

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem, straight_arm
 
+from vdsm_pin.arm.kinematics import joint_centres, link_angles
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_centres, link_angles
-from vdsm_pin.manipulator import built_in
+from vdsm_pin.geometry.solids import Cylinder, Sphere
 from vdsm_pin.planner.impossible.bounds import deviation, least_changed
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scene import Cylinder, Sphere
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance
 

@@ -6,9 +6,10 @@ import pytest
 import shapely
 from scenes_for_fewest import problem
 
+from vdsm_pin.arm.kinematics import joint_angles, link_angles
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import rotation_from_rpy
-from vdsm_pin.kinematics import joint_angles, link_angles
-from vdsm_pin.manipulator import built_in
+from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.growth import Grown, Population
 from vdsm_pin.planner.fewest.inner_capsules import blocked_by, cores_of
@@ -21,8 +22,8 @@ from vdsm_pin.planner.fewest.route import path_rows, tip_route
 from vdsm_pin.planner.fewest.shapes import Shapes, one_knee_shapes
 from vdsm_pin.planner.fewest.vary import vary
 from vdsm_pin.planner.impossible.bounds import prove_tips
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scene import Box, Capsule, Cylinder, HalfSpace, Obstacle, Prism, Sphere
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance
 

@@ -7,22 +7,22 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem, random_problem
 
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.kinematics import joint_centres, link_angles
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import NoPlanFound, OutOfReach, OutOfTime, PathBlocked
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.solids import Box, HalfSpace, Sphere
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.kinematics import joint_centres, link_angles
-from vdsm_pin.manipulator import built_in
 from vdsm_pin.planner.fewest.strategy import plan_clearest, plan_fewest
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.planner.time_limit import within_time
-from vdsm_pin.problem import Blocked, PlanningProblem
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Box, HalfSpace, Sphere
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import Blocked, PlanningProblem
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 from vdsm_pin.verification.yes_or_no import is_certified
 

@@ -7,9 +7,15 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem
 
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import (
+    CableLayout,
+    Manipulator,
+    built_in,
+    paper_hole_angles,
+)
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
+from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.charts import Directions, Projections
 from vdsm_pin.planner.fewest.follow_the_leader import followed
@@ -23,12 +29,12 @@ from vdsm_pin.planner.fewest.sparsify import sparser
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.tip_routes import TipSpace, resampled
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.problem import DesiredPath, PlanningProblem
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Box, Cylinder, Obstacle, Scene, Sphere
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 ARM = built_in("hrm8")

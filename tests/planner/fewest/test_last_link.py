@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem, random_problem
 
-from vdsm_pin.errors import HemmedIn
-from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.manipulator import (
+from vdsm_pin.arm.manipulator import (
     CableLayout,
     Manipulator,
     built_in,
     paper_hole_angles,
 )
+from vdsm_pin.errors import HemmedIn
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.solids import Box
+from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.impossible.last_link import _least_along, hemmed_in
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scene import Box
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.verification.link_clearance import link_clearance
 
 X = np.array([1.0, 0.0, 0.0])

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem, random_problem
 
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import CutOff
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, rotation_from_rpy
+from vdsm_pin.geometry.solids import Box, Sphere
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.manipulator import built_in
 from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.impossible.cut_off import cut_off
 from vdsm_pin.planner.impossible.octree import DEPTH, adjoining, places
-from vdsm_pin.problem import Blocked
-from vdsm_pin.scene import Box, Sphere
+from vdsm_pin.problem.planning_problem import Blocked
 from vdsm_pin.verification.link_clearance import link_clearance
 
 KEEP = built_in("hrm8").link_radius + 0.0035

@@ -6,19 +6,20 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem
 
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import LinkBody, built_in
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import LinkBody, built_in
+from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
 from vdsm_pin.planner.fewest.charts import turned_towards
-from vdsm_pin.pointing import AimError, Pointing, angles_between
-from vdsm_pin.problem import Blocked, DesiredPath, PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import Blocked, DesiredPath, PlanningProblem
+from vdsm_pin.problem.pointing import AimError, Pointing, angles_between
+from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.refinement import Refinement, plan_and_verify
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Box, Cylinder, Obstacle, Scene, Sphere
 from vdsm_pin.verification.pointing import NAME
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 
 ARM = built_in("hrm8")
 WELD = np.array([[2.8, 0.2, 0.1], [2.8, 0.5, 0.1], [2.8, 0.5, 0.4]])

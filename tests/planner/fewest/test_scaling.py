@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem
 
-from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.arm.manipulator import Manipulator
+from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, Prism, Sphere
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.explore import explore
 from vdsm_pin.planner.fewest.levels import QUICK, THOROUGH, Effort, Insert
@@ -16,8 +17,8 @@ from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.shortcut import shortcut
 from vdsm_pin.planner.fewest.strategy import CLEAREST, FEWEST
 from vdsm_pin.planner.fewest.unbend import unbend
-from vdsm_pin.problem import DesiredPath, Order, PlanningProblem
-from vdsm_pin.scene import Box, Capsule, Cylinder, Obstacle, Prism, Scene, Sphere
+from vdsm_pin.problem.planning_problem import DesiredPath, Order, PlanningProblem
+from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.verification.link_clearance import link_clearance
 
 LENGTHS = {

@@ -9,11 +9,12 @@ import pytest
 import yaml
 from scenes_for_fewest import problem
 
+from vdsm_pin.arm.kinematics import joint_centres, link_angles
+from vdsm_pin.arm.manipulator import CableLayout, Manipulator, paper_hole_angles
 from vdsm_pin.errors import Infeasible, NoPlanFound, NoWayOut
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.io.problem_file import built_in_text, read_problem
-from vdsm_pin.kinematics import joint_centres, link_angles
-from vdsm_pin.manipulator import CableLayout, Manipulator, paper_hole_angles
 from vdsm_pin.planner.fewest import explore
 from vdsm_pin.planner.fewest.insertion import Inserted
 from vdsm_pin.planner.fewest.judge import Judge
@@ -22,11 +23,11 @@ from vdsm_pin.planner.fewest.start_node import with_start
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.unbend import leans_ahead, unbend
 from vdsm_pin.planner.paper.pipeline import plan_paper
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Obstacle, Sphere
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 LENGTH = 3.126

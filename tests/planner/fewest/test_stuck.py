@@ -8,6 +8,7 @@ from scenes_for_fewest import problem
 
 from vdsm_pin.errors import NoPlanFound, OutOfReach
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.solids import Box
 from vdsm_pin.planner.feasibility import rail_distance
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.explain import refuse
@@ -16,9 +17,9 @@ from vdsm_pin.planner.fewest.levels import Effort, Insert
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.stuck import Stuck, where_stuck
-from vdsm_pin.problem import Blocked, PlanningProblem
+from vdsm_pin.problem.planning_problem import Blocked, PlanningProblem
+from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.progress import shown
-from vdsm_pin.scene import Box, Obstacle
 from vdsm_pin.verification.link_clearance import link_clearance
 
 HALF = 0.08

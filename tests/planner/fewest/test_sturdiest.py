@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem, random_problem, straight_arm
 
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.geometry.solids import Cylinder, Sphere
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import built_in
 from vdsm_pin.planner.fewest.joint_error import levers, link_by_link, link_margins
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
@@ -23,13 +23,13 @@ from vdsm_pin.planner.fewest.strategy import (
     plan_sturdiest,
 )
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Cylinder, Sphere
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.robust import largest_joint_error
 from vdsm_pin.verification.verify import verify
 

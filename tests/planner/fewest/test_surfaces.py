@@ -5,9 +5,9 @@ import pytest
 import trimesh
 from scenes_for_fewest import problem
 
+from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.mesh_distance import STEP, surfaces_of
-from vdsm_pin.scene import Mesh
 from vdsm_pin.verification.link_clearance import link_clearance
 
 REACH = 0.3

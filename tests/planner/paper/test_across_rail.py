@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import shapely
 
+from vdsm_pin.arm.kinematics import joint_angles, link_angles
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.kinematics import joint_angles, link_angles
 from vdsm_pin.planner.paper.across_rail import AcrossRail, across_rail
 from vdsm_pin.planner.paper.lift import lift
 from vdsm_pin.planner.paper.project import project

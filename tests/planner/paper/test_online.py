@@ -9,7 +9,7 @@ from vdsm_pin.errors import Infeasible
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.paper.online import OnlineRule
 from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.robot_model import load_robot
+from vdsm_pin.verification.robot_model import load_robot
 
 
 @pytest.mark.parametrize("name", ["free", "obs1", "obs2-small", "obs3"])

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.kinematics import joint_centres, link_angles
 from vdsm_pin.errors import (
     Infeasible,
     NoPlanFound,
@@ -14,16 +15,16 @@ from vdsm_pin.errors import (
     StartBlocked,
 )
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, Prism, Sphere
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.kinematics import joint_centres, link_angles
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.problem import Approach, Blocked, PlanningProblem
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Box, Capsule, Cylinder, Obstacle, Prism, Scene, Sphere
+from vdsm_pin.problem.planning_problem import Approach, Blocked, PlanningProblem
+from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 ALL = ["free", "obs1", "obs2", "obs2-small", "obs3"]

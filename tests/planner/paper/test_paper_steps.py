@@ -6,9 +6,14 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vdsm_pin.arm.kinematics import joint_angles, link_angles
+from vdsm_pin.arm.manipulator import (
+    CableLayout,
+    Manipulator,
+    built_in,
+    paper_hole_angles,
+)
 from vdsm_pin.errors import LimitExceeded, LinkTooShort, OutOfReach
-from vdsm_pin.kinematics import joint_angles, link_angles
-from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
 from vdsm_pin.planner.feasibility import (
     check_feasibility,
     curled_reach,
@@ -20,7 +25,7 @@ from vdsm_pin.planner.paper.lift import lift
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.scale import scale
 from vdsm_pin.planner.paper.solve import check_limits
-from vdsm_pin.problem import DesiredPath
+from vdsm_pin.problem.planning_problem import DesiredPath
 from vdsm_pin.tolerances import TOLERANCES
 
 HRM8 = built_in("hrm8")

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.feasibility import curled_reach, straight_reach
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.verification.link_clearance import link_clearance

@@ -11,12 +11,17 @@ from vdsm_pin.io.problem_file import built_in_text, read_problem
 from vdsm_pin.planner.paper.online import OnlineRule
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scaling import (
+    OtherRatios,
+    ProjectionCylinder,
+    Scaling,
+    ScalingCentre,
+)
 from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scaling import OtherRatios, ProjectionCylinder, Scaling, ScalingCentre
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 
 FREE = read_problem("paper/free").problem
 ARM = FREE.manipulator

@@ -7,15 +7,16 @@ import pytest
 import shapely
 
 from vdsm_pin.errors import NoPlanFound
+from vdsm_pin.geometry.solids import Cylinder, Sphere
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.detours import first_station
 from vdsm_pin.planner.paper.sections import Section, merged
-from vdsm_pin.problem import Approach, PlanningProblem
+from vdsm_pin.problem.planning_problem import Approach, PlanningProblem
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.robot_model import load_robot
-from vdsm_pin.scene import Cylinder, Scene, Sphere
 from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.robot_model import load_robot
 
 FREE = read_problem("paper/free").problem
 ROBOT = load_robot(FREE.manipulator)

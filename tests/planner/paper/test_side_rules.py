@@ -21,7 +21,7 @@ from vdsm_pin.planner.paper.side_rules import (
     slid,
 )
 from vdsm_pin.planner.paper.sliding_kernels import standing
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 
 CORES = {
     "disc": [[0.7, 0.6]],

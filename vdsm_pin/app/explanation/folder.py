@@ -7,15 +7,15 @@ import numpy as np
 
 from vdsm_pin.app.explanation import steps
 from vdsm_pin.app.explanation.parts import Moment, Part, mm, table
+from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.problem_file import ProblemFile
-from vdsm_pin.kinematics import link_angles
 from vdsm_pin.planner.paper.steps import PaperSteps
 from vdsm_pin.refinement import Refinement, plan_and_verify
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.html import rendered
-from vdsm_pin.robot_model import RobotModel, load_robot
 from vdsm_pin.verification.coal_clearance import coal_distances
+from vdsm_pin.verification.robot_model import RobotModel, load_robot
 
 PAGE: Final = "explain.html"
 

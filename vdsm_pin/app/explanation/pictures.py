@@ -8,12 +8,13 @@ import shapely
 from vdsm_pin.app.explanation.canvas import Canvas
 from vdsm_pin.app.explanation.cross import Cross
 from vdsm_pin.app.explanation.parts import Moment, name
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.geometry.solids import HalfSpace
 from vdsm_pin.planner.paper.danger_region import DangerRegion
+from vdsm_pin.problem.scene import solid_of
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import surface
-from vdsm_pin.scene import HalfSpace, solid_of
 
 VIEWS = {"y": (1, 2), "side": (0, 2), "top": (0, 1)}
 

@@ -5,14 +5,14 @@ import numpy as np
 from vdsm_pin.app.explanation import pictures
 from vdsm_pin.app.explanation.cross import NAMES, Cross, crosses
 from vdsm_pin.app.explanation.parts import Moment, Part, Table, at, deg, mm, name, table
-from vdsm_pin.cables import cable_lengths
-from vdsm_pin.kinematics import link_angles, position_angles
+from vdsm_pin.arm.cables import cable_lengths
+from vdsm_pin.arm.kinematics import link_angles, position_angles
 from vdsm_pin.planner.feasibility import curled_reach, straight_reach
 from vdsm_pin.planner.paper.across_rail import AcrossRail
 from vdsm_pin.planner.paper.along_rail import AlongRail
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.joint_paths import chain_ratios
-from vdsm_pin.problem import Approach
+from vdsm_pin.problem.planning_problem import Approach
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
 

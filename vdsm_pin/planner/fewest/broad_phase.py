@@ -15,12 +15,13 @@ from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hulls, Piece
 from vdsm_pin.geometry.ordering import coherent_order
+from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.planner.fewest.inner_capsules import blocked_by, cores_of
 from vdsm_pin.planner.fewest.mesh_distance import STEP, Surfaces, surfaces_of
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.time_limit import deadline_of
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scene import Mesh, Obstacle
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 

@@ -4,8 +4,8 @@ from typing import Final, Protocol
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.fewest.direction_kernels import vary_directions
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.vary import COPIED, SCALES, vary

@@ -29,11 +29,11 @@ from vdsm_pin.planner.impossible.cut_off import narrowest
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.time_limit import deadline_of
 from vdsm_pin.planner.upper_clearance import culprit, upper_clearance
-from vdsm_pin.problem import Blocked, PlanningProblem
+from vdsm_pin.problem.planning_problem import Blocked, PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import say
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import in_mm
 
 

@@ -39,7 +39,7 @@ from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.planner.impossible.bounds import TipProof, prove_tips
 from vdsm_pin.planner.impossible.cut_off import cut_off
 from vdsm_pin.planner.impossible.last_link import hemmed_in
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 

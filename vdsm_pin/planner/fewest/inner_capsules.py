@@ -13,7 +13,7 @@ from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
 from vdsm_pin.geometry.segments import squared_gap
-from vdsm_pin.scene import Obstacle
+from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.tolerances import TOLERANCES
 
 MOST_POINTS = 16

@@ -18,7 +18,7 @@ from vdsm_pin.planner.fewest.follow_the_leader import followed
 from vdsm_pin.planner.fewest.growth import FAMILY, lacking
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
-from vdsm_pin.pointing import angles_between
+from vdsm_pin.problem.pointing import angles_between
 
 LED: Final = 0.4
 """Part of the children that follow the leader; [-]."""

@@ -6,8 +6,8 @@ Clearance that grows alike along the arm is worth as much everywhere.
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.manipulator import Manipulator
 
 
 def levers(arm: Manipulator) -> FloatArray:

@@ -18,8 +18,8 @@ from vdsm_pin.planner.fewest.motion import Corners, Intervals
 from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along, pieces_of
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Pricing, link_limit
 from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.pointing import ANYWHERE, AimError, LastLinkCone
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.pointing import ANYWHERE, AimError, LastLinkCone
 from vdsm_pin.tolerances import TOLERANCES
 
 CUTS: Final = 16

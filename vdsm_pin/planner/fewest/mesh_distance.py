@@ -18,7 +18,8 @@ from vdsm_pin.geometry.obstacles import STACK, encloses, has_inside
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.geometry.segments import squared_gap
-from vdsm_pin.scene import Mesh, Obstacle, covers_of
+from vdsm_pin.geometry.solids import Mesh
+from vdsm_pin.problem.scene import Obstacle, covers_of
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 
 STEP: Final = 1e-6

@@ -16,10 +16,10 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.arm.kinematics import joint_angles, joint_centres
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.kinematics import joint_angles, joint_centres
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.fewest.direction_kernels import placed_between
 from vdsm_pin.planner.fewest.pose_kernels import centres_between, knees_between
 from vdsm_pin.planner.fewest.roadmap import Roadmap

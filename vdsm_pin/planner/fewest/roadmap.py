@@ -5,15 +5,15 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.fewest.joint_error import link_by_link, link_margins
 from vdsm_pin.planner.fewest.roadmap_kernels import Barred, Graph, pose_shapes
 from vdsm_pin.planner.fewest.route import TipRoute
 from vdsm_pin.planner.fewest.shapes import Shapes
 from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.pointing import ANYWHERE, LastLinkCone
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.pointing import ANYWHERE, LastLinkCone
 from vdsm_pin.tolerances import TOLERANCES
 
 STRAIN: Final = 0.032

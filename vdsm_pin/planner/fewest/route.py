@@ -7,7 +7,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.spacing import count_of
-from vdsm_pin.problem import DesiredPath, Order, PlanningProblem
+from vdsm_pin.problem.planning_problem import DesiredPath, Order, PlanningProblem
 
 
 @dataclass(frozen=True)

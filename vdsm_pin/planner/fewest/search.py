@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, motion_corners
 from vdsm_pin.planner.fewest.roadmap import Roadmap
 from vdsm_pin.planner.fewest.route import TipRoute
 from vdsm_pin.planner.fewest.sequence import Planner, reordered
-from vdsm_pin.problem import Order
+from vdsm_pin.problem.planning_problem import Order
 
 
 @dataclass(frozen=True)

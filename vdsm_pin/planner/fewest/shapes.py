@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.manipulator import Manipulator
 
 
 @dataclass(frozen=True)

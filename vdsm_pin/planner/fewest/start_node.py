@@ -2,16 +2,16 @@
 
 import numpy as np
 
+from vdsm_pin.arm.kinematics import joint_centres, link_angles
 from vdsm_pin.errors import LimitExceeded, NoPlanFound, NoWayOut
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_centres, link_angles
 from vdsm_pin.planner.fewest.charts import Chart, Projections
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap, extended
 from vdsm_pin.planner.fewest.sequence import TURN
 from vdsm_pin.planner.start import start_centres
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
 EXITS = 24

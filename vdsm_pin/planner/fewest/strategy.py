@@ -7,10 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.cables import cable_lengths
+from vdsm_pin.arm.cables import cable_lengths
+from vdsm_pin.arm.kinematics import joint_angles
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.kinematics import joint_angles
 from vdsm_pin.planner.fewest.broad_phase import BroadPhase, broad_phase
 from vdsm_pin.planner.fewest.explain import (
     how_far,
@@ -39,10 +39,10 @@ from vdsm_pin.planner.fewest.unbend import (
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan, TipPath
 from vdsm_pin.planner.start import check_start
 from vdsm_pin.planner.time_limit import deadline_of
-from vdsm_pin.problem import Blocked, PlanningProblem
+from vdsm_pin.problem.planning_problem import Blocked, PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 from vdsm_pin.units import in_mm
 
 SEARCHED: Final = 0.6

@@ -9,7 +9,7 @@ from vdsm_pin.errors import Reached
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.fewest.pose_kernels import bends_of
 from vdsm_pin.planner.upper_clearance import culprit, upper_clearance
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.units import in_mm
 
 AT_LIMIT: Final = 0.97

@@ -24,8 +24,8 @@ from vdsm_pin.planner.impossible.octree import (
     places,
 )
 from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.pointing import angles_between
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.pointing import angles_between
 from vdsm_pin.tolerances import TOLERANCES
 
 FIRST_LEVEL: Final = 4

@@ -12,16 +12,16 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.cables import cable_lengths
+from vdsm_pin.arm.cables import cable_lengths
+from vdsm_pin.arm.kinematics import joint_centres, link_angles
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_centres, link_angles
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.joint_lines import clear_line
 from vdsm_pin.planner.records import LinkClearance, Plan, TipPath
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.trajectory import Trajectory
 
 AHEAD: Final = 0.15
 """A link leans ahead if it advances along the rail by so much of its length; [-]."""

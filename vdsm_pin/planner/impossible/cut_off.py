@@ -26,7 +26,7 @@ from vdsm_pin.planner.impossible.octree import (
     places,
 )
 from vdsm_pin.planner.upper_clearance import upper_bounds
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 

@@ -25,11 +25,11 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.upper_clearance import upper_clearance
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
 LEANS: Final = 4

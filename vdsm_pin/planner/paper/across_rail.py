@@ -25,7 +25,7 @@ from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.scale import scale
 from vdsm_pin.planner.paper.sections import VIEWS, Section, grown_by, planned_gap
 from vdsm_pin.planner.paper.tip_path import Route, drawn_rows, straight_route
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 
 SCAN: Final = 12
 """Moves of the bend tried before the first clear one is narrowed down."""

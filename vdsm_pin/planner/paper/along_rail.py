@@ -27,7 +27,7 @@ from vdsm_pin.planner.paper.side_rules import (
     stands,
 )
 from vdsm_pin.planner.paper.tip_path import Route
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.units import in_mm
 
 ROUNDINGS: Final = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.75, 1.0)

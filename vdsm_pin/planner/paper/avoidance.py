@@ -18,7 +18,7 @@ from vdsm_pin.planner.paper.along_rail import along_rail
 from vdsm_pin.planner.paper.sections import Section, merged, section_along
 from vdsm_pin.planner.paper.tip_path import Route, straight_route
 from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 
 MOST_OBSTACLES: Final = 4
 """Of so many obstacles 15 groups can be made, and each is tried; [-]."""

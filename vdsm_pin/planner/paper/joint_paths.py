@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.sliding_kernels import slide_chains
 

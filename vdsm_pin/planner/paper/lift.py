@@ -4,9 +4,9 @@ from typing import NoReturn
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import LinkTooShort
 from vdsm_pin.geometry.arrays import FloatArray, read_only
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.row_kernels import lift_rows
 
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdsm_pin.cables import cable_lengths
+from vdsm_pin.arm.cables import cable_lengths
+from vdsm_pin.arm.kinematics import joint_angles
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_angles
 from vdsm_pin.planner.paper.across_rail import AcrossRail
 from vdsm_pin.planner.paper.along_rail import AlongRail
 from vdsm_pin.planner.paper.avoidance import Avoidance
@@ -20,7 +20,7 @@ from vdsm_pin.planner.paper.scale import scale
 from vdsm_pin.planner.paper.side_rules import slid
 from vdsm_pin.planner.paper.solve import check_limits
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.cables import cable_lengths
+from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.errors import Infeasible, NoPlanFound, PathBlocked
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.feasibility import check_feasibility
@@ -17,7 +17,7 @@ from vdsm_pin.planner.paper.tip_path import Route, subdivided
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.planner.spacing import row_steps
 from vdsm_pin.planner.start import check_start
-from vdsm_pin.problem import Blocked, PlanningProblem
+from vdsm_pin.problem.planning_problem import Blocked, PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
 

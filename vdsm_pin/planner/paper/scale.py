@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.records import TipPath
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 
 
 def references(problem: PlanningProblem, tip_path: TipPath) -> FloatArray:

@@ -15,8 +15,9 @@ import numpy as np
 import shapely
 
 from vdsm_pin.geometry.arrays import FloatArray, frozen
-from vdsm_pin.problem import PlanningProblem
-from vdsm_pin.scene import Box, Capsule, Cylinder, Obstacle, Prism
+from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, Prism
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.tolerances import TOLERANCES
 
 VIEWS: Final = {"x": (1, 2), "y": (0, 2), "z": (0, 1)}

@@ -13,15 +13,15 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.joint_paths import chain_ratios, slide_joints
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.region_kernels import core_gaps
 from vdsm_pin.planner.paper.sliding_kernels import standing
 from vdsm_pin.planner.paper.trial_kernels import best_rule
-from vdsm_pin.problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 
 GROWTHS: Final = (0.0, 0.01, 0.02, 0.03, 0.04, 0.06, 0.08, 0.1, 0.12, 0.15)
 """How far the region is grown for the links, as parts of the longest link; [-]."""

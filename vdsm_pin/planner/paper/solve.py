@@ -1,16 +1,16 @@
 """Step 7: joint angles from the joint centres, within every limit (paper, section 5).
 
-The step's cable lengths are `vdsm_pin.cables.cable_lengths`.
+The step's cable lengths are `vdsm_pin.arm.cables.cable_lengths`.
 """
 
 import numpy as np
 
+from vdsm_pin.arm.kinematics import joint_angles, link_angles
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import LimitExceeded
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.kinematics import joint_angles, link_angles
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.planner.paper.tip_path import Route
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.trajectory import Trajectory
 
 
 def solve(manipulator: Manipulator, route: Route, centres: FloatArray) -> Trajectory:

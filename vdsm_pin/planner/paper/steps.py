@@ -6,7 +6,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.paper.along_rail import AlongRail
 from vdsm_pin.planner.paper.avoidance import Avoidance
 from vdsm_pin.planner.paper.tip_path import Route
-from vdsm_pin.trajectory import Trajectory
+from vdsm_pin.problem.trajectory import Trajectory
 
 
 @dataclass(frozen=True)

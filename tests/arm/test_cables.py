@@ -7,9 +7,14 @@ from flint import arb
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vdsm_pin.cables import angles_from_cables, cable_lengths
+from vdsm_pin.arm.cables import angles_from_cables, cable_lengths
+from vdsm_pin.arm.manipulator import (
+    CableLayout,
+    Manipulator,
+    built_in,
+    paper_hole_angles,
+)
 from vdsm_pin.errors import InconsistentCables, InvalidInput
-from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
 from vdsm_pin.tolerances import TOLERANCES
 
 HRM8 = built_in("hrm8")

@@ -6,18 +6,16 @@ import shapely
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.convex import Hull
-from vdsm_pin.scene import (
+from vdsm_pin.geometry.solids import (
     Box,
     Capsule,
     Cylinder,
     HalfSpace,
     Mesh,
-    Obstacle,
     Prism,
-    Scene,
     Sphere,
-    with_hulls,
 )
+from vdsm_pin.problem.scene import Obstacle, Scene, with_hulls
 
 EYE = np.eye(3)
 L_SHAPE = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 3], [0, 3]]

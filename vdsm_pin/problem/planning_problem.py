@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, frozen, running_sums
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.notebook import Summarised
-from vdsm_pin.pointing import Pointing
-from vdsm_pin.scaling import Scaling
-from vdsm_pin.scene import Scene
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.pointing import Pointing
+from vdsm_pin.problem.scaling import Scaling
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M, in_mm
 
@@ -327,7 +327,7 @@ class PlanningProblem(Summarised):
     @cached_property
     def packed(self) -> "PackedPieces":
         """The obstacles, then the bodies of the arm in the frames of their links."""
-        from vdsm_pin.arm_bodies import arm_bodies  # compiled code, which few need
+        from vdsm_pin.arm.bodies import arm_bodies  # compiled code, which few need
         from vdsm_pin.geometry.pieces import pack_pieces
 
         bodies = [[body.piece] for body in arm_bodies(self.manipulator)]

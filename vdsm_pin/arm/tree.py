@@ -2,7 +2,7 @@
 
 from functools import lru_cache
 
-from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.proof.tree import Joint, Kind, Tree, X, Y, Z, shifted
 
 RAIL: int = 0

@@ -16,10 +16,10 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InconsistentCables, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, frozen, read_only
 from vdsm_pin.geometry.cable_kernels import add_spans, solve_joint, take_off
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.tolerances import TOLERANCES
 
 CHUNK: Final = 1024

@@ -9,13 +9,13 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import FEED, PART, LinkBody, Manipulator
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
-from vdsm_pin.manipulator import FEED, PART, LinkBody, Manipulator
-from vdsm_pin.scene import Mesh
+from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.tolerances import TOLERANCES
 
 DIRECTIONS: Final = 256

@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.manipulator import (
+    CableLayout,
+    Manipulator,
+    built_in,
+    paper_hole_angles,
+)
 from vdsm_pin.errors import InvalidInput, UnknownName
-from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
 
 HRM8 = built_in("hrm8")
 

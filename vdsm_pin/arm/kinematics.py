@@ -8,10 +8,10 @@ from typing import Final, NoReturn
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import LinkTooShort
 from vdsm_pin.geometry.arrays import FloatArray, read_only
 from vdsm_pin.geometry.joint_kernels import centres_of, turns_of
-from vdsm_pin.manipulator import Manipulator
 from vdsm_pin.tolerances import TOLERANCES
 
 CHUNK: Final = 1024

@@ -5,10 +5,10 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.error_boxes import ErrorBox
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
-from vdsm_pin.manipulator import Manipulator
+from vdsm_pin.problem.error_boxes import ErrorBox
 
 WIDEST: Final = np.pi / 2.0
 """Cones are narrower than this; [rad]."""

@@ -54,7 +54,6 @@ def test_the_urdf_has_what_links_carry(tmp_path: Path) -> None:
     names = {one.name.rsplit("_", 1)[0] for one in shapes.geometryObjects}
     assert {f"body{k}" for k in range(1, 7)} <= names
     from vdsm_pin.io.problem_file import read_problem
-    from vdsm_pin.scene import corners_of
 
     carried = read_problem(tmp_path / "p.yaml").problem.manipulator.carried
     rng = np.random.default_rng(0)
@@ -69,7 +68,7 @@ def test_the_urdf_has_what_links_carry(tmp_path: Path) -> None:
                 + support(one.geometry, one.placement.rotation.T @ n)
                 for one in mine
             )
-            points, grown = corners_of(solid)
+            points, grown = solid.corners, solid.grown
             if solid.name == "can":
                 grown *= np.linalg.norm(np.cross(n, solid.axis))
             assert found == pytest.approx((points @ n).max() + grown, abs=1e-5), solid

@@ -10,12 +10,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
+from vdsm_pin.arm.urdf_validator import validate_urdf
+from vdsm_pin.arm.urdf_writer import urdf_text
 from vdsm_pin.errors import InvalidInput, UnknownName, VerificationFailed
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.io.source import sha256_of
-from vdsm_pin.manipulator import Manipulator
-from vdsm_pin.urdf_validator import validate_urdf
-from vdsm_pin.urdf_writer import urdf_text
 
 POSE_SIZE: Final = 12
 """Numbers in a pose as Pinocchio stores it: the rotation's columns, then the origin."""

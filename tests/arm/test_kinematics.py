@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from vdsm_pin.errors import LinkTooShort
-from vdsm_pin.kinematics import (
+from vdsm_pin.arm.kinematics import (
     joint_angles,
     joint_centres,
     link_angles,
     position_angles,
 )
-from vdsm_pin.manipulator import built_in
+from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.errors import LinkTooShort
 
 HRM8 = built_in("hrm8")
 LIMIT = HRM8.max_joint_angle

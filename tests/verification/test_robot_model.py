@@ -9,11 +9,16 @@ import numpy as np
 import pytest
 import yourdfpy
 
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import (
+    CableLayout,
+    Manipulator,
+    built_in,
+    paper_hole_angles,
+)
+from vdsm_pin.arm.urdf_writer import urdf_text
 from vdsm_pin.errors import InvalidInput, UnknownName, VerificationFailed
-from vdsm_pin.kinematics import joint_centres
-from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
-from vdsm_pin.robot_model import load_robot, read_robot
-from vdsm_pin.urdf_writer import urdf_text
+from vdsm_pin.verification.robot_model import load_robot, read_robot
 
 HRM8 = built_in("hrm8")
 AGREEMENT = 1e-12

@@ -10,7 +10,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import FloatArray, frozen
-from vdsm_pin.scene import Box, Capsule, Cylinder, Mesh, Prism, Sphere, corners_of
+from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, Mesh, Prism, Sphere
 from vdsm_pin.units import MM_PER_M
 
 MAX_LINKS: Final = 40
@@ -336,7 +336,7 @@ class Manipulator:
 
     def _reach_of(self, body: LinkBody) -> float:
         """Largest distance of a body from the axis of its link; [m]."""
-        points, grown = corners_of(body.solid)
+        points, grown = body.solid.corners, body.solid.grown
         away = points.copy()
         away[:, 0] -= points[:, 0].clip(0.0, self.link_lengths[body.link - 1])
         return float(np.linalg.norm(away, axis=1).max()) + grown

@@ -6,10 +6,10 @@ import re
 import pytest
 import yourdfpy
 
+from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.arm.urdf_validator import validate_urdf
+from vdsm_pin.arm.urdf_writer import urdf_text
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.manipulator import built_in
-from vdsm_pin.urdf_validator import validate_urdf
-from vdsm_pin.urdf_writer import urdf_text
 
 TEXT = urdf_text(built_in("hrm8"))
 

@@ -8,12 +8,17 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from vdsm_pin.manipulator import CableLayout, Manipulator, built_in, paper_hole_angles
-from vdsm_pin.urdf_validator import validate_urdf
-from vdsm_pin.urdf_writer import DENSITY, urdf_text
+from vdsm_pin.arm.manipulator import (
+    CableLayout,
+    Manipulator,
+    built_in,
+    paper_hole_angles,
+)
+from vdsm_pin.arm.urdf_validator import validate_urdf
+from vdsm_pin.arm.urdf_writer import DENSITY, urdf_text
 
 HRM8 = built_in("hrm8")
-COMMITTED = Path(__file__).parents[1] / "urdf" / "hrm8.urdf"
+COMMITTED = Path(__file__).parents[2] / "urdf" / "hrm8.urdf"
 
 
 def random_arm(rng: np.random.Generator, n_links: int) -> Manipulator:

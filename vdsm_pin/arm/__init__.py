@@ -1,0 +1,1 @@
+"""The snake arm: its description, kinematics, cables, bodies, and its URDF."""

@@ -1,0 +1,452 @@
+"""Named solids, and the convex pieces that they are made of.
+
+Everything that measures a distance works on pieces (`geometry/convex.py`). A mesh is
+one hull per triangle plus, where they close (`geometry/closed_meshes.py`), an inside.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import ClassVar, Final, NoReturn, Self, TypeAlias
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct, frozen
+from vdsm_pin.geometry.closed_meshes import ClosedMesh, close_mesh
+from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Hulls, Piece
+
+BOX_CORNERS: Final = frozen(
+    [[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]
+)
+"""Corners of the cube [-1, 1]^3, shape (8, 3); [-]."""
+
+
+@dataclass(frozen=True)
+class _Solid:
+    """What all solids have in common; each says which of its fields are what.
+
+    Args:
+        name: Unique name.
+    """
+
+    name: str
+
+    POINTS: ClassVar[tuple[str, ...]]
+    """Points, shape (.., 3); [m]."""
+    TURNED: ClassVar[tuple[str, ...]] = ()
+    """What turns with the frame: unit vectors and rotations; [-]."""
+    SIZES: ClassVar[tuple[str, ...]] = ()
+    """Above zero; [m]."""
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays, check that numbers are finite and sizes above zero."""
+        for field in (*self.POINTS, *self.TURNED, *self.SIZES):
+            value = getattr(self, field)
+            if not np.isfinite(np.asarray(value, dtype=float)).all():
+                self._refuse(f"{field} is {value}, expected finite numbers")
+            if np.ndim(value):
+                object.__setattr__(self, field, frozen(value))
+        for field in self.SIZES:
+            value = getattr(self, field)
+            if not (np.asarray(value) > 0.0).all():
+                self._refuse(f"{field} is {value} m, expected above 0")
+
+    def placed(self, pose: FloatArray) -> Self:
+        """It in another frame; `pose` is T_other_frame, shape (4, 4); [m]."""
+        turn, shift = pose[:3, :3], pose[:3, 3]
+        moved = {name: getattr(self, name) @ turn.T + shift for name in self.POINTS}
+        turned = {name: turn @ getattr(self, name) for name in self.TURNED}
+        return replace(self, **moved, **turned)
+
+    @property
+    def corners(self) -> FloatArray:
+        """Points whose hull, grown by `grown`, holds the solid, shape (n, 3); [m].
+
+        Of a half-space the point that it is given by.
+        """
+        return np.asarray(getattr(self, self.POINTS[0])).reshape(-1, 3)
+
+    @property
+    def grown(self) -> float:
+        """What to grow that hull by; [m]."""
+        return 0.0
+
+    @property
+    def reach(self) -> float:
+        """Largest distance of its corners, grown, from its frame's origin; [m]."""
+        return float(np.linalg.norm(self.corners, axis=1).max()) + self.grown
+
+    def _refuse(self, reason: str) -> NoReturn:
+        message = f"obstacle {self.name!r}: {reason}"
+        raise InvalidInput(message)
+
+    def _check_rows(self, field: str) -> None:
+        rows = getattr(self, field)
+        if rows.ndim != 2 or rows.shape[1:] != (3,) or not rows.size:
+            self._refuse(f"{field} have shape {rows.shape}, expected (n, 3)")
+
+
+@dataclass(frozen=True)
+class Sphere(_Solid):
+    """A ball.
+
+    Args:
+        name: Unique name.
+        centre: Shape (3,); [m].
+        radius: [m].
+    """
+
+    centre: FloatArray
+    radius: float
+
+    POINTS, SIZES = ("centre",), ("radius",)
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        return (Hull(self.corners, self.radius),)
+
+    @property
+    def grown(self) -> float:
+        """Its radius; [m]."""
+        return self.radius
+
+
+@dataclass(frozen=True)
+class _Axial(_Solid):
+    """A solid of revolution."""
+
+    centre: FloatArray
+    axis: FloatArray
+    half_length: float
+    radius: float
+
+    POINTS, TURNED, SIZES = ("centre",), ("axis",), ("radius", "half_length")
+
+    @property
+    def corners(self) -> FloatArray:
+        """The centres of its ends, shape (2, 3); [m]."""
+        offset = self.half_length * self.axis
+        return frozen([self.centre - offset, self.centre + offset])
+
+    @property
+    def grown(self) -> float:
+        """Its radius; [m]."""
+        return self.radius
+
+
+class Capsule(_Axial):
+    """A segment grown by a radius.
+
+    Args:
+        name: Unique name.
+        centre: Shape (3,); [m].
+        axis: Unit vector, shape (3,); [-].
+        half_length: Half the distance between the centres of its ends; [m].
+        radius: [m].
+    """
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        return (Hull(self.corners, self.radius),)
+
+
+class Cylinder(_Axial):
+    """A cylinder with flat ends.
+
+    Args:
+        name: Unique name.
+        centre: Shape (3,); [m].
+        axis: Unit vector, shape (3,); [-].
+        half_length: Half the height; [m].
+        radius: [m].
+    """
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        return (FlatCylinder(self.centre, self.axis, self.half_length, self.radius),)
+
+
+@dataclass(frozen=True)
+class Box(_Solid):
+    """A cuboid.
+
+    Args:
+        name: Unique name.
+        centre: Shape (3,); [m].
+        rotation: R_base_box, shape (3, 3); [-].
+        half_size: Half the edge lengths, shape (3,); [m].
+    """
+
+    centre: FloatArray
+    rotation: FloatArray
+    half_size: FloatArray
+
+    POINTS, TURNED, SIZES = ("centre",), ("rotation",), ("half_size",)
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        return (Hull(self.corners),)
+
+    @property
+    def corners(self) -> FloatArray:
+        """Its corners, shape (8, 3); [m]."""
+        return frozen(self.centre + (BOX_CORNERS * self.half_size) @ self.rotation.T)
+
+
+@dataclass(frozen=True)
+class Prism(_Solid):
+    """A simple polygon swept along its normal.
+
+    Args:
+        name: Unique name.
+        origin: Origin of the section frame, shape (3,); [m].
+        rotation: R_base_section, shape (3, 3): columns are the section's two in-plane
+            axes and the sweep axis; [-].
+        polygon: Corners in the section plane, shape (n, 2), either sense; [m].
+        span: Where the sweep starts and ends along the sweep axis; [m].
+    """
+
+    origin: FloatArray
+    rotation: FloatArray
+    polygon: FloatArray
+    span: tuple[float, float]
+
+    POINTS, TURNED = ("origin",), ("rotation",)
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and refuse polygons that enclose no simple area."""
+        super().__post_init__()
+        object.__setattr__(self, "polygon", frozen(self.polygon))
+        if not np.isfinite(self.polygon).all() or not np.isfinite(self.span).all():
+            self._refuse("polygon and span have other than finite numbers")
+        if self.polygon.ndim != 2 or self.polygon.shape[0] < 3:
+            self._refuse("polygon needs at least 3 corners")
+        import shapely  # slow to import, and only prisms need it
+
+        shape = shapely.Polygon(self.polygon)
+        if not shape.is_valid or not shape.area > 0.0:
+            self._refuse(f"polygon is not simple ({shapely.is_valid_reason(shape)})")
+        if not self.span[0] < self.span[1]:
+            self._refuse(f"span {self.span} m, expected from < to")
+
+    @cached_property
+    def convex_sections(self) -> tuple[FloatArray, ...]:
+        """The section as convex polygons, each of shape (k, 2); [m]."""
+        import shapely
+
+        shape = shapely.Polygon(self.polygon)
+        if shape.equals(shape.convex_hull):
+            return (frozen(self.polygon),)
+        triangles = shapely.constrained_delaunay_triangles(shape)
+        return tuple(
+            frozen(np.asarray(part.exterior.coords)[:3]) for part in triangles.geoms
+        )
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        return tuple(Hull(self._swept(section)) for section in self.convex_sections)
+
+    @property
+    def corners(self) -> FloatArray:
+        """Its corners, shape (n, 3); [m]."""
+        return self._swept(self.polygon)
+
+    def _swept(self, section: FloatArray) -> FloatArray:
+        """The corners of a section at both ends of the sweep, shape (2 k, 3); [m]."""
+        ends = [np.insert(section, 2, s, axis=1) for s in self.span]
+        return frozen(self.origin + np.vstack(ends) @ self.rotation.T)
+
+
+@dataclass(frozen=True)
+class HalfSpace(_Solid):
+    """Everything on one side of a plane: (p - point) . normal <= 0.
+
+    Args:
+        name: Unique name.
+        point: A point of the plane, shape (3,); [m].
+        normal: Unit vector out of the solid, shape (3,); [-].
+    """
+
+    point: FloatArray
+    normal: FloatArray
+
+    POINTS, TURNED = ("point",), ("normal",)
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        return (HalfSpacePiece(self.normal, float(self.normal @ self.point)),)
+
+
+@dataclass(frozen=True)
+class Mesh(_Solid):
+    """Triangles, and the inside of the closed surface that they make.
+
+    Args:
+        name: Unique name.
+        vertices: Shape (n, 3), in the base frame; [m].
+        triangles: Vertex indices, shape (m, 3), m >= 1.
+        solid: Whether the problem says that there is an inside; None where it leaves
+            that to the triangles.
+        assumed_size: Its size in words where neither its file nor the problem states
+            a unit; else empty.
+        notes: What else its file had, one phrase each.
+    """
+
+    vertices: FloatArray
+    triangles: IntArray
+    solid: bool | None = None
+    assumed_size: str = ""
+    notes: tuple[str, ...] = ()
+
+    POINTS = ("vertices",)
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check the indices."""
+        super().__post_init__()
+        triangles, count = frozen(self.triangles, np.int64), len(self.vertices)
+        object.__setattr__(self, "triangles", triangles)
+        if not triangles.size or not ((triangles >= 0) & (triangles < count)).all():
+            self._refuse(f"triangles do not index {count} vertices")
+
+    @cached_property
+    def pieces(self) -> Hulls:
+        """One hull per triangle."""
+        return Hulls(self.vertices[self.triangles])
+
+    @property
+    def corners(self) -> FloatArray:
+        """The corners of its triangles, shape (3 m, 3); [m]."""
+        return np.asarray(self.vertices[self.triangles]).reshape(-1, 3)
+
+    @cached_property
+    def closed_mesh(self) -> ClosedMesh:
+        """The closed surface that the triangles make, if they do."""
+        return close_mesh(self.vertices, self.triangles)
+
+    @cached_property
+    def hull(self) -> "ConvexCover":
+        """Its convex hull."""
+        corners = distinct(self.corners, axis=0)
+        return ConvexCover(self.name, (Hull(frozen(corners)),))
+
+    @property
+    def is_surface(self) -> bool:
+        """Whether the problem says that nothing but the surface is meant."""
+        return self.solid is False
+
+    @property
+    def has_inside(self) -> bool:
+        """Whether an inside is asked for, and there is one."""
+        return not self.is_surface and self.closed_mesh.closed
+
+
+@dataclass(frozen=True)
+class ConvexCover:
+    """The convex hull of a mesh: its inside lies within, whatever counts as inside.
+
+    Args:
+        name: The mesh's.
+        pieces: The hull alone.
+    """
+
+    name: str
+    pieces: tuple[Hull]
+
+    @property
+    def reach(self) -> float:
+        """Its largest distance from its frame's origin; [m]."""
+        return float(np.linalg.norm(self.pieces[0].points, axis=1).max())
+
+
+@dataclass(frozen=True)
+class PointCloud(_Solid):
+    """Measured points, each a ball of the scan's error.
+
+    Args:
+        name: Unique name.
+        points: Shape (n, 3), n >= 1; [m].
+        radius: Of the balls; [m].
+        assumed_size: As of a mesh.
+        notes: As of a mesh.
+    """
+
+    points: FloatArray
+    radius: float
+    assumed_size: str = ""
+    notes: tuple[str, ...] = ()
+
+    POINTS, SIZES = ("points",), ("radius",)
+
+    def __post_init__(self) -> None:
+        """Freeze the array and check its shape and the size."""
+        super().__post_init__()
+        self._check_rows("points")
+
+    @cached_property
+    def pieces(self) -> Hulls:
+        """One ball per point."""
+        return Hulls(self.points[:, None], self.radius)
+
+    @property
+    def grown(self) -> float:
+        """The radius; [m]."""
+        return self.radius
+
+
+@dataclass(frozen=True)
+class Voxels(_Solid):
+    """Occupied cells of a grid, each a cuboid; they need not touch.
+
+    Args:
+        name: Unique name.
+        centres: Shape (n, 3), n >= 1; [m].
+        rotation: R_base_grid, shape (3, 3); [-].
+        half_size: Half the edge lengths of a cell, shape (3,); [m].
+        assumed_size: As of a mesh.
+        notes: As of a mesh.
+    """
+
+    centres: FloatArray
+    rotation: FloatArray
+    half_size: FloatArray
+    assumed_size: str = ""
+    notes: tuple[str, ...] = ()
+
+    POINTS, TURNED, SIZES = ("centres",), ("rotation",), ("half_size",)
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays, check their shape and the sizes."""
+        super().__post_init__()
+        self._check_rows("centres")
+
+    @cached_property
+    def pieces(self) -> Hulls:
+        """One cuboid per cell."""
+        return Hulls(self._cells())
+
+    @property
+    def corners(self) -> FloatArray:
+        """The corners of all cells, shape (8 n, 3); [m]."""
+        return self._cells().reshape(-1, 3)
+
+    @property
+    def reach(self) -> float:
+        """Not below that of any corner, without working out all of them; [m]."""
+        far = float(np.linalg.norm(self.centres, axis=1).max())
+        return far + float(np.linalg.norm(self.half_size))
+
+    def _cells(self) -> FloatArray:
+        corners = (BOX_CORNERS * self.half_size) @ self.rotation.T
+        return np.asarray(self.centres[:, None] + corners)
+
+
+FromFile: TypeAlias = Mesh | PointCloud | Voxels
+"""Obstacles that stand in files of their own."""
+
+Solid: TypeAlias = Sphere | Capsule | Cylinder | Box | Prism | HalfSpace | FromFile

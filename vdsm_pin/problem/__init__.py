@@ -1,0 +1,1 @@
+"""What is asked: arm, obstacles, desired path, motions, errors."""

@@ -1,0 +1,206 @@
+"""Obstacles, at rest and moving, in the base frame."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, TypeAlias, cast
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.convex import Piece
+from vdsm_pin.geometry.solids import ConvexCover, Mesh, Solid
+from vdsm_pin.proof.tree import Kind, Tree
+from vdsm_pin.tolerances import TOLERANCES
+
+if TYPE_CHECKING:  # it brings compiled code, for which readers need not wait
+    from vdsm_pin.geometry.pieces import PackedPieces
+    from vdsm_pin.proof.paths import Path
+
+
+@dataclass(frozen=True, eq=False)
+class Carrier:
+    """Joints that carry obstacles about as time goes by.
+
+    Args:
+        tree: The joints, hung on the base's frame.
+        path: How they move, with times; at rest before and after.
+    """
+
+    tree: Tree
+    path: "Path"
+
+    def poses(self, times: FloatArray) -> FloatArray:
+        """T_base_frame of all frames at some times (m,), (m, n_frames, 4, 4); [m]."""
+        return self.tree.poses(self.path.at(times))
+
+    @cached_property
+    def reach(self) -> float:
+        """No frame is ever farther from the base's origin than this; [m]."""
+        far, most = 0.0, self.path.reach
+        for joint in self.tree.joints:
+            far += float(np.linalg.norm(np.asarray(joint.placement)[:3, 3]))
+            if joint.kind is Kind.PRISMATIC:
+                moved = 0.0 if joint.column is None else float(most[joint.column])
+                far += abs(joint.offset) + abs(joint.ratio) * moved
+        return far
+
+
+@dataclass(frozen=True)
+class Moving:
+    """A solid that moves.
+
+    Args:
+        solid: In the frame that carries it.
+        carrier: What does; several solids may share one.
+        frame: Which of its frames, from 1.
+    """
+
+    solid: "Solid | ConvexCover"
+    carrier: Carrier
+    frame: int
+
+    @property
+    def name(self) -> str:
+        """The solid's."""
+        return self.solid.name
+
+    @property
+    def pieces(self) -> Sequence[Piece]:
+        """The convex pieces, in the frame that carries them."""
+        return self.solid.pieces
+
+    def poses(self, times: FloatArray) -> FloatArray:
+        """T_base_solid at some times (m,), shape (m, 4, 4); [m]."""
+        return np.asarray(self.carrier.poses(times)[:, self.frame])
+
+
+Obstacle: TypeAlias = Solid | Moving
+
+
+def solid_of(obstacle: Obstacle) -> Solid:
+    """The solid that an obstacle is, in its own frame where it moves."""
+    found = obstacle.solid if isinstance(obstacle, Moving) else obstacle
+    return cast("Solid", found)
+
+
+def reach_of(obstacle: Obstacle | ConvexCover) -> float:
+    """Largest distance of an obstacle from the base's origin, at any time; [m].
+
+    Of a half-space that of the stated point alone.
+    """
+    if isinstance(obstacle, Moving):
+        return obstacle.solid.reach + obstacle.carrier.reach
+    return obstacle.reach
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All obstacles of one problem, in the base frame.
+
+    Args:
+        obstacles: Any number, names unique, within `TOLERANCES.scene_extent`.
+
+    Raises:
+        InvalidInput: If two share a name, or one is too far from the base.
+    """
+
+    obstacles: tuple[Obstacle, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse duplicate names, and what distances are not proved for."""
+        for obstacle in self.obstacles:
+            if not (reach := reach_of(obstacle)) <= TOLERANCES.scene_extent:
+                message = (
+                    f"obstacle {obstacle.name!r} reaches {reach:.6g} m from the base, "
+                    f"expected at most {TOLERANCES.scene_extent:g} m"
+                )
+                raise InvalidInput(message)
+        seen: set[str] = set()
+        for name in self.names:
+            if name in seen:
+                message = f"two obstacles are named {name!r}; names are unique"
+                raise InvalidInput(message)
+            seen.add(name)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names in file order."""
+        return tuple(obstacle.name for obstacle in self.obstacles)
+
+    @property
+    def moving(self) -> tuple[Moving, ...]:
+        """The obstacles that move, in file order."""
+        return tuple(one for one in self.obstacles if isinstance(one, Moving))
+
+    @property
+    def at_rest(self) -> "Scene":
+        """The obstacles that do not."""
+        still = (one for one in self.obstacles if not isinstance(one, Moving))
+        return Scene(tuple(still)) if self.moving else self
+
+    @property
+    def rest_time(self) -> float:
+        """From when on nothing moves; -inf where nothing ever does; [s]."""
+        ends = (one.path.own_times[-1] for one in self.carriers)
+        return float(max(ends, default=-np.inf))
+
+    @property
+    def start_time(self) -> float:
+        """When the first one begins to move; inf where nothing ever does; [s]."""
+        begins = (one.path.own_times[0] for one in self.carriers)
+        return float(min(begins, default=np.inf))
+
+    def at_time(self, time: float) -> "Scene":
+        """The scene as it stands at a time, nothing of it moving any more; [s]."""
+        when = np.array([time])
+        return Scene(
+            tuple(
+                solid_of(one).placed(one.poses(when)[0])
+                if isinstance(one, Moving)
+                else one
+                for one in self.obstacles
+            )
+        )
+
+    @property
+    def carriers(self) -> tuple[Carrier, ...]:
+        """What carries them, each once."""
+        return tuple(dict.fromkeys(one.carrier for one in self.moving))
+
+
+def with_hulls(scene: Scene, names: Collection[str]) -> Scene:
+    """A scene with the convex hulls of some meshes in their places.
+
+    For whoever asks obstacles for their names and pieces alone: proofs and planners.
+
+    Args:
+        scene: All obstacles.
+        names: Of meshes.
+    """
+    obstacles: list[Obstacle | ConvexCover] = []
+    for one in scene.obstacles:
+        solid = solid_of(one)
+        if not isinstance(solid, Mesh) or one.name not in names:
+            obstacles.append(one)
+        elif isinstance(one, Moving):
+            obstacles.append(replace(one, solid=solid.hull))
+        else:
+            obstacles.append(solid.hull)
+    return Scene(tuple(cast("list[Obstacle]", obstacles)))
+
+
+def covers_of(obstacles: Sequence[Obstacle], pieces: "PackedPieces") -> IntArray:
+    """How the pieces of obstacles count where an inside is asked for, (n_pieces,).
+
+    Args:
+        obstacles: Any.
+        pieces: Theirs, packed.
+    """
+    covers = np.zeros(len(pieces.kind), np.int64)
+    for k, mesh in enumerate(obstacles):
+        if isinstance(mesh, Mesh) and mesh.has_inside:
+            mine = slice(pieces.first_piece[k], pieces.first_piece[k + 1])
+            covers[mine] = mesh.closed_mesh.covers[pieces.order[mine]]
+    return covers
