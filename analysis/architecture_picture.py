@@ -17,7 +17,7 @@ PACKAGE: Final = Path(__file__).parents[1] / "vdsm_pin"
 TARGET: Final = PACKAGE.parent / "docs" / "architecture.svg"
 FOLDER, MODULE, ARROW, INK = "#d0e2f7", "#eef1f5", "#8791a0", "#1f2733"
 COMMON: Final = 0.4
-"""What is imported by more than this share of the boxes stands in the lowest line."""
+"""A module imported by more than this share of the boxes stands in the lowest line."""
 
 Graph = dict[str, set[str]]
 
@@ -45,7 +45,8 @@ def imports() -> Graph:
 def split_common(graph: Graph) -> tuple[Graph, list[str]]:
     """The graph without what stands lowest, and that: what nearly everything uses."""
     used = {box: sum(box in found for found in graph.values()) for box in graph}
-    common = {box for box in graph if used[box] > COMMON * len(graph)}
+    often = {box for box in graph if used[box] > COMMON * len(graph)}
+    common = {box for box in often if not (PACKAGE / box).is_dir()}
     alone = {box for box in graph if used[box] and not graph[box] - common}
     common |= {box for box in alone if not (PACKAGE / box).is_dir()}
     rest = {box: found - common for box, found in graph.items() if box not in common}
