@@ -2,7 +2,9 @@
 
 import importlib.metadata
 import tomllib
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -12,6 +14,7 @@ from vdsm_pin.app.doctor import Finding, examine
 from vdsm_pin.cli import main
 
 ROOT = Path(__file__).parents[1]
+NO_OPENMP = "libgomp.so.1: cannot open shared object file"
 
 
 def found(what: str) -> Finding:
@@ -45,6 +48,37 @@ def test_a_missing_library_is_named_with_its_remedy(
     (cluster,) = [line for line in lines if " cluster " in line]
     assert cluster.startswith("– ")
     assert cluster.endswith("pip install 'vdsm-pin[cluster]'")
+
+
+def test_a_library_that_the_system_cannot_load_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def without_openmp(name: str) -> ModuleType:
+        if name == "pinocchio":
+            raise ImportError(NO_OPENMP, name=name)
+        return import_module(name)
+
+    monkeypatch.setattr("vdsm_pin.app.doctor.importlib.import_module", without_openmp)
+    pin = found("pin")
+    assert not pin.works
+    assert "does not load: libgomp.so.1" in pin.found
+    assert "libgomp1" in pin.remedy
+    assert found("coal").works
+
+
+def test_a_command_that_cannot_load_a_library_says_so_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def unloadable(*_: object) -> None:
+        raise ImportError(NO_OPENMP)
+
+    monkeypatch.setattr(doctor, "examine", unloadable)
+    with pytest.raises(SystemExit) as ended:
+        main(["doctor"])
+    assert ended.value.code == 1
+    assert capsys.readouterr().err == (
+        f"vdsm: {NO_OPENMP}; vdsm doctor says what is missing\n"
+    )
 
 
 def test_a_missing_browser_is_no_failure(monkeypatch: pytest.MonkeyPatch) -> None:

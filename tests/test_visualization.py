@@ -83,6 +83,12 @@ def test_a_changed_file_is_noticed_and_a_broken_one_explained(tmp_path: Path) ->
         assert "Cannot be shown" not in get(server.url)
 
 
+def test_a_bad_motion_is_refused_before_a_page_is_promised(tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text("not a table\n")
+    with pytest.raises(InvalidFile, match=r"t\.csv: line 1"):
+        ViewServer("paper/obs1", tmp_path / "t.csv", 0, watch=False)
+
+
 def test_without_watching_no_page_asks(tmp_path: Path) -> None:
     with serving(None, watch=False) as server:
         assert "data-seen" not in get(server.url)

@@ -1,5 +1,6 @@
 """What this installation can do, and what it lacks: `vdsm doctor`."""
 
+import importlib
 import importlib.metadata
 import os
 import re
@@ -25,6 +26,18 @@ USES: Final = {
 """What the extras are for."""
 
 _DISTRIBUTION: Final = "vdsm-pin"
+
+_COMPILED: Final = {
+    "pin": "pinocchio",
+    "coal": "coal",
+    "python-flint": "flint",
+    "shapely": "shapely",
+}
+"""Modules that link to libraries of the system, which may lack them."""
+
+_LACKING: Final = (
+    "install the system's package of that library (libgomp.so.1: libgomp1 in Debian)"
+)
 
 
 @dataclass(frozen=True)
@@ -70,14 +83,23 @@ def _libraries() -> Iterator[Finding]:
         what = f"unknown: {_DISTRIBUTION} itself is not installed"
         yield Finding("libraries", what, False, True, f"pip install {_DISTRIBUTION}")
     for name in _required(""):
-        version = _version(name)
-        yield Finding(
-            name,
-            version or "not installed",
-            version is not None,
-            needed=True,
-            remedy="" if version else f"pip install {name}",
-        )
+        if (version := _version(name)) is None:
+            yield Finding(name, "not installed", False, True, f"pip install {name}")
+        elif why := _does_not_load(name):
+            yield Finding(
+                name, f"{version} does not load: {why}", False, True, _LACKING
+            )
+        else:
+            yield Finding(name, version, True, True)
+
+
+def _does_not_load(name: str) -> str:
+    """Why a library of machine code cannot be loaded; empty where it can."""
+    try:
+        importlib.import_module(_COMPILED.get(name, "sys"))
+    except ImportError as error:
+        return str(error)
+    return ""
 
 
 def _machine_code() -> Finding:

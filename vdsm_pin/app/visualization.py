@@ -88,7 +88,7 @@ class ViewServer(ThreadingHTTPServer):
         self.watch, self.ended = watch, False
         self._files: tuple[Path, ...] = ()
         self._seen, self._page, self._lock = "", "", Lock()
-        self._read()  # bad files are refused before a page is promised
+        shown_motion(self._read(), trajectory)  # bad files are refused at once
         try:
             super().__init__((HOST, port), _Handler)
         except OSError as error:

@@ -37,7 +37,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="Plan motions of hyper-redundant arms and prove that they are collision-free.",
+    help="Plan motions of snake arms; prove those of any robot free of collisions.",
     epilog="Exit status: 0 certified; 1 incomplete, refuted, undecided or infeasible; "
     "2 bad input.",
 )
@@ -60,11 +60,11 @@ def vdsm(
     version: Annotated[
         bool,
         typer.Option(
-            "--version", is_eager=True, callback=_show_version, help="Say it and end."
+            "--version", is_eager=True, callback=_show_version, help="Print it and end."
         ),
     ] = False,
 ) -> None:
-    """Plan motions of hyper-redundant arms and prove that they are collision-free."""
+    """Plan motions of snake arms; prove those of any robot free of collisions."""
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -89,4 +89,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         nobody_reads()
     except OSError as error:
         fail(error, BAD_INPUT)
+    except ImportError as error:
+        if (error.name or "").startswith("vdsm_pin"):
+            raise
+        fail(ImportError(f"{error}; vdsm doctor says what is missing"), NOT_PASSED)
     sys.exit(PASSED)

@@ -42,9 +42,10 @@ def batch(
         ),
     ] = None,
     strategy: Strategy = DEFAULT_STRATEGY,
-    jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
+    jobs: Annotated[int, typer.Option(min=1, metavar="NUMBER", help="Processes.")] = 1,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Skip what is finished and intact.")
+        bool,
+        typer.Option("--resume", help="Skip problems that are finished and intact."),
     ] = False,
     time_limit: TimeLimit = None,
     scheduler: Annotated[

@@ -17,12 +17,12 @@ commands = family()
 def check_certificate(
     certificate: Annotated[
         Path,
-        typer.Argument(metavar="FILE", help="What vdsm verify --certificate wrote."),
+        typer.Argument(metavar="FILE", help="Written by vdsm verify --certificate."),
     ],
     problem: Problem,
     trajectory: Annotated[
         Path,
-        typer.Argument(metavar="TRAJECTORY", help="The trajectory.csv it is about."),
+        typer.Argument(metavar="TRAJECTORY", help="The motion that it is about (CSV)."),
     ],
 ) -> None:
     """Recheck a certificate.

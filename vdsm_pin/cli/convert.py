@@ -20,19 +20,20 @@ def convert(
     problem: Problem,
     out: OutFolder,
     trajectory: Annotated[
-        Path | None, typer.Option(help="Joint angles, as trajectory.csv.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Joint angles, as trajectory.csv."),
     ] = None,
     centres: Annotated[
-        Path | None, typer.Option(help="Joint centres, as centres.csv.")
+        Path | None, typer.Option(metavar="FILE", help="Joint centres, as centres.csv.")
     ] = None,
     cables: Annotated[
-        Path | None, typer.Option(help="Cable lengths, as cables.csv.")
+        Path | None, typer.Option(metavar="FILE", help="Cable lengths, as cables.csv.")
     ] = None,
 ) -> None:
-    """Convert angles, joint centres and cable lengths into one another.
+    """Convert angles, centres and cable lengths.
 
-    Takes one of them and writes all: trajectory.csv, centres.csv and cables.csv.
-    Nothing is judged.
+    Takes joint angles, joint centres or cable lengths, and writes all of them:
+    trajectory.csv, centres.csv and cables.csv. Nothing is judged.
     """
     from vdsm_pin.app.conversion import Given, convert_to_folder
     from vdsm_pin.io.problem_file import read_problem

@@ -13,9 +13,10 @@ commands = family()
 @commands.command(epilog=examples("vdsm diff out/monday out/tuesday"))
 def diff(
     old: Annotated[
-        Path, typer.Argument(metavar="OLD", help="A folder of vdsm batch or verify.")
+        Path,
+        typer.Argument(metavar="OLD", help="A result folder of vdsm batch or verify."),
     ],
-    new: Annotated[Path, typer.Argument(metavar="NEW", help="Another one.")],
+    new: Annotated[Path, typer.Argument(metavar="NEW", help="A newer one.")],
 ) -> None:
     """Compare two result folders.
 

@@ -21,7 +21,9 @@ def explain(
     waypoint: Annotated[
         int | None,
         typer.Option(
-            min=0, help="Waypoint, from 0; the one with the largest link angle if none."
+            min=0,
+            metavar="NUMBER",
+            help="From 0; the one with the largest link angle if none.",
         ),
     ] = None,
 ) -> None:

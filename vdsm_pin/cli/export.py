@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from vdsm_pin.cli.options import Problem, examples, family
+from vdsm_pin.cli.options import Problem, ShownMotion, examples, family
 
 commands = family()
 
@@ -20,26 +20,37 @@ commands = family()
 def export(
     problem: Problem,
     out: Annotated[
-        Path, typer.Option(help="The file: .glb (glTF), .png or .mp4 (needs ffmpeg).")
+        Path,
+        typer.Option(metavar="FILE", help=".glb (glTF), .png or .mp4 (needs ffmpeg)."),
     ],
-    trajectory: Annotated[
-        Path | None, typer.Option(help="A trajectory.csv; without it the start.")
-    ] = None,
+    trajectory: ShownMotion = None,
     moment: Annotated[
-        float, typer.Option(min=0.0, help="Waypoint of a .png; 12.5 is between two.")
+        float,
+        typer.Option(
+            min=0.0, metavar="WAYPOINT", help="Of a .png; 12.5 is between two."
+        ),
     ] = 0.0,
     seconds: Annotated[
         float | None,
         typer.Option(
-            min=0.1, help="How long it plays; 10, or as the trajectory's times say."
+            min=0.1,
+            metavar="SECONDS",
+            help="How long it plays; 10, or as the trajectory's times say.",
         ),
     ] = None,
     look: Annotated[
         str,
-        typer.Option(help="overview, side, top, front, tip, or from where: 1,-1,0.5."),
+        typer.Option(
+            metavar="VIEW",
+            help="overview, side, top, front, tip, or a direction: 1,-1,0.5.",
+        ),
     ] = "overview",
-    width: Annotated[int, typer.Option(min=64, max=4096, help="In pixels.")] = 1280,
-    height: Annotated[int, typer.Option(min=64, max=4096, help="In pixels.")] = 720,
+    width: Annotated[
+        int, typer.Option(min=64, max=4096, metavar="PIXELS", help="Of the picture.")
+    ] = 1280,
+    height: Annotated[
+        int, typer.Option(min=64, max=4096, metavar="PIXELS", help="Of the picture.")
+    ] = 720,
     numbers: Annotated[
         bool, typer.Option("--numbers", help="Number the links.")
     ] = False,

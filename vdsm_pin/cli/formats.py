@@ -15,11 +15,15 @@ def schema(
     name: Annotated[
         str,
         typer.Argument(
-            help="problem, certificate, verification, plan, manifest or timing."
+            metavar="FILE",
+            help="problem, certificate, verification, plan, manifest or timing.",
         ),
     ] = "problem",
 ) -> None:
-    """Print the JSON Schema of a file, or of each line of a certificate."""
+    """Print the JSON Schema of a file.
+
+    Of a certificate it is that of each line.
+    """
     from vdsm_pin.report.files import schema, schema_text
 
     typer.echo(schema_text(schema(name)), nl=False)
@@ -35,7 +39,7 @@ def urdf(
         str,
         typer.Argument(metavar="ARM", help="A built-in arm, or a problem for its arm."),
     ],
-    out: Annotated[Path, typer.Option("--out", help="The URDF file.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE")],
 ) -> None:
     """Write the URDF of an arm."""
     from vdsm_pin.arm.manipulator import BUILT_IN, built_in

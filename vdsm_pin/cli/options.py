@@ -20,22 +20,43 @@ NOT_PASSED: Final = 1
 Problem = Annotated[
     str, typer.Argument(metavar="PROBLEM", help="A built-in name or a problem file.")
 ]
-OutFolder = Annotated[Path, typer.Option("--out", help="Folder for the results.")]
-Trajectory = Annotated[Path, typer.Option(help="A trajectory.csv.")]
-Strategy = Annotated[str, typer.Option(help=f"How to plan: {', '.join(STRATEGIES)}.")]
+OutFolder = Annotated[
+    Path, typer.Option("--out", metavar="FOLDER", help="Where the results go.")
+]
+Trajectory = Annotated[
+    Path, typer.Option(metavar="FILE", help="The motion: rows of joint values (CSV).")
+]
+ShownMotion = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE", help="The motion (CSV); the arm at its start if none."
+    ),
+]
+Strategy = Annotated[
+    str, typer.Option(metavar="NAME", help=f"One of {', '.join(STRATEGIES)}.")
+]
 
 JointError = Annotated[
-    float, typer.Option(min=0.0, help="Largest error of every joint angle [deg].")
+    float,
+    typer.Option(
+        min=0.0, metavar="DEG", help="Largest error of every joint angle [deg]."
+    ),
 ]
 BaseError = Annotated[
-    float, typer.Option(min=0.0, help="Largest shift of the base, any direction [mm].")
+    float,
+    typer.Option(
+        min=0.0, metavar="MM", help="Largest shift of the base, any direction [mm]."
+    ),
 ]
 BaseTurn = Annotated[
     float,
-    typer.Option(min=0.0, help="Largest turn of the base about its origin [deg]."),
+    typer.Option(
+        min=0.0, metavar="DEG", help="Largest turn of the base about its origin [deg]."
+    ),
 ]
 ObstacleError = Annotated[
-    float, typer.Option(min=0.0, help="Largest error of the obstacles [mm].")
+    float,
+    typer.Option(min=0.0, metavar="MM", help="Largest error of the obstacles [mm]."),
 ]
 
 JointErrors = Annotated[
@@ -63,14 +84,23 @@ ObstacleTurns = Annotated[
 
 PlanningTime = Annotated[
     float | None,
-    typer.Option(min=0.001, help="Time limit in seconds; 60 by default, inf for none."),
+    typer.Option(
+        min=0.001,
+        metavar="SECONDS",
+        help="When to give up; 60 by default, 600 where machine code is not made yet, "
+        "inf for never.",
+    ),
 ]
 TimeLimit = Annotated[
     float | None,
-    typer.Option(min=0.001, help="Time limit in seconds, for each problem."),
+    typer.Option(
+        min=0.001,
+        metavar="SECONDS",
+        help="When to give up; in a batch, on each problem.",
+    ),
 ]
 
-Quiet = Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors only.")]
 AsJson = Annotated[
     bool, typer.Option("--json", help="Print the result as JSON, for other programs.")
 ]

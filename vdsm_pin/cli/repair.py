@@ -35,7 +35,7 @@ def repair(
     problem: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[PROBLEM]", help="A problem file with robot; none with --urdf."
+            metavar="PROBLEM", help="A problem file with robot; none with --urdf."
         ),
     ] = None,
     urdf: Urdf = None,
@@ -51,7 +51,7 @@ def repair(
     ] = None,
     time_limit: TimeLimit = None,
 ) -> None:
-    """Change a robot's trajectory a little, so that it is certified.
+    """Move a robot's waypoints until they are certified.
 
     Writes trajectory.csv, repair.json (how far each waypoint moved) and
     verification.json; where no such trajectory is found, nothing, and says why.

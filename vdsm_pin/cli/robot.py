@@ -12,15 +12,23 @@ if TYPE_CHECKING:
     from vdsm_pin.robots.cell import Cell
 
 
-Urdf = Annotated[Path | None, typer.Option(help="Any robot, in place of a problem.")]
+Urdf = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="A robot of any kind, in place of a problem."),
+]
 Srdf = Annotated[
-    Path | None, typer.Option(help="Its links that need not be held apart.")
+    Path | None,
+    typer.Option(
+        metavar="FILE", help="Pairs of its links that need not be held apart."
+    ),
 ]
 SceneFile = Annotated[
-    Path | None, typer.Option(help="Its obstacles: ours or a PlanningScene.")
+    Path | None,
+    typer.Option(metavar="FILE", help="Its obstacles; YAML or a PlanningScene."),
 ]
 PackageDirs = Annotated[
-    list[Path] | None, typer.Option(help="Where package:// is looked for.")
+    list[Path] | None,
+    typer.Option(metavar="FOLDER", help="Where package:// is looked for."),
 ]
 Locks = Annotated[
     list[str] | None,
@@ -28,11 +36,15 @@ Locks = Annotated[
 ]
 RequiredClearance = Annotated[
     float | None,
-    typer.Option(min=0.0, help="With --urdf: from obstacles [mm]; 0 by default."),
+    typer.Option(
+        min=0.0, metavar="MM", help="With --urdf: from obstacles [mm]; 0 by default."
+    ),
 ]
 RequiredSelfClearance = Annotated[
     float | None,
-    typer.Option(min=0.0, help="With --urdf: between links [mm]; 0 by default."),
+    typer.Option(
+        min=0.0, metavar="MM", help="With --urdf: between links [mm]; 0 by default."
+    ),
 ]
 
 

@@ -29,14 +29,16 @@ def simulate(
     out: OutFolder,
     settings: Annotated[
         Path | None,
-        typer.Option(help="A YAML file of masses, cables, motors, gains, kicks."),
+        typer.Option(
+            metavar="FILE", help="Masses, cables, motors, gains and kicks (YAML)."
+        ),
     ] = None,
 ) -> None:
-    """Run a plan in closed loop: elastic cables, motors, encoders, PID.
+    """Run a plan in closed loop.
 
-    Needs MuJoCo (extra `simulation`). Writes executed.csv, simulation.csv,
-    simulation.json and simulation.html. Status 1 where the executed motion is not
-    proved clear.
+    Simulates elastic cables, motors, encoders and PID. Needs MuJoCo (extra
+    `simulation`). Writes executed.csv, simulation.csv, simulation.json and
+    simulation.html. Status 1 where the executed motion is not proved clear.
     """
     from vdsm_pin.io.problem_file import read_problem
     from vdsm_pin.simulation.folder import SimulationOrder, simulate_to_folder

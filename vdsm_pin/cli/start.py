@@ -36,7 +36,7 @@ def new(
         Path, typer.Argument(metavar="NAME", help="Folder to make; names the problem.")
     ],
     kind: Annotated[
-        str, typer.Option("--from", help="snake, port or paper.")
+        str, typer.Option("--from", metavar="KIND", help="snake, port or paper.")
     ] = "snake",
 ) -> None:
     """Make a folder with a problem to start from."""
@@ -49,7 +49,9 @@ def new(
 
 @commands.command(epilog=examples("vdsm doctor"))
 def doctor() -> None:
-    """Say what this installation can do, what it lacks and how to get it.
+    """Say what this installation can do and lacks.
+
+    A line for each part, with the way to get what is missing.
 
     Exit status 1 if planning or verification lacks something.
     """

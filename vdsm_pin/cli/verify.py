@@ -75,7 +75,7 @@ def verify(
     problem: Annotated[
         str | None,
         typer.Argument(
-            metavar="[PROBLEM]",
+            metavar="PROBLEM",
             help="A built-in name or a problem file; none with --urdf.",
         ),
     ] = None,
@@ -85,17 +85,20 @@ def verify(
     obstacle_error_mm: ObstacleErrors = None,
     obstacle_error_deg: ObstacleTurns = None,
     certificate: Annotated[
-        Path | None, typer.Option(help="Write the proof to this file.")
+        Path | None, typer.Option(metavar="FILE", help="Write the proof to this file.")
     ] = None,
     pdf: Annotated[
         Path | None,
-        typer.Option(help="Print the report to this file; needs Chromium or Chrome."),
+        typer.Option(
+            metavar="FILE",
+            help="Print the report to this file; needs Chromium or Chrome.",
+        ),
     ] = None,
     time_limit: TimeLimit = None,
     all_pairs: Annotated[
         bool,
         typer.Option(
-            "--all-pairs", help="Every pair at every interval in clearance.csv."
+            "--all-pairs", help="List every pair at every interval in clearance.csv."
         ),
     ] = False,
     interpolation: Annotated[
@@ -115,11 +118,11 @@ def verify(
     required_clearance_mm: RequiredClearance = None,
     required_self_clearance_mm: RequiredSelfClearance = None,
 ) -> None:
-    """Verify a trajectory of any planner.
+    """Prove a trajectory clear, or say where it is not.
 
-    Writes report.html, verification.json, clearance.csv, link_angles.csv, centres.csv
-    and cables.csv; of a robot (problem with robot, or --urdf) verification.json
-    alone.
+    The trajectory may be of any planner. Writes report.html, verification.json,
+    clearance.csv, link_angles.csv, centres.csv and cables.csv; of a robot (problem with
+    robot, or --urdf) verification.json alone.
     """
     of_robot = RobotOptions(
         urdf,

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from vdsm_pin.cli.options import Problem, examples, family
+from vdsm_pin.cli.options import Problem, ShownMotion, examples, family
 
 commands = family()
 
@@ -18,18 +18,27 @@ commands = family()
 )
 def view(
     problem: Problem,
-    trajectory: Annotated[
-        Path | None, typer.Option(help="A trajectory.csv; without it the start.")
+    trajectory: ShownMotion = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Write the page to this file; serve nothing."
+        ),
     ] = None,
-    html: Annotated[Path | None, typer.Option(help="Write a page and end.")] = None,
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Port to serve on; 0 for any.")
+        int,
+        typer.Option(
+            min=0, max=65535, metavar="NUMBER", help="Port to serve on; 0 for any."
+        ),
     ] = 7000,
     watch: Annotated[
-        bool, typer.Option("--watch", help="Reload when a file changes.")
+        bool, typer.Option("--watch", help="Reload the page when a file changes.")
     ] = False,
 ) -> None:
-    """Show a motion in 3D in the browser."""
+    """Show a motion in 3D in the browser.
+
+    Serves a page to this machine until Ctrl-C, or writes it with --html.
+    """
     from vdsm_pin.app.visualization import serve, write_page
 
     if html is not None:
