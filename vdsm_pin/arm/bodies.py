@@ -128,9 +128,13 @@ def _bounded(piece: Piece) -> Hull | FlatCylinder:
 def triangle_groups(body: LinkBody) -> tuple[IntArray, ...]:
     """Numbers of the triangles under each hull of a mesh body."""
     assert isinstance(body.solid, Mesh)
-    corners = body.solid.vertices[body.solid.triangles]
+    return grouped(body.solid.vertices[body.solid.triangles], body.parts)
+
+
+def grouped(corners: FloatArray, parts: int) -> tuple[IntArray, ...]:
+    """Numbers of triangles (n, 3, 3) in so many groups of neighbours, at most n."""
     order = coherent_order(corners.mean(axis=1))
-    return tuple(np.array_split(order, min(body.parts, len(order))))
+    return tuple(np.array_split(order, min(parts, len(order))))
 
 
 def outer_points(points: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ negative mass and limits that are upside down; Pinocchio drops shapes it does no
 
 import xml.etree.ElementTree as ET
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Final
 
 import numpy as np
@@ -15,7 +15,10 @@ from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 
 JOINT_KINDS: Final = ("fixed", "revolute", "prismatic", "continuous")
-"""Joint types this package can do something with."""
+"""Joint types of an arm."""
+
+ANY_JOINT_KINDS: Final = (*JOINT_KINDS, "planar", "floating")
+"""Joint types of robots that are judged."""
 
 SIZES: Final = {
     "sphere": {"radius": 1},
@@ -24,13 +27,17 @@ SIZES: Final = {
 }
 """Shapes every reader takes, with the count of numbers in each of their sizes."""
 
+ANY_SIZES: Final = {**SIZES, "capsule": {"radius": 1, "length": 1}}
+"""Shapes of robots that are judged."""
+
 
 def validate_urdf(text: str, *, geometry_only: bool = False) -> None:
     """Refuse a URDF document with any defect that a reader might let pass.
 
     Args:
         text: The document.
-        geometry_only: Whether masses do not matter and meshes are taken.
+        geometry_only: Whether masses do not matter, and meshes, capsules, planar and
+            floating joints and joints without limits are taken.
 
     Raises:
         InvalidInput: If the text is not XML; a name is missing or used twice; a joint
@@ -60,7 +67,7 @@ def _problems(robot: ET.Element, geometry_only: bool) -> Iterator[str]:
             if count > 1:
                 yield f"{count} {kind}s are named {name!r}; names are unique"
     for joint in robot.findall("joint"):
-        yield from _joint_problems(joint)
+        yield from _joint_problems(joint, geometry_only)
     yield from _tree_problems(robot)
     for link in robot.findall("link"):
         yield from _link_problems(link, geometry_only)
@@ -68,6 +75,9 @@ def _problems(robot: ET.Element, geometry_only: bool) -> Iterator[str]:
 
 def _tree_problems(robot: ET.Element) -> Iterator[str]:
     links = {link.get("name", "") for link in robot.findall("link")}
+    if not links:
+        yield "has no link; a xacro file must end in .xacro"
+        return
     parent_of: dict[str, str] = {}
     for joint in robot.findall("joint"):
         name = joint.get("name", "")
@@ -90,30 +100,41 @@ def _tree_problems(robot: ET.Element) -> Iterator[str]:
             seen.add(link)
 
 
-def _joint_problems(joint: ET.Element) -> Iterator[str]:
+def _joint_problems(joint: ET.Element, geometry_only: bool) -> Iterator[str]:
     where = f"joint {joint.get('name', '')!r}"
     kind = joint.get("type", "")
-    if kind not in JOINT_KINDS:
-        yield f"{where}: type {kind!r}, expected one of {', '.join(JOINT_KINDS)}"
+    kinds = ANY_JOINT_KINDS if geometry_only else JOINT_KINDS
+    if kind not in kinds:
+        yield f"{where}: type {kind!r}, expected one of {', '.join(kinds)}"
     yield from _origin_problems(joint, where)
     if kind == "fixed":
         return
+    axis = None if joint.find("axis") is None else _numbers(joint, "axis", "xyz", 3)
     if joint.find("axis") is not None:
-        axis = _numbers(joint, "axis", "xyz", 3)
+        text = _attribute(joint, "axis", "xyz")
         if axis is None or not np.linalg.norm(axis) > 0.0:
-            yield f"{where}: axis {_attribute(joint, 'axis', 'xyz')!r} is no direction"
-    if kind == "continuous":
+            yield f"{where}: axis {text!r} is no direction"
+        elif kind == "planar" and (axis[:2].any() or not axis[2] > 0.0):
+            yield f"{where}: axis {text!r}, expected 0 0 1 of a planar joint"
+    yield from _limit_problems(joint, where, optional=geometry_only)
+
+
+def _limit_problems(joint: ET.Element, where: str, optional: bool) -> Iterator[str]:
+    """What is wrong with limits; `optional` ones are judged where they are given."""
+    limit, kind = joint.find("limit"), joint.get("type")
+    given = {} if limit is None else limit.attrib
+    if kind in ("revolute", "prismatic"):
+        defaults = {"lower": "0", "upper": "0", **given} if optional else given
+        bounds = [_number(defaults.get(name, "")) for name in ("lower", "upper")]
+        if not np.isfinite(bounds).all():
+            yield f"{where}: limit needs numbers lower and upper"
+        elif not bounds[0] <= bounds[1]:
+            yield f"{where}: lower limit {bounds[0]} is above upper limit {bounds[1]}"
+    elif not optional:
         return
-    low = _numbers(joint, "limit", "lower", 1)
-    high = _numbers(joint, "limit", "upper", 1)
-    if low is None or high is None:
-        yield f"{where}: limit needs numbers lower and upper"
-    elif not low[0] <= high[0]:
-        yield f"{where}: lower limit {low[0]} is above upper limit {high[0]}"
-    for name in ("effort", "velocity"):
-        bound = _numbers(joint, "limit", name, 1)
-        if bound is None or not bound[0] >= 0.0:
-            text = _attribute(joint, "limit", name)
+    for name in ("effort", "velocity", *(["acceleration"] if optional else [])):
+        text = given.get(name, "0" if optional else "")
+        if not _number(text) >= 0.0:
             yield f"{where}: limit {name} is {text!r}, expected 0 or more"
 
 
@@ -123,10 +144,12 @@ def _link_problems(link: ET.Element, geometry_only: bool) -> Iterator[str]:
     if inertial is not None and not geometry_only:
         yield from _origin_problems(inertial, where)
         yield from _inertia_problems(inertial, where)
-    for shape in link.findall("visual") + link.findall("collision"):
+    shown = [] if geometry_only else link.findall("visual")
+    for shape in shown + link.findall("collision"):
         yield from _origin_problems(shape, where)
         if not (geometry_only and shape.find("geometry/mesh") is not None):
-            yield from _shape_problems(shape, where)
+            sizes = ANY_SIZES if geometry_only else SIZES
+            yield from _shape_problems(shape, where, sizes)
 
 
 def _inertia_problems(inertial: ET.Element, where: str) -> Iterator[str]:
@@ -148,18 +171,20 @@ def _inertia_problems(inertial: ET.Element, where: str) -> Iterator[str]:
         yield f"{where}: inertia breaks the triangle inequality of a real body"
 
 
-def _shape_problems(shape: ET.Element, where: str) -> Iterator[str]:
+def _shape_problems(
+    shape: ET.Element, where: str, sizes: Mapping[str, Mapping[str, int]]
+) -> Iterator[str]:
     geometry = shape.find("geometry")
     bodies = [] if geometry is None else list(geometry)
     if geometry is None or len(bodies) != 1:
         yield f"{where}: {shape.tag} has {len(bodies)} geometries, expected 1"
         return
     kind = bodies[0].tag
-    if kind not in SIZES:
-        known = ", ".join(SIZES)
+    if kind not in sizes:
+        known = ", ".join(sizes)
         yield f"{where}: <{kind}> is not read by everybody; expected one of {known}"
         return
-    for name, count in SIZES[kind].items():
+    for name, count in sizes[kind].items():
         value = _numbers(geometry, kind, name, count)
         if value is None or not (value > 0.0).all():
             text = _attribute(geometry, kind, name)
@@ -178,6 +203,15 @@ def _attribute(element: ET.Element, child: str, name: str) -> str:
     """An attribute of a child element; empty where either is missing."""
     found = element.find(child)
     return "" if found is None else found.get(name, "")
+
+
+def _number(text: str) -> float:
+    """A finite number; NaN where it is none."""
+    try:
+        value = float(text)
+    except ValueError:
+        return np.nan
+    return value if np.isfinite(value) else np.nan
 
 
 def _numbers(

@@ -7,8 +7,12 @@ import typer
 
 from vdsm_pin.cli.options import OutFolder, TimeLimit, Trajectory, examples, family
 from vdsm_pin.cli.robot import (
+    Bodies,
+    Group,
+    JointLimits,
     Locks,
     PackageDirs,
+    Parts,
     RequiredClearance,
     RequiredSelfClearance,
     RobotOptions,
@@ -45,6 +49,10 @@ def repair(
     lock: Locks = None,
     required_clearance_mm: RequiredClearance = None,
     required_self_clearance_mm: RequiredSelfClearance = None,
+    group: Group = None,
+    bodies: Bodies = None,
+    parts: Parts = None,
+    joint_limits: JointLimits = None,
     pin: Annotated[
         list[int] | None,
         typer.Option(metavar="ROW", help="A waypoint, from 0, that stays."),
@@ -67,6 +75,10 @@ def repair(
         tuple(lock or ()),
         required_clearance_mm,
         required_self_clearance_mm,
+        group,
+        bodies,
+        parts,
+        joint_limits,
     )
     with enforced(deadline):
         cell = options.cell(problem)

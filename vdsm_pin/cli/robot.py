@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
@@ -34,6 +34,20 @@ Locks = Annotated[
     list[str] | None,
     typer.Option(metavar="JOINT=VALUE", help="A joint that stands still [rad, m]."),
 ]
+Group = Annotated[
+    str | None,
+    typer.Option(help="Group of the SRDF whose joints move; others stand still."),
+]
+Bodies = Annotated[
+    Literal["hull", "parts", "primitives"] | None,
+    typer.Option(help="What stands for the mesh of a link; its hull by default."),
+]
+Parts = Annotated[
+    int | None, typer.Option(min=1, max=256, help="Hulls of one mesh [8].")
+]
+JointLimits = Annotated[
+    Path | None, typer.Option(help="A joint_limits.yaml; the stricter limit counts.")
+]
 RequiredClearance = Annotated[
     float | None,
     typer.Option(
@@ -58,6 +72,10 @@ class RobotOptions(NamedTuple):
     lock: tuple[str, ...]
     required_mm: float | None
     required_self_mm: float | None
+    group: str | None
+    bodies: Literal["hull", "parts", "primitives"] | None
+    parts: int | None
+    joint_limits: Path | None
 
     def cell(self, problem: Path | None) -> "Cell":
         """The robot and what it is held to.
@@ -68,7 +86,13 @@ class RobotOptions(NamedTuple):
         Raises:
             InvalidInput: If both or neither are given, or a file is bad.
         """
-        from vdsm_pin.robots.cell import cell_of, read_cell
+        from vdsm_pin.robots.cell import (
+            RobotFiles,
+            cell_of,
+            locks,
+            read_cell,
+            solids_of,
+        )
         from vdsm_pin.units import MM_PER_M
 
         if problem is not None:
@@ -77,12 +101,18 @@ class RobotOptions(NamedTuple):
         if self.urdf is None:
             message = "expected a PROBLEM, or --urdf for a robot"
             raise InvalidInput(message)
-        return cell_of(
+        files = RobotFiles(
             self.urdf,
             self.srdf,
-            self.scene,
             self.package_dirs,
-            self.lock,
+            locks(self.lock),
+            self.group,
+            solids_of(self.bodies, self.parts),
+            self.joint_limits,
+        )
+        return cell_of(
+            files,
+            self.scene,
             (self.required_mm or 0.0) / MM_PER_M,
             (self.required_self_mm or 0.0) / MM_PER_M,
         )
@@ -95,6 +125,10 @@ class RobotOptions(NamedTuple):
             "--scene": self.scene,
             "--package-dir": self.package_dirs,
             "--lock": self.lock,
+            "--group": self.group,
+            "--bodies": self.bodies,
+            "--parts": self.parts,
+            "--joint-limits": self.joint_limits,
             "--required-clearance-mm": self.required_mm,
             "--required-self-clearance-mm": self.required_self_mm,
         }

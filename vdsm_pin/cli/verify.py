@@ -24,8 +24,12 @@ from vdsm_pin.cli.options import (
     family,
 )
 from vdsm_pin.cli.robot import (
+    Bodies,
+    Group,
+    JointLimits,
     Locks,
     PackageDirs,
+    Parts,
     RequiredClearance,
     RequiredSelfClearance,
     RobotOptions,
@@ -117,6 +121,10 @@ def verify(
     lock: Locks = None,
     required_clearance_mm: RequiredClearance = None,
     required_self_clearance_mm: RequiredSelfClearance = None,
+    group: Group = None,
+    bodies: Bodies = None,
+    parts: Parts = None,
+    joint_limits: JointLimits = None,
 ) -> None:
     """Prove a trajectory clear, or say where it is not.
 
@@ -132,6 +140,10 @@ def verify(
         tuple(lock or ()),
         required_clearance_mm,
         required_self_clearance_mm,
+        group,
+        bodies,
+        parts,
+        joint_limits,
     )
     of_arm: dict[str, object] = {
         "--joint-error-deg": joint_error_deg != "0",

@@ -1,6 +1,7 @@
 """A robot among its obstacles: from files named one by one, or from a problem file."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, Literal
@@ -10,6 +11,7 @@ from pydantic import BeforeValidator, Field, ValidationError
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import rotation_from_rpy
+from vdsm_pin.io.body_schema import MAX_PARTS
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.motion_schema import MovableModel
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
@@ -21,6 +23,7 @@ from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import read_yaml
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.robots.judgement import Asked
+from vdsm_pin.robots.link_solids import HULLS, PARTS, MeshCover, Solids
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.scene_files import MAX_BYTES, SceneModel, check_judged, read_scene
 from vdsm_pin.robots.urdf import read_robot
@@ -39,33 +42,84 @@ class Cell:
     files: tuple[Path, ...]
 
 
+@dataclass(frozen=True)
+class RobotFiles:
+    """A robot, by files and what is said of them; as `read_robot` takes it.
+
+    Args:
+        urdf: The robot.
+        srdf: Pairs that are not held apart; None: neighbours are not.
+        package_dirs: Where `package://` is looked for.
+        lock: Joints that stand still; [rad] or [m].
+        group: Of the SRDF, whose joints alone move.
+        solids: What stands for the meshes of links.
+        joint_limits: A joint_limits.yaml.
+    """
+
+    urdf: Path
+    srdf: Path | None = None
+    package_dirs: tuple[Path, ...] = ()
+    lock: Mapping[str, float] = field(default_factory=dict)
+    group: str | None = None
+    solids: Solids = HULLS
+    joint_limits: Path | None = None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Those that it is read from, the URDF first."""
+        return (self.urdf, *filter(None, (self.srdf, self.joint_limits)))
+
+    def read(self) -> Robot:
+        """The robot.
+
+        Raises:
+            InvalidInput: If a file is bad or a value makes no sense.
+        """
+        return read_robot(
+            self.urdf,
+            self.srdf,
+            self.package_dirs,
+            self.lock,
+            self.group,
+            self.solids,
+            self.joint_limits,
+        )
+
+
 def cell_of(
-    urdf: Path,
-    srdf: Path | None = None,
+    files: RobotFiles,
     scene: Path | None = None,
-    package_dirs: tuple[Path, ...] = (),
-    lock: tuple[str, ...] = (),
     required: float = 0.0,
     required_self: float = 0.0,
 ) -> Cell:
     """The cell of files that are named one by one.
 
     Args:
-        urdf: The robot.
-        srdf: Pairs that are not held apart; None: neighbours are not.
+        files: Of the robot.
         scene: The obstacles; None for none.
-        package_dirs: Where `package://` is looked for.
-        lock: NAME=VALUE of joints that stand still; [rad] or [m].
         required: Least clearance from obstacles; [m].
         required_self: Least clearance between links; [m].
 
     Raises:
         InvalidInput: If a file is bad or a value makes no sense.
     """
-    robot = read_robot(urdf, srdf, package_dirs, _locks(lock))
+    robot = files.read()
     solids = Scene() if scene is None else read_scene(scene, _size(robot))
     asked = Asked(robot, solids, required, required_self)
-    return Cell(asked, (urdf, *filter(None, (srdf, scene))))
+    return Cell(asked, (*files.files, *filter(None, (scene,))))
+
+
+def solids_of(bodies: MeshCover | None, parts: int | None) -> Solids:
+    """What stands for meshes; a number of parts alone asks for parts.
+
+    Raises:
+        InvalidInput: If a number is given beside another cover.
+    """
+    cover = bodies or ("hull" if parts is None else "parts")
+    if parts is not None and cover != "parts":
+        message = f"parts is {parts} beside bodies {cover!r}, expected bodies 'parts'"
+        raise InvalidInput(message)
+    return Solids(cover, parts or PARTS)
 
 
 class RobotModel(FileModel):
@@ -83,6 +137,36 @@ class RobotModel(FileModel):
     lock: dict[str, Number] = Field(
         default={}, description="Joints that stand still, in the URDF's units [rad, m]."
     )
+    group: str | None = Field(
+        default=None,
+        description="Group of the SRDF whose joints a trajectory moves; the others "
+        "stand where lock says, or at 0. Default: all move that are not locked.",
+    )
+    bodies: MeshCover | None = Field(
+        default=None,
+        description="What stands for the mesh of a link: its hull, hulls of parts of "
+        "it, or a ball, capsule or box around it (primitives). Default: hull.",
+    )
+    parts: int | None = Field(
+        default=None, ge=1, le=MAX_PARTS, description="Hulls of one mesh, with parts."
+    )
+    joint_limits: str | None = Field(
+        default=None, description="A joint_limits.yaml of MoveIt; the stricter counts."
+    )
+
+    def files(self, folder: Path) -> RobotFiles:
+        """The files that it names in a folder."""
+        optional = (self.srdf, self.joint_limits)
+        srdf, limits = (None if name is None else folder / name for name in optional)
+        return RobotFiles(
+            folder / self.urdf,
+            srdf,
+            tuple(folder / name for name in self.package_dirs),
+            self.lock,
+            self.group,
+            solids_of(self.bodies, self.parts),
+            limits,
+        )
 
 
 class CellModel(SceneModel):
@@ -117,11 +201,9 @@ def read_cell(path: Path) -> Cell:
         model = CellModel.model_validate(document.data)
     except ValidationError as error:
         raise first_error(error, document) from None
-    folder, given = path.parent, model.robot
-    urdf = folder / given.urdf
-    srdf = None if given.srdf is None else folder / given.srdf
-    dirs = tuple(folder / name for name in given.package_dirs)
-    robot = read_robot(urdf, srdf, dirs, given.lock)
+    folder = path.parent
+    robot_files = model.robot.files(folder)
+    robot = robot_files.read()
     rotation = rotation_from_rpy(np.radians(model.base.rpy_deg))
     frame = Frame(model.length_unit, rotation, np.array(model.base.position))
     builder = ObstacleBuilder(document, folder, frame, _size(robot), sha256())
@@ -130,11 +212,16 @@ def read_cell(path: Path) -> Cell:
     required = float(frame.metres(model.required_clearance))
     required_self = float(frame.metres(model.required_self_clearance))
     meshes = [one.file for one in model.obstacles if isinstance(one, FromFileModel)]
-    files = (path, urdf, *filter(None, (srdf,)), *(folder / name for name in meshes))
+    files = (path, *robot_files.files, *(folder / name for name in meshes))
     return Cell(Asked(robot, scene, required, required_self), files)
 
 
-def _locks(words: tuple[str, ...]) -> dict[str, float]:
+def locks(words: tuple[str, ...]) -> dict[str, float]:
+    """Values of joints by NAME=VALUE; [rad] or [m].
+
+    Raises:
+        InvalidInput: If one is of another form.
+    """
     found = {}
     for word in words:
         name, _, value = word.partition("=")

@@ -15,7 +15,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
-from vdsm_pin.robots.hulls import hull_planes, is_solid
+from vdsm_pin.robots.hulls import hull_planes
 from vdsm_pin.tolerances import TOLERANCES
 
 CORNERS: Final = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]) / 3**0.5
@@ -99,9 +99,10 @@ def _slack(piece: Piece) -> Slack:
         return lambda x: _in_cylinder(piece, x)
     if len(piece.points) <= 2:
         return lambda x: _in_capsule(piece, x)
-    if not is_solid(piece.points):
+    planes = hull_planes(piece.points)
+    if planes is None:
         return lambda x: (-np.inf, np.zeros(3))
-    normals, offsets = hull_planes(piece.points)
+    normals, offsets = planes
 
     def in_hull(x: FloatArray) -> tuple[float, FloatArray]:
         rooms = offsets - normals @ x

@@ -1,4 +1,4 @@
-"""Convex hulls of points by Coal (Qhull), made covers of all the points."""
+"""Convex covers of points: hulls by Coal (Qhull), and the simplest solids."""
 
 from typing import Any, Final
 
@@ -9,10 +9,13 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
+from vdsm_pin.geometry.solids import BOX_CORNERS
 from vdsm_pin.tolerances import TOLERANCES
 
 FLAT: Final = 1e-6
 """Coal's hull of points flatter than this part of their size ends the process; [-]."""
+
+UNIT_BOX: Final = (BOX_CORNERS + 1.0) / 2.0
 
 MOST_GROWN: Final = 1e-6
 """By how much a hull may be grown to hold what Qhull takes for its surface; [m]."""
@@ -24,8 +27,8 @@ def covering_hull(points: FloatArray) -> Hull:
     Args:
         points: Shape (n, 3); [m].
     """
-    if is_solid(points):
-        corners = np.array(coal_hull(points).points())
+    if (hull := coal_hull(points)) is not None:
+        corners = np.array(hull.points())
         pieces = pack_pieces([[Hull(corners)]])
         ends = np.ascontiguousarray(np.repeat(points[:, None], 2, axis=1))
         none = np.zeros(len(points), np.int64)
@@ -36,6 +39,39 @@ def covering_hull(points: FloatArray) -> Hull:
     return Hull(outer_points(points))
 
 
+def covering_primitive(points: FloatArray) -> Hull:
+    """The ball, capsule or box along the axes of inertia that holds all points.
+
+    The one of least volume, grown by what arithmetic may lose.
+
+    Args:
+        points: Shape (n, 3); [m].
+    """
+    middle = points.mean(axis=0)
+    _, _, axes = np.linalg.svd(points - middle, full_matrices=False)
+    along = (points - middle) @ axes.T
+    low, high = along.min(axis=0), along.max(axis=0)
+    grown = TOLERANCES.arithmetic
+    box = Hull(middle + (low + (high - low) * UNIT_BOX) @ axes, grown)
+    centre = 0.5 * (low + high)
+    radius = float(np.linalg.norm(along - centre, axis=1).max())
+    ball = Hull((middle + centre @ axes)[None], radius + grown)
+    across = np.linalg.norm(along[:, 1:] - centre[1:], axis=1)
+    girth = float(across.max())
+    room = np.sqrt(np.maximum(girth**2 - across**2, 0.0))
+    first, last = (along[:, 0] + room).min(), (along[:, 0] - room).max()
+    first, last = min(first, last), max(first, last)
+    ends = np.array([[first, *centre[1:]], [last, *centre[1:]]])
+    capsule = Hull(middle + ends @ axes, girth + grown)
+    length = last - first
+    volumes = [
+        float(np.prod(high - low)),
+        4.0 / 3.0 * np.pi * radius**3,
+        np.pi * girth**2 * (length + 4.0 / 3.0 * girth),
+    ]
+    return (box, ball, capsule)[int(np.argmin(volumes))]
+
+
 def is_solid(points: FloatArray) -> bool:
     """Whether points are far enough from one plane for Coal's hull."""
     if len(points) < 4:
@@ -44,20 +80,31 @@ def is_solid(points: FloatArray) -> bool:
     return bool(sizes[-1] > FLAT * sizes[0])
 
 
-def coal_hull(points: FloatArray) -> Any:
-    """The hull as a coal.Convex, of points for which `is_solid` holds."""
+def coal_hull(points: FloatArray) -> Any | None:
+    """The hull as a coal.Convex; None where the points are flat or Qhull gives up."""
     import coal
 
+    if not is_solid(points):
+        return None
     vertices = coal.StdVec_Vec3s()
     vertices.extend([np.array(point) for point in points])
-    return coal.Convex.convexHull(vertices, True, "Qt")
+    # A face of hundreds of corners, cut into a fan, has more neighbours at its tip than
+    # Coal can count; of joggled points it is cut otherwise.
+    for how in ("Qt", "QJ"):
+        try:
+            return coal.Convex.convexHull(vertices, True, how)
+        except RuntimeError:
+            continue
+    return None
 
 
-def hull_planes(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Planes n.x = d of the faces of a hull, of points for which `is_solid` holds.
+def hull_planes(points: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """Planes n.x = d of the faces of a hull; None where `coal_hull` has none.
 
     Returns:
         Outward unit normals, shape (n_faces, 3), and offsets, shape (n_faces,); [m].
     """
     hull = coal_hull(points)
+    if hull is None:
+        return None
     return np.array(hull.normals()), -np.array(hull.offsets()).ravel()

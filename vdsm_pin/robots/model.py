@@ -2,9 +2,13 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.tree import Tree
+from vdsm_pin.robots.link_solids import HULLS, Solids
+from vdsm_pin.robots.srdf import Base
 
 
 @dataclass(frozen=True)
@@ -16,12 +20,16 @@ class RobotJoint:
         lower: Least value, -inf where there is no limit; [rad] or [m].
         upper: Largest value.
         turns: Whether its values are angles.
+        velocity: Largest rate, inf where there is no limit; [rad/s] or [m/s].
+        acceleration: Largest change of it; [rad/s^2] or [m/s^2].
     """
 
     name: str
     lower: float
     upper: float
     turns: bool
+    velocity: float = np.inf
+    acceleration: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -52,6 +60,9 @@ class Robot:
         bodies: The links that have collision solids.
         held: Numbers of two bodies that are held apart, each.
         left_out: Pairs of links with solids that are not.
+        base: The joint between world and root link; None where it stands.
+        solids: What stands for the meshes of links.
+        notes: What else a reader should know, a sentence each.
     """
 
     name: str
@@ -62,6 +73,9 @@ class Robot:
     bodies: tuple[Body, ...]
     held: tuple[tuple[int, int], ...]
     left_out: tuple[LeftOut, ...]
+    base: Base | None = None
+    solids: Solids = HULLS
+    notes: tuple[str, ...] = ()
 
     def poses(self, q: FloatArray) -> dict[str, FloatArray]:
         """T_world_link of every link at rows of q, shape (n_rows, 4, 4); [m]."""

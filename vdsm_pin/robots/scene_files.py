@@ -1,9 +1,8 @@
 """Scenes for robots: obstacles as in a problem file, or a PlanningScene of MoveIt."""
 
 import hashlib
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -17,8 +16,9 @@ from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.problem_errors import first_error
 from vdsm_pin.io.schema_types import FileModel
 from vdsm_pin.io.source import read_text
-from vdsm_pin.io.yaml_reader import Location, YamlDocument, read_yaml
+from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
 from vdsm_pin.problem.scene import Moving, Obstacle, Scene
+from vdsm_pin.robots.places import Place
 
 MAX_BYTES: Final = 32 << 20
 UNIT_NORM: Final = 1e-3
@@ -84,53 +84,12 @@ def _ours(document: YamlDocument, path: Path, robot_size: float) -> Scene:
     return Scene(builder.build_all(model.obstacles, ("obstacles",)))
 
 
-@dataclass(frozen=True)
-class _Place:
-    """A value of the file, and where it stands."""
-
-    document: YamlDocument
-    at: Location
-    value: Any
-
-    def __getitem__(self, key: str | int) -> "_Place":
-        if isinstance(key, str) and not isinstance(self.value, dict):
-            problem = "is no mapping"
-            raise self.invalid(problem)
-        try:
-            return _Place(self.document, (*self.at, key), self.value[key])
-        except (KeyError, IndexError, TypeError):
-            problem = f"has no {key!r}"
-            raise self.invalid(problem) from None
-
-    def get(self, key: str, default: Any) -> "_Place":
-        has = isinstance(self.value, dict) and self.value.get(key) is not None
-        return self[key] if has else _Place(self.document, self.at, default)
-
-    def items(self) -> list["_Place"]:
-        if not isinstance(self.value, list):
-            problem = "is no list"
-            raise self.invalid(problem)
-        return [self[k] for k in range(len(self.value))]
-
-    def numbers(self, count: int) -> FloatArray:
-        values = self.value
-        good = isinstance(values, list) and len(values) >= count
-        good = good and all(type(v) in (int, float) for v in values)
-        if not good or len(values) > count or not np.isfinite(values).all():
-            problem = f"is {str(values)[:60]}, expected {count} numbers"
-            raise self.invalid(problem)
-        return np.array(values, dtype=np.float64)
-
-    def invalid(self, problem: str) -> InvalidFile:
-        return self.document.invalid(self.at, problem)
-
-
 def _moveit(document: YamlDocument) -> Scene:
     """The collision objects of a PlanningScene, all solids of one as one obstacle each.
 
     Its allowed collision matrix is not read: the SRDF says which links may touch.
     """
-    whole = _Place(document, (), document.data)
+    whole = Place(document, (), document.data)
     attached = whole.get("robot_state", {}).get("attached_collision_objects", [])
     if attached.value:
         problem = "has attached objects, which are not judged yet"
@@ -147,7 +106,7 @@ def _moveit(document: YamlDocument) -> Scene:
         raise whole["world"].invalid(str(error)) from None
 
 
-def _solids(thing: _Place) -> list[Obstacle]:
+def _solids(thing: Place) -> list[Obstacle]:
     name = thing["id"].value
     if not isinstance(name, str) or not name:
         problem = "is no name"
@@ -174,7 +133,7 @@ def _solids(thing: _Place) -> list[Obstacle]:
     return found
 
 
-def _primitive(shape: _Place, name: str, placement: FloatArray) -> Obstacle:
+def _primitive(shape: Place, name: str, placement: FloatArray) -> Obstacle:
     kinds = {1: "box", 2: "sphere", 3: "cylinder"}
     kind = shape["type"].value
     kind = kinds.get(kind, kind) if not isinstance(kind, bool) else kind
@@ -198,7 +157,7 @@ def _primitive(shape: _Place, name: str, placement: FloatArray) -> Obstacle:
     raise shape["type"].invalid(problem)
 
 
-def _plane(plane: _Place, name: str, placement: FloatArray) -> Obstacle:
+def _plane(plane: Place, name: str, placement: FloatArray) -> Obstacle:
     """What lies below a x + b y + c z + d = 0."""
     a, b, c, d = plane["coef"].numbers(4)
     length = float(np.linalg.norm((a, b, c)))
@@ -210,7 +169,7 @@ def _plane(plane: _Place, name: str, placement: FloatArray) -> Obstacle:
     return HalfSpace(name, foot, normal)
 
 
-def _pose(pose: _Place) -> FloatArray:
+def _pose(pose: Place) -> FloatArray:
     """T_world_object, shape (4, 4): position, quaternion x y z w, listed or named."""
     placement = np.eye(4)
     placement[:3, 3] = _named(pose.get("position", [0, 0, 0]), "xyz")
@@ -225,8 +184,8 @@ def _pose(pose: _Place) -> FloatArray:
     return placement
 
 
-def _named(place: _Place, keys: str) -> FloatArray:
+def _named(place: Place, keys: str) -> FloatArray:
     if not isinstance(place.value, dict):
         return place.numbers(len(keys))
     values = [place[key].value for key in keys]
-    return _Place(place.document, place.at, values).numbers(len(keys))
+    return Place(place.document, place.at, values).numbers(len(keys))

@@ -7,10 +7,11 @@ from typing import Any, Final
 import numpy as np
 
 from vdsm_pin.errors import VerificationFailed
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
-from vdsm_pin.robots.hulls import coal_hull, is_solid
+from vdsm_pin.robots.hulls import coal_hull
 from vdsm_pin.robots.model import Robot
+from vdsm_pin.robots.srdf import Base
 from vdsm_pin.verification.coal_bodies import CoalBody, turn_z_to
 
 KEPT: Final = 8
@@ -31,7 +32,7 @@ def pose_difference(robot: Robot, q: FloatArray) -> FloatArray:
     """
     import pinocchio as pin
 
-    model = _model(robot.text)
+    model = _model(robot.text, robot.base)
     data, values = model.createData(), robot.tree.values(q)
     poses, worst = robot.poses(q), np.zeros(len(q))
     numbers = {name: model.getFrameId(name, pin.BODY) for name in robot.frames}
@@ -49,33 +50,49 @@ def pose_difference(robot: Robot, q: FloatArray) -> FloatArray:
 
 
 @lru_cache(maxsize=KEPT)
-def _model(text: str) -> Any:
-    """Pinocchio's model of a URDF.
+def _model(text: str, base: Base | None) -> Any:
+    """Pinocchio's model of a URDF on its base.
 
     Raises:
         VerificationFailed: If Pinocchio refuses it.
     """
     import pinocchio as pin
 
+    free = {"planar": pin.JointModelPlanar, "floating": pin.JointModelFreeFlyer}
     try:
-        return pin.buildModelFromXML(text)
+        if base is None:
+            return pin.buildModelFromXML(text)
+        return pin.buildModelFromXML(text, free[base.kind](), base.name)
     except (ValueError, RuntimeError) as error:
         message = f"Pinocchio refuses the URDF: {error}"
         raise VerificationFailed(message) from None
 
 
 def _configuration(pin: Any, model: Any, robot: Robot, values: FloatArray) -> Any:
-    """Pinocchio's q, which has a cosine and a sine for a joint without limits."""
+    """Pinocchio's q of the values of the tree's joints.
+
+    It has a cosine and a sine for an angle without limits, a quaternion for a frame
+    that floats.
+    """
+    names = [joint.name for joint in robot.tree.joints]
+    value = dict(zip(names, values.tolist(), strict=True))
     full = pin.neutral(model)
-    for joint, value in zip(robot.tree.joints, values, strict=True):
-        if not model.existJointName(joint.name):
-            continue
-        number = model.getJointId(joint.name)
-        at = model.idx_qs[number]
-        if model.nqs[number] == 2:
-            full[at], full[at + 1] = np.cos(value), np.sin(value)
-        elif model.nqs[number] == 1:
-            full[at] = value
+    for number in range(1, model.njoints):
+        name, at, count = model.names[number], model.idx_qs[number], model.nqs[number]
+        if count == 1:
+            own = [value[name]]
+        elif count == 2:
+            own = [np.cos(value[name]), np.sin(value[name])]
+        else:
+            own = [value[f"{name}/x"], value[f"{name}/y"]]
+            if count == 4:
+                theta = value[f"{name}/theta"]
+                own += [np.cos(theta), np.sin(theta)]
+            else:
+                turns = (value[f"{name}/{part}"] for part in ("roll", "pitch", "yaw"))
+                turn = pin.Quaternion(rotation_from_rpy(np.array([*turns])))
+                own += [value[f"{name}/z"], *turn.coeffs()]
+        full[at : at + count] = own
     return full
 
 
@@ -97,8 +114,15 @@ def coal_parts(pieces: Sequence[Piece]) -> tuple[CoalBody, ...] | None:
         elif isinstance(piece, Hull) and len(piece.points) == 1:
             shape = coal.Sphere(piece.radius)
             pose = coal.Transform3s(np.eye(3), np.array(piece.points[0]))
-        elif isinstance(piece, Hull) and is_solid(piece.points):
-            shape = coal_hull(piece.points)
+        elif isinstance(piece, Hull) and len(piece.points) == 2:
+            way = piece.points[1] - piece.points[0]
+            length = float(np.linalg.norm(way))
+            if not length > 0.0:
+                return None
+            shape = coal.Capsule(piece.radius, length)
+            middle = piece.points.mean(axis=0)
+            pose = coal.Transform3s(turn_z_to(way / length), middle)
+        elif isinstance(piece, Hull) and (shape := coal_hull(piece.points)):
             pose = coal.Transform3s(np.eye(3), np.zeros(3))
         else:
             return None

@@ -1,0 +1,198 @@
+"""What a robot is read as: groups, bases, limits, covers; Pinocchio agrees."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.robots.test_robots import URDF, mutated, write
+from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
+from vdsm_pin.geometry.pieces import pack_pieces
+from vdsm_pin.geometry.row_bounds import row_brackets
+from vdsm_pin.robots.cell import solids_of
+from vdsm_pin.robots.joint_limits import read_limits
+from vdsm_pin.robots.link_solids import Solids
+from vdsm_pin.robots.model import Robot
+from vdsm_pin.robots.second_opinion import link_shapes, pose_difference
+from vdsm_pin.robots.urdf import read_robot
+
+SRDF = """<robot name="two">
+  <virtual_joint name="cart" type="planar" parent_frame="w" child_link="base"/>
+  <group name="arm"><chain base_link="base" tip_link="hand"/></group>
+  <group name="first"><joint name="turn"/></group>
+  <group name="both"><group name="first"/><link name="hand"/></group>
+  <group name="round"><group name="round"/></group>
+  <group name="lost"><joint name="elbow"/></group>
+  <group name="up"><chain base_link="hand" tip_link="base"/></group>
+  <disable_collisions link1="arm" link2="base" reason="Adjacent"/>
+</robot>
+"""
+LIMITS = """joint_limits:
+  turn: {has_velocity_limits: true, max_velocity: 0.5}
+  slide: {has_acceleration_limits: true, max_acceleration: 2, has_position_limits: true,
+          min_position: -1, max_position: 0.2}
+"""
+
+
+@pytest.fixture
+def urdf(tmp_path: Path) -> Path:
+    return write(tmp_path, "two.urdf", URDF)
+
+
+def names(robot: Robot) -> list[str]:
+    return [joint.name for joint in robot.joints]
+
+
+def test_a_group_says_which_joints_move(tmp_path: Path, urdf: Path) -> None:
+    srdf = write(tmp_path, "two.srdf", SRDF)
+    assert names(read_robot(urdf, srdf, group="arm")) == ["turn", "slide"]
+    assert names(read_robot(urdf, srdf, group="both")) == ["turn", "slide"]
+    robot = read_robot(urdf, srdf, group="first", lock={"slide": 0.3})
+    assert names(robot) == ["turn"]
+    assert "joint 'slide' is locked at 0.3" in robot.notes
+    assert "joint 'cart/x' is no part of the group and stands at 0" in robot.notes
+    assert pose_difference(robot, np.array([[0.7]])).max() < 1e-12
+    for group, expected in (
+        ("leg", "has no group 'leg'; known: arm, first"),
+        ("round", "is a part of itself"),
+        ("lost", "names joint 'elbow', which the URDF lacks"),
+        ("up", "no chain leads from 'hand' to 'base'"),
+    ):
+        with pytest.raises(InvalidFile, match=expected):
+            read_robot(urdf, srdf, group=group)
+    with pytest.raises(InvalidInput, match="needs a SRDF"):
+        read_robot(urdf, group="arm")
+    away = URDF.replace('lower="-0.1"', 'lower="0.1"')
+    with pytest.raises(InvalidFile, match=r"stands at 0, outside .* 0\.1 to 0\.4"):
+        read_robot(write(tmp_path, "away.urdf", away), srdf, group="first")
+
+
+@pytest.mark.parametrize("kind", ["planar", "floating"])
+def test_what_floats_stands_where_pinocchio_has_it(tmp_path: Path, kind: str) -> None:
+    """As a joint of the URDF, as a base by the SRDF, and both locked."""
+    srdf = write(tmp_path, "two.srdf", SRDF.replace("planar", kind))
+    text = URDF.replace('type="prismatic"', f'type="{kind}"')
+    text = text.replace('<axis xyz="0 1 0"/>', "").replace(
+        'joint="slide"', 'joint="turn"'
+    )
+    urdf = write(tmp_path, "two.urdf", text)
+    robot = read_robot(urdf, srdf)
+    count = {"planar": 3, "floating": 6}[kind]
+    assert len(robot.joints) == 2 * count + 1
+    q = np.random.default_rng(2).uniform(-3.0, 3.0, (50, len(robot.joints)))
+    assert pose_difference(robot, q).max() < 1e-12
+    still = read_robot(urdf, srdf, lock={"cart": 0.0, "slide/x": 0.3})
+    assert names(still)[0] == "turn"
+    assert pose_difference(still, q[:, : len(still.joints)]).max() < 1e-12
+    with pytest.raises(InvalidFile, match="'cart' has several values; lock cart/x"):
+        read_robot(urdf, srdf, lock={"cart": 1.0})
+
+
+def test_limits_that_are_not_stated_are_noted(tmp_path: Path, urdf: Path) -> None:
+    limit = '<limit lower="-3" upper="3" effort="1" velocity="1"/>'
+    free = write(tmp_path, "free.urdf", URDF.replace(limit, "", 1))
+    robot = read_robot(free)
+    assert robot.joints[0].upper == np.inf
+    assert robot.notes == ("joint 'turn' states no limits, and none are checked",)
+    limits = write(tmp_path, "joint_limits.yaml", LIMITS)
+    turn, slide = read_robot(urdf, joint_limits=limits).joints
+    assert (turn.velocity, turn.acceleration, turn.upper) == (0.5, np.inf, 3.0)
+    assert (slide.velocity, slide.acceleration) == (1.0, 2.0)
+    assert (slide.lower, slide.upper) == (-0.1, 0.2)
+    write(tmp_path, "joint_limits.yaml", LIMITS.replace("0.5", "-0.5"))
+    with pytest.raises(InvalidFile, match="expected above 0"):
+        read_limits(limits)
+
+
+def octahedron(folder: Path) -> Path:
+    """A mesh of two octahedra, one beside the other."""
+    corners = np.vstack([np.eye(3), -np.eye(3)])
+    text = "".join(
+        f"v {x} {y} {z}\n"
+        for x, y, z in [*corners, *(corners + np.array([6.0, 1.0, 0.5]))]
+    )
+    for first in (1, 7):
+        for k in range(8):
+            a, b, c = (first + i + 3 * (k >> i & 1) for i in range(3))
+            text += f"f {a} {b} {c}\n"
+    return write(folder, "two.obj", text)
+
+
+def test_covers_of_a_mesh_hold_all_of_it(tmp_path: Path) -> None:
+    octahedron(tmp_path)
+    mesh = '<mesh filename="two.obj" scale="0.1 0.1 0.1"/>'
+    text = URDF.replace('<sphere radius="0.1"/>', mesh)
+    urdf = write(tmp_path, "mesh.urdf", text)
+    points = 0.1 * np.vstack([np.eye(3), -np.eye(3)])
+    points = np.vstack([points, points + np.array([0.6, 0.1, 0.05])])
+    points += np.array([1.0, 0.0, 0.0])
+    far = []
+    for solids in (Solids(), Solids("parts", 2), Solids("primitives")):
+        robot = read_robot(urdf, solids=solids)
+        (arm,) = [body for body in robot.bodies if body.name == "arm"]
+        ends = np.repeat(points[:, None], 2, axis=1)
+        none = np.zeros(len(points), np.int64)
+        covered = np.min(
+            [
+                row_brackets(pack_pieces([[piece]]), ends, none, 1e-9)[:, 1]
+                for piece in arm.pieces
+            ],
+            axis=0,
+        )
+        assert covered.max() <= 2e-9
+        between = np.array([[[1.3, 0.05, 0.025]] * 2])
+        far.append(
+            max(
+                row_brackets(pack_pieces([[piece]]), between, none[:1], 1e-9)[0, 0]
+                for piece in arm.pieces
+            )
+        )
+        assert all(shapes is not None for shapes in link_shapes(robot))
+    assert len(robot.bodies) == 3
+    assert far[0] <= 0.0  # the hull fills the gap, two hulls do not
+    assert far[1] > 0.1
+    with pytest.raises(InvalidInput, match="expected bodies 'parts'"):
+        solids_of("hull", 3)
+
+
+def test_a_capsule_is_its_closed_form(tmp_path: Path) -> None:
+    text = URDF.replace('<sphere radius="0.1"/>', '<capsule radius="0.1" length="2"/>')
+    (arm,) = [
+        body
+        for body in read_robot(write(tmp_path, "c.urdf", text)).bodies
+        if body.name == "arm"
+    ]
+    point = np.array([[[1.0, 0.0, 1.5]] * 2])
+    packed = pack_pieces([list(arm.pieces)])
+    low, high = row_brackets(packed, point, np.zeros(1, np.int64), 1e-9)[0]
+    assert low <= 0.4 <= high
+    assert high - low < 1e-8
+
+
+def test_xacro_is_expanded(tmp_path: Path) -> None:
+    pytest.importorskip("xacrodoc")
+    head = '<robot name="two" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+    head += '<xacro:property name="size" value="${0.05 * 2}"/>'
+    text = URDF.replace('<robot name="two">', head).replace('"0.1"', '"${size}"')
+    robot = read_robot(write(tmp_path, "two.urdf.xacro", text))
+    plain = read_robot(write(tmp_path, "two.urdf", URDF))
+    q = np.array([[0.3, 0.1]])
+    np.testing.assert_array_equal(robot.tree.poses(q), plain.tree.poses(q))
+    for bad in (text.replace("0.05 *", "length *"), text[:300]):
+        with pytest.raises(InvalidFile, match="is not expanded by xacrodoc"):
+            read_robot(write(tmp_path, "two.urdf.xacro", bad))
+
+
+def test_damaged_semantics_never_end_in_a_traceback(tmp_path: Path, urdf: Path) -> None:
+    rng = np.random.default_rng(7)
+    refused = 0
+    for _ in range(150):
+        srdf = write(tmp_path, "two.srdf", mutated(SRDF, rng))
+        limits = write(tmp_path, "limits.yaml", mutated(LIMITS, rng))
+        for files in ({"srdf": srdf, "group": "both"}, {"joint_limits": limits}):
+            try:
+                read_robot(urdf, **files)  # type: ignore[arg-type]
+            except VdsmError as error:
+                refused += 1
+                assert len(str(error).splitlines()) == 1
+    assert refused > 100

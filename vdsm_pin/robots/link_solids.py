@@ -1,0 +1,166 @@
+"""The convex solids of a robot's links, from its URDF and meshes."""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal, TypeAlias
+
+import numpy as np
+
+from vdsm_pin.arm.bodies import grouped
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.geometry.convex import FlatCylinder, Hull
+from vdsm_pin.geometry.solids import BOX_CORNERS
+from vdsm_pin.io.mesh_file import read_mesh
+from vdsm_pin.robots.hulls import covering_hull, covering_primitive
+
+LARGEST_LINK: Final = 20.0
+"""A link's mesh larger than this must be in another unit; [m]."""
+
+LinkPiece: TypeAlias = Hull | FlatCylinder
+MeshCover: TypeAlias = Literal["hull", "parts", "primitives"]
+
+PARTS: Final = 8
+"""Hulls that a mesh is covered by, where `parts` is asked for without a number."""
+
+
+@dataclass(frozen=True)
+class Solids:
+    """What stands for the collision meshes of links; other shapes count as they are.
+
+    Args:
+        cover: `hull`: the convex hull of each mesh; `parts`: hulls of groups of its
+            triangles; `primitives`: a ball, capsule or box that holds it.
+        parts: Hulls of one mesh.
+    """
+
+    cover: MeshCover = "hull"
+    parts: int = PARTS
+
+    @property
+    def words(self) -> str:
+        """For the record."""
+        meshes = {
+            "hull": "hulls of meshes",
+            "parts": f"{self.parts} hulls of groups of triangles for each mesh",
+            "primitives": "a ball, capsule or box around each mesh",
+        }
+        return f"{meshes[self.cover]}; boxes, cylinders, spheres, capsules as they are"
+
+
+HULLS: Final = Solids()
+"""The default."""
+
+
+@dataclass(frozen=True)
+class LinkReader:
+    """Reads the solids of the links of one URDF.
+
+    Args:
+        path: The URDF.
+        package_dirs: Where `package://NAME/REST` is looked for.
+        solids: What stands for meshes.
+    """
+
+    path: Path
+    package_dirs: tuple[Path, ...] = ()
+    solids: Solids = HULLS
+
+    def pieces(self, link: ET.Element) -> tuple[LinkPiece, ...]:
+        """The convex pieces of a link, in its frame, which hold all of it.
+
+        Raises:
+            InvalidFile: If a mesh is missing, far too large or scaled oddly.
+        """
+        name = link.get("name", "")
+        collisions = link.findall("collision")
+        return tuple(p for one in collisions for p in self._of(name, one))
+
+    def _of(self, link: str, collision: ET.Element) -> Iterator[LinkPiece]:
+        placement = origin_of(collision)
+        turn, shift = placement[:3, :3], placement[:3, 3]
+        geometry = collision.find("geometry")
+        for shape in [] if geometry is None else list(geometry):
+            match shape.tag:
+                case "box":
+                    size = np.array([float(w) for w in shape.get("size", "").split()])
+                    yield Hull(shift + (BOX_CORNERS * size / 2.0) @ turn.T)
+                case "sphere":
+                    yield Hull(shift[None], float(shape.get("radius", "")))
+                case "cylinder":
+                    half = float(shape.get("length", "")) / 2.0
+                    radius = float(shape.get("radius", ""))
+                    yield FlatCylinder(shift, turn[:, 2], half, radius)
+                case "capsule":
+                    along = float(shape.get("length", "")) / 2.0 * turn[:, 2]
+                    ends = np.array([shift - along, shift + along])
+                    yield Hull(ends, float(shape.get("radius", "")))
+                case "mesh":
+                    corners = shift + self._triangles(link, shape) @ turn.T
+                    yield from self._cover(corners)
+
+    def _cover(self, corners: FloatArray) -> Iterator[LinkPiece]:
+        """Pieces that hold all triangles, shape (n, 3, 3)."""
+        if self.solids.cover == "primitives":
+            yield covering_primitive(corners.reshape(-1, 3))
+            return
+        count = self.solids.parts if self.solids.cover == "parts" else 1
+        for group in grouped(corners, count):
+            yield covering_hull(np.unique(corners[group].reshape(-1, 3), axis=0))
+
+    def _triangles(self, link: str, shape: ET.Element) -> FloatArray:
+        """The corners of a link's mesh, scaled, shape (n, 3, 3); [m]."""
+        name = shape.get("filename", "")
+        mesh = read_mesh(self._found(link, name))
+        try:
+            scale = np.array([float(w) for w in shape.get("scale", "1 1 1").split()])
+        except ValueError:
+            scale = np.zeros(0)
+        if scale.shape != (3,) or not (np.isfinite(scale) & (scale != 0.0)).all():
+            word = shape.get("scale")
+            problem = f"scale is {word!r}, expected 3 numbers that are not 0"
+            raise self._invalid(link, problem)
+        metres = 1.0 if mesh.unit is None else mesh.unit  # COLLADA states its own
+        points: FloatArray = metres * mesh.vertices * scale
+        size = float(np.ptp(points, axis=0).max())
+        if not size <= LARGEST_LINK:
+            problem = (
+                f"its mesh {name!r} is {size:.4g} m large; is it in "
+                'millimetres? expected scale="0.001 0.001 0.001"'
+            )
+            raise self._invalid(link, problem)
+        return np.asarray(points[mesh.triangles])
+
+    def _found(self, link: str, name: str) -> Path:
+        """The file of a mesh."""
+        beside = self.path.resolve().parent
+        if not name.startswith(("package://", "model://")):
+            places = [beside / name.removeprefix("file://")]
+        else:
+            inner = Path(name.split("://", 1)[1])
+            rest = Path(*inner.parts[1:])
+            folders = [*self.package_dirs, beside, *beside.parents]
+            places = [folder / part for folder in folders for part in (inner, rest)]
+        for place in places:
+            try:
+                if place.is_file():
+                    return place
+            except (OSError, ValueError):  # a name that no file can have
+                break
+        problem = f"mesh {name!r} is not found; say where with --package-dir"
+        raise self._invalid(link, problem)
+
+    def _invalid(self, link: str, problem: str) -> InvalidFile:
+        return InvalidFile(file=self.path, problem=f"link {link!r}: {problem}")
+
+
+def origin_of(element: ET.Element) -> FloatArray:
+    """T_parent_element, shape (4, 4), of numbers that were checked."""
+    placement, origin = np.eye(4), element.find("origin")
+    if origin is not None:
+        rpy = np.array([float(word) for word in origin.get("rpy", "0 0 0").split()])
+        placement[:3, :3] = rotation_from_rpy(rpy)
+        placement[:3, 3] = [float(word) for word in origin.get("xyz", "0 0 0").split()]
+    return placement

@@ -1,0 +1,87 @@
+"""Values of a YAML or JSON document that know where they stand."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.yaml_reader import Location, YamlDocument
+
+
+@dataclass(frozen=True)
+class Place:
+    """A value of the file, and where it stands."""
+
+    document: YamlDocument
+    at: Location
+    value: Any
+
+    def __getitem__(self, key: str | int) -> "Place":
+        """What stands under a key or number.
+
+        Raises:
+            InvalidFile: If there is none.
+        """
+        if isinstance(key, str) and not isinstance(self.value, dict):
+            problem = "is no mapping"
+            raise self.invalid(problem)
+        try:
+            return Place(self.document, (*self.at, key), self.value[key])
+        except (KeyError, IndexError, TypeError):
+            problem = f"has no {key!r}"
+            raise self.invalid(problem) from None
+
+    def get(self, key: str, default: Any) -> "Place":
+        """What stands under a key, or a default."""
+        has = isinstance(self.value, dict) and self.value.get(key) is not None
+        return self[key] if has else Place(self.document, self.at, default)
+
+    def items(self) -> list["Place"]:
+        """Of a list.
+
+        Raises:
+            InvalidFile: If it is none.
+        """
+        if not isinstance(self.value, list):
+            problem = "is no list"
+            raise self.invalid(problem)
+        return [self[k] for k in range(len(self.value))]
+
+    def keys(self) -> list[str]:
+        """Of a mapping.
+
+        Raises:
+            InvalidFile: If it is none, or a key is no text.
+        """
+        if not isinstance(self.value, dict):
+            problem = "is no mapping"
+            raise self.invalid(problem)
+        for key in self.value:
+            if not isinstance(key, str):
+                problem = f"has the key {key!r}, expected a name"
+                raise self.invalid(problem)
+        return list(self.value)
+
+    def number(self) -> float:
+        """A finite number."""
+        return float(Place(self.document, self.at, [self.value]).numbers(1)[0])
+
+    def numbers(self, count: int) -> FloatArray:
+        """So many finite numbers, shape (count,).
+
+        Raises:
+            InvalidFile: If it is another thing.
+        """
+        values = self.value
+        good = isinstance(values, list) and len(values) >= count
+        good = good and all(type(v) in (int, float) for v in values)
+        if not good or len(values) > count or not np.isfinite(values).all():
+            problem = f"is {str(values)[:60]}, expected {count} numbers"
+            raise self.invalid(problem)
+        return np.array(values, dtype=np.float64)
+
+    def invalid(self, problem: str) -> InvalidFile:
+        """The value is not what is expected."""
+        return self.document.invalid(self.at, problem)

@@ -1,0 +1,162 @@
+"""A SRDF: pairs that need not be held apart, groups of joints, how the robot stands."""
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal, TypeAlias, cast
+
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.io.source import read_text
+
+MAX_BYTES: Final = 16 << 20
+
+BaseKind: TypeAlias = Literal["planar", "floating"]
+
+
+@dataclass(frozen=True)
+class Base:
+    """A joint between the world and the root link.
+
+    Args:
+        name: Of the joint.
+        kind: What it leaves free.
+    """
+
+    name: str
+    kind: BaseKind
+
+
+class Srdf:
+    """One SRDF of a robot.
+
+    Args:
+        path: The file.
+        robot: The root element of the robot's URDF.
+
+    Raises:
+        InvalidFile: If it is no SRDF.
+    """
+
+    def __init__(self, path: Path, robot: ET.Element) -> None:
+        self._path = path
+        try:
+            self._root = ET.fromstring(read_text(path, limit=MAX_BYTES))
+        except ET.ParseError as error:
+            problem = f"SRDF is not XML: {error}"
+            raise self._invalid(problem) from None
+        if self._root.tag != "robot":
+            problem = f"root element is <{self._root.tag}>, expected <robot>"
+            raise self._invalid(problem)
+        self._links = {link.get("name", "") for link in robot.findall("link")}
+        self._joints = {
+            joint.get("name", ""): joint for joint in robot.findall("joint")
+        }
+        self._joint_of = {end(j, "child"): n for n, j in self._joints.items()}
+
+    def _invalid(self, problem: str) -> InvalidFile:
+        return InvalidFile(file=self._path, problem=problem)
+
+    def disabled(self) -> dict[frozenset[str], str]:
+        """Pairs of links that it does not hold apart, with its reason.
+
+        Raises:
+            InvalidFile: If it names what is no link.
+        """
+        found = {}
+        for element in self._root.iter("disable_collisions"):
+            pair = element.get("link1", ""), element.get("link2", "")
+            for name in pair:
+                if name not in self._links:
+                    problem = f"disable_collisions names {name!r}, which is no link"
+                    raise self._invalid(problem)
+            reason = element.get("reason", "no reason given")
+            found[frozenset(pair)] = f"left out by the SRDF: {reason}"
+        return found
+
+    def base(self) -> Base | None:
+        """Its planar or floating virtual joint; None where the root link stands.
+
+        Raises:
+            InvalidFile: If it does not carry the root link or is of no known type.
+        """
+        for element in self._root.findall("virtual_joint"):
+            name, kind = element.get("name", ""), element.get("type", "")
+            if kind == "fixed":
+                continue
+            where = f"virtual_joint {name!r}"
+            if kind not in ("planar", "floating"):
+                problem = f"{where}: type {kind!r}, expected fixed, planar or floating"
+                raise self._invalid(problem)
+            child = element.get("child_link", "")
+            if child not in self._links or child in self._joint_of:
+                problem = f"{where}: child_link {child!r} is not the root link"
+                raise self._invalid(problem)
+            if not name or name in self._joints:
+                problem = f"{where}: expected a name that no joint has"
+                raise self._invalid(problem)
+            return Base(name, cast("BaseKind", kind))
+        return None
+
+    def group(self, name: str) -> frozenset[str]:
+        """Names of the joints of a group.
+
+        Raises:
+            InvalidFile: If it or what it is made of is not there.
+        """
+        return frozenset(self._members(name, ()))
+
+    def _members(self, name: str, within: tuple[str, ...]) -> set[str]:
+        groups = {g.get("name", ""): g for g in self._root.findall("group")}
+        if name not in groups:
+            known = ", ".join(groups) or "none"
+            problem = f"has no group {name!r}; known: {known}"
+            raise self._invalid(problem)
+        if name in within:
+            problem = f"group {name!r} is a part of itself"
+            raise self._invalid(problem)
+        where, found = f"group {name!r}", set[str]()
+        for part in groups[name]:
+            match part.tag:
+                case "joint":
+                    found.add(self._joint(part.get("name", ""), where))
+                case "link":
+                    link = self._link(part.get("name", ""), where)
+                    found |= {self._joint_of[link]} if link in self._joint_of else set()
+                case "chain":
+                    found |= self._chain(part, where)
+                case "group":
+                    found |= self._members(part.get("name", ""), (*within, name))
+        return found
+
+    def _joint(self, name: str, where: str) -> str:
+        virtual = {v.get("name", "") for v in self._root.findall("virtual_joint")}
+        if name not in self._joints and name not in virtual:
+            problem = f"{where} names joint {name!r}, which the URDF lacks"
+            raise self._invalid(problem)
+        return name
+
+    def _link(self, name: str, where: str) -> str:
+        if name not in self._links:
+            problem = f"{where} names link {name!r}, which the URDF lacks"
+            raise self._invalid(problem)
+        return name
+
+    def _chain(self, chain: ET.Element, where: str) -> set[str]:
+        """The joints from a base link down to a tip."""
+        first = self._link(chain.get("base_link", ""), where)
+        tip = link = self._link(chain.get("tip_link", ""), where)
+        found = set()
+        while link != first:
+            if link not in self._joint_of:
+                problem = f"{where}: no chain leads from {first!r} to {tip!r}"
+                raise self._invalid(problem)
+            joint = self._joint_of[link]
+            found.add(joint)
+            link = end(self._joints[joint], "parent")
+        return found
+
+
+def end(joint: ET.Element, which: str) -> str:
+    """The `parent` or `child` link of a joint of a URDF."""
+    element = joint.find(which)
+    return "" if element is None else element.get("link", "")
