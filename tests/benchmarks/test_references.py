@@ -5,12 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.hrm2000.references import REFERENCES, reference
+from benchmarks.hrm2000.references import REFERENCES, intelligent, reference
+from benchmarks.hrm2000.references.arm import Arm
 from benchmarks.hrm2000.references.follow_the_leader import behind
+from benchmarks.hrm2000.references.intelligent import Task
 from benchmarks.hrm2000.references.multi_directional import _turned
 from benchmarks.hrm2000.references.neural_network import Network
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.errors import NoPlanFound
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
 from vdsm_pin.verification.link_clearance import link_clearance
@@ -68,10 +71,30 @@ def test_the_square_across_the_rail_cannot_be_followed(name: str) -> None:
         reference(name)(FREE, ROBOT, link_clearance(FREE))
 
 
-def test_evolution_reaches_a_path_ahead() -> None:
+class Bowl(Task):
+    """A penalty whose least place is known."""
+
+    def cost(self, rows: FloatArray) -> FloatArray:
+        return np.asarray(((rows - self.tip) ** 2).sum(axis=1))
+
+
+@pytest.mark.parametrize(
+    "name", [at.split(":")[1] for at in REFERENCES.values() if "intelligent:" in at]
+)
+def test_intelligent_algorithms_find_the_bottom_of_a_bowl(name: str) -> None:
+    arm = Arm(FREE, ROBOT, link_clearance(FREE))
+    rng = np.random.default_rng(8)
+    bottom, box = rng.uniform(-0.5, 0.5, arm.nq), np.ones(arm.nq)
+    task = Bowl(arm, np.zeros(arm.nq), bottom, -box, box, rng)
+    found = getattr(intelligent, name).__wrapped__(task)
+    assert (np.abs(found) <= 1.0).all()
+    assert task.cost(found[None]) < 0.1 * (bottom**2).sum()
+
+
+def test_a_swarm_reaches_a_path_ahead() -> None:
     problem = ahead()
     problem = replace(problem, tip_path=replace(problem.path, spacing=0.1))
-    follow = reference("differential-evolution")
+    follow = reference("particle-swarm")
     motion = follow(problem, ROBOT, link_clearance(problem))
     row = verify(problem, motion, ROBOT).checks
     assert all(c.verdict is Verdict.CERTIFIED for c in row if "waypoints" in c.name)
