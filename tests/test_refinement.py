@@ -161,23 +161,45 @@ def test_with_a_coal_that_reports_less_the_plan_keeps_so_much_more(
     assert "Coal measures" in careful.plan.notes[-1]
 
 
+@pytest.mark.parametrize(
+    ("name", "error", "again"),
+    [("clearest", 0.005, False), ("sturdiest", 0.005, False), ("clearest", 0.2, True)],
+)
+def test_what_keeps_much_anyway_keeps_more_where_coal_finds_it_missing(
+    name: str, error: float, again: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = replace(short("obs3"), required_clearance=0.010)
+    robot = load_robot(problem.manipulator)
+    monkeypatch.setattr(coal_missing, "coal_distances", off_by(-error))
+    careful = refinement.plan_and_verify(problem, name, robot)
+    assert careful.verification.min_clearance >= problem.required_clearance + error
+    assert (len(careful.rounds) > 1) == again
+
+
+STRATEGIES = ("paper", "fewest", "clearest", "sturdiest")
+
+
+@pytest.mark.parametrize("name", STRATEGIES)
 def test_with_a_coal_that_reports_more_no_plan_is_returned(
-    monkeypatch: pytest.MonkeyPatch,
+    name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     problem = short("obs3")
     robot = load_robot(problem.manipulator)
     for module in (coal_missing, coal_clearance):
         monkeypatch.setattr(module, "coal_distances", off_by(0.005))
     with pytest.raises(NoPlanFound, match="Coal"):
-        refinement.plan_and_verify(problem, "paper", robot)
+        refinement.plan_and_verify(problem, name, robot)
 
 
-def test_without_coal_there_is_no_plan(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("name", STRATEGIES)
+def test_without_coal_there_is_no_plan(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     problem = short("obs3")
     robot = load_robot(problem.manipulator)
     monkeypatch.setitem(sys.modules, "coal", None)
     with pytest.raises(ImportError):
-        refinement.plan_and_verify(problem, "paper", robot)
+        refinement.plan_and_verify(problem, name, robot)
 
 
 def test_only_the_link_that_coal_names_gets_a_margin() -> None:
