@@ -1,17 +1,32 @@
 """Angles, joint centres and cables from one another (paper, section 5)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from vdsm_pin.app.workflow import CABLES, CENTRES, TRAJECTORY
-from vdsm_pin.errors import InvalidInput
+from vdsm_pin.arm.manipulator import Manipulator
+from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.io.bags import is_bag, read_bag, write_bag
+from vdsm_pin.io.joint_trajectory import (
+    ENDINGS as MESSAGE_ENDINGS,
+)
+from vdsm_pin.io.joint_trajectory import (
+    JointTrajectory,
+    read_joint_trajectory,
+    text_of,
+)
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.io.waypoint_tables import read_cables, read_centres
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.tables import write_cables, write_centres
+from vdsm_pin.robots.cell import Cell
+from vdsm_pin.robots.trajectory_files import csv_text, read_motion
 
 CONVERTED: Final = TRAJECTORY, CENTRES, CABLES
 """What a conversion writes to its folder."""
@@ -58,16 +73,22 @@ class Given:
             return read_centres(self.centres, source.problem)
         if self.cables is not None:
             return read_cables(self.cables, source.problem)
+        if is_bag(self.file) or self.file.suffix.lower() in MESSAGE_ENDINGS:
+            return read_arm_message(self.file, source.problem.manipulator)
         return read_trajectory(self.file, source.problem.manipulator)
 
 
-def convert_to_folder(source: ProblemFile, given: Given, folder: Path) -> Trajectory:
+def convert_to_folder(
+    source: ProblemFile, given: Given, folder: Path, also: Sequence[str] = ()
+) -> Trajectory:
     """Write one motion as angles, as joint centres and as cable lengths.
 
     Args:
         source: The problem, for its arm and frame.
         given: The file to convert.
-        folder: Where the three files go.
+        folder: Where the files go.
+        also: Formats that the angles are written in too, as a JointTrajectory: yaml,
+            json, mcap (ROS 2) or bag (ROS 1).
 
     Returns:
         The motion.
@@ -77,11 +98,101 @@ def convert_to_folder(source: ProblemFile, given: Given, folder: Path) -> Trajec
     """
     file = given.file
     check_output_folder(folder)
-    outputs = [folder / name for name in CONVERTED]
+    outputs = [folder / name for name in (*CONVERTED, *map(message_name, also))]
     check_kept(outputs, [*source.source.files, file])
     motion = given.read(source)
     with staged(folder) as aside:
         write_trajectory(aside / TRAJECTORY, motion)
         write_centres(aside / CENTRES, source.problem, motion)
         write_cables(aside / CABLES, source.problem, motion)
+        write_messages(aside, arm_message(motion), also)
     return motion
+
+
+def convert_robot(cell: Cell, file: Path, folder: Path, also: Sequence[str]) -> int:
+    """Write a robot's trajectory of any format as trajectory.csv, and in others.
+
+    Args:
+        cell: The robot.
+        file: The trajectory.
+        folder: Where the files go.
+        also: Formats besides, as of `convert_to_folder`.
+
+    Returns:
+        The number of waypoints.
+
+    Raises:
+        InvalidInput: If the file is bad or the folder cannot be written.
+    """
+    check_output_folder(folder)
+    names = (TRAJECTORY, *map(message_name, also))
+    check_kept([folder / name for name in names], [*cell.files, file])
+    robot = cell.asked.robot
+    motion = read_motion(file, robot)
+    with staged(folder) as aside:
+        (aside / TRAJECTORY).write_text(csv_text(motion, robot), encoding="utf-8")
+        write_messages(aside, motion, also)
+    return len(motion.q)
+
+
+def message_name(ending: str) -> str:
+    """The file of a format."""
+    return f"trajectory.{ending}"
+
+
+def write_messages(folder: Path, motion: JointTrajectory, also: Sequence[str]) -> None:
+    """Write a motion in formats of ROS.
+
+    Raises:
+        InvalidInput: If rosbags is needed and not installed.
+    """
+    for ending in also:
+        file = folder / message_name(ending)
+        if ending in ("yaml", "json"):
+            file.write_text(text_of(motion, f".{ending}"), encoding="utf-8")
+        else:
+            write_bag(motion, file)
+
+
+def read_arm_message(file: Path, arm: Manipulator) -> Trajectory:
+    """A motion of the arm by the joints of its URDF: x0, alpha1, theta1, ..
+
+    Raises:
+        InvalidFile: If a joint is missing, or a value so large that its unit is wrong.
+    """
+    found = read_bag(file) if is_bag(file) else read_joint_trajectory(file)
+    names = arm_joints(arm.n_links)
+    missing = [name for name in names if name not in found.names]
+    if missing:
+        problem = f"has no joint {missing[0]!r}"
+        raise InvalidFile(file=file, where="joint_names", problem=problem)
+    found = found.of(names)
+    q, n = found.q, len(found.q)
+    if not (np.abs(q[:, 1:]) <= np.pi).all():
+        problem = "has an angle beyond pi; is it in degrees? expected radians"
+        raise InvalidFile(file=file, problem=problem)
+    none, parts = np.zeros(n, dtype=np.bool_), (q[:, 0], q[:, 1::2], q[:, 2::2])
+    try:
+        return Trajectory(
+            none,
+            np.zeros(n),
+            *parts,
+            times=found.times,
+            rates=found.rates,
+            changes=found.changes,
+        )
+    except InvalidInput as error:
+        raise InvalidFile(file=file, problem=str(error)) from None
+
+
+def arm_joints(n_links: int) -> list[str]:
+    """Names of the joints of an arm's URDF that move."""
+    pairs = ((f"alpha{i}", f"theta{i}") for i in range(1, n_links + 1))
+    return ["x0", *(name for pair in pairs for name in pair)]
+
+
+def arm_message(motion: Trajectory) -> JointTrajectory:
+    """A motion of the arm by the joints of its URDF: x0, alpha1, theta1, .."""
+    names = tuple(arm_joints(motion.n_links))
+    times, rates, changes = motion.times, motion.rates, motion.changes
+    return JointTrajectory(names, np.asarray(motion.joints), times, rates, changes)

@@ -1,18 +1,31 @@
 """`vdsm convert`."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from vdsm_pin.cli.options import OutFolder, Problem, examples, family
+from vdsm_pin.cli.robot import refuse_beside
 
 commands = family()
+
+
+class Format(StrEnum):
+    """Of a JointTrajectory."""
+
+    yaml = "yaml"
+    json = "json"
+    mcap = "mcap"
+    bag = "bag"
 
 
 @commands.command(
     epilog=examples(
         "vdsm convert paper/obs1 --trajectory out/obs1/trajectory.csv --out out/all",
+        "vdsm convert paper/obs1 --trajectory out/obs1/trajectory.csv --also mcap "
+        "--out out/ros",
         "vdsm convert mine.yaml --cables measured.csv --out out/mine",
     )
 )
@@ -29,15 +42,28 @@ def convert(
     cables: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Cable lengths, as cables.csv.")
     ] = None,
+    also: Annotated[
+        list[Format] | None,
+        typer.Option(help="Write a JointTrajectory too; mcap is ROS 2, bag ROS 1."),
+    ] = None,
 ) -> None:
     """Convert angles, centres and cable lengths.
 
     Takes joint angles, joint centres or cable lengths, and writes all of them:
-    trajectory.csv, centres.csv and cables.csv. Nothing is judged.
+    trajectory.csv, centres.csv and cables.csv. Of a robot (problem with robot) it
+    takes a trajectory of any format and writes trajectory.csv. Nothing is judged.
     """
-    from vdsm_pin.app.conversion import Given, convert_to_folder
-    from vdsm_pin.io.problem_file import read_problem
+    from vdsm_pin.app.conversion import Given, convert_robot, convert_to_folder
+    from vdsm_pin.io.problem_file import RobotProblem, read_problem
 
-    given = Given(trajectory, centres, cables)
-    rows = convert_to_folder(read_problem(problem), given, out)
-    typer.echo(f"wrote {rows.n_samples} waypoints to {out}")
+    given, more = Given(trajectory, centres, cables), [one.value for one in also or ()]
+    try:
+        source = read_problem(problem)
+    except RobotProblem as error:
+        from vdsm_pin.robots.cell import read_cell
+
+        refuse_beside("a robot", {"--centres": centres, "--cables": cables})
+        count = convert_robot(read_cell(Path(error.file)), given.file, out, more)
+    else:
+        count = convert_to_folder(source, given, out, more).n_samples
+    typer.echo(f"wrote {count} waypoints to {out}")

@@ -18,6 +18,7 @@ from vdsm_pin.cli.robot import (
     RobotOptions,
     SceneFile,
     Srdf,
+    Topic,
     Urdf,
 )
 from vdsm_pin.time_limit import Deadline, enforced
@@ -53,6 +54,7 @@ def repair(
     bodies: Bodies = None,
     parts: Parts = None,
     joint_limits: JointLimits = None,
+    topic: Topic = None,
     pin: Annotated[
         list[int] | None,
         typer.Option(metavar="ROW", help="A waypoint, from 0, that stays."),
@@ -82,7 +84,7 @@ def repair(
     )
     with enforced(deadline):
         cell = options.cell(problem)
-        order = RobotOrder(cell, trajectory, out, context.obj, deadline)
+        order = RobotOrder(cell, trajectory, out, context.obj, deadline, topic)
         found = repair_to_folder(order, tuple(pin or ()))
     new = int((found.given < 0).sum())
     typer.echo(

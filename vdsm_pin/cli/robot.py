@@ -48,6 +48,12 @@ Parts = Annotated[
 JointLimits = Annotated[
     Path | None, typer.Option(help="A joint_limits.yaml; the stricter limit counts.")
 ]
+Topic = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME[#K]", help="Of a trajectory in a bag, and its message from 0."
+    ),
+]
 RequiredClearance = Annotated[
     float | None,
     typer.Option(

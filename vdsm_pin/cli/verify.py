@@ -35,6 +35,7 @@ from vdsm_pin.cli.robot import (
     RobotOptions,
     SceneFile,
     Srdf,
+    Topic,
     Urdf,
     refuse_beside,
 )
@@ -125,6 +126,7 @@ def verify(
     bodies: Bodies = None,
     parts: Parts = None,
     joint_limits: JointLimits = None,
+    topic: Topic = None,
 ) -> None:
     """Prove a trajectory clear, or say where it is not.
 
@@ -162,7 +164,7 @@ def verify(
         refuse_beside("--urdf", {"PROBLEM": problem, **of_arm})
         with enforced(deadline):
             cell = of_robot.cell(None)
-        _end_robot(cell, trajectory, out, context.obj, said, deadline)
+        _end_robot(cell, trajectory, out, context.obj, said, deadline, topic)
     refuse_beside("a problem", of_robot.named())
     if problem is None:
         message = "expected a PROBLEM, or --urdf for any other robot"
@@ -185,7 +187,8 @@ def verify(
         refuse_beside("a robot", of_arm)
         with enforced(deadline):
             cell = of_robot.cell(Path(error.file))
-        _end_robot(cell, trajectory, out, context.obj, said, deadline)
+        _end_robot(cell, trajectory, out, context.obj, said, deadline, topic)
+    refuse_beside("an arm", {"--topic": topic})
     with enforced(deadline):
         arm = VerifyOrder(
             source=source.under(errors),
@@ -232,6 +235,7 @@ def _end_robot(
     command: str,
     said: Said,
     deadline: Deadline,
+    topic: str | None,
 ) -> NoReturn:
     """Verify the motion of a robot, say what was found, and end by the verdict."""
     from vdsm_pin.robots.folder import (
@@ -242,7 +246,7 @@ def _end_robot(
     )
 
     with enforced(deadline), said.progress():
-        order = RobotOrder(cell, trajectory, out, command, deadline)
+        order = RobotOrder(cell, trajectory, out, command, deadline, topic)
         found = verify_robot_to_folder(order)
     if said.as_json:
         typer.echo((out / FILE).read_text("utf-8"), nl=False)

@@ -39,6 +39,7 @@ class RobotOrder:
         folder: Where the result goes.
         command: The exact command line.
         deadline: When to stop.
+        topic: Of the trajectory, in a bag.
     """
 
     cell: Cell
@@ -46,6 +47,7 @@ class RobotOrder:
     folder: Path
     command: str
     deadline: Deadline = NO_LIMIT
+    topic: str | None = None
 
     @property
     def inputs(self) -> list[Path]:
@@ -62,7 +64,7 @@ def verify_robot_to_folder(order: RobotOrder) -> RobotVerification:
     check_output_folder(order.folder)
     check_kept([order.folder / FILE], order.inputs)
     asked = order.cell.asked
-    path = read_path(order.trajectory, asked.robot)
+    path = read_path(order.trajectory, asked.robot, order.topic)
     found = asked.verified(path, order.deadline)
     content = {
         "vdsm_robot_verification": 1,
@@ -90,7 +92,7 @@ def repair_to_folder(order: RobotOrder, pinned: tuple[int, ...] = ()) -> Repaire
     check_output_folder(order.folder)
     check_kept([order.folder / name for name in names], order.inputs)
     asked = order.cell.asked
-    path = read_path(order.trajectory, asked.robot)
+    path = read_path(order.trajectory, asked.robot, order.topic)
     found = repair_robot(asked, path, pinned, order.deadline)
     rows = zip(found.given.tolist(), found.moved.tolist(), strict=True)
     content = {
@@ -107,7 +109,8 @@ def repair_to_folder(order: RobotOrder, pinned: tuple[int, ...] = ()) -> Repaire
         text = path_text(found.verification.path, asked.robot)
         (aside / TRAJECTORY).write_text(text, encoding="utf-8")
         (aside / REPAIR).write_text(json.dumps(content, indent=1) + "\n", "utf-8")
-    verify_robot_to_folder(replace(order, trajectory=order.folder / TRAJECTORY))
+    written = order.folder / TRAJECTORY
+    verify_robot_to_folder(replace(order, trajectory=written, topic=None))
     return found
 
 

@@ -19,6 +19,7 @@ from vdsm_pin.proof.terms import CERTIFIED, REFUTED, WORLD
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.contacts import common_ball, in_world
 from vdsm_pin.robots.model import Robot
+from vdsm_pin.robots.rates import rate_checks
 from vdsm_pin.robots.second_opinion import link_shapes, placed, pose_difference
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
@@ -171,6 +172,7 @@ class Asked:
         checks = [
             _poses(robot, path),
             *_limits(robot, path),
+            *rate_checks(robot.joints, path),
             *_clearances(judged, self.required, self.required_self),
             _coal(self.coal, robot.tree, path, proof, self.pairs),
         ]

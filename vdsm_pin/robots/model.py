@@ -31,6 +31,11 @@ class RobotJoint:
     velocity: float = np.inf
     acceleration: float = np.inf
 
+    @property
+    def unit(self) -> str:
+        """Of its values."""
+        return "rad" if self.turns else "m"
+
 
 @dataclass(frozen=True)
 class LeftOut:

@@ -1,112 +1,205 @@
-"""Trajectories of robots: CSV with named columns, JointTrajectory as YAML or JSON."""
+"""Trajectories of robots: CSV with named columns, messages and bags of ROS."""
 
+import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path as File
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io.source import check_is_file, read_text
+from vdsm_pin.io.bags import is_bag, read_bag
+from vdsm_pin.io.joint_trajectory import (
+    ENDINGS,
+    STILL,
+    JointTrajectory,
+    read_joint_trajectory,
+)
+from vdsm_pin.io.source import check_is_file
 from vdsm_pin.io.tables import Table, open_text
-from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
-from vdsm_pin.problem.trajectory import MAX_ROWS
 from vdsm_pin.proof.paths import Path, cubic_path, quintic_path
 from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.units import MM_PER_M
 
-MAX_BYTES: Final = 256 << 20
 UNITS: Final = {"rad": 1.0, "deg": np.pi / 180.0, "m": 1.0, "mm": 1.0 / MM_PER_M}
 MOST_TURNS: Final = 4.0 * np.pi
 """An angle beyond this must be in degrees; [rad]."""
 
+TIME: Final = "time_s"
+RATES: Final = "velocity", "s"
+CHANGES: Final = "acceleration", "s2"
+
 _COLUMN: Final = re.compile(r"(.+)_(rad|deg|mm|m)")
-_TEXT: Final = (".yaml", ".yml", ".json")
+_SMOOTH: Final = re.compile(r"(.+)_(velocity|acceleration)_(rad|deg|mm|m)_(s|s2)")
 
 
-@dataclass(frozen=True)
-class _Rows:
-    """Rows of the robot's columns, and what the file has besides.
-
-    Args:
-        q: Shape (n_rows, n_columns); [rad], [m].
-        times: Shape (n_rows,); [s]. None where not stated.
-        rates: As q; per [s]. None where not stated.
-        changes: As q; per [s^2]. None where not stated.
-    """
-
-    q: FloatArray
-    times: FloatArray | None = None
-    rates: FloatArray | None = None
-    changes: FloatArray | None = None
-
-
-def read_path(file: File, robot: Robot) -> Path:
-    """A trajectory as the controller runs it.
-
-    Straight lines between waypoints; cubic pieces where velocities are stated too, and
-    quintic ones with accelerations.
+def read_motion(file: File, robot: Robot, topic: str | None = None) -> JointTrajectory:
+    """The waypoints of a trajectory, a column for each joint that moves.
 
     Args:
         file: CSV with a column for each joint, `NAME_rad`, `NAME_deg`, `NAME_m` or
-            `NAME_mm`; or a JointTrajectory or RobotTrajectory as YAML or JSON.
+            `NAME_mm`; a JointTrajectory or RobotTrajectory as YAML or JSON; or a bag.
         robot: Whose joints they are.
+        topic: Of a bag.
 
     Raises:
         InvalidFile: If a joint is missing or unknown, or a value is no number or in
             another unit than stated.
     """
-    check_is_file(file)
-    if file.suffix.lower() in _TEXT:
-        rows = _read_message(file, robot)
+    if topic is not None and not is_bag(file):
+        problem = f"is no bag, so --topic {topic} has no meaning"
+        raise InvalidFile(file=file, problem=problem)
+    if is_bag(file):
+        found = _of_robot(file, read_bag(file, topic), robot)
     else:
-        rows = _read_csv(file, robot)
-    _check_units(file, rows.q, robot.joints)
+        check_is_file(file)
+        if file.suffix.lower() in ENDINGS:
+            found = _of_robot(file, read_joint_trajectory(file), robot)
+        else:
+            found = _read_csv(file, robot)
+    _check_units(file, found.q, robot.joints)
+    return found
+
+
+def read_path(file: File, robot: Robot, topic: str | None = None) -> Path:
+    """A trajectory as the controller runs it; arguments as of `read_motion`.
+
+    Straight lines between waypoints; cubic pieces where velocities and times are stated
+    too, and quintic ones with accelerations.
+
+    Raises:
+        InvalidFile: As `read_motion`, or if times do not rise.
+    """
+    motion = read_motion(file, robot, topic)
     try:
-        if rows.times is None or rows.rates is None:
-            return Path(rows.q)
-        if rows.changes is None:
-            return cubic_path(rows.q, rows.rates, rows.times)
-        return quintic_path(rows.q, rows.rates, rows.changes, rows.times)
+        if motion.times is None or motion.rates is None:
+            return Path(motion.q, times=motion.times)
+        if motion.changes is None:
+            return cubic_path(motion.q, motion.rates, motion.times)
+        return quintic_path(motion.q, motion.rates, motion.changes, motion.times)
     except ValueError as error:
         raise InvalidFile(file=file, problem=str(error)) from None
 
 
-def _read_csv(file: File, robot: Robot) -> _Rows:
+def _of_robot(file: File, motion: JointTrajectory, robot: Robot) -> JointTrajectory:
+    """The columns of the robot's joints, planar ones by their turn about z.
+
+    Raises:
+        InvalidFile: If one is missing.
+    """
+    named = {joint.name for joint in robot.joints}
+    names = list(motion.names)
+    for k, name in enumerate(names):
+        joint, _, part = name.rpartition("/")
+        if f"{joint}/theta" not in named or name in named:
+            continue
+        if part != "yaw" and not (np.abs(motion.q[:, k]) <= STILL).all():
+            problem = f"joint {joint!r} is planar, expected {part} 0"
+            raise InvalidFile(file=file, problem=problem)
+        if part == "yaw":
+            names[k] = f"{joint}/theta"
+    missing = [joint.name for joint in robot.joints if joint.name not in names]
+    if missing:
+        problem = f"has no joint {missing[0]!r}; state its value with --lock"
+        raise InvalidFile(file=file, where="joint_names", problem=problem)
+    wanted = [joint.name for joint in robot.joints]
+    return replace(motion, names=tuple(names)).of(wanted)
+
+
+def _read_csv(file: File, robot: Robot) -> JointTrajectory:
     with open_text(file) as text:
         head = text.readline()
     names = [word.strip().strip('"') for word in re.split("[,;\t]", head.strip())]
+    columns, factors = _position_columns(file, names, robot.joints)
+    smooth = [_smooth_columns(file, names, robot.joints, *w) for w in (RATES, CHANGES)]
+    if smooth[1] and not smooth[0]:
+        problem = "has accelerations, expected velocities too"
+        raise InvalidFile(file=file, where="line 1", problem=problem)
+    times = [TIME] if TIME in names else []
+    if smooth[0] and not times:
+        problem = f"has velocities, expected {TIME} too"
+        raise InvalidFile(file=file, where="line 1", problem=problem)
+    wanted = [*columns, *times, *smooth[0], *smooth[1]]
+    table, n = _table(file, wanted), len(columns)
+    _check_degrees(file, table, columns)
+    rest = table[:, n + len(times) :]
+    parts = [
+        rest[:, k * n : (k + 1) * n]
+        * np.array([UNITS[m[3]] for name in found if (m := _SMOOTH.fullmatch(name))])
+        if found
+        else None
+        for k, found in enumerate(smooth)
+    ]
+    return JointTrajectory(
+        tuple(joint.name for joint in robot.joints),
+        table[:, :n] * np.array(factors),
+        table[:, n] if times else None,
+        parts[0],
+        parts[1],
+    )
+
+
+def _position_columns(
+    file: File, names: Sequence[str], joints: Sequence[RobotJoint]
+) -> tuple[list[str], list[float]]:
+    """Names of the columns of the joints, and what makes them SI units."""
     named = {m[1]: (name, m[2]) for name in names if (m := _COLUMN.fullmatch(name))}
     columns, factors = [], []
-    for joint in robot.joints:
+    for joint in joints:
         if joint.name not in named:
-            unit = "rad" if joint.turns else "m"
             problem = (
                 f"has no column for joint {joint.name!r}, expected "
-                f"{joint.name}_{unit}; or state its value with --lock"
+                f"{joint.name}_{joint.unit}; or state its value with --lock"
             )
             raise InvalidFile(file=file, where="line 1", problem=problem)
         name, unit = named[joint.name]
-        if (unit in ("rad", "deg")) != joint.turns:
-            expected = "_rad or _deg" if joint.turns else "_m or _mm"
-            problem = f"has the column {name!r}, expected {expected} for this joint"
-            raise InvalidFile(file=file, where="line 1", problem=problem)
+        _check_kind(file, name, unit, joint)
         columns.append(name)
         factors.append(UNITS[unit])
+    return columns, factors
+
+
+def _check_kind(file: File, name: str, unit: str, joint: RobotJoint) -> None:
+    """Refuse lengths of a joint that turns, and angles of one that slides."""
+    if (unit in ("rad", "deg")) != joint.turns:
+        expected = "_rad or _deg" if joint.turns else "_m or _mm"
+        problem = f"has the column {name!r}, expected {expected} for this joint"
+        raise InvalidFile(file=file, where="line 1", problem=problem)
+
+
+def _smooth_columns(
+    file: File, names: Sequence[str], joints: Sequence[RobotJoint], what: str, per: str
+) -> list[str]:
+    """Names of the velocities or accelerations of all joints, or none at all."""
+    found = {
+        m[1]: (name, m[3])
+        for name in names
+        if (m := _SMOOTH.fullmatch(name)) and (m[2], m[4]) == (what, per)
+    }
+    mine = [joint for joint in joints if joint.name in found]
+    for joint in joints if mine else []:
+        if joint.name not in found:
+            expected = f"{joint.name}_{what}_{joint.unit}_{per}"
+            problem = f"has no column {expected}, but one for {mine[0].name!r}"
+            raise InvalidFile(file=file, where="line 1", problem=problem)
+        _check_kind(file, *found[joint.name], joint)
+    return [found[joint.name][0] for joint in joints] if mine else []
+
+
+def _table(file: File, columns: Sequence[str]) -> FloatArray:
+    """The numbers of some columns, shape (n_rows, n_columns)."""
     try:
         with open_text(file) as text:
-            parts = list(Table(file, text, columns).rows())
+            parts = list(Table(file, text, list(columns)).rows())
     except OSError as error:
         reason = error.strerror or str(error)
         raise InvalidFile(file=file, problem=f"cannot be read: {reason}") from None
     if not parts:
         raise InvalidFile(file=file, problem="has no row")
-    table = np.concatenate(parts)
-    _check_degrees(file, table, columns)
-    return _Rows(table * np.array(factors))
+    return np.concatenate(parts)
 
 
 def _check_degrees(file: File, table: FloatArray, columns: Sequence[str]) -> None:
@@ -137,90 +230,22 @@ def _check_units(file: File, q: FloatArray, joints: Sequence[RobotJoint]) -> Non
             raise InvalidFile(file=file, problem=problem)
 
 
-def _read_message(file: File, robot: Robot) -> _Rows:
-    document = read_yaml(read_text(file, limit=MAX_BYTES), file=file)
-    message = _trajectory(document, document.data)
-    names, points = message.get("joint_names"), message.get("points")
-    if not isinstance(names, list) or not isinstance(points, list) or not points:
-        problem = "is no JointTrajectory: expected joint_names and points"
-        raise InvalidFile(file=file, problem=problem)
-    if len(points) > MAX_ROWS:
-        raise InvalidFile(file=file, problem=f"has more than {MAX_ROWS} points")
-    missing = [joint.name for joint in robot.joints if joint.name not in names]
-    if missing:
-        problem = f"has no joint {missing[0]!r}; state its value with --lock"
-        raise InvalidFile(file=file, where="joint_names", problem=problem)
-    order = [names.index(joint.name) for joint in robot.joints]
-    q = _values(file, points, "positions", len(names))
-    if q is None:
-        raise InvalidFile(file=file, where="points[0]", problem="has no positions")
-    rates = _values(file, points, "velocities", len(names))
-    changes = _values(file, points, "accelerations", len(names))
-    return _Rows(
-        q[:, order],
-        _times(file, points),
-        None if rates is None else rates[:, order],
-        None if changes is None else changes[:, order],
-    )
-
-
-def _trajectory(document: YamlDocument, data: Any) -> dict[str, Any]:
-    """A JointTrajectory, by itself or in a RobotTrajectory or a message about one."""
-    while isinstance(data, dict):
-        if "joint_names" in data:
-            return data
-        multi = data.get("multi_dof_joint_trajectory") or {}
-        if isinstance(multi, dict) and multi.get("points"):
-            problem = "has points of joints with several degrees, which are not judged"
-            raise document.invalid(("multi_dof_joint_trajectory",), problem)
-        keys = ("joint_trajectory", "trajectory")
-        data = next((data[key] for key in keys if key in data), None)
-    problem = "is no trajectory: expected joint_names and points"
-    raise document.invalid((), problem)
-
-
-def _values(file: File, points: list[Any], key: str, count: int) -> FloatArray | None:
-    """One list of numbers of each point; None where no point has it."""
-    rows = [point.get(key) if isinstance(point, dict) else None for point in points]
-    if not any(rows):
-        return None
-    for k, row in enumerate(rows):
-        values = row if isinstance(row, list) else []
-        good = len(values) == count
-        good = good and all(type(value) in (int, float) for value in values)
-        if not good or not np.isfinite(values).all():
-            problem = f"is {str(row)[:60]}, expected {count} finite numbers"
-            raise InvalidFile(file=file, where=f"points[{k}].{key}", problem=problem)
-    return np.array(rows, dtype=np.float64)
-
-
-def _times(file: File, points: list[Any]) -> FloatArray | None:
-    """When each point is reached; None where no point says so; [s]."""
-    found = [point.get("time_from_start") for point in points]
-    if all(time is None for time in found):
-        return None
-    times = []
-    for k, stated in enumerate(found):
-        time = stated
-        if isinstance(stated, dict):
-            part = stated.get("nanosec", stated.get("nsecs", 0))
-            time = _second(stated.get("sec", stated.get("secs", 0)), part)
-        if type(time) not in (int, float) or not np.isfinite(time):
-            where = f"points[{k}].time_from_start"
-            problem = f"is {str(stated)[:60]}, expected seconds"
-            raise InvalidFile(file=file, where=where, problem=problem)
-        times.append(float(time))
-    return np.array(times)
-
-
-def _second(whole: Any, part: Any) -> float | None:
-    if type(whole) not in (int, float) or type(part) not in (int, float):
-        return None
-    return float(whole + 1e-9 * part)
+def csv_text(motion: JointTrajectory, robot: Robot) -> str:
+    """Waypoints as CSV, which `read_motion` reads back to the same numbers."""
+    heads = [f"{joint.name}_{joint.unit}" for joint in robot.joints]
+    parts = [motion.q]
+    if motion.times is not None:
+        heads.append(TIME)
+        parts.append(motion.times[:, None])
+    for values, (what, per) in ((motion.rates, RATES), (motion.changes, CHANGES)):
+        if values is not None:
+            heads += [f"{j.name}_{what}_{j.unit}_{per}" for j in robot.joints]
+            parts.append(values)
+    rows = [json.dumps(row)[1:-1].replace(" ", "") for row in np.hstack(parts).tolist()]
+    return "\n".join([",".join(heads), *rows]) + "\n"
 
 
 def path_text(path: Path, robot: Robot) -> str:
-    """Waypoints as CSV, which `read_path` reads back to the same numbers."""
-    names = [f"{j.name}_{'rad' if j.turns else 'm'}" for j in robot.joints]
-    rows = [",".join(map(repr, row)) for row in path.knots.tolist()]
-    return "\n".join([",".join(names), *rows]) + "\n"
+    """The waypoints of straight lines as CSV."""
+    names = tuple(joint.name for joint in robot.joints)
+    return csv_text(JointTrajectory(names, path.knots, path.times), robot)

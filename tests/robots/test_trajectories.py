@@ -1,0 +1,249 @@
+"""Trajectories of robots in every format: the same numbers back, limits of rates."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.robots.test_robots import CELL, SCENE, URDF, mutated, write
+from vdsm_pin.cli import main
+from vdsm_pin.errors import InvalidFile, VdsmError
+from vdsm_pin.io.bags import read_bag, write_bag
+from vdsm_pin.io.joint_trajectory import JointTrajectory, text_of
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
+from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.proof.paths import cubic_path, quintic_path
+from vdsm_pin.robots.model import Robot, RobotJoint
+from vdsm_pin.robots.rates import rate_checks
+from vdsm_pin.robots.trajectory_files import csv_text, read_motion, read_path
+from vdsm_pin.robots.urdf import read_robot
+from vdsm_pin.verification.records import Verdict
+
+FORMATS = [".csv", ".yaml", ".json", ".bag", ".mcap"]
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Robot:
+    return read_robot(write(tmp_path, "two.urdf", URDF))
+
+
+def motion(smooth: int, rows: int = 5) -> JointTrajectory:
+    rng = np.random.default_rng(smooth)
+    q, rates, changes = rng.uniform(-0.09, 0.09, (3, rows, 2))
+    times = np.cumsum(rng.integers(1, 9, rows) / 8.0)
+    return JointTrajectory(
+        ("turn", "slide"),
+        q,
+        times,
+        rates if smooth > 0 else None,
+        changes if smooth > 1 else None,
+    )
+
+
+def written(folder: Path, ending: str, given: JointTrajectory, robot: Robot) -> Path:
+    file = folder / f"plan{ending}"
+    if ending == ".csv":
+        file.write_text(csv_text(given, robot))
+    elif ending in (".bag", ".mcap"):
+        pytest.importorskip("rosbags")
+        write_bag(given, file)
+    else:
+        file.write_text(text_of(given, ending))
+    return file
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+@pytest.mark.parametrize("smooth", [0, 1, 2])
+def test_what_is_written_is_read_back(
+    tmp_path: Path, robot: Robot, ending: str, smooth: int
+) -> None:
+    given = motion(smooth)
+    file = written(tmp_path, ending, given, robot)
+    found = read_motion(file, robot)
+    for one, other in zip(
+        (given.q, given.times, given.rates, given.changes),
+        (found.q, found.times, found.rates, found.changes),
+        strict=True,
+    ):
+        if one is None:
+            assert other is None
+        else:
+            np.testing.assert_array_equal(one, other)
+    path = read_path(file, robot)
+    assert path.degree == (1, 3, 5)[smooth]
+    assert path.times is not None
+
+
+def test_topics_are_chosen(tmp_path: Path, robot: Robot) -> None:
+    pytest.importorskip("rosbags")
+    file = written(tmp_path, ".mcap", motion(1), robot)
+    assert len(read_bag(file, "/joint_trajectory#0").q) == 5
+    for topic, expected in (
+        ("/other", "has no trajectory under topic '/other'; topics: /joint_trajectory"),
+        ("/joint_trajectory#1", "has messages 0 to 0, not '1'"),
+    ):
+        with pytest.raises(InvalidFile, match=expected):
+            read_bag(file, topic)
+    csv = written(tmp_path, ".csv", motion(1), robot)
+    with pytest.raises(InvalidFile, match="is no bag"):
+        read_motion(csv, robot, "/joint_trajectory")
+    data = file.read_bytes()
+    for end in (0, 20, len(data) // 2):
+        file.write_bytes(data[:end])
+        with pytest.raises(InvalidFile, match=r"has no|cannot"):
+            read_bag(file)
+
+
+def test_joints_of_several_degrees_turn_about_z(tmp_path: Path) -> None:
+    text = URDF.replace('type="prismatic"', 'type="planar"')
+    text = text.replace('<axis xyz="0 1 0"/>', "")
+    text = text.replace('joint="slide"', 'joint="turn"')
+    robot = read_robot(write(tmp_path, "planar.urdf", text))
+    angles = [3.0, 3.3]
+    message = {
+        "joint_trajectory": {
+            "joint_names": ["turn"],
+            "points": [{"positions": [0.1]}, {"positions": [0.2]}],
+        },
+        "multi_dof_joint_trajectory": {
+            "joint_names": ["slide"],
+            "points": [
+                {
+                    "transforms": [
+                        {
+                            "translation": {"x": 1, "y": 2, "z": 0},
+                            "rotation": {
+                                "x": 0,
+                                "y": 0,
+                                "z": np.sin(angle / 2),
+                                "w": np.cos(angle / 2),
+                            },
+                        }
+                    ]
+                }
+                for angle in angles
+            ],
+        },
+    }
+    found = read_motion(write(tmp_path, "t.json", json.dumps(message)), robot)
+    np.testing.assert_allclose(found.q[:, 3], angles)
+    np.testing.assert_array_equal(found.q[:, :3], [[0.1, 1, 2], [0.2, 1, 2]])
+    bad = json.dumps(message).replace('"x": 0', '"x": 0.5', 1)
+    with pytest.raises(InvalidFile, match="rotation has length"):
+        read_motion(write(tmp_path, "t.json", bad), robot)
+    tilted = json.dumps(message).replace('"x": 0', '"x": 0.03', 1)
+    with pytest.raises(InvalidFile, match="another axis than z"):
+        read_motion(write(tmp_path, "t.json", tilted), robot)
+    high = json.dumps(message).replace('"z": 0}', '"z": 0.2}', 1)
+    with pytest.raises(InvalidFile, match="'slide' is planar, expected z 0"):
+        read_motion(write(tmp_path, "t.json", high), robot)
+
+
+ODD = {
+    "turn_rad,slide_m,turn_velocity_rad_s\n0,0,0\n": "no column slide_velocity_m_s",
+    "turn_rad,slide_m,turn_velocity_m_s,slide_velocity_m_s\n": "expected _rad or _deg",
+    "turn_rad,slide_m,turn_velocity_rad_s,slide_velocity_m_s\n": "expected time_s",
+    "turn_rad,slide_m,time_s\n0,0,1\n0,0,1\n": "times must rise",
+}
+
+
+@pytest.mark.parametrize("text", ODD)
+def test_odd_tables_are_refused(tmp_path: Path, robot: Robot, text: str) -> None:
+    with pytest.raises(InvalidFile) as caught:
+        read_path(write(tmp_path, "t.csv", text), robot)
+    assert ODD[text] in str(caught.value)
+
+
+def test_rates_agree_with_dense_samples() -> None:
+    """Limits just above and below what samples find; near a limit, neither is wrong."""
+    rng = np.random.default_rng(3)
+    verdicts = set()
+    for trial in range(60):
+        rows = int(rng.integers(2, 5))
+        q, rates, changes = rng.normal(size=(3, rows, 1))
+        times = np.cumsum(rng.uniform(0.1, 2.0, rows))
+        path = (
+            cubic_path(q, rates, times)
+            if trial % 2
+            else quintic_path(q, rates, changes, times)
+        )
+        dense = np.linspace(times[0], times[-1], 20_001)
+        step = dense[1] - dense[0]
+        speeds = np.gradient(path.at(dense)[:, 0], step)
+        bends = np.gradient(speeds, step)
+        inner = [float(np.abs(values).max()) for values in (speeds, bends)]
+        for share in (0.98, 1.02):
+            joint = RobotJoint("a", -9, 9, True, share * inner[0], share * inner[1])
+            speed, bend = rate_checks((joint,), path)
+            expected = Verdict.REFUTED if share < 1 else Verdict.CERTIFIED
+            assert speed.verdict is expected
+            verdicts.add(bend.verdict)
+    assert Verdict.REFUTED in verdicts
+
+
+def test_limits_of_rates_are_judged_where_times_are(
+    tmp_path: Path, robot: Robot
+) -> None:
+    """1 rad/s of the URDF: 2 rad in 1.9 s refuted, in 2.1 s certified, by hand."""
+    write(tmp_path, "s.yaml", SCENE)
+    for seconds, verdict in ((1.9, Verdict.REFUTED), (2.1, Verdict.CERTIFIED)):
+        text = f"turn_rad,slide_m,time_s\n0,0,0\n2,0,{seconds}\n"
+        path = read_path(write(tmp_path, "t.csv", text), robot)
+        turn, slide = rate_checks(robot.joints, path)
+        assert turn.verdict is verdict
+        assert turn.worst == pytest.approx(2.0 / seconds)
+        assert slide.verdict is Verdict.CERTIFIED
+    bent = RobotJoint("turn", -3, 3, True, acceleration=1.0)
+    assert rate_checks((bent,), path)[0].verdict is Verdict.UNDECIDED
+    assert rate_checks(robot.joints, read_path(tmp_path / "t.csv", robot)) != []
+
+
+def test_damaged_trajectories_never_end_in_a_traceback(
+    tmp_path: Path, robot: Robot
+) -> None:
+    rng = np.random.default_rng(5)
+    refused = 0
+    for ending in (".csv", ".yaml", ".json"):
+        text = written(tmp_path, ending, motion(2), robot).read_text()
+        for _ in range(100):
+            try:
+                read_path(write(tmp_path, f"t{ending}", mutated(text, rng)), robot)
+            except VdsmError as error:
+                refused += 1
+                assert len(str(error).splitlines()) == 1
+    assert refused > 100
+
+
+def run(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as ended:
+        main([str(argument) for argument in arguments])
+    return int(str(ended.value.code))
+
+
+def test_trajectories_are_converted(tmp_path: Path, robot: Robot) -> None:
+    """Of a robot and of the arm, to every format and back to the same numbers."""
+    pytest.importorskip("rosbags")
+    formats = [word for f in FORMATS[1:] for word in ("--also", f[1:])]
+    given = motion(1)
+    cell = write(tmp_path, "cell.yaml", CELL + SCENE)
+    file, out = written(tmp_path, ".csv", given, robot), tmp_path / "out"
+    assert run("convert", cell, "--trajectory", file, "--out", out, *formats) == 0
+    for ending in FORMATS:
+        found = read_motion(out / f"trajectory{ending}", robot)
+        np.testing.assert_array_equal(found.q, given.q)
+    assert run("convert", cell, "--cables", file, "--out", out) == 2
+    source = read_problem("paper/obs1")
+    rng = np.random.default_rng(8)
+    angles = rng.uniform(-0.1, 0.1, (2, 4, 8))
+    flags = np.zeros(4, dtype=np.bool_)
+    arm = Trajectory(flags, np.zeros(4), rng.uniform(0, 1, 4), *angles)
+    write_trajectory(tmp_path / "arm.csv", arm)
+    words = ("convert", "paper/obs1", "--trajectory")
+    assert run(*words, tmp_path / "arm.csv", "--out", out, *formats) == 0
+    for ending in FORMATS:
+        back = tmp_path / "back"
+        assert run(*words, out / f"trajectory{ending}", "--out", back) == 0
+        found = read_trajectory(back / "trajectory.csv", source.problem.manipulator)
+        np.testing.assert_array_equal(found.joints, arm.joints)

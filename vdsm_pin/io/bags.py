@@ -1,0 +1,190 @@
+"""Trajectories in ROS 1 bags, ROS 2 bags and MCAP files, by rosbags (extra `bags`)."""
+
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.io.joint_trajectory import JointTrajectory, message_of, of_message
+
+ENDINGS: Final = (".bag", ".mcap", ".db3")
+PLANS: Final = (
+    "trajectory_msgs/msg/JointTrajectory",
+    "moveit_msgs/msg/RobotTrajectory",
+    "moveit_msgs/msg/DisplayTrajectory",
+    "control_msgs/msg/FollowJointTrajectoryGoal",
+    "control_msgs/msg/FollowJointTrajectoryActionGoal",
+)
+"""Types of which one message is a trajectory."""
+
+STATES: Final = "sensor_msgs/msg/JointState"
+"""Of this type each message is a waypoint."""
+
+LARGEST: Final = 4 << 30
+"""Largest bag; [bytes]."""
+
+MOST: Final = 10_000_000
+"""Messages that are looked at."""
+
+TOPIC: Final = "/joint_trajectory"
+
+
+def is_bag(file: Path) -> bool:
+    """Whether a path names a bag: by its ending, or a folder with a metadata.yaml."""
+    return file.suffix.lower() in ENDINGS or (file / "metadata.yaml").is_file()
+
+
+def read_bag(file: Path, topic: str | None = None) -> JointTrajectory:
+    """The trajectory in a bag.
+
+    Args:
+        file: A ROS 1 bag, an MCAP or db3 file, or the folder of a ROS 2 bag.
+        topic: Where it is, `NAME`, or `NAME#K` for its message K, from 0. None where
+            there is only one.
+
+    Raises:
+        InvalidFile: If it is not there, not the only one or damaged.
+    """
+    if find_spec("rosbags") is None:
+        problem = "bags need rosbags: pip install 'vdsm-pin[bags]'"
+        raise InvalidFile(file=file, problem=problem)
+    if not file.exists():
+        raise InvalidFile(file=file, problem="does not exist")
+    try:
+        return _read(file, topic)
+    except InvalidInput:
+        raise
+    except Exception as error:  # noqa: BLE001 (rosbags raises what it meets)
+        said = " ".join(str(error).split())[:200] or type(error).__name__
+        problem = f"cannot be read by rosbags: {said}"
+        raise InvalidFile(file=file, problem=problem) from None
+
+
+def _read(file: Path, topic: str | None) -> JointTrajectory:
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    name, _, number = (topic or "").partition("#")
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    with AnyReader([file], default_typestore=store) as reader:
+        found = [c for c in reader.connections if c.msgtype in (*PLANS, STATES)]
+        wanted = [c for c in found if c.topic == name] if name else found
+        topics = {c.topic for c in wanted}
+        if len(topics) != 1:
+            known = ", ".join(sorted({f"{c.topic} ({c.msgtype})" for c in found}))
+            what = f"has no trajectory under topic {name!r}" if name else "has several"
+            what = "has no trajectory" if not found else what
+            problem = f"{what}; topics: {known or 'none'}; choose with --topic"
+            raise InvalidFile(file=file, problem=problem)
+        messages = [
+            reader.deserialize(raw, connection.msgtype)
+            for connection, _, raw in reader.messages(connections=wanted)
+        ]
+    return _chosen(file, messages, wanted[0].msgtype, topics.pop(), number)
+
+
+def _chosen(
+    file: Path, messages: list[Any], kind: str, topic: str, number: str
+) -> JointTrajectory:
+    """The trajectory in the messages of a topic."""
+    if kind == STATES and messages:
+        return of_message(file, _states(messages))
+    count = len(messages)
+    if number and not (number.isdecimal() and int(number) < count):
+        problem = f"topic {topic} has messages 0 to {count - 1}, not {number!r}"
+        raise InvalidFile(file=file, problem=problem)
+    if count != 1 and not number:
+        problem = f"topic {topic} has {count} messages; choose with --topic {topic}#K"
+        raise InvalidFile(file=file, problem=problem)
+    return of_message(file, _plain(messages[int(number or 0)]))
+
+
+def _plain(message: Any) -> Any:
+    """A message in mappings, lists and numbers."""
+    if isinstance(message, np.ndarray):
+        return [_plain(one) for one in message.tolist()]
+    if isinstance(message, list):
+        return [_plain(one) for one in message]
+    fields = getattr(message, "__dataclass_fields__", None)
+    if fields is None:
+        return message
+    return {name: _plain(getattr(message, name)) for name in fields if name[0] != "_"}
+
+
+def _states(messages: list[Any]) -> dict[str, Any]:
+    """Measured states as waypoints, with times from the first."""
+    points, names = [], list(messages[0].name)
+    first = None
+    for message in messages:
+        stamp = message.header.stamp
+        time = stamp.sec + 1e-9 * stamp.nanosec
+        first = time if first is None else first
+        position = dict(zip(message.name, message.position.tolist(), strict=False))
+        points.append(
+            {
+                "positions": [position.get(name) for name in names],
+                "time_from_start": time - first,
+            }
+        )
+    return {"joint_names": names, "points": points}
+
+
+def write_bag(motion: JointTrajectory, file: Path) -> None:
+    """Write a JointTrajectory under the topic /joint_trajectory.
+
+    Args:
+        motion: What it holds.
+        file: Its ending says what: `.bag` for ROS 1, `.mcap` for ROS 2.
+
+    Raises:
+        InvalidInput: If rosbags is not installed.
+    """
+    if find_spec("rosbags") is None:
+        message = f"{file.suffix} needs rosbags: pip install 'vdsm-pin[bags]'"
+        raise InvalidInput(message)
+    from rosbags.typesys import Stores, get_typestore
+
+    if file.suffix == ".bag":
+        from rosbags.rosbag1 import Writer as Writer1
+
+        store = get_typestore(Stores.ROS1_NOETIC)
+        with Writer1(file) as writer:
+            connection = writer.add_connection(TOPIC, PLANS[0], typestore=store)
+            data = store.serialize_ros1(_typed(store, motion), PLANS[0])
+            writer.write(connection, 0, data)
+        return
+    from rosbags.rosbag2 import StoragePlugin, Writer
+
+    store, folder = get_typestore(Stores.ROS2_HUMBLE), file.with_suffix(".parts")
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as two:
+        connection = two.add_connection(TOPIC, PLANS[0], typestore=store)
+        two.write(connection, 0, store.serialize_cdr(_typed(store, motion), PLANS[0]))
+    (written,) = folder.glob("*.mcap")
+    written.replace(file)
+    for left in folder.iterdir():
+        left.unlink()
+    folder.rmdir()
+
+
+def _typed(store: Any, motion: JointTrajectory) -> Any:
+    """The JointTrajectory of a store of types."""
+    types, message = store.types, message_of(motion)
+    none = np.zeros(0)
+    points = []
+    for point in message["points"]:
+        time = point.get("time_from_start", {"sec": 0, "nanosec": 0})
+        values = [
+            np.array(point.get(key, none))
+            for key in ("positions", "velocities", "accelerations")
+        ]
+        when = types["builtin_interfaces/msg/Duration"](**time)
+        kind = types["trajectory_msgs/msg/JointTrajectoryPoint"]
+        points.append(kind(*values, none, when))
+    stamp = types["builtin_interfaces/msg/Time"](sec=0, nanosec=0)
+    header = types["std_msgs/msg/Header"]
+    fields = {"stamp": stamp, "frame_id": ""}
+    if "seq" in header.__dataclass_fields__:
+        fields["seq"] = 0
+    return types[PLANS[0]](header(**fields), list(motion.names), points)
