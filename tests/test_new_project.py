@@ -11,6 +11,7 @@ from vdsm_pin.app.new_project import KINDS, TEMPLATES, new_project
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.robots.cell import read_cell
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -20,9 +21,12 @@ def test_what_is_made_is_read_under_its_name(
 ) -> None:
     files = new_project(tmp_path / "a" / name, kind)
     folder = tmp_path / "a" / name
-    problem = read_problem(folder / "problem.yaml").problem
-    assert problem.name == name
-    assert problem.tip_path is not None
+    if kind == "robot":
+        assert read_cell(folder / "problem.yaml").asked.robot.joints
+    else:
+        problem = read_problem(folder / "problem.yaml").problem
+        assert problem.name == name
+        assert problem.tip_path is not None
     assert files == sorted(path.name for path in folder.iterdir())
     assert f"# {name}\n" in (folder / "README.md").read_text(encoding="utf-8")
     assert "NAME" not in (folder / "problem.yaml").read_text(encoding="utf-8")
@@ -37,6 +41,29 @@ def test_what_is_made_is_planned_and_certified(tmp_path: Path, kind: str) -> Non
     with pytest.raises(SystemExit) as ended:
         main(["plan", str(problem), "--out", str(out)])
     assert ended.value.code == 0
+
+
+def test_the_robot_is_certified_and_beside_a_higher_wall_repaired(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "cell"
+    new_project(folder, "robot")
+    given = ["--trajectory", str(folder / "plan.csv"), "--out", str(tmp_path / "out")]
+
+    def ends(command: str) -> int:
+        with pytest.raises(SystemExit) as ended:
+            main([command, str(folder / "problem.yaml"), *given])
+        return int(ended.value.code or 0)
+
+    assert ends("verify") == 0
+    text = (folder / "problem.yaml").read_text(encoding="utf-8")
+    low, high = (
+        "[600, 0, 210], size: [500, 30, 420]",
+        "[600, 0, 230], size: [500, 30, 460]",
+    )
+    (folder / "problem.yaml").write_text(text.replace(low, high), encoding="utf-8")
+    assert ends("verify") == 1
+    assert ends("repair") == 0
 
 
 def test_the_vessel_has_the_port_that_its_problem_states() -> None:

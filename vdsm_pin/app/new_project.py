@@ -14,6 +14,7 @@ TEMPLATES: Final = Path(__file__).parent / "templates"
 KINDS: Final = {
     "snake": "an arm, a few obstacles, a circle to draw",
     "port": "a vessel from a mesh, entered through a port",
+    "robot": "a robot from a URDF, its cell and a motion to verify",
     "paper": "the paper's arm and its first obstacle",
 }
 """What may be started from, in words."""
@@ -25,7 +26,7 @@ _WORD: Final = re.compile(r"\bNAME\b")
 
 
 def new_project(folder: Path, kind: str) -> list[str]:
-    """Make a folder with problem.yaml, its meshes and a README.
+    """Make a folder with problem.yaml, what it names and a README.
 
     Args:
         folder: What is made; its name is the problem's.
@@ -68,7 +69,7 @@ def _fill(folder: Path, kind: str, name: str) -> None:
         texts["problem.yaml"] = text.replace("\nname: obs1\n", f'\nname: "{name}"\n')
     else:
         for source in (TEMPLATES / kind).iterdir():
-            if source.suffix == ".yaml":
+            if source.suffix in (".yaml", ".md"):
                 texts[source.name] = source.read_text(encoding="utf-8")
             else:
                 shutil.copyfile(source, folder / source.name)

@@ -30,13 +30,13 @@ def problems(
     typer.echo(names if show is None else built_in_text(show), nl=False)
 
 
-@commands.command(epilog=examples("vdsm new mine", "vdsm new vessel --from port"))
+@commands.command(epilog=examples("vdsm new mine", "vdsm new cell --from robot"))
 def new(
     folder: Annotated[
         Path, typer.Argument(metavar="NAME", help="Folder to make; names the problem.")
     ],
     kind: Annotated[
-        str, typer.Option("--from", metavar="KIND", help="snake, port or paper.")
+        str, typer.Option("--from", metavar="KIND", help="snake, port, robot or paper.")
     ] = "snake",
 ) -> None:
     """Make a folder with a problem to start from."""
@@ -44,7 +44,10 @@ def new(
 
     files = new_project(folder, kind)
     typer.echo(f"made {folder} with {', '.join(files)}; next:")
-    typer.echo(f"  vdsm plan {shlex.quote(str(folder / 'problem.yaml'))} --out out")
+    words = ["vdsm", "plan", str(folder / "problem.yaml")]
+    if kind == "robot":
+        words = ["vdsm", "verify", words[-1], "--trajectory", str(folder / "plan.csv")]
+    typer.echo(f"  {shlex.join(words)} --out out")
 
 
 @commands.command(epilog=examples("vdsm doctor"))
