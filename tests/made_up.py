@@ -18,13 +18,13 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.run_record import RunRecord
 from vdsm_pin.verification.records import (
+    ArmVerification,
     Check,
     ClearanceChunk,
     ClearanceProfile,
     ClosestApproach,
     Pair,
     Verdict,
-    Verification,
 )
 
 X, Y, Z = np.eye(3)
@@ -80,7 +80,7 @@ def verification(
     n: int = 200,
     scene: Scene | None = None,
     joint_error: float = 0.0023,
-) -> Verification:
+) -> ArmVerification:
     task, rows = problem(scene), trajectory(n)
     names, intervals = task.scene.names, max(n - 1, 1)
     pairs = tuple(Pair(link, name) for name in names for link in range(1, 9))
@@ -108,7 +108,7 @@ def verification(
         Check("clearance", verdict, intervals * len(pairs), 0.0041, 0.0035, "m", "x"),
         Check("link_angle_cone", Verdict.CERTIFIED, n * 8, 0.65, 0.7418, "rad", "ψ5"),
     )
-    return Verification(
+    return ArmVerification(
         problem=task,
         trajectory=rows,
         errors=ErrorBox(),

@@ -36,7 +36,7 @@ LAYERS = {
     "simulation": 13,
     "app": 13,
     "batch": 13,
-    "robots": 13,
+    "robots": 11,
     "certificate_checker": 13,
     "api": 14,
     "cli": 14,

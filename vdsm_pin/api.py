@@ -24,7 +24,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox as Box
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import Deadline
-from vdsm_pin.verification.records import Verification
+from vdsm_pin.verification.records import ArmVerification
 from vdsm_pin.verification.robot_model import load_robot
 
 PYTHON = "from Python"
@@ -130,7 +130,7 @@ def verify(
     errors: Box | None = None,
     joint_error: bool = False,
     time_limit: float | None = None,
-) -> Verification:
+) -> ArmVerification:
     """Judge a trajectory over continuous time, whoever made it.
 
     Args:
@@ -170,7 +170,7 @@ def verify(
     )
 
 
-def write_report(result: Verification, path: str | Path) -> None:
+def write_report(result: ArmVerification, path: str | Path) -> None:
     """Write the report page of a verification: one file that works offline.
 
     Args:
@@ -203,7 +203,7 @@ def write_report(result: Verification, path: str | Path) -> None:
 
 
 def write_certificate(
-    result: Verification, path: str | Path, trajectory: str | Path
+    result: ArmVerification, path: str | Path, trajectory: str | Path
 ) -> None:
     """Write the proof of a certified motion, for `vdsm check-certificate`.
 

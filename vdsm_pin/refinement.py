@@ -29,7 +29,7 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
 from vdsm_pin.verification.coal_missing import coal_missing
 from vdsm_pin.verification.link_clearance import link_clearance
-from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.records import ArmVerification, Verdict
 from vdsm_pin.verification.robot_model import RobotModel
 from vdsm_pin.verification.robust import (
     largest_joint_error,
@@ -103,7 +103,7 @@ class Refinement:
     """
 
     plan: Plan
-    verification: Verification
+    verification: ArmVerification
     rounds: tuple[Round, ...]
 
 
@@ -241,7 +241,7 @@ def _by_coal(
 
 
 def _by_proof(
-    verification: Verification, margins: FloatArray
+    verification: ArmVerification, margins: FloatArray
 ) -> tuple[Adjustment, ...]:
     """What the proof finds missing over the intervals of a plan."""
     problem = verification.problem
@@ -338,7 +338,7 @@ def _measured(margins: FloatArray, adjustments: tuple[Adjustment, ...]) -> Round
 
 def _proved(
     margins: FloatArray,
-    verification: Verification,
+    verification: ArmVerification,
     adjustments: tuple[Adjustment, ...],
 ) -> Round:
     """A round that was verified; the worst check that failed is its reason."""

@@ -13,7 +13,7 @@ from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import Refinement, plan_and_verify
-from vdsm_pin.verification.records import Verification
+from vdsm_pin.verification.records import ArmVerification
 from vdsm_pin.verification.robot_model import RobotModel, load_robot
 
 SCENES: Final = ("obs1", "obs2", "obs2-small", "obs3", "free")
@@ -51,7 +51,7 @@ class Run:
         return self.refinement.plan
 
     @property
-    def verification(self) -> Verification:
+    def verification(self) -> ArmVerification:
         """How it was certified."""
         return self.refinement.verification
 

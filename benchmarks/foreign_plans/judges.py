@@ -14,11 +14,12 @@ from vdsm_pin.errors import Infeasible
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
+from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import (
     LINKS,
     OBSTACLES,
-    Asked,
     RobotVerification,
+    verify_robot,
 )
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.repair import repair_robot
@@ -88,10 +89,10 @@ def judge(plan: Plan, sampled: Sampled, robot: Robot, scene: Scene) -> Judged:
     """
     rows = np.array(plan.waypoints)
     motion = Motion(rows)
-    Asked(robot, scene).verified(Motion(rows[:1]))  # compiled, nothing kept
+    verify_robot(Cell(robot, scene), Motion(rows[:1]))  # compiled, nothing kept
     begin = time.process_time()
-    asked = Asked(robot, scene)
-    found = asked.verified(motion)
+    cell = Cell(robot, scene)
+    found = verify_robot(cell, motion)
     spent = 1e3 * (time.process_time() - begin)
     about = [one.verdict for one in found.checks if one.name in (OBSTACLES, LINKS)]
     verdict = combine(tuple(about))
@@ -102,7 +103,7 @@ def judge(plan: Plan, sampled: Sampled, robot: Robot, scene: Scene) -> Judged:
     near = sampled.clearance(_witness(found, motion))
     seconds, fault = nan, _fault(sampled, rows, verdict, bool(hits[-1]), near)
     if verdict is Verdict.REFUTED:
-        seconds, repaired = _repair(asked, motion)
+        seconds, repaired = _repair(cell, motion)
         fault += _fault(sampled, repaired, Verdict.CERTIFIED, hit=False, near=0.0)
     return Judged(
         plan=plan,
@@ -115,11 +116,11 @@ def judge(plan: Plan, sampled: Sampled, robot: Robot, scene: Scene) -> Judged:
     )
 
 
-def _repair(asked: Asked, motion: Motion) -> tuple[float, FloatArray]:
+def _repair(cell: Cell, motion: Motion) -> tuple[float, FloatArray]:
     """Processor time of a repair, inf where there is none, and its waypoints."""
     begin = time.process_time()
     try:
-        repaired = repair_robot(asked, motion).verification.path.knots
+        repaired = repair_robot(cell, motion).verification.trajectory.knots
     except Infeasible:
         return inf, np.zeros((0, motion.knots.shape[1]))
     return time.process_time() - begin, repaired
@@ -150,10 +151,8 @@ def _samples(
 
 def _witness(found: RobotVerification, motion: Motion) -> FloatArray:
     """The configuration at which the proof finds two bodies nearest; [rad]."""
-    worst = min(found.pairs, key=lambda pair: pair.upper)
-    interval = min(int(worst.moment), motion.n_intervals - 1)
-    share = worst.moment - interval
-    return motion.within(np.array([interval]), np.array([share]))[0]
+    worst = [int(np.argmin(found.least.upper))]
+    return motion.within(found.least.interval[worst], found.least.time[worst])[0]
 
 
 def _fault(

@@ -22,7 +22,7 @@ from vdsm_pin.report.facts import changed_angles, motion_facts
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.units import in_mm
 from vdsm_pin.verification.link_clearance import link_clearance
-from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.records import ArmVerification, Verdict
 from vdsm_pin.verification.robot_model import RobotModel, load_robot
 from vdsm_pin.verification.verify import verify
 
@@ -73,7 +73,7 @@ class Judged:
     """A motion, what the judge said, and the processor time of planning [s]."""
 
     trajectory: Trajectory
-    verification: Verification
+    verification: ArmVerification
     plan_s: float
 
 

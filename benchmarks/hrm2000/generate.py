@@ -19,7 +19,7 @@ from benchmarks.hrm2000.files import write
 from benchmarks.hrm2000.motions import DraftRejected
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
-from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.records import ArmVerification, Verdict
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
@@ -52,7 +52,7 @@ def witness_of(path: Path) -> Path:
     return path.with_suffix(".witness.csv")
 
 
-def verified(path: Path) -> Verification:
+def verified(path: Path) -> ArmVerification:
     """The judgement of a problem's witness, both read from their files."""
     problem = read_problem(path).problem
     trajectory = read_trajectory(witness_of(path), problem.manipulator)

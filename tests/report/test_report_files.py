@@ -27,10 +27,10 @@ from vdsm_pin.report.files import (
     VerificationFile,
     schema,
 )
-from vdsm_pin.verification.records import Check, Pair, Verdict, Verification
+from vdsm_pin.verification.records import ArmVerification, Check, Pair, Verdict
 
 
-def written(verification: Verification) -> VerificationFile:
+def written(verification: ArmVerification) -> VerificationFile:
     return verification_file(verification, made_up.RECORD)
 
 
@@ -80,7 +80,7 @@ def test_schemas_are_valid_themselves_and_unknown_ones_refused() -> None:
 def test_undefined_numbers_become_null_and_never_pass() -> None:
     checks = (Check("clearance", Verdict.UNDECIDED, 0, math.nan, math.nan, "m"),)
     judged = made_up.verification()
-    bare = Verification(
+    bare = ArmVerification(
         problem=judged.problem,
         trajectory=judged.trajectory,
         errors=judged.errors,

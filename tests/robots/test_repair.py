@@ -13,7 +13,8 @@ from vdsm_pin.errors import Infeasible, InvalidInput
 from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
-from vdsm_pin.robots.judgement import Asked
+from vdsm_pin.robots.cell import Cell
+from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.repair import repair_robot
 from vdsm_pin.robots.trajectory_files import path_text, read_path
 from vdsm_pin.robots.urdf import read_robot
@@ -33,7 +34,7 @@ OVER = np.array([[0.0, 0.3], [1.2, 0.3]])
 """A sweep whose tip passes a ball just inside of its reach."""
 
 
-def asked(folder: Path, *balls: tuple[float, float, float]) -> Asked:
+def asked(folder: Path, *balls: tuple[float, float, float]) -> Cell:
     """Balls at (x, y) of a radius, in the plane; [m]."""
     file = folder / "two.urdf"
     file.write_text(URDF)
@@ -41,7 +42,7 @@ def asked(folder: Path, *balls: tuple[float, float, float]) -> Asked:
         Sphere(f"ball{k}", np.array([x, y, 0.0]), r)
         for k, (x, y, r) in enumerate(balls)
     ]
-    return Asked(read_robot(file), Scene(tuple(solids)), required=1e-3)
+    return Cell(read_robot(file), Scene(tuple(solids)), 1e-3)
 
 
 def tip_at(a: float, b: float) -> tuple[float, float]:
@@ -54,10 +55,10 @@ def test_grazing_motion_is_repaired(tmp_path: Path) -> None:
     """The repaired motion keeps its ends, and dense samples by Coal keep clearance."""
     x, y = tip_at(0.6, 0.3)
     this = asked(tmp_path, (1.04 * x, 1.04 * y, 0.03))
-    assert this.verified(Motion(OVER)).verdict == "refuted"
+    assert verify_robot(this, Motion(OVER)).verdict == "refuted"
     found = repair_robot(this, Motion(OVER))
     assert found.verification.verdict == "certified"
-    rows = found.verification.path.knots
+    rows = found.verification.trajectory.knots
     assert rows[[0, -1]].tolist() == OVER.tolist()
     assert found.given[[0, -1]].tolist() == [0, 1]
     assert 0.0 < found.moved.max() < 0.2
@@ -73,7 +74,7 @@ def test_grazing_motion_is_repaired(tmp_path: Path) -> None:
 def test_certified_motion_stays(tmp_path: Path) -> None:
     """Nothing is changed where nothing is wrong."""
     found = repair_robot(asked(tmp_path, (5.0, 5.0, 0.1)), Motion(OVER))
-    assert found.verification.path.knots.tolist() == OVER.tolist()
+    assert found.verification.trajectory.knots.tolist() == OVER.tolist()
     assert not found.moved.any()
 
 

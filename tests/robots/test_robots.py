@@ -11,7 +11,9 @@ from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile, VdsmError
 from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.geometry.solids import Cylinder, HalfSpace, Sphere
-from vdsm_pin.robots.cell import read_cell
+from vdsm_pin.proof.paths import Path as Motion
+from vdsm_pin.report.files import VerificationFile
+from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.scene_files import read_scene
@@ -83,17 +85,39 @@ def test_the_least_clearance_is_the_closed_form(tmp_path: Path, robot: Robot) ->
     # The arm's ball runs on a circle of 1 m, the other stands 1.3 m away: 150 mm left.
     scene = read_scene(write(tmp_path, "s.yaml", SCENE), 1.0)
     path = read_path(write(tmp_path, "t.csv", ROWS), robot)
-    found = verify_robot(robot, scene, path, 0.149)
+    found = verify_robot(Cell(robot, scene, 0.149), path)
     assert found.verdict is Verdict.CERTIFIED, found.checks
-    (pair,) = [p for p in found.pairs if (p.link, p.other) == ("arm", "ball")]
-    assert pair.lower <= 0.15 <= pair.upper
-    assert pair.upper - pair.lower < 0.02 * 0.15
-    assert pair.moment == pytest.approx(np.pi / 6.0, abs=0.05)
-    lost = verify_robot(robot, scene, path, 0.151)
+    near = found.approaches[0]
+    assert (near.pair.own, near.pair.label) == ("arm", "ball")
+    assert near.lower <= 0.15 <= near.upper
+    assert near.upper - near.lower < 0.02 * 0.15
+    assert near.moment == pytest.approx(np.pi / 6.0, abs=0.05)
+    assert near.coal == pytest.approx(near.upper, abs=5e-6)
+    lost = verify_robot(Cell(robot, scene, 0.151), path)
     assert lost.verdict is Verdict.REFUTED
     np.testing.assert_allclose(
-        np.linalg.norm(pair.link_point - pair.other_point), pair.upper, atol=1e-6
+        np.linalg.norm(near.link_point - near.other_point), near.upper, atol=1e-6
     )
+
+
+def test_the_profile_is_the_least_of_each_link_and_obstacle(
+    tmp_path: Path, robot: Robot
+) -> None:
+    """The arm's ball in closed form, interval by interval, from both columns."""
+    scene = read_scene(write(tmp_path, "s.yaml", SCENE), 1.0)
+    turns = np.linspace(0.0, 3.0, 40)
+    path = Motion(np.column_stack([turns, np.zeros(40)]))
+    profile = verify_robot(Cell(robot, scene), path).profile
+    fine = np.linspace(turns[:-1], turns[1:], 50)
+    gap = np.hypot(np.cos(fine), np.sin(fine) - 1.3) - 0.15
+    k = [body.name for body in robot.bodies].index("arm")
+    least = gap.min(axis=0)
+    assert (profile.link_lower[:, k] <= least).all()
+    assert (least <= profile.link_upper[:, k] + 1e-3).all()
+    # Another link may be nearer to the ball, where the arm is far.
+    assert (profile.obstacle_lower[:, 0] <= least).all()
+    assert profile.obstacle_upper.min() == profile.link_upper.min()
+    assert profile.obstacle_upper.min() == pytest.approx(0.15, rel=0.03)
 
 
 def test_what_meets_is_refuted_though_nothing_is_required(
@@ -107,9 +131,9 @@ def test_what_meets_is_refuted_though_nothing_is_required(
             tmp_path, "s.yaml", text.replace("X", str(x)) + "size: [0.2, 1, 0.05]}"
         )
         rows = read_path(write(tmp_path, "t.csv", ROWS), robot)
-        found = verify_robot(robot, read_scene(scene, 1.0), rows, 0.0)
-        of_base = [p for p in found.pairs if p.link == "base" and p.is_obstacle]
-        assert [p.verdict for p in of_base] == [verdict]
+        found = verify_robot(Cell(robot, read_scene(scene, 1.0)), rows)
+        k = [str(pair) for pair in found.pairs].index("base and crate")
+        assert found.least.verdict[k] == (verdict is Verdict.REFUTED)
 
 
 def test_limits_are_checked_at_and_between_waypoints(
@@ -119,7 +143,7 @@ def test_limits_are_checked_at_and_between_waypoints(
     past = read_path(
         write(tmp_path, "t.csv", "turn_deg,slide_mm\n0,0\n90,401\n"), robot
     )
-    found = verify_robot(robot, scene, past, 0.0)
+    found = verify_robot(Cell(robot, scene), past)
     refuted = [c.name for c in found.checks if c.verdict is Verdict.REFUTED]
     assert refuted == ["joint 'slide' in its limits"]
     message = {
@@ -136,7 +160,7 @@ def test_limits_are_checked_at_and_between_waypoints(
     smooth = read_path(write(tmp_path, "t.json", json.dumps(message)), robot)
     assert smooth.degree == 3
     assert smooth.knots.tolist() == [[0.0, 0.39], [1.0, 0.39]]
-    found = verify_robot(robot, scene, smooth, 0.0)
+    found = verify_robot(Cell(robot, scene), smooth)
     assert found.verdict is not Verdict.CERTIFIED
 
 
@@ -265,7 +289,13 @@ def test_the_command_ends_with_the_verdict(
     assert "certified  two" in capsys.readouterr().out
     file = json.loads((out / "verification.json").read_text())
     assert file["verdict"] == "certified"
-    assert file["pairs"][0]["other"] == "ball"
+    VerificationFile.model_validate(file)
+    first = file["closest"][0]
+    assert (first["body"], first["obstacle"]) == ("arm", "ball")
+    assert [joint["name"] for joint in file["motion"]["joints"]] == ["turn", "slide"]
+    assert file["left_out"][0]["body"] == "base"
+    rows = (out / "clearance.csv").read_text().splitlines()
+    assert len(rows) == 1 + 3 + 1  # three links to the ball, base to hand
     assert run(*asked, "--out", out, "--required-clearance-mm", 151) == 1
     assert run(*asked, "--out", out, "--lock", "elbow=1") == 2
     assert "has no joint 'elbow' to lock" in capsys.readouterr().err
@@ -285,7 +315,7 @@ def test_a_problem_file_names_a_robot(
     pairs = []
     for asked in (("verify", "--urdf", urdf, "--scene", scene), ("verify", problem)):
         assert run(*asked, "--trajectory", rows, "--out", out) == 0
-        pairs.append(json.loads((out / "verification.json").read_text())["pairs"])
+        pairs.append(json.loads((out / "verification.json").read_text())["closest"])
     assert pairs[0] == pairs[1]
     for required, status in ((151, 1), (149, 0)):
         write(tmp_path, "cell.yaml", CELL.replace("149", str(required)) + SCENE)
@@ -315,7 +345,7 @@ def test_a_base_moves_the_robot_in_the_scene(tmp_path: Path) -> None:
         there = (1e3 * (R @ center + position)).tolist()
         text = CELL + SCENE.replace("[0, 1300, 500]", str(there))
         text += f"base: {{position: {place}, rpy_deg: {turn}}}\n"
-        (ball,) = read_cell(write(tmp_path, "cell.yaml", text)).asked.scene.obstacles
+        (ball,) = read_cell(write(tmp_path, "cell.yaml", text)).scene.obstacles
         assert isinstance(ball, Sphere)
         np.testing.assert_allclose(ball.centre, center, atol=1e-12)
 

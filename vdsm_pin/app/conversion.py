@@ -127,7 +127,7 @@ def convert_robot(cell: Cell, file: Path, folder: Path, also: Sequence[str]) -> 
     check_output_folder(folder)
     names = (TRAJECTORY, *map(message_name, also))
     check_kept([folder / name for name in names], [*cell.files, file])
-    robot = cell.asked.robot
+    robot = cell.robot
     motion = read_motion(file, robot)
     with staged(folder) as aside:
         (aside / TRAJECTORY).write_text(csv_text(motion, robot), encoding="utf-8")

@@ -5,8 +5,9 @@ Nothing is judged here: problems are read, planned, verified and written down.
 
 import math
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from pydantic import ValidationError
 
@@ -18,6 +19,7 @@ from vdsm_pin.io.trajectory_file import (
     read_trajectory,
     write_trajectory,
 )
+from vdsm_pin.problem.planning_problem import PlanningProblem, ProblemSource
 from vdsm_pin.progress import step
 from vdsm_pin.report.browser import find_browser
 from vdsm_pin.report.facts import plan_file, verification_file
@@ -39,10 +41,13 @@ from vdsm_pin.report.tables import (
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.coal_clearance import reach_of
 from vdsm_pin.verification.moving import untimed
-from vdsm_pin.verification.records import Verdict, Verification
-from vdsm_pin.verification.robot_model import RobotModel, load_robot
+from vdsm_pin.verification.records import ArmVerification, Verdict, Verification
+from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.task import all_pairs
 from vdsm_pin.verification.verify import verify
+
+if TYPE_CHECKING:  # whoever verifies an arm needs no robots
+    from vdsm_pin.robots.cell import Cell
 
 TRAJECTORY: Final = "trajectory.csv"
 PLAN: Final = "plan.json"
@@ -67,7 +72,7 @@ class VerifyOrder:
     """What to verify and what to write besides the folder.
 
     Args:
-        source: The problem as it was read.
+        source: The problem of an arm as it was read, or a robot in its cell.
         trajectory: The trajectory file.
         folder: Where the results go.
         command: The exact command line, for the report.
@@ -76,11 +81,12 @@ class VerifyOrder:
         deadline: When to give up what is left; it is then undecided.
         date: When, for the report; None where files shall not tell.
         interpolation: What joins the rows of the trajectory file.
+        topic: Of a robot's trajectory, in a bag.
         all_pairs: Whether clearance.csv has every pair at every interval, not the near
             ones and the least of each alone.
     """
 
-    source: ProblemFile
+    source: "ProblemFile | Cell"
     trajectory: Path
     folder: Path
     command: str
@@ -90,6 +96,13 @@ class VerifyOrder:
     all_pairs: bool = False
     date: str | None = None
     interpolation: Interpolation = "auto"
+    topic: str | None = None
+
+    @property
+    def read(self) -> ProblemSource:
+        """The files of the problem."""
+        assert self.source.source is not None  # it was read
+        return self.source.source
 
 
 @dataclass(frozen=True)
@@ -199,32 +212,14 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
     from vdsm_pin.report.html import write_report
 
     _check_outputs(order)
-    problem = order.source.problem
-    robot = load_robot(problem.manipulator)
-    trajectory = read_trajectory(
-        order.trajectory, problem.manipulator, order.interpolation
-    )
-    if why := untimed(problem.scene, trajectory):
-        raise InvalidFile(file=order.trajectory, where="line 1", problem=why)
-    record = _record(order, robot)
+    source = order.source
     with staged(order.folder) as aside:
-        pairs = all_pairs(problem)
-        reach = math.inf if order.all_pairs else reach_of(problem)
-        with ClearanceCsv(aside / CLEARANCE, problem, pairs, reach) as clearance:
-            verification = verify(
-                problem,
-                trajectory,
-                robot,
-                sinks=(clearance,),
-                joint_error=True,
-                deadline=order.deadline,
-                reach=reach,
-            )
-            clearance.write(verification)
-        step("writing the results")
-        write_link_angles(aside / LINK_ANGLES, verification)
-        write_centres(aside / CENTRES, problem, trajectory)
-        write_cables(aside / CABLES, problem, trajectory)
+        verification: Verification
+        if isinstance(source, ProblemFile):
+            urdf, verification = _judge_arm(order, source.problem, aside)
+        else:
+            urdf, verification = _judge_robot(order, source, aside)
+        record = _record(order, urdf)
         file = verification_file(verification, record)
         (aside / VERIFICATION).write_text(file.text(), encoding="utf-8")
         write_report(aside / REPORT, verification, file, planned_by(order.trajectory))
@@ -235,6 +230,51 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
     return Verified(file, verification, missing)
 
 
+def _judge_arm(
+    order: VerifyOrder, problem: PlanningProblem, aside: Path
+) -> tuple[str, Verification]:
+    """The SHA-256 of the arm's URDF and the judgement; its tables stand aside."""
+    robot = load_robot(problem.manipulator)
+    trajectory = read_trajectory(
+        order.trajectory, problem.manipulator, order.interpolation
+    )
+    if why := untimed(problem.scene, trajectory):
+        raise InvalidFile(file=order.trajectory, where="line 1", problem=why)
+    pairs = all_pairs(problem)
+    reach = math.inf if order.all_pairs else reach_of(problem)
+    with ClearanceCsv(aside / CLEARANCE, problem, pairs, reach) as clearance:
+        verification = verify(
+            problem,
+            trajectory,
+            robot,
+            sinks=(clearance,),
+            joint_error=True,
+            deadline=order.deadline,
+            reach=reach,
+        )
+        clearance.write(verification)
+    step("writing the results")
+    write_link_angles(aside / LINK_ANGLES, verification)
+    write_centres(aside / CENTRES, problem, trajectory)
+    write_cables(aside / CABLES, problem, trajectory)
+    return robot.urdf_sha256, verification
+
+
+def _judge_robot(
+    order: VerifyOrder, cell: "Cell", aside: Path
+) -> tuple[str, Verification]:
+    """The same of any other robot."""
+    from vdsm_pin.robots.judgement import verify_robot
+    from vdsm_pin.robots.trajectory_files import read_path
+
+    motion = read_path(order.trajectory, cell.robot, order.topic)
+    verification = verify_robot(cell, motion, order.deadline)
+    step("writing the results")
+    with ClearanceCsv(aside / CLEARANCE, cell, verification.pairs) as clearance:
+        clearance.write(verification)
+    return sha256(cell.robot.text.encode()).hexdigest(), verification
+
+
 def _check_outputs(order: VerifyOrder) -> None:
     """Refuse what cannot be written before any work is done."""
     check_output_folder(order.folder)
@@ -243,7 +283,7 @@ def _check_outputs(order: VerifyOrder) -> None:
         check_output_file(file)
     outputs = [*(order.folder / name for name in JUDGED), *alone]
     beside = order.trajectory.with_name(PLAN)
-    check_kept(outputs, [*order.source.source.files, order.trajectory, beside])
+    check_kept(outputs, [*order.read.files, order.trajectory, beside])
     if order.pdf is not None:
         find_browser()
 
@@ -265,6 +305,7 @@ def _certify(order: VerifyOrder, verification: Verification, record: RunRecord) 
         return "not asked for"
     if verification.verdict is not Verdict.CERTIFIED:
         return "no proof"
+    assert isinstance(verification, ArmVerification)
     # Imported by those who ask for one: its schema takes a while to build.
     from vdsm_pin.verification.certificate_writer import (
         Hashes,
@@ -283,12 +324,12 @@ def _certify(order: VerifyOrder, verification: Verification, record: RunRecord) 
     return ""
 
 
-def _record(order: VerifyOrder, robot: RobotModel) -> RunRecord:
+def _record(order: VerifyOrder, urdf_sha256: str) -> RunRecord:
     return RunRecord(
         command=order.command,
-        problem_file=str(order.source.path),
-        problem_sha256=order.source.sha256,
+        problem_file=str(order.read.path),
+        problem_sha256=order.read.sha256,
         trajectory_sha256=sha256_of_file(order.trajectory),
-        urdf_sha256=robot.urdf_sha256,
+        urdf_sha256=urdf_sha256,
         date=order.date,
     )

@@ -40,7 +40,7 @@ from vdsm_pin.report.run_record import versions
 from vdsm_pin.report.words import TIME_LIMIT, outcome
 from vdsm_pin.text import printable
 from vdsm_pin.time_limit import Deadline
-from vdsm_pin.verification.records import Verdict
+from vdsm_pin.verification.records import ArmVerification, Verdict
 
 MANIFEST: Final = "manifest.json"
 TIMING: Final = "timing.json"
@@ -308,6 +308,7 @@ def _plan_and_verify(task: Task, source: ProblemFile, deadline: Deadline) -> Bat
         raise VerificationFailed(message)
     if deadline.passed and verified.records.verdict not in HANDED_OUT:
         raise OutOfTime(deadline.limit, "a plan was found and proved, but not reported")
+    assert isinstance(verified.records, ArmVerification)
     drawing = picture(verified.records)
     (task.aside / PICTURE).write_text(drawing, encoding="utf-8")
     row = batch_row(task.folder, task.strategy, verified.file)

@@ -54,12 +54,12 @@ def convert(
     takes a trajectory of any format and writes trajectory.csv. Nothing is judged.
     """
     from vdsm_pin.app.conversion import Given, convert_robot, convert_to_folder
-    from vdsm_pin.io.problem_file import RobotProblem, read_problem
+    from vdsm_pin.io.problem_file import ProblemOfRobot, read_problem
 
     given, more = Given(trajectory, centres, cables), [one.value for one in also or ()]
     try:
         source = read_problem(problem)
-    except RobotProblem as error:
+    except ProblemOfRobot as error:
         from vdsm_pin.robots.cell import read_cell
 
         refuse_beside("a robot", {"--centres": centres, "--cables": cables})

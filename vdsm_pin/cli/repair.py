@@ -66,7 +66,8 @@ def repair(
     Writes trajectory.csv, repair.json (how far each waypoint moved) and
     verification.json; where no such trajectory is found, nothing, and says why.
     """
-    from vdsm_pin.robots.folder import RobotOrder, repair_to_folder
+    from vdsm_pin.app.repair import repair_to_folder
+    from vdsm_pin.app.workflow import VerifyOrder
 
     deadline = Deadline.after(time_limit)
     options = RobotOptions(
@@ -84,8 +85,10 @@ def repair(
     )
     with enforced(deadline):
         cell = options.cell(problem)
-        order = RobotOrder(cell, trajectory, out, context.obj, deadline, topic)
-        found = repair_to_folder(order, tuple(pin or ()))
+        order = VerifyOrder(
+            cell, trajectory, out, context.obj, deadline=deadline, topic=topic
+        )
+        found = repair_to_folder(order, cell, tuple(pin or ()))
     new = int((found.given < 0).sum())
     typer.echo(
         f"certified with {len(found.moved)} waypoints, {new} of them new; moved by "

@@ -2,7 +2,7 @@
 
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple, NoReturn
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
@@ -44,6 +44,8 @@ from vdsm_pin.time_limit import Deadline, enforced
 
 if TYPE_CHECKING:
     from vdsm_pin.app.workflow import VerifyOrder
+    from vdsm_pin.io.problem_file import ProblemFile
+    from vdsm_pin.problem.error_boxes import ErrorBox
     from vdsm_pin.robots.cell import Cell
 
 commands = family()
@@ -132,7 +134,7 @@ def verify(
 
     The trajectory may be of any planner. Writes report.html, verification.json,
     clearance.csv, link_angles.csv, centres.csv and cables.csv; of a robot (problem with
-    robot, or --urdf) verification.json alone.
+    robot, or --urdf) the first three.
     """
     of_robot = RobotOptions(
         urdf,
@@ -160,19 +162,6 @@ def verify(
     }
     said = Said(quiet, as_json)
     deadline = Deadline.after(time_limit)
-    if urdf is not None:
-        refuse_beside("--urdf", {"PROBLEM": problem, **of_arm})
-        with enforced(deadline):
-            cell = of_robot.cell(None)
-        _end_robot(cell, trajectory, out, context.obj, said, deadline, topic)
-    refuse_beside("a problem", of_robot.named())
-    if problem is None:
-        message = "expected a PROBLEM, or --urdf for any other robot"
-        raise InvalidInput(message)
-    from vdsm_pin.app.workflow import VerifyOrder
-    from vdsm_pin.io.problem_file import RobotProblem, read_problem
-    from vdsm_pin.report.run_record import now
-
     errors = errors_of(
         joint_error_deg,
         base_error_mm,
@@ -180,18 +169,12 @@ def verify(
         obstacle_error_mm,
         obstacle_error_deg,
     )
-    try:
-        with enforced(deadline):
-            source = read_problem(problem)
-    except RobotProblem as error:
-        refuse_beside("a robot", of_arm)
-        with enforced(deadline):
-            cell = of_robot.cell(Path(error.file))
-        _end_robot(cell, trajectory, out, context.obj, said, deadline, topic)
-    refuse_beside("an arm", {"--topic": topic})
+    from vdsm_pin.app.workflow import VerifyOrder
+    from vdsm_pin.report.run_record import now
+
     with enforced(deadline):
-        arm = VerifyOrder(
-            source=source.under(errors),
+        order = VerifyOrder(
+            source=_read(problem, errors, of_robot, of_arm, topic),
             trajectory=trajectory,
             folder=out,
             command=context.obj,
@@ -201,12 +184,45 @@ def verify(
             all_pairs=all_pairs,
             date=now(),
             interpolation=interpolation,
+            topic=topic,
         )
-    raise typer.Exit(PASSED if _arm_passes(arm, said) else NOT_PASSED)
+    raise typer.Exit(PASSED if _passes(order, said) else NOT_PASSED)
 
 
-def _arm_passes(order: "VerifyOrder", said: Said) -> bool:
-    """Verify the motion of an arm, and say what was found."""
+def _read(
+    problem: str | None,
+    errors: "ErrorBox",
+    of_robot: RobotOptions,
+    of_arm: dict[str, object],
+    topic: str | None,
+) -> "ProblemFile | Cell":
+    """The problem of an arm or a robot, from a file or from options.
+
+    Raises:
+        InvalidInput: If a file is bad, or an option has no meaning for it.
+    """
+    if of_robot.urdf is not None:
+        refuse_beside("--urdf", {"PROBLEM": problem, **of_arm})
+        return of_robot.cell(None)
+    refuse_beside("a problem", of_robot.named())
+    if problem is None:
+        message = "expected a PROBLEM, or --urdf for any other robot"
+        raise InvalidInput(message)
+    from vdsm_pin.io.problem_file import ProblemOfRobot, read_problem
+
+    try:
+        arm = read_problem(problem).under(errors)
+    except ProblemOfRobot as error:
+        path = Path(error.file)
+    else:
+        refuse_beside("an arm", {"--topic": topic})
+        return arm
+    refuse_beside("a robot", of_arm)
+    return of_robot.cell(path)
+
+
+def _passes(order: "VerifyOrder", said: Said) -> bool:
+    """Verify a motion, and say what was found."""
     from vdsm_pin.app.workflow import verify_to_folder
     from vdsm_pin.report.terminal import show_verification
     from vdsm_pin.report.words import outcome
@@ -226,30 +242,3 @@ def _arm_passes(order: "VerifyOrder", said: Said) -> bool:
         show_verification(verified.file, order.folder, *written)
     complete = order.certificate is None or not verified.no_certificate
     return outcome(verified.file.verdict).passed and complete
-
-
-def _end_robot(
-    cell: "Cell",
-    trajectory: Path,
-    out: Path,
-    command: str,
-    said: Said,
-    deadline: Deadline,
-    topic: str | None,
-) -> NoReturn:
-    """Verify the motion of a robot, say what was found, and end by the verdict."""
-    from vdsm_pin.robots.folder import (
-        FILE,
-        RobotOrder,
-        show_robot,
-        verify_robot_to_folder,
-    )
-
-    with enforced(deadline), said.progress():
-        order = RobotOrder(cell, trajectory, out, command, deadline, topic)
-        found = verify_robot_to_folder(order)
-    if said.as_json:
-        typer.echo((out / FILE).read_text("utf-8"), nl=False)
-    elif not said.quiet:
-        show_robot(found, out)
-    raise typer.Exit(PASSED if found.verdict == "certified" else NOT_PASSED) from None

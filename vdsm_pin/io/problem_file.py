@@ -65,7 +65,7 @@ class ProblemFile:
         return self.source.sha256
 
 
-class RobotProblem(InvalidFile):
+class ProblemOfRobot(InvalidFile):
     """The problem is about a robot of a URDF, which `robots.cell` reads."""
 
 
@@ -80,7 +80,7 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
 
     Raises:
         InvalidFile: If the file or its content breaks the contract.
-        RobotProblem: If it has `robot` in place of `manipulator`.
+        ProblemOfRobot: If it has `robot` in place of `manipulator`.
     """
     path = find_problem(name_or_path)
     content = read_bytes(path, limit=MAX_PROBLEM_BYTES)
@@ -89,7 +89,7 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
         line = document.line(("robot",))
         where = "robot" if line is None else f"robot (line {line})"
         what = "is for verify and repair only; expected manipulator"
-        raise RobotProblem(file=path, where=where, problem=what)
+        raise ProblemOfRobot(file=path, where=where, problem=what)
     try:
         model = ProblemModel.model_validate(document.data)
     except ValidationError as error:

@@ -73,6 +73,17 @@ class Path:
         return max(1, len(self.knots) - 1)
 
     @property
+    def n_samples(self) -> int:
+        """Number of knots."""
+        return len(self.knots)
+
+    def times_at(self, moments: FloatArray) -> FloatArray | None:
+        """Times of moments in knots, shape (m,); [s]. None where not known."""
+        if self.times is None:
+            return None
+        return np.interp(moments, np.arange(self.n_samples), self.times)
+
+    @property
     def reach(self) -> FloatArray:
         """How large each column gets at most, shape (n_columns,)."""
         most = np.abs(self.knots).max(axis=0)

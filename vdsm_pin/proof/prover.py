@@ -41,6 +41,9 @@ class Proof:
         points: Witnesses on the first and on the second body, in the world's frame,
             shape (n_pairs, 2, 3); [m].
         in_time: Whether there was time for all; what is not judged is undecided.
+        profile: Least lower and upper bounds by column in each bin of intervals, shape
+            (2, n_columns, n_bins); [m].
+        stride: Intervals of a bin.
     """
 
     verdict: IntArray
@@ -51,6 +54,8 @@ class Proof:
     share: FloatArray
     points: FloatArray
     in_time: bool
+    profile: FloatArray
+    stride: int
 
     @property
     def is_certified(self) -> bool:
@@ -152,13 +157,16 @@ def start_proof(
     pairs: PairTable,
     errors: ErrorBox | None = None,
     budget: Budget | None = None,
+    columns: IntArray | None = None,
 ) -> tuple[Proving, _Plan]:
     """Everything ready, nothing judged; arguments as for `prove`."""
     budget, plan = budget or Budget(), _planned(bodies, pairs)
     _check(tree, bodies, path)
     pieces = pack_pieces([body.pieces for body in plan.bodies])
     rules = budget.rules(rounding_pad(_extent(tree, path, pieces)))
-    task = pack_task(tree, plan.bodies, plan.pairs, rules, path.reach, pieces=pieces)
+    count = 1 if columns is None else int(columns.max(initial=0)) + 1
+    columns = None if columns is None else columns[plan.number]
+    task = pack_task(tree, plan.bodies, plan.pairs, rules, path.reach, columns, pieces)
     if errors is not None:
         surfaces = errors.surfaces
         if surfaces is not None:
@@ -166,7 +174,7 @@ def start_proof(
         task = with_errors(
             task, ErrorBox(errors.joints, errors.shifts, errors.tilts, surfaces)
         )
-    return new_proving(task, path.packed(), 1, plan.n_obstacles, budget), plan
+    return new_proving(task, path.packed(), count, plan.n_obstacles, budget), plan
 
 
 def _check(tree: Tree, bodies: Sequence[Body], path: Path) -> None:
@@ -197,6 +205,7 @@ def prove(
     pairs: Sequence[Pair] | PairTable,
     errors: ErrorBox | None = None,
     budget: Budget | None = None,
+    columns: IntArray | None = None,
 ) -> Proof:
     """Bracket the clearance of every pair over the whole path.
 
@@ -207,6 +216,8 @@ def prove(
         pairs: Which bodies are held apart, and how far.
         errors: The proof covers every motion within it; None for the path itself.
         budget: How long it may take.
+        columns: Column of each body in the profile, shape (n_bodies,); the profile is
+            of moving bodies against those at rest. None for no profile.
 
     Returns:
         The proof, its least brackets narrowed unless the time ended before.
@@ -215,7 +226,7 @@ def prove(
         ValueError: If bodies, pairs, path and tree do not fit together.
     """
     table = pairs if isinstance(pairs, PairTable) else PairTable.of(pairs)
-    proving, plan = start_proof(tree, bodies, path, table, errors, budget)
+    proving, plan = start_proof(tree, bodies, path, table, errors, budget, columns)
     in_time = proving.run()
     return _summed(proving.results, plan, table.size, in_time)
 
@@ -239,6 +250,8 @@ def _summed(results: Results, plan: _Plan, n: int, in_time: bool) -> Proof:
         share=frozen(best[met, TIME]),
         points=frozen(points),
         in_time=in_time,
+        profile=frozen(results.profile),
+        stride=results.stride,
     )
 
 

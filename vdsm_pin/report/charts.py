@@ -14,7 +14,7 @@ from vdsm_pin.report.palette import link_colours, obstacle_colours
 from vdsm_pin.report.postures import straight_arm
 from vdsm_pin.report.thinning import MOST_PLOTTED, Thinned, nearest_obstacles
 from vdsm_pin.units import MM_PER_M
-from vdsm_pin.verification.records import Verification
+from vdsm_pin.verification.records import ArmVerification, Verification
 
 _DASHES: Final = ("", "7 3", "2 3")
 _INK: Final = "currentColor"
@@ -31,10 +31,20 @@ def packed(values: Any, dtype: str = "<f4") -> str:
 
 def charts(verification: Verification, shown: Thinned) -> list[dict[str, Any]]:
     """Every plot of the report, in order; angles in degrees, lengths in mm."""
+    if not isinstance(verification, ArmVerification):
+        from vdsm_pin.report.robot_page import joint_charts
+        from vdsm_pin.robots.judgement import RobotVerification
+
+        assert isinstance(verification, RobotVerification)
+        names = [body.name for body in verification.problem.robot.bodies]
+        clearances = _clearance_charts(verification, shown, names)
+        return [*clearances, *joint_charts(verification, shown)]
+    links = verification.problem.manipulator.n_links
+    names = [f"link {i + 1}" for i in range(links)]
     return [
         _link_angle_chart(verification, shown),
         _base_chart(verification, shown),
-        *_clearance_charts(verification, shown),
+        *_clearance_charts(verification, shown, names),
         _changed_chart(verification, shown),
         *_joint_charts(verification, shown),
         _cable_chart(verification, shown),
@@ -57,7 +67,7 @@ def _limit(label: str, value: float) -> dict[str, Any]:
     return {"label": label, "value": value}
 
 
-def _link_angle_chart(verification: Verification, shown: Thinned) -> dict[str, Any]:
+def _link_angle_chart(verification: ArmVerification, shown: Thinned) -> dict[str, Any]:
     rows = verification.trajectory
     psi = link_angles(rows.alpha[shown.rows], rows.theta[shown.rows])
     cone = math.degrees(verification.problem.manipulator.max_link_angle)
@@ -73,7 +83,7 @@ def _link_angle_chart(verification: Verification, shown: Thinned) -> dict[str, A
     }
 
 
-def _base_chart(verification: Verification, shown: Thinned) -> dict[str, Any]:
+def _base_chart(verification: ArmVerification, shown: Thinned) -> dict[str, Any]:
     x0 = verification.trajectory.x0[shown.rows] * MM_PER_M
     low, high = (v * MM_PER_M for v in verification.problem.manipulator.base_range)
     return {
@@ -89,7 +99,7 @@ def _base_chart(verification: Verification, shown: Thinned) -> dict[str, Any]:
 
 
 def _clearance_charts(
-    verification: Verification, shown: Thinned
+    verification: Verification, shown: Thinned, links: list[str]
 ) -> list[dict[str, Any]]:
     profile, scene = verification.profile, verification.problem.scene
     required = verification.problem.required_clearance * MM_PER_M
@@ -101,7 +111,6 @@ def _clearance_charts(
         "scale": "asinh",
         "limits": [_limit(f"required {required:g} mm", required)],
     }
-    links = [f"link {i + 1}" for i in range(profile.link_lower.shape[1])]
     note = "Solid: proved lower bound. Dashed: proved upper bound."
     # What is proved for the whole motion holds in every interval of it.
     least = min_clearance(verification)
@@ -154,7 +163,7 @@ def _brackets(
     ]
 
 
-def _changed_chart(verification: Verification, shown: Thinned) -> dict[str, Any]:
+def _changed_chart(verification: ArmVerification, shown: Thinned) -> dict[str, Any]:
     rows = verification.trajectory
     psi = link_angles(rows.alpha[shown.rows], rows.theta[shown.rows])
     count = changed_angles(psi)
@@ -171,7 +180,9 @@ def _changed_chart(verification: Verification, shown: Thinned) -> dict[str, Any]
     }
 
 
-def _joint_charts(verification: Verification, shown: Thinned) -> list[dict[str, Any]]:
+def _joint_charts(
+    verification: ArmVerification, shown: Thinned
+) -> list[dict[str, Any]]:
     rows = verification.trajectory
     box = math.degrees(verification.problem.manipulator.max_joint_angle)
     limits = [_limit(f"+{box:g}°", box), _limit(f"−{box:g}°", -box)]
@@ -191,7 +202,7 @@ def _joint_charts(verification: Verification, shown: Thinned) -> list[dict[str, 
     ]
 
 
-def _cable_chart(verification: Verification, shown: Thinned) -> dict[str, Any]:
+def _cable_chart(verification: ArmVerification, shown: Thinned) -> dict[str, Any]:
     straight = cables(verification.problem, straight_arm(verification.problem))
     arm, rows = verification.problem.manipulator, verification.trajectory
     lengths = cable_lengths(arm, rows.alpha[shown.rows], rows.theta[shown.rows])

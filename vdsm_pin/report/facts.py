@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -39,6 +39,7 @@ from vdsm_pin.verification.fk import PLANNED
 from vdsm_pin.verification.inside import NAME as INSIDE
 from vdsm_pin.verification.inside import surfaces
 from vdsm_pin.verification.records import (
+    ArmVerification,
     Check,
     ClosestApproach,
     Counterexample,
@@ -275,7 +276,9 @@ def reason(verification: Verification) -> str:
     """The verdict in one sentence."""
     if verification.verdict is Verdict.CERTIFIED:
         return _certified_sentence(verification)
-    if verification.verdict is Verdict.INCOMPLETE:
+    if isinstance(verification, ArmVerification) and (
+        verification.verdict is Verdict.INCOMPLETE
+    ):
         return _incomplete_sentence(verification, _left_out(verification))
     bad = [c for c in verification.checks if c.verdict is verification.verdict]
     if not bad:
@@ -302,7 +305,7 @@ def reason(verification: Verification) -> str:
     return f"{undecided} This counts as not passed."
 
 
-def plan_reason(plan: Plan, verification: Verification) -> str:
+def plan_reason(plan: Plan, verification: ArmVerification) -> str:
     """The verdict on a plan in one sentence, with what the strategy knows of it."""
     if verification.verdict is not Verdict.INCOMPLETE or not plan.undrawn:
         return reason(verification)
@@ -310,13 +313,13 @@ def plan_reason(plan: Plan, verification: Verification) -> str:
     return _incomplete_sentence(verification, why)
 
 
-def _incomplete_sentence(verification: Verification, why: str) -> str:
+def _incomplete_sentence(verification: ArmVerification, why: str) -> str:
     drawn = percent(verification.coverage)
     required = percent(verification.problem.path.required_coverage)
     return f"incomplete: {drawn} drawn, because {why}; {required} is required"
 
 
-def _left_out(verification: Verification) -> str:
+def _left_out(verification: ArmVerification) -> str:
     """What the motion leaves out of the desired path, in words."""
     gaps = verification.undrawn
     if not len(gaps):
@@ -328,13 +331,15 @@ def _left_out(verification: Verification) -> str:
 
 def _certified_sentence(verification: Verification) -> str:
     count = len(verification.checks)
-    smallest = min_clearance(verification)
-    drawn = f"{percent(verification.coverage)} of the desired path is drawn"
-    if verification.problem.tip_path is None:
-        drawn = "no desired path is asked for"
+    smallest, drawn, who = min_clearance(verification), "", "robot"
+    if isinstance(verification, ArmVerification):
+        who, drawn = "arm", "; no desired path is asked for"
+        if verification.problem.tip_path is not None:
+            share = percent(verification.coverage)
+            drawn = f"; {share} of the desired path is drawn"
     if smallest is None:
         return (
-            f"All {count} checks passed over the whole motion; no obstacle is there; "
+            f"All {count} checks passed over the whole motion; no obstacle is there"
             f"{drawn}."
         )
     problem = verification.problem
@@ -342,9 +347,9 @@ def _certified_sentence(verification: Verification) -> str:
     box = asdict(verification.errors)
     errors = ", with any error of the error box," if any(box.values()) else ""
     return (
-        f"All {count} checks passed; at every instant of the motion{errors} the arm "
+        f"All {count} checks passed; at every instant of the motion{errors} the {who} "
         f"keeps at least {quantity(smallest.lower_m, 'm')} from every obstacle, "
-        f"{required} are required; {drawn}."
+        f"{required} are required{drawn}."
         + "".join(f" {name!r} is a surface only." for name in surfaces(problem))
     )
 
@@ -358,19 +363,44 @@ def hashes(record: RunRecord) -> Hashes:
     )
 
 
+def _own_facts(verification: Verification) -> dict[str, Any]:
+    """What the file says of an arm, or of any other robot."""
+    if not isinstance(verification, ArmVerification):
+        # Whoever verifies an arm needs no robots.
+        from vdsm_pin.report.robot_facts import robot_facts
+        from vdsm_pin.robots.judgement import RobotVerification
+
+        assert isinstance(verification, RobotVerification)
+        return robot_facts(verification)
+    problem, rows = verification.problem, verification.trajectory
+    path = problem.tip_path
+    return {
+        "notes": input_notes(problem, rows),
+        "coverage": finite(verification.coverage),
+        "path_length_m": None if path is None else path.length,
+        "undrawn_m": tuple((float(a), float(b)) for a, b in verification.undrawn),
+        "error_box": _error_box(verification.errors, rows.n_links),
+        "left_out": left_out(problem),
+        "counterexamples": tuple(
+            counterexample_row(verification, found)
+            for found in verification.counterexamples
+        ),
+        "motion": motion_facts(problem, rows),
+    }
+
+
 def verification_file(
     verification: Verification, record: RunRecord
 ) -> VerificationFile:
     """verification.json of one verification."""
-    errors, problem = verification.errors, verification.problem
-    path = problem.tip_path
+    problem = verification.problem
     return VerificationFile(
+        **_own_facts(verification),
         problem=problem.name,
         date=record.date,
         verdict=verification.verdict.value,
         reason=reason(verification),
         assumed_sizes=assumed_sizes(problem),
-        notes=input_notes(problem, verification.trajectory),
         checks=tuple(
             check_row(check, time_at(verification, check.moment))
             for check in verification.checks
@@ -380,23 +410,13 @@ def verification_file(
         closest=tuple(
             closest_row(verification, row) for row in verification.approaches
         ),
-        coverage=finite(verification.coverage),
-        path_length_m=None if path is None else path.length,
-        undrawn_m=tuple((float(a), float(b)) for a, b in verification.undrawn),
-        error_box=_error_box(errors, verification.trajectory.n_links),
         max_joint_error_rad=finite(verification.joint_error),
         refuted_joint_error_rad=finite(verification.refuted_joint_error),
         time_limit_s=finite(verification.time_limit),
         not_done=verification.not_done,
-        left_out=left_out(problem),
-        counterexamples=tuple(
-            counterexample_row(verification, found)
-            for found in verification.counterexamples
-        ),
         nominal_clear=verification.nominal_clear
         if verification.counterexamples
         else None,
-        motion=motion_facts(problem, verification.trajectory),
         hashes=hashes(record),
         versions=versions(),
         machine=machine(),
@@ -451,7 +471,16 @@ def plan_file(refinement: "Refinement", record: RunRecord) -> PlanFile:
 def batch_row(folder: str, strategy: str, file: VerificationFile) -> BatchRow:
     """The row of one verified problem."""
     smallest, motion = file.min_clearance, file.motion
+    of_arm: dict[str, float | None] = {}
+    if isinstance(motion, MotionFacts):
+        of_arm = {
+            "max_link_angle_rad": max(motion.max_link_angle_rad),
+            "changed_angles_mean_on_path": motion.changed_angles_mean_on_path,
+            "x0_min_m": motion.x0_min_m,
+            "x0_max_m": motion.x0_max_m,
+        }
     return BatchRow(
+        **of_arm,
         folder=folder,
         problem=file.problem,
         strategy=strategy,
@@ -461,11 +490,7 @@ def batch_row(folder: str, strategy: str, file: VerificationFile) -> BatchRow:
         closest_link=smallest.link if smallest else None,
         closest_obstacle=smallest.obstacle if smallest else None,
         coverage=file.coverage,
-        max_link_angle_rad=max(motion.max_link_angle_rad),
-        changed_angles_mean_on_path=motion.changed_angles_mean_on_path,
         max_joint_error_rad=file.max_joint_error_rad,
-        x0_min_m=motion.x0_min_m,
-        x0_max_m=motion.x0_max_m,
         waypoints=motion.waypoints,
         reason="; ".join(filter(None, (file.reason, assumption(file.assumed_sizes)))),
     )

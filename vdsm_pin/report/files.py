@@ -11,6 +11,8 @@ from vdsm_pin.io.problem_file import SCHEMA_DIALECT, problem_schema
 from vdsm_pin.report.words import BASE_ERROR
 
 Point = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+Range = tuple[FiniteFloat, FiniteFloat]
+Limits = tuple[FiniteFloat | None, FiniteFloat | None]
 VerdictWord = Annotated[
     Literal["certified", "incomplete", "refuted", "undecided"],
     Field(description="only certified counts as passed"),
@@ -28,7 +30,14 @@ OutcomeWord = Literal[
 
 _MOMENT: Final = "in waypoints, 12.25 is a quarter of the way from 12 to 13"
 _TIME: Final = "when that is [s]; null where the trajectory has no times"
-_LINK: Final = "links count from 1 at the base"
+_LINK: Final = (
+    "links count from 1 at the base; of a robot of a URDF those with solids do, and "
+    "`body` is the name"
+)
+_BODY: Final = (
+    "`tool` where it is that; of a robot of a URDF the name of the link; null for a "
+    "link of an arm"
+)
 _FRAME: Final = "in the frame of the problem file"
 _DEEPER: Final = (
     "whether the link's axis meets the body: no depth beyond the link's radius is "
@@ -103,7 +112,7 @@ class ClosestRow(FileModel):
     moment: FiniteFloat = Field(description=f"when upper_m was found; {_MOMENT}")
     time_s: FiniteFloat | None = Field(default=None, description=_TIME)
     link: int = Field(description=_LINK)
-    body: str | None = Field(description="`tool` where it is that; null for the link")
+    body: str | None = Field(description=_BODY)
     obstacle: str | None = Field(description="its name; null in a pair of links")
     other_link: int | None = Field(description="null unless a pair of links")
     other_body: str | None = Field(description="as body, of the other link")
@@ -126,7 +135,7 @@ class MinClearance(FileModel):
     moment: FiniteFloat = Field(description=f"when upper_m was found; {_MOMENT}")
     time_s: FiniteFloat | None = Field(default=None, description=_TIME)
     link: int = Field(description=_LINK)
-    body: str | None = Field(description="`tool` where it is that; null for the link")
+    body: str | None = Field(description=_BODY)
     obstacle: str = Field(description="name of the obstacle")
     deeper: bool = Field(description=f"of both bounds: {_DEEPER}")
     coal_m: FiniteFloat | None = Field(default=None, description=_COAL)
@@ -135,7 +144,7 @@ class MinClearance(FileModel):
 class LeftOutRow(FileModel):
     """Two bodies of the arm that are not held apart."""
 
-    body: str = Field(description="`link 1` and so on, or `tool`")
+    body: str = Field(description="`link 1` and so on, `tool`, or a name of the URDF")
     other: str = Field(description="the other one")
     reason: str = Field(description="why they are not")
 
@@ -177,7 +186,7 @@ class CounterexampleRow(FileModel):
 
     moment: FiniteFloat = Field(description=f"when it does; {_MOMENT}")
     link: int = Field(description=_LINK)
-    body: str | None = Field(description="`tool` where it is that; null for the link")
+    body: str | None = Field(description=_BODY)
     obstacle: str | None = Field(description="its name; null in a pair of links")
     other_link: int | None = Field(description="null unless a pair of links")
     other_body: str | None = Field(description="as body, of the other link")
@@ -228,12 +237,43 @@ class MotionFacts(FileModel):
     changed_angles_max: int = Field(description="most of them at any waypoint")
 
 
+class JointRow(FileModel):
+    """One joint of a robot and where it goes at the waypoints."""
+
+    name: str = Field(description="as in the URDF")
+    range_rad: Range | None = Field(
+        default=None, description="of its values; null for one that slides"
+    )
+    range_m: Range | None = Field(
+        default=None, description="of its values; null for one that turns"
+    )
+    limits_rad: Limits | None = Field(
+        default=None, description="lower and upper; null where there is none"
+    )
+    limits_m: Limits | None = Field(
+        default=None, description="lower and upper; null where there is none"
+    )
+
+
+class RobotFacts(FileModel):
+    """What a robot of a URDF does, measured at the waypoints."""
+
+    waypoints: int = Field(description="rows of the trajectory")
+    robot: str = Field(description="its name in the URDF")
+    interpolation: Literal["linear", "cubic", "quintic"] = Field(
+        description="what joins the waypoints"
+    )
+    bodies: str = Field(description="what stands for the solids of its links")
+    links: tuple[str, ...] = Field(description="those with solids, link 1 first")
+    joints: tuple[JointRow, ...] = Field(description="those that the motion moves")
+
+
 class Hashes(FileModel):
     """SHA-256 of the inputs; empty where there was none."""
 
     problem_sha256: str = Field(description="problem file and the meshes it names")
     trajectory_sha256: str = Field(description="trajectory.csv")
-    urdf_sha256: str = Field(description="URDF of the arm")
+    urdf_sha256: str = Field(description="URDF of the arm or robot")
 
 
 class VerificationFile(FileModel):
@@ -279,7 +319,7 @@ class VerificationFile(FileModel):
         description="what the time limit left out besides checks, which have their rows"
     )
     left_out: tuple[LeftOutRow, ...] = Field(
-        description="bodies of the arm that are not held apart, with a reason each"
+        description="bodies that are not held apart, with a reason each"
     )
     counterexamples: tuple[CounterexampleRow, ...] = Field(
         description="errors within the box that lose the clearance where it is refuted "
@@ -289,7 +329,9 @@ class VerificationFile(FileModel):
         description="whether the motion without errors is proved clear; null where "
         "there is no counterexample"
     )
-    motion: MotionFacts
+    motion: MotionFacts | RobotFacts = Field(
+        description="what an arm, or any other robot, does at the waypoints"
+    )
     hashes: Hashes
     versions: dict[str, str] = Field(description=_VERSIONS)
     machine: str = Field(description="system, architecture, processors")

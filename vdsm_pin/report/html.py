@@ -42,7 +42,7 @@ from vdsm_pin.report.words import (
     term,
 )
 from vdsm_pin.units import MM_PER_M
-from vdsm_pin.verification.records import Verification
+from vdsm_pin.verification.records import ArmVerification, Verification
 
 _TEMPLATES: Final = Path(__file__).parent / "templates"
 
@@ -153,12 +153,15 @@ def write_report(
         file: The same as words and rows.
         plan: How the trajectory was planned, where that is known.
     """
-    data = report_data(verification)
+    data, arm = report_data(verification), None
+    if isinstance(verification, ArmVerification):
+        arm = verification.problem.manipulator
     page = rendered(
         "report.html.j2",
         file=file,
         plan=plan,
         problem=verification.problem,
+        arm=arm,
         data=data.text,
         most_drawn=MOST_DRAWN,
         charts=data.charts,

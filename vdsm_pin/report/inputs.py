@@ -9,6 +9,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import solid_of
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.inside import mesh_notes
+from vdsm_pin.verification.records import Problem
 
 _NAMED: Final = 3
 """Sizes that one line names; the JSON files have all of them."""
@@ -20,7 +21,7 @@ BEHIND: Final = (
 """Where there are obstacles, one may stand in the way of the feed."""
 
 
-def assumed_sizes(problem: PlanningProblem) -> tuple[str, ...]:
+def assumed_sizes(problem: Problem) -> tuple[str, ...]:
     """The obstacles whose unit nobody states, with the size they were taken to have."""
     return tuple(
         f"{one.name!r} is {one.assumed_size}"

@@ -27,8 +27,11 @@ from vdsm_pin.report.thinning import (
     thinned,
 )
 from vdsm_pin.verification.records import (
+    ArmVerification,
     ClosestApproach,
     Counterexample,
+    Motion,
+    Problem,
     Verification,
 )
 
@@ -36,16 +39,31 @@ _MOST_BETWEEN: Final = 4_000
 """Rows that a smooth motion is drawn with, where it has not more itself."""
 
 
-def scene_data(
-    problem: PlanningProblem, obstacles: Sequence[Obstacle], trajectory: Trajectory
+def obstacle_data(
+    problem: Problem, obstacles: Sequence[Obstacle], trajectory: Motion, extent: float
 ) -> dict[str, Any]:
-    """The arm, some obstacles and the desired path; base frame, [m].
+    """Some obstacles, and where their frame is; base frame, [m].
 
     What moves is in its own frame, which stands where `moves` says.
     """
-    arm = problem.manipulator
-    extent, fine = arm.total_length, detail(len(obstacles))
+    fine = detail(len(obstacles))
     return {
+        "pose": problem.T_world_base.ravel().tolist(),
+        "obstacles": [
+            {**_solid(solid_of(one), extent, fine), **moves(one, trajectory)}
+            for one in obstacles
+        ],
+    }
+
+
+def scene_data(
+    problem: PlanningProblem, obstacles: Sequence[Obstacle], trajectory: Trajectory
+) -> dict[str, Any]:
+    """The arm, some obstacles and the desired path; base frame, [m]."""
+    arm = problem.manipulator
+    extent = arm.total_length
+    return {
+        **obstacle_data(problem, obstacles, trajectory, extent),
         "lengths": arm.link_lengths.tolist(),
         "radius": arm.link_radius,
         "axes": [
@@ -55,11 +73,6 @@ def scene_data(
             )
         ],
         "colours": list(link_colours(arm.n_links)),
-        "pose": problem.T_world_base.ravel().tolist(),
-        "obstacles": [
-            {**_solid(solid_of(one), extent, fine), **moves(one, trajectory)}
-            for one in obstacles
-        ],
         "carried": [
             {"link": link, **_solid(solid, extent, FINE)} for link, solid in arm.carried
         ],
@@ -80,19 +93,26 @@ def _solid(solid: Solid, extent: float, fine: Detail) -> dict[str, Any]:
     }
 
 
+def row_data(trajectory: Motion, shown: Thinned) -> dict[str, Any]:
+    """Which rows are shown, and when they are."""
+    times = {} if trajectory.times is None else {"times": trajectory.times[shown.rows]}
+    return {
+        "nSamples": trajectory.n_samples,
+        **{name: packed(values, "<f8") for name, values in times.items()},
+        "complete": shown.complete,
+        "rows": packed(shown.rows, "<i4"),
+    }
+
+
 def motion_data(
     problem: PlanningProblem, trajectory: Trajectory, shown: Thinned
 ) -> dict[str, Any]:
     """The joint values of the rows shown; the page computes the poses from them."""
     rows = shown.rows
     on_path = () if problem.tip_path is None else trajectory.on_path[rows]
-    times = {} if trajectory.times is None else {"times": trajectory.times[rows]}
     return {
-        "nSamples": trajectory.n_samples,
-        **{name: packed(values, "<f8") for name, values in times.items()},
+        **row_data(trajectory, shown),
         **({"smooth": _smooth(trajectory)} if trajectory.is_smooth else {}),
-        "complete": shown.complete,
-        "rows": packed(rows, "<i4"),
         "onPath": packed(on_path, "u1"),
         "pathM": packed(trajectory.path_m[rows]),
         "x0": packed(trajectory.x0[rows]),
@@ -137,7 +157,7 @@ def closest_data(
     }
 
 
-def ghost_data(verification: Verification, found: Counterexample) -> dict[str, Any]:
+def ghost_data(verification: ArmVerification, found: Counterexample) -> dict[str, Any]:
     """The arm of a counterexample, errors applied; base frame, [m]."""
     joints, arm = found.joints, verification.problem.manipulator
     centres = joint_centres(arm, joints[:1], joints[None, 1::2], joints[None, 2::2])[0]
@@ -167,6 +187,26 @@ class PageData:
     triangles: dict[str, int]
 
 
+def _drawn(
+    verification: Verification, obstacles: Sequence[Obstacle], shown: Thinned
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The scene and the motion of an arm, or of any other robot."""
+    rows = verification.trajectory
+    if isinstance(verification, ArmVerification):
+        problem, lost = verification.problem, verification.counterexamples
+        scene = scene_data(problem, obstacles, verification.trajectory)
+        scene["ghosts"] = [ghost_data(verification, one) for one in lost]
+        return scene, motion_data(problem, verification.trajectory, shown)
+    from vdsm_pin.report.robot_page import robot_links, robot_motion
+    from vdsm_pin.robots.judgement import RobotVerification
+
+    assert isinstance(verification, RobotVerification)
+    links = robot_links(verification)
+    extent = 20.0 * links["radius"]
+    scene = {**obstacle_data(verification.problem, obstacles, rows, extent), **links}
+    return scene, row_data(rows, shown) | robot_motion(verification, shown)
+
+
 def report_data(verification: Verification) -> PageData:
     """The data of a report."""
     lost = verification.counterexamples
@@ -177,12 +217,11 @@ def report_data(verification: Verification) -> PageData:
     plots = charts(verification, shown)
     obstacles = verification.problem.scene.obstacles
     drawn = [obstacles[k] for k in nearest_obstacles(verification, MOST_DRAWN)]
-    scene = scene_data(verification.problem, drawn, verification.trajectory)
-    scene["ghosts"] = [ghost_data(verification, one) for one in lost]
+    scene, motion = _drawn(verification, drawn, shown)
     text = _embedded(
         {
             "scene": scene,
-            "motion": motion_data(verification.problem, verification.trajectory, shown),
+            "motion": motion,
             "closest": [
                 closest_data(verification, row) for row in verification.approaches
             ],

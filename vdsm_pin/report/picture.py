@@ -13,7 +13,7 @@ from vdsm_pin.report.moves import start_pose
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import surface
 from vdsm_pin.report.thinning import MOST_DRAWN, nearest_obstacles
-from vdsm_pin.verification.records import Verification
+from vdsm_pin.verification.records import ArmVerification
 
 _WIDTH, _HEIGHT = 240.0, 160.0
 _MARGIN: Final = 12.0
@@ -26,7 +26,7 @@ def _view(points: FloatArray) -> FloatArray:
     return np.column_stack([0.88 * x - 0.36 * y, -0.92 * z - 0.2 * y - 0.12 * x])
 
 
-def picture(verification: Verification) -> str:
+def picture(verification: ArmVerification) -> str:
     """The arm at the moment of its smallest clearance, in its scene."""
     problem, rows = verification.problem, verification.trajectory
     arm = problem.manipulator
@@ -63,7 +63,7 @@ def picture(verification: Verification) -> str:
     return "".join([*parts, "</svg>\n"])
 
 
-def _outlines(verification: Verification) -> list[FloatArray]:
+def _outlines(verification: ArmVerification) -> list[FloatArray]:
     found = []
     obstacles = verification.problem.scene.obstacles
     for k in nearest_obstacles(verification, MOST_DRAWN):

@@ -7,8 +7,9 @@ from typing import Final
 
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.io.source import BLOCK
-from vdsm_pin.problem.planning_problem import PlanningProblem, ProblemSource
+from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.problem.scene import Moving, Obstacle, solid_of
+from vdsm_pin.verification.records import Problem
 
 MOST_LISTED: Final = 200
 """Obstacles that a page lists."""
@@ -37,7 +38,7 @@ class SceneRow:
     sha256: str
 
 
-def scene_rows(problem: PlanningProblem) -> tuple[SceneRow, ...]:
+def scene_rows(problem: Problem) -> tuple[SceneRow, ...]:
     """The first obstacles of a problem, `MOST_LISTED` at most."""
     source = problem.source
     listed = problem.scene.obstacles[:MOST_LISTED]

@@ -181,9 +181,9 @@ def _prism(solid: Prism) -> Surface:
     parts = [_polygons(np.vstack(rim), tuple(tuple(wall) for wall in walls))]
     for section in solid.convex_sections:
         parts += [_cap(section, solid.span[0]), _cap(section, solid.span[1])]
-    joined = _joined(parts)
-    points = solid.origin + joined.vertices @ solid.rotation.T
-    return Surface(points, joined.triangles)
+    whole = joined(parts)
+    points = solid.origin + whole.vertices @ solid.rotation.T
+    return Surface(points, whole.triangles)
 
 
 def _cap(section: FloatArray, height: float) -> Surface:
@@ -191,11 +191,13 @@ def _cap(section: FloatArray, height: float) -> Surface:
     return _polygons(corners, (tuple(range(len(section))),))
 
 
-def _joined(parts: list[Surface]) -> Surface:
+def joined(parts: list[Surface]) -> Surface:
+    """Several surfaces as one; round where all are."""
     starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
     triangles = [part.triangles + s for part, s in zip(parts, starts, strict=True)]
     points = np.vstack([part.vertices for part in parts])
-    return Surface(points, np.concatenate(triangles))
+    smooth = all(part.round for part in parts)
+    return Surface(points, np.concatenate(triangles), smooth)
 
 
 def _plane(solid: HalfSpace, extent: float) -> Surface:

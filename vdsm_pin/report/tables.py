@@ -27,9 +27,11 @@ from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.row_text import Form
 from vdsm_pin.verification.coal_rows import NOTHING_MEASURED, CoalIndex
 from vdsm_pin.verification.records import (
+    ArmVerification,
     ClearanceChunk,
     LeastClearances,
     Pair,
+    Problem,
     Verification,
 )
 
@@ -82,7 +84,7 @@ class ClearanceCsv(_OwnFile):
     def __init__(
         self,
         path: Path,
-        problem: PlanningProblem,
+        problem: Problem,
         pairs: Sequence[Pair],
         reach: float = math.inf,
     ) -> None:
@@ -174,7 +176,7 @@ class ClearanceCsv(_OwnFile):
         return np.column_stack([*columns, *points]).astype(np.float64)
 
 
-def write_link_angles(path: Path, verification: Verification) -> None:
+def write_link_angles(path: Path, verification: ArmVerification) -> None:
     """link_angles.csv: psi and gamma of every joint at every row."""
     rows = verification.trajectory
     joints = range(1, rows.n_links + 1)

@@ -7,8 +7,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.verification.records import Verification
-from vdsm_pin.verification.task import ArmPairs
+from vdsm_pin.verification.records import Motion, Verification
 
 MOST_ROWS: Final = 2_000
 """Rows of a motion that a page shows at most, besides remarkable ones."""
@@ -30,9 +29,11 @@ def nearest_obstacles(verification: Verification, most: int) -> IntArray:
     count, least = len(verification.problem.scene.obstacles), verification.least
     if count <= most or least is None:
         return np.arange(min(count, most))
-    lower = np.append(least.lower, np.inf)  # -1 is no pair
-    lowers = lower[ArmPairs(verification.problem).number].min(axis=0)
-    return np.sort(np.argpartition(lowers, most)[:most])
+    lowers = dict.fromkeys(verification.problem.scene.names, np.inf)
+    for pair, lower in zip(verification.pairs, least.lower.tolist(), strict=True):
+        if pair.obstacle:
+            lowers[pair.obstacle] = min(lowers[pair.obstacle], lower)
+    return np.sort(np.argpartition(list(lowers.values()), most)[:most])
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ class Thinned:
         return frozen(np.minimum.reduceat(padded, edges, axis=0)[::2])
 
 
-def thinned(trajectory: Trajectory, keep: IntArray) -> Thinned:
+def thinned(trajectory: Motion, keep: IntArray) -> Thinned:
     """Choose the rows to show.
 
     Args:
@@ -82,7 +83,9 @@ def thinned(trajectory: Trajectory, keep: IntArray) -> Thinned:
     if n <= MOST_ROWS:
         return Thinned(np.arange(n), n)
     even = np.linspace(0, n - 1, MOST_ROWS).astype(np.int64)
-    changes = np.flatnonzero(np.diff(trajectory.on_path.astype(np.int64)))
-    changes = changes[:_MOST_CHANGES]
+    changes = np.zeros(0, np.int64)
+    if isinstance(trajectory, Trajectory):
+        changes = np.flatnonzero(np.diff(trajectory.on_path.astype(np.int64)))
+        changes = changes[:_MOST_CHANGES]
     chosen = np.concatenate([even, changes, changes + 1, keep])
     return Thinned(np.unique(chosen[(chosen >= 0) & (chosen < n)]), n)

@@ -2,7 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from hashlib import sha256
+from math import inf
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,7 +12,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import rotation_from_rpy
+from vdsm_pin.geometry.arrays import FloatArray, frozen, rotation_from_rpy
 from vdsm_pin.io.body_schema import MAX_PARTS
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.motion_schema import MovableModel
@@ -21,25 +23,90 @@ from vdsm_pin.io.problem_schema import BasePoseModel, not_bool
 from vdsm_pin.io.schema_types import FileModel, Name, NotNegative, Number
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import read_yaml
+from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.problem.scene import Scene
-from vdsm_pin.robots.judgement import Asked
+from vdsm_pin.proof.bodies import Body, Pair
+from vdsm_pin.proof.terms import WORLD
+from vdsm_pin.robots.coal_pairs import CoalPairs
 from vdsm_pin.robots.link_solids import HULLS, PARTS, MeshCover, Solids
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.scene_files import MAX_BYTES, SceneModel, check_judged, read_scene
 from vdsm_pin.robots.urdf import read_robot
+from vdsm_pin.units import MM_PER_M
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Cell:
-    """What a motion of a robot is judged against.
+    """A robot among its obstacles, and what its motions are held to.
 
     Args:
-        asked: The robot, its obstacles, the clearances asked for.
-        files: What it was read from, the robot or the problem first.
+        robot: The robot.
+        scene: Obstacles in its base frame.
+        required_clearance: Least clearance from obstacles; [m].
+        required_self_clearance: Least clearance between links that are held apart; [m].
+        stated_name: Of the problem; empty for the robot's.
+        T_world_base: The robot's root link in the frame of the files, (4, 4); [m].
+        source: The files it was read from; None for none.
+
+    Raises:
+        InvalidInput: If a clearance is negative or not finite.
     """
 
-    asked: Asked
-    files: tuple[Path, ...]
+    robot: Robot
+    scene: Scene
+    required_clearance: float = 0.0
+    required_self_clearance: float = 0.0
+    stated_name: str = ""
+    T_world_base: FloatArray = field(default_factory=lambda: np.eye(4))
+    source: ProblemSource | None = None
+
+    def __post_init__(self) -> None:
+        """Check the clearances."""
+        for value in (self.required_clearance, self.required_self_clearance):
+            if not 0.0 <= value < inf:
+                millimetres = value * MM_PER_M
+                message = (
+                    f"required clearance is {millimetres:g} mm, expected 0 or more"
+                )
+                raise InvalidInput(message)
+
+    @property
+    def name(self) -> str:
+        """Of the problem, or of the robot."""
+        return self.stated_name or self.robot.name
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """What it was read from, the robot or the problem first."""
+        return () if self.source is None else self.source.files
+
+    @cached_property
+    def bodies(self) -> list[Body]:
+        """Links first, then obstacles."""
+        resting = (Body(WORLD, o.pieces, o.name) for o in self.scene.obstacles)
+        return [*self.robot.bodies, *resting]
+
+    @cached_property
+    def pairs(self) -> list[Pair]:
+        """All that are held apart; the obstacle first, which may have many pieces."""
+        n = len(self.robot.bodies)
+        outer = range(n, len(self.bodies))
+        required = self.required_clearance
+        pairs = [Pair(k, b, required) for k in outer for b in range(n)]
+        own = self.required_self_clearance
+        return pairs + [Pair(i, k, own) for i, k in self.robot.held]
+
+    @cached_property
+    def coal(self) -> CoalPairs:
+        """Coal's distances of them."""
+        return CoalPairs(self.robot, self.scene)
+
+    def names(self, pair: Pair) -> str:
+        """Both bodies of a pair in words, a link first."""
+        one, other = self.bodies[pair.one], self.bodies[pair.other]
+        if one.frame == WORLD:
+            one, other = other, one
+        return f"{one.name} and {other.name}"
 
 
 @dataclass(frozen=True)
@@ -105,8 +172,8 @@ def cell_of(
     """
     robot = files.read()
     solids = Scene() if scene is None else read_scene(scene, _size(robot))
-    asked = Asked(robot, solids, required, required_self)
-    return Cell(asked, (*files.files, *filter(None, (scene,))))
+    source = _source((*files.files, *filter(None, (scene,))))
+    return Cell(robot, solids, required, required_self, source=source)
 
 
 def solids_of(bodies: MeshCover | None, parts: int | None) -> Solids:
@@ -211,9 +278,33 @@ def read_cell(path: Path) -> Cell:
     check_judged(document, scene)
     required = float(frame.metres(model.required_clearance))
     required_self = float(frame.metres(model.required_self_clearance))
-    meshes = [one.file for one in model.obstacles if isinstance(one, FromFileModel)]
-    files = (path, *robot_files.files, *(folder / name for name in meshes))
-    return Cell(Asked(robot, scene, required, required_self), files)
+    of_files = tuple(
+        (name, folder / one.file)
+        for name, one in zip(scene.names, model.obstacles, strict=True)
+        if isinstance(one, FromFileModel)
+    )
+    files = (path, *robot_files.files, *(file for _, file in of_files))
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation, frame.metres(model.base.position)
+    return Cell(
+        robot=robot,
+        scene=scene,
+        required_clearance=required,
+        required_self_clearance=required_self,
+        stated_name=model.name or "",
+        T_world_base=frozen(pose),
+        source=_source(files, of_files),
+    )
+
+
+def _source(
+    files: tuple[Path, ...], of_obstacles: tuple[tuple[str, Path], ...] = ()
+) -> ProblemSource:
+    """The files that a cell was read from, the robot or the problem first."""
+    digest = sha256()
+    for file in files:
+        digest.update(file.read_bytes())
+    return ProblemSource(files[0], digest.hexdigest(), files[1:], of_obstacles)
 
 
 def locks(words: tuple[str, ...]) -> dict[str, float]:

@@ -5,7 +5,7 @@ from typing import Any, Final
 import numpy as np
 
 from vdsm_pin.arm.bodies import outer_points
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
@@ -108,3 +108,23 @@ def hull_planes(points: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     if hull is None:
         return None
     return np.array(hull.normals()), -np.array(hull.offsets()).ravel()
+
+
+def hull_triangles(points: FloatArray) -> tuple[FloatArray, IntArray] | None:
+    """Corners and triangles of a hull; None where `coal_hull` has none.
+
+    Returns:
+        Corners, shape (n, 3); [m]. Triangles counter-clockwise from outside, (m, 3).
+    """
+    hull = coal_hull(points)
+    if hull is None:
+        return None
+    corners, count = np.array(hull.points()), hull.num_polygons
+    triangles = np.array(
+        [[hull.polygons(k)[i] for i in range(3)] for k in range(count)]
+    )
+    a, b, c = (corners[triangles[:, i]] for i in range(3))
+    outward = a - corners.mean(axis=0)
+    inside_out = np.einsum("ij,ij->i", np.cross(b - a, c - a), outward) < 0.0
+    triangles[inside_out] = triangles[inside_out, ::-1]
+    return corners, triangles

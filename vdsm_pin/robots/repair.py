@@ -15,10 +15,9 @@ from vdsm_pin.errors import Infeasible, InvalidInput
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.proof.bodies import Pair
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.robots.judgement import (
-    Asked,
-    RobotVerification,
-)
+from vdsm_pin.proof.terms import CERTIFIED
+from vdsm_pin.robots.cell import Cell
+from vdsm_pin.robots.judgement import RobotVerification, verify_robot
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.records import Verdict
@@ -103,7 +102,7 @@ class _Rows:
 
 
 def repair_robot(
-    asked: Asked,
+    cell: Cell,
     path: Path,
     pinned: Sequence[int] = (),
     deadline: Deadline = NO_LIMIT,
@@ -111,7 +110,7 @@ def repair_robot(
     """A certified motion near a given one.
 
     Args:
-        asked: Robot, scene and required clearances.
+        cell: Robot, scene and required clearances.
         path: Straight lines between waypoints.
         pinned: Numbers of waypoints, from 0, that stay besides start and goal.
         deadline: When to give up.
@@ -131,36 +130,32 @@ def repair_robot(
     fixed = np.isin(np.arange(n), [0, n - 1, *pinned])
     rows = _Rows(path.knots, path.knots, np.arange(n), fixed)
     near: dict[int, None] = {}
-    found = asked.verified(path, deadline)
+    found = verify_robot(cell, path, deadline)
     for margin in MARGINS:
-        bad = [
-            k
-            for k, pair in enumerate(found.pairs)
-            if pair.verdict is not Verdict.CERTIFIED
-        ]
+        bad = np.flatnonzero(found.least.verdict != CERTIFIED).tolist()
         if not bad or deadline.passed:
             break
         near |= dict.fromkeys(bad)
-        rows = _pushed(rows, asked, [asked.pairs[k] for k in near], margin)
-        found = asked.verified(Path(rows.q), deadline)
+        rows = _pushed(rows, cell, [cell.pairs[k] for k in near], margin)
+        found = verify_robot(cell, Path(rows.q), deadline)
     if found.verdict is not Verdict.CERTIFIED:
         raise Infeasible(_why(found))
     return Repaired(found, rows.given, np.abs(rows.q - rows.base).max(axis=1))
 
 
-def _pushed(rows: _Rows, asked: Asked, pairs: Sequence[Pair], margin: float) -> _Rows:
+def _pushed(rows: _Rows, cell: Cell, pairs: Sequence[Pair], margin: float) -> _Rows:
     """The motion with waypoints where pairs come too near, pushed apart.
 
     Raises:
         Infeasible: If a waypoint that stays is too near.
     """
-    rows, slopes = rows.sampled(), _Slopes(asked, pairs, margin)
+    rows, slopes = rows.sampled(), _Slopes(cell, pairs, margin)
     gaps = slopes.gaps(rows.q)
     for k in np.flatnonzero(rows.fixed & (gaps.min(axis=1) < -margin)):
         pair = pairs[int(np.argmin(gaps[k]))]
         short = -MM_PER_M * (gaps[k].min() + margin)
         message = (
-            f"waypoint {rows.given[k]} stays, and there {asked.names(pair)} are "
+            f"waypoint {rows.given[k]} stays, and there {cell.names(pair)} are "
             f"{short:.3f} mm nearer than required"
         )
         raise Infeasible(message)
@@ -168,7 +163,7 @@ def _pushed(rows: _Rows, asked: Asked, pairs: Sequence[Pair], margin: float) -> 
     if bad.sum() > MOST:
         pair = pairs[int(np.argmin(gaps.min(axis=0)))]
         message = (
-            f"{int(bad.sum())} samples are too near, {asked.names(pair)} most: small "
+            f"{int(bad.sum())} samples are too near, {cell.names(pair)} most: small "
             "changes do not lead round; expected a new plan"
         )
         raise Infeasible(message)
@@ -185,12 +180,12 @@ def _pushed(rows: _Rows, asked: Asked, pairs: Sequence[Pair], margin: float) -> 
 
 
 class _Slopes:
-    """How much room pairs have beyond what is asked, and where it grows."""
+    """How much room pairs have beyond what is cell, and where it grows."""
 
-    def __init__(self, asked: Asked, pairs: Sequence[Pair], margin: float) -> None:
-        self._tree, self._coal, self._pairs = asked.robot.tree, asked.coal, pairs
+    def __init__(self, cell: Cell, pairs: Sequence[Pair], margin: float) -> None:
+        self._tree, self._coal, self._pairs = cell.robot.tree, cell.coal, pairs
         self._target = np.array([pair.required + margin for pair in pairs])
-        joints = asked.robot.joints
+        joints = cell.robot.joints
         self._limits = [j.lower for j in joints], [j.upper for j in joints]
 
     def gaps(self, q: FloatArray) -> FloatArray:

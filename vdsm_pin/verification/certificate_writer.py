@@ -46,7 +46,7 @@ from vdsm_pin.verification.certificate_file import (
 from vdsm_pin.verification.inside import locate_start, unlocated
 from vdsm_pin.verification.limits import extremes
 from vdsm_pin.verification.moving import whole_motion
-from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.records import ArmVerification, Verdict
 from vdsm_pin.verification.task import all_pairs, make_task
 
 LEVEL: Final = 9
@@ -79,7 +79,7 @@ class Hashes:
 
 def write_certificate(
     path: Path,
-    verification: Verification,
+    verification: ArmVerification,
     hashes: Hashes,
     deadline: Deadline = NO_LIMIT,
 ) -> None:
@@ -130,7 +130,7 @@ def _packed(path: Path) -> Iterator[IO[bytes]]:
 
 
 def _header(
-    verification: Verification, hashes: Hashes, pieces: PackedPieces
+    verification: ArmVerification, hashes: Hashes, pieces: PackedPieces
 ) -> HeaderLine:
     problem, trajectory = verification.problem, verification.trajectory
     box, found = verification.errors, extremes(trajectory)

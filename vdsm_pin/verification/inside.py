@@ -28,7 +28,7 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
-from vdsm_pin.verification.records import Check, Verdict, combine
+from vdsm_pin.verification.records import Check, Problem, Verdict, combine
 
 NAME: Final = "arm outside the meshes"
 """Name of the row."""
@@ -186,7 +186,7 @@ def check_inside(located: Mapping[str, Location]) -> tuple[Check, ...]:
     )
 
 
-def surfaces(problem: PlanningProblem) -> tuple[str, ...]:
+def surfaces(problem: Problem) -> tuple[str, ...]:
     """Names of the meshes of which only the surface is meant."""
     meshes = (s for s in map(solid_of, problem.scene.obstacles) if isinstance(s, Mesh))
     return tuple(mesh.name for mesh in meshes if mesh.is_surface)

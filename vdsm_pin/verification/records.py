@@ -4,12 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from math import inf, nan
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.notebook import Summarised, in_percent
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem, ProblemSource
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
@@ -88,8 +89,11 @@ def is_deepest(clearance: float, link_radius: float) -> bool:
 class Pair:
     """A body of the arm and what it must stay clear of: an obstacle, or another body.
 
+    Of any other robot the bodies are its links, by their names in the URDF.
+
     Args:
-        link: The link that the body rides on, 1 to N.
+        link: The link that the body rides on, 1 to N; of any other robot its number
+            among the links with solids, from 1.
         obstacle: Name; empty for a pair of bodies.
         other_link: The link of the other body, farther from the base; else 0.
         body: Name of the body; empty for the link itself.
@@ -261,9 +265,52 @@ class ClearanceProfile:
     first_interval: IntArray
 
 
-@dataclass(frozen=True, repr=False)
+class Problem(Protocol):
+    """What the motion of an arm or of any other robot is held to."""
+
+    @property
+    def name(self) -> str:
+        """Of the problem."""
+
+    @property
+    def scene(self) -> Scene:
+        """The obstacles, in the base frame."""
+
+    @property
+    def required_clearance(self) -> float:
+        """Least clearance from obstacles; [m]."""
+
+    @property
+    def required_self_clearance(self) -> float:
+        """Least clearance between bodies of the robot; [m]."""
+
+    @property
+    def T_world_base(self) -> FloatArray:  # noqa: N802  field notation
+        """The base frame in the frame of the problem file, shape (4, 4); [m]."""
+
+    @property
+    def source(self) -> ProblemSource | None:
+        """The files that it was read from."""
+
+
+class Motion(Protocol):
+    """Rows of joint values, whatever lies between them."""
+
+    @property
+    def n_samples(self) -> int:
+        """Number of rows."""
+
+    @property
+    def times(self) -> FloatArray | None:
+        """Of the rows; None where not known; [s]."""
+
+    def times_at(self, moments: FloatArray) -> FloatArray | None:
+        """Times of moments in waypoints; None where not known; [s]."""
+
+
+@dataclass(frozen=True, repr=False, kw_only=True)
 class Verification(Summarised):
-    """The judgement of one trajectory against one problem.
+    """The judgement of one motion against one problem, of an arm or any other robot.
 
     Args:
         problem: What was asked.
@@ -274,11 +321,6 @@ class Verification(Summarised):
         approaches: The closest approaches over the whole motion, nearest first, one per
             pair at most, ten at most; the first is the minimum clearance.
         profile: Brackets along the motion.
-        tip_deviation: Bound of the distance from the desired path on the intervals
-            that draw it; 0 where there is none; [m].
-        coverage: Proved part of the desired path that is drawn, 0 to 1; NaN where there
-            is none; [-].
-        undrawn: Stretches not drawn, arc lengths from and to, shape (k, 2); [m].
         joint_error: Largest joint error still certified; 0 if none is; NaN if it was
             not asked for; [rad].
         refuted_joint_error: A joint error at which the clearance is lost, with a
@@ -294,17 +336,14 @@ class Verification(Summarised):
         coal: What Coal measured; None where it was not asked.
     """
 
-    problem: PlanningProblem
-    trajectory: Trajectory
+    problem: Problem
+    trajectory: Motion
     errors: ErrorBox
     pairs: tuple[Pair, ...]
     checks: tuple[Check, ...]
     approaches: tuple[ClosestApproach, ...]
     profile: ClearanceProfile
-    tip_deviation: float
-    coverage: float
-    undrawn: FloatArray
-    joint_error: float
+    joint_error: float = nan
     refuted_joint_error: float = nan
     counterexamples: tuple[Counterexample, ...] = ()
     nominal_clear: bool = False
@@ -331,12 +370,40 @@ class Verification(Summarised):
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Verdict, clearance, and the checks that did not pass."""
         bad = (c for c in self.checks if c.verdict is not Verdict.CERTIFIED)
-        rows = [
+        return (
             ("problem", self.problem.name),
             ("verdict", self.verdict.value),
             ("proved clearance", in_mm(self.min_clearance)),
             ("waypoints", str(self.trajectory.n_samples)),
-            *([("drawn", in_percent(self.coverage))] if self.problem.tip_path else []),
+            *self._drawn(),
             *((c.name, f"{c.verdict.value} {c.where}".strip()) for c in bad),
-        ]
-        return tuple(rows)
+        )
+
+    def _drawn(self) -> tuple[tuple[str, str], ...]:
+        """What is drawn of a desired path, where there is one."""
+        return ()
+
+
+@dataclass(frozen=True, repr=False, kw_only=True)
+class ArmVerification(Verification):
+    """The judgement of a snake arm's trajectory, which may draw a desired path.
+
+    Args:
+        problem: What was asked.
+        trajectory: What was judged.
+        tip_deviation: Bound of the distance from the desired path on the intervals
+            that draw it; 0 where there is none; [m].
+        coverage: Proved part of the desired path that is drawn, 0 to 1; NaN where there
+            is none; [-].
+        undrawn: Stretches not drawn, arc lengths from and to, shape (k, 2); [m].
+    """
+
+    problem: PlanningProblem
+    trajectory: Trajectory
+    tip_deviation: float
+    coverage: float
+    undrawn: FloatArray
+
+    def _drawn(self) -> tuple[tuple[str, str], ...]:
+        drawn = (("drawn", in_percent(self.coverage)),)
+        return drawn if self.problem.tip_path else ()

@@ -53,13 +53,13 @@ from vdsm_pin.verification.inside import (
 from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.moving import check_timed
 from vdsm_pin.verification.records import (
+    ArmVerification,
     Check,
     ClearanceChunk,
     ClearanceSink,
     ClosestApproach,
     Counterexample,
     Verdict,
-    Verification,
     is_deepest,
 )
 from vdsm_pin.verification.robot_model import RobotModel
@@ -88,7 +88,7 @@ def verify(
     deadline: Deadline = NO_LIMIT,
     reach: float | None = None,
     centres: FloatArray | None = None,
-) -> Verification:
+) -> ArmVerification:
     """Judge a trajectory against a problem.
 
     Args:
@@ -186,7 +186,7 @@ def verify(
             refuted = besides.take(name, lambda: survival.refuted(largest), nan)
     elif joint_error:
         largest = 0.0
-    return Verification(
+    return ArmVerification(
         problem=problem,
         trajectory=trajectory,
         errors=box,

@@ -24,14 +24,9 @@ function between(values, value) {
 class Motion {
   constructor(data, lengths) {
     this.rows = unpack(data.rows, Int32Array);
-    this.onPath = unpack(data.onPath, Uint8Array); // empty without a desired path
-    this.pathM = unpack(data.pathM, Float32Array);
-    this.x0 = unpack(data.x0, Float32Array);
-    this.alpha = unpack(data.alpha, Float32Array);
-    this.theta = unpack(data.theta, Float32Array);
-    this.drawn = this.smooth(data.smooth) || this.asRows();
     this.times = data.times ? unpack(data.times, Float64Array) : null; // of the rows [s]
     this.lengths = lengths;
+    this.read(data);
     this.end = this.rows[this.rows.length - 1];
     this.time = 0;
     this.playing = false;
@@ -41,6 +36,16 @@ class Motion {
     this.scales = { waypoint: this.rows, travel: this.travel() };
     if (this.times) this.scales.time = this.times.map((time) => time - this.times[0]);
     this.scale = this.scales.waypoint;
+  }
+
+  // The joint values of an arm.
+  read(data) {
+    this.onPath = unpack(data.onPath, Uint8Array); // empty without a desired path
+    this.pathM = unpack(data.pathM, Float32Array);
+    this.x0 = unpack(data.x0, Float32Array);
+    this.alpha = unpack(data.alpha, Float32Array);
+    this.theta = unpack(data.theta, Float32Array);
+    this.drawn = this.smooth(data.smooth) || this.asRows();
   }
 
   // What is drawn where straight lines join the rows.
@@ -61,7 +66,7 @@ class Motion {
     const found = new Float32Array(this.rows.length);
     let before = null;
     this.rows.forEach((row, k) => {
-      const tip = this.centres(row)[this.lengths.length];
+      const tip = this.centres(row).at(-1);
       if (before)
         found[k] = found[k - 1] + 1000 * Math.hypot(...tip.map((v, i) => v - before[i]));
       before = tip;

@@ -3,7 +3,8 @@
 
 (function () {
   const data = JSON.parse(document.getElementById("data").textContent);
-  const motion = new Motion(data.motion, data.scene.lengths);
+  const Kind = data.scene.links ? LinkMotion : Motion;
+  const motion = new Kind(data.motion, data.scene.lengths);
   const pane = document.getElementById("view");
   const view = makeView(pane, data.scene, motion);
   bindControls(motion, clearancesOf(data.charts, motion));

@@ -93,6 +93,7 @@ function crossings({ geometry: shape, matrix }, plane, points) {
 function sweptVolume(view) {
   const { InstancedMesh, Group, Object3D, Vector3 } = MeshCat.THREE;
   const { motion, scene } = view;
+  if (scene.links) return view.arm.swept(motion, Math.min(SWEPT, motion.drawn.moments.length));
   const moments = Math.min(SWEPT, motion.rows.length);
   const group = new Group();
   const placer = new Object3D();

@@ -29,7 +29,7 @@ class ArmView {
     this.viewer.scene.add(this.root);
     this.box = new Box3(); // what the side views have to show, in the base frame
     this.addPaths();
-    this.arm = new Arm(scene);
+    this.arm = this.body();
     this.root.add(this.arm.group);
     this.addGhosts();
     this.addObstacles();
@@ -57,6 +57,11 @@ class ArmView {
     this.overlay.resize();
     this.viewer.renderer.setSize(width, height);
     this.viewer.set_dirty();
+  }
+
+  // The arm, or any other robot; `more` changes the look of every part.
+  body(more = {}, scene = this.scene) {
+    return scene.links ? new Robot(scene, more) : new Arm(scene, more);
   }
 
   line(points, colour, opacity = 1) {
@@ -102,7 +107,7 @@ class ArmView {
 
   addPaths() {
     const { CylinderGeometry, Mesh, MeshBasicMaterial, Vector3, Group } = this.three;
-    const flat = unpack(this.scene.path, Float32Array);
+    const flat = unpack(this.scene.path || "", Float32Array);
     const corners = [];
     for (let i = 0; i < flat.length; i += 3) corners.push(new Vector3(...flat.slice(i, i + 3)));
     this.desired = new Group();
@@ -120,12 +125,11 @@ class ArmView {
     this.root.add(this.desired);
     corners.forEach((corner) => this.box.expandByPoint(corner));
 
-    const tracks = this.scene.lengths.map(() => []);
-    tracks.push([]);
+    const tracks = this.motion.centres(0).map(() => []);
     for (const moment of this.motion.drawn.moments)
       this.motion.centres(moment).forEach((point, j) => tracks[j].push(point));
     tracks.flat().forEach((point) => this.box.expandByPoint(new Vector3(...point)));
-    this.box.expandByScalar(this.scene.radius);
+    this.box.expandByScalar(this.scene.margin || this.scene.radius);
     const colours = ["#7a7f87", ...this.scene.colours];
     this.tracks = new Group();
     tracks.forEach((points, j) => this.tracks.add(this.line(points, colours[j], 0.75)));
@@ -143,6 +147,7 @@ class ArmView {
     const middle = this.box.getCenter(new Vector3());
     floor.position.set(Math.round(middle.x), Math.round(middle.y), low.z - 3 * this.scene.radius);
     this.root.add(floor);
+    if (this.scene.links) return;
     const rail = [[low.x - 0.3, 0, 0], [high.x + 0.2, 0, 0]];
     this.root.add(this.line(rail, 0x8b93a1, 0.8));
   }
@@ -152,8 +157,8 @@ class ArmView {
     const look = { transparent: true, opacity: GHOST, depthWrite: false };
     this.ghosts = (this.scene.ghosts || []).map((told) => {
       const colours = this.scene.colours.map(() => MARKED.short);
-      const arm = new Arm({ ...this.scene, colours }, look);
-      arm.pose(told.centres);
+      const arm = this.body(look, { ...this.scene, colours });
+      arm.pose(told.centres, told.turns);
       this.root.add(arm.group);
       return { ...told, arm };
     });

@@ -1,0 +1,57 @@
+"""What verification.json says of a robot of a URDF: joints, links, notes."""
+
+from typing import Any, Final
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.report.facts import finite
+from vdsm_pin.report.files import ErrorBoxRow, JointRow, LeftOutRow, RobotFacts
+from vdsm_pin.robots.cell import Cell
+from vdsm_pin.robots.judgement import RobotVerification
+from vdsm_pin.robots.model import RobotJoint
+
+_PIECES: Final = {1: "linear", 3: "cubic", 5: "quintic"}
+
+
+def robot_facts(verification: RobotVerification) -> dict[str, Any]:
+    """The fields of verification.json that are a robot's own."""
+    cell, path = verification.problem, verification.trajectory
+    return {
+        "notes": cell.robot.notes,
+        "coverage": None,
+        "path_length_m": None,
+        "undrawn_m": (),
+        "error_box": ErrorBoxRow(),
+        "left_out": tuple(
+            LeftOutRow(body=pair.one, other=pair.other, reason=pair.reason)
+            for pair in cell.robot.left_out
+        ),
+        "counterexamples": (),
+        "motion": _motion(cell, path),
+    }
+
+
+def _motion(cell: Cell, path: Path) -> RobotFacts:
+    robot = cell.robot
+    rows = (
+        _joint(joint, values)
+        for joint, values in zip(robot.joints, path.knots.T, strict=True)
+    )
+    return RobotFacts.model_validate(
+        {
+            "waypoints": path.n_samples,
+            "robot": robot.name,
+            "interpolation": _PIECES[path.degree],
+            "bodies": robot.solids.words,
+            "links": tuple(body.name for body in robot.bodies),
+            "joints": tuple(rows),
+        }
+    )
+
+
+def _joint(joint: RobotJoint, values: FloatArray) -> JointRow:
+    reached = float(values.min()), float(values.max())
+    limits = finite(joint.lower), finite(joint.upper)
+    if joint.turns:
+        return JointRow(name=joint.name, range_rad=reached, limits_rad=limits)
+    return JointRow(name=joint.name, range_m=reached, limits_m=limits)

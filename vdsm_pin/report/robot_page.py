@@ -1,0 +1,159 @@
+"""What a page shows of a robot of a URDF: its links, its motion, its joints' plots.
+
+Links are drawn as they are judged: a mesh as its convex hull.
+"""
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
+from vdsm_pin.geometry.solids import Capsule, Cylinder, Sphere
+from vdsm_pin.proof.bodies import Body
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.report.charts import packed
+from vdsm_pin.report.moves import quaternion
+from vdsm_pin.report.palette import link_colours
+from vdsm_pin.report.solids import FINE, Surface, joined, surface
+from vdsm_pin.report.thinning import Thinned
+from vdsm_pin.robots.hulls import hull_triangles
+from vdsm_pin.robots.judgement import RobotVerification
+from vdsm_pin.units import MM_PER_M
+
+_STEP: Final = np.deg2rad(4.0)
+"""Between two moments that a page is told no joint moves farther; [rad], [m]."""
+
+_MOST: Final = 4_000
+"""Moments that a page is told besides the rows."""
+
+_SMALLEST: Final = 1e-4
+"""Radius that a corner of a flat body is drawn with at least; [m]."""
+
+_SMOOTH: Final = 8
+"""Parts of a smooth piece at least."""
+
+
+def robot_links(verification: RobotVerification) -> dict[str, Any]:
+    """The links to draw, each about the middle of its corners."""
+    bodies = verification.problem.robot.bodies
+    skins, middles = [_skin(body) for body in bodies], _middles(bodies)
+    size = max(float(np.ptp(skin.vertices, axis=0).max()) for skin in skins)
+    return {
+        "radius": 0.1 * size,
+        "margin": 0.5 * size,
+        "colours": list(link_colours(len(bodies))),
+        "links": [
+            {
+                "name": body.name,
+                "vertices": packed(skin.vertices - middle),
+                "triangles": packed(skin.triangles, "<u4"),
+                "round": skin.round,
+            }
+            for body, skin, middle in zip(bodies, skins, middles, strict=True)
+        ],
+    }
+
+
+def robot_motion(verification: RobotVerification, shown: Thinned) -> dict[str, Any]:
+    """Where the links are at moments, near enough to go straight in between."""
+    cell, path = verification.problem, verification.trajectory
+    moments = _moments(path, shown)
+    intervals = np.minimum(moments.astype(np.int64), path.n_intervals - 1)
+    poses = cell.robot.tree.poses(path.within(intervals, moments - intervals))
+    bodies = cell.robot.bodies
+    places, turns = [], []
+    for body, middle in zip(bodies, _middles(bodies), strict=True):
+        of_link = poses[:, body.frame]
+        places.append(of_link[:, :3, :3] @ middle + of_link[:, :3, 3])
+        turns.append([quaternion(pose[:3, :3]) for pose in of_link])
+    return {
+        "moments": packed(moments, "<f8"),
+        "links": len(bodies),
+        "places": packed(places),
+        "turns": packed(turns),
+    }
+
+
+def _moments(path: Path, shown: Thinned) -> FloatArray:
+    rows = shown.rows.astype(np.float64)
+    if len(rows) < 2:
+        return rows
+    ways = np.abs(np.diff(path.knots[shown.rows], axis=0)).max(axis=1, initial=0.0)
+    most = max(1, _MOST // len(ways))
+    least = 1 if path.degree == 1 else min(_SMOOTH, most)
+    parts = np.ceil(ways / _STEP).clip(least, most).astype(int)
+    pairs = zip(rows[:-1], rows[1:], parts, strict=True)
+    told = [np.linspace(a, b, n, endpoint=False) for a, b, n in pairs]
+    return np.concatenate([*told, rows[-1:]])
+
+
+def _middles(bodies: Sequence[Body]) -> list[FloatArray]:
+    """The middle of each body's corners, in the frame of its link; [m]."""
+    found = []
+    for body in bodies:
+        corners = [
+            piece.points if isinstance(piece, Hull) else np.array([piece.centre])
+            for piece in body.pieces
+            if isinstance(piece, Hull | FlatCylinder)
+        ]
+        found.append(np.concatenate(corners).mean(axis=0))
+    return found
+
+
+def _skin(body: Body) -> Surface:
+    """Triangles to draw a body with, in the frame of its link."""
+    return joined([_surface(piece) for piece in body.pieces])
+
+
+def _surface(piece: Piece) -> Surface:
+    if isinstance(piece, FlatCylinder):
+        axis, half = piece.axis, piece.half_length
+        return surface(Cylinder("", piece.centre, axis, half, piece.radius), 1.0, FINE)
+    assert isinstance(piece, Hull)  # links have no half-spaces
+    points = piece.points
+    if (hull := hull_triangles(points)) is not None:
+        return Surface(*hull)
+    way = points[-1] - points[0]
+    length = float(np.linalg.norm(way))
+    if len(points) == 2 and length > 0.0:
+        middle, radius = points.mean(axis=0), piece.radius
+        return surface(Capsule("", middle, way / length, length / 2.0, radius), 1.0)
+    radius = max(piece.radius, _SMALLEST)
+    return joined([surface(Sphere("", point, radius), 1.0) for point in points])
+
+
+def joint_charts(
+    verification: RobotVerification, shown: Thinned
+) -> list[dict[str, Any]]:
+    """A plot of the joints that turn, and one of those that slide."""
+    joints = verification.problem.robot.joints
+    q = verification.trajectory.knots[shown.rows]
+    colours, charts = link_colours(len(joints)), []
+    for turns, name, unit, factor in (
+        (True, "Joint angles", "°", np.degrees(1.0)),
+        (False, "Joint positions", " mm", MM_PER_M),
+    ):
+        mine = [k for k, joint in enumerate(joints) if joint.turns is turns]
+        if not mine:
+            continue
+        charts.append(
+            {
+                "id": "turning" if turns else "sliding",
+                "title": name,
+                "note": "By the names of the URDF, at the waypoints.",
+                "unit": unit,
+                "axis": f"value [{unit.strip()}]",
+                "limits": [],
+                "series": [
+                    {
+                        "name": joints[k].name,
+                        "colour": colours[k],
+                        "values": packed(factor * q[:, k]),
+                    }
+                    for k in mine
+                ],
+            }
+        )
+    return charts
