@@ -201,3 +201,51 @@ def test_long_and_odd_names_have_folders_of_their_own(here: Path) -> None:
     rows = run_batch(Batch(tuple(f"{n}.yaml" for n in names), here / "out", "fewest"))
     assert [row.outcome for row in rows] == 4 * ["certified"]
     assert len({row.folder for row in rows}) == 4
+
+
+def test_an_arm_is_not_written_over_its_problem(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("urdf", "problem.yaml", "--out", "../" + here.name + "/part.stl") == 2
+    assert run("urdf", "problem.yaml", "--out", "problem.yaml") == 2
+    assert capsys.readouterr().err.count("is an input") == 2
+    assert (here / "problem.yaml").read_text() == PROBLEM
+    assert run("urdf", "problem.yaml", "--out", "arm.urdf") == 0
+
+
+@pytest.mark.parametrize("name", ["executed.csv", "simulation.html"])
+def test_a_simulation_is_not_written_over_its_plan(
+    name: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copy("motion.csv", name)
+    before = (here / name).read_bytes()
+    words = ["simulate", "problem.yaml", "--trajectory", name, "--out", "."]
+    assert run(*words) == 2
+    assert "is an input" in capsys.readouterr().err
+    assert (here / name).read_bytes() == before
+
+
+def test_nothing_takes_the_place_of_a_pipe(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "out").mkdir()
+    pipes = here / "pipe", here / "out" / "cables.csv"
+    verify = ["verify", "problem.yaml", "--trajectory", "motion.csv"]
+    for pipe in pipes:
+        os.mkfifo(pipe)
+        assert run(*verify, "--out", pipe.parent, "--certificate", pipes[0]) == 2
+    assert run("plan", "problem.yaml", "--out", "out") == 2
+    assert run("view", "problem.yaml", "--html", "pipe") == 2
+    with pytest.raises(InvalidFile, match="is there and is not a regular file"):
+        problem = api.read_problem("problem.yaml")
+        motion = api.read_trajectory("motion.csv", problem)
+        api.write_trajectory(pipes[0], motion)
+    assert capsys.readouterr().err.count("is not a regular file") == 4
+    assert all(pipe.is_fifo() for pipe in pipes)
+
+
+def test_a_batch_writes_over_no_table_of_others(here: Path) -> None:
+    (here / "summary.csv").write_text("mine")
+    with pytest.raises(InvalidFile, match="is not a result of a batch"):
+        run_batch(Batch(("problem.yaml",), here, "fewest"))
+    assert (here / "summary.csv").read_text() == "mine"

@@ -166,6 +166,7 @@ def _tasks(batch: Batch) -> list[Task]:
         InvalidFile: If a folder to be written holds something else.
     """
     names = folder_names(expanded(batch.problems), OWN)
+    _check_own(batch.folder)
     check_kept([batch.folder / name for name in OWN], map(Path, names))
     tasks = []
     for problem, name in names.items():
@@ -185,6 +186,20 @@ def _tasks(batch: Batch) -> list[Task]:
         )
         tasks.append(task)
     return tasks
+
+
+def _check_own(folder: Path) -> None:
+    """Refuse a folder with files that would be overwritten and are no batch's.
+
+    Raises:
+        InvalidFile: If there is one; every batch leaves its lock beside its files.
+    """
+    if (folder / _LOCK).exists():
+        return
+    for file in (folder / name for name in OWN):
+        if file.exists():
+            what = "exists and is not a result of a batch; nothing was overwritten"
+            raise InvalidFile(file=file, problem=what)
 
 
 def _check_replaceable(final: Path) -> None:

@@ -46,22 +46,23 @@ def urdf(
     from vdsm_pin.arm.urdf_writer import mesh_names, urdf_text
     from vdsm_pin.io.atomic import atomic_path
     from vdsm_pin.io.problem_file import built_in_names, read_problem
-    from vdsm_pin.report.folder import check_output_file
+    from vdsm_pin.report.folder import check_kept, check_output_file
     from vdsm_pin.report.solids import obj_text
 
     known = name in BUILT_IN or name in built_in_names() or Path(name).exists()
     if not known:
         built_in(name)  # which says what arms there are
-    arm = BUILT_IN.get(name) or read_problem(name).problem.manipulator
+    source = None if name in BUILT_IN else read_problem(name)
+    arm = BUILT_IN[name] if source is None else source.problem.manipulator
     text = urdf_text(arm)
-    check_output_file(out)
     shapes = {solid.name: solid for _, solid in arm.carried}
     files = {
         out.with_name(file): obj_text(shapes[body])
         for body, file in mesh_names(arm).items()
     }
-    for file in files:
+    for file in (out, *files):
         check_output_file(file)
+    check_kept((out, *files), () if source is None else source.source.files)
     for file, content in {**files, out: text}.items():
         with atomic_path(file) as path:
             path.write_text(content, encoding="utf-8")

@@ -46,7 +46,8 @@ def simulate(
     from vdsm_pin.simulation.terminal import show_simulation
 
     assumed = Settings() if settings is None else read_settings(settings)
-    order = SimulationOrder(read_problem(problem), trajectory, out, assumed)
+    source = read_problem(problem)
+    order = SimulationOrder(source, trajectory, out, assumed, settings)
     file = simulate_to_folder(order)
     show_simulation(file, out)
     passed = file.executed.verdict == "certified"

@@ -9,6 +9,18 @@ from pathlib import Path
 from vdsm_pin.errors import InvalidFile
 
 
+def check_replaceable(path: Path) -> None:
+    """Refuse to put a file where something stands that is none, as a pipe or a device.
+
+    Raises:
+        InvalidFile: If there is a folder or a special file.
+    """
+    if path.is_dir():
+        raise InvalidFile(file=path, problem="is a folder, expected a file")
+    if path.exists() and not path.is_file():
+        raise InvalidFile(file=path, problem="is there and is not a regular file")
+
+
 @contextmanager
 def atomic_path(path: str | Path) -> Iterator[Path]:
     """A path to write to, whose file takes its final name when the block succeeds.
@@ -29,8 +41,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     final = Path(path)
     temporary = final.with_name(f".{final.name[:80]}.{secrets.token_hex(8)}.part")
     try:
-        if final.is_dir():
-            raise InvalidFile(file=path, problem="is a folder, expected a file")
+        check_replaceable(final)
         final.parent.mkdir(parents=True, exist_ok=True)
         yield temporary
         _flush(temporary)

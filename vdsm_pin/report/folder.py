@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.io.atomic import check_replaceable
 
 
 def check_output_folder(folder: Path) -> None:
@@ -29,10 +30,10 @@ def check_output_file(path: Path) -> None:
     """Refuse an output file that cannot be written, before any work is done.
 
     Raises:
-        InvalidFile: If it is a folder, or its folder cannot take files.
+        InvalidFile: If it is a folder or a special file, or its folder cannot take
+            files.
     """
-    if path.is_dir():
-        raise InvalidFile(file=path, problem="is a folder, expected a file")
+    check_replaceable(path)
     check_output_folder(path.parent)
 
 
@@ -46,10 +47,11 @@ def check_kept(outputs: Sequence[Path], inputs: Iterable[Path]) -> None:
         inputs: Files that are read.
 
     Raises:
-        InvalidFile: If one output is an input or another output.
+        InvalidFile: If one output is an input, another output, or no regular file.
     """
     places: dict[str, Path] = {}
     for output in outputs:
+        check_replaceable(output)
         first = places.setdefault(os.path.realpath(output), output)
         if first is not output:
             problem = f"is where {first} goes too; nothing was written"

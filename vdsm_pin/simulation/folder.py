@@ -17,7 +17,7 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.report.facts import finite
 from vdsm_pin.report.files import FileModel, VerdictWord
-from vdsm_pin.report.folder import check_output_folder, staged
+from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.run_record import versions
 from vdsm_pin.simulation.closed_loop import SLACK, Simulation, simulate
 from vdsm_pin.simulation.page import page
@@ -85,12 +85,22 @@ class SimulationOrder:
         trajectory: The planned trajectory file.
         folder: Where the results go.
         settings: What is assumed.
+        settings_file: Where that was read; None for the defaults.
     """
 
     source: ProblemFile
     trajectory: Path
     folder: Path
     settings: Settings
+    settings_file: Path | None = None
+
+
+def _check_outputs(order: SimulationOrder) -> None:
+    """Refuse what cannot be written, or would take an input's place."""
+    check_output_folder(order.folder)
+    read = [*order.source.source.files, order.trajectory, order.settings_file]
+    outputs = [order.folder / name for name in (EXECUTED, RECORD, SUMMARY, PAGE)]
+    check_kept(outputs, filter(None, read))
 
 
 def simulate_to_folder(order: SimulationOrder) -> SimulationFile:
@@ -100,7 +110,7 @@ def simulate_to_folder(order: SimulationOrder) -> SimulationFile:
         InvalidInput: If a file is bad or the folder cannot be written.
         VerificationFailed: If MuJoCo is missing or the simulation diverges.
     """
-    check_output_folder(order.folder)
+    _check_outputs(order)
     problem = order.source.problem
     if problem.scene.moving:
         name = problem.scene.moving[0].name
