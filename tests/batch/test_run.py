@@ -164,6 +164,20 @@ def check_kills(problems: Path, reference: Path, out: Path, rounds: int) -> int:
     return killed
 
 
+def test_what_a_killed_batch_was_writing_is_gone_after_the_next(
+    problems: Path, reference: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(reference, out)
+    for name in ("summary.csv", "rows.parquet"):
+        (out / f".{name}.0123456789abcdef.part").write_text("half")
+    (out / ".mine.part").write_text("whole")
+    (out / ".unfinished" / "good").mkdir(parents=True)
+    run_batch(Batch((str(problems),), out, "paper", resume=True))
+    (out / ".mine.part").unlink()
+    assert tree(out) == tree(reference)
+
+
 def test_killed_and_resumed_is_the_same_to_the_byte(
     problems: Path, reference: Path, tmp_path: Path
 ) -> None:

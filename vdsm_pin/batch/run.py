@@ -28,7 +28,7 @@ from vdsm_pin.batch.task import (
     write_manifest,
 )
 from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
-from vdsm_pin.io.atomic import atomic_path, write_text
+from vdsm_pin.io.atomic import atomic_path, remove_parts, write_text
 from vdsm_pin.io.problem_file import built_in_names
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.report.browser import find_browser
@@ -105,6 +105,8 @@ def run_batch(batch: Batch) -> tuple[BatchRow, ...]:
     tasks = _tasks(batch)
     batch.folder.mkdir(parents=True, exist_ok=True)
     with _locked(batch.folder), _stoppable() as stop:
+        for name in OWN:
+            remove_parts(batch.folder / name)
         shutil.rmtree(batch.folder / _ASIDE, ignore_errors=True)
         rows: list[BatchRow] = []
         running = batch.folder / RUNNING
@@ -167,7 +169,8 @@ def _tasks(batch: Batch) -> list[Task]:
     """
     names = folder_names(expanded(batch.problems), OWN)
     _check_own(batch.folder)
-    check_kept([batch.folder / name for name in OWN], map(Path, names))
+    files = [batch.folder / name for name in OWN if name != _ASIDE]
+    check_kept(files, map(Path, names))
     tasks = []
     for problem, name in names.items():
         final = batch.folder / name

@@ -1,5 +1,6 @@
 """Files that appear whole or not at all."""
 
+import glob
 import os
 import secrets
 from collections.abc import Iterator
@@ -39,7 +40,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         InvalidFile: If the folder cannot be made or the file not be written.
     """
     final = Path(path)
-    temporary = final.with_name(f".{final.name[:80]}.{secrets.token_hex(8)}.part")
+    temporary = final.with_name(_part(final, secrets.token_hex(8)))
     try:
         check_replaceable(final)
         final.parent.mkdir(parents=True, exist_ok=True)
@@ -53,6 +54,17 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     finally:
         with suppress(OSError):  # told above already, or nothing to remove
             temporary.unlink()
+
+
+def remove_parts(path: Path) -> None:
+    """Remove what killed processes left of a file that nobody is writing now."""
+    for part in path.parent.glob(_part(Path(glob.escape(path.name)), "?" * 16)):
+        part.unlink(missing_ok=True)
+
+
+def _part(final: Path, mark: str) -> str:
+    """Name of a file that is being written; marks tell writers apart."""
+    return f".{final.name[:80]}.{mark}.part"
 
 
 def write_text(path: str | Path, text: str) -> None:
