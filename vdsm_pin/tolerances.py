@@ -94,6 +94,10 @@ class Tolerances:
     scene_extent: float = _held(100.0, "m")
     """Largest coordinate in the base frame, for which `arithmetic` is derived; [m]."""
 
+    mesh_extent: float = _held(10.0, "m")
+    """Largest coordinate of a mesh in its own frame that is turned about its origin in
+    floating point, which loses 5e-14 m there; [m]."""
+
     path_extent: float = _held(1e4, "m")
     """Largest path_m of a trajectory; [m].
 

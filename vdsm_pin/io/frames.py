@@ -98,7 +98,7 @@ class Frame:
         """
         pivot, shift = np.zeros(3), np.array(center) - self.origin
         reach = float(self.metres(np.abs(vertices).max() * scale))
-        if not reach <= TOLERANCES.scene_extent:
+        if not reach <= TOLERANCES.mesh_extent:
             pivot = vertices[0]
             shift = self._far_shift(pivot, scale, rpy_deg, center)
         turn = rotation_from_rpy(radians(rpy_deg))
