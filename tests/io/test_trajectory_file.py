@@ -209,9 +209,13 @@ def test_a_last_row_without_line_end_is_read(tmp_path: Path) -> None:
     found = read_trajectory(tmp_path / "t.csv", short_arm())
     assert same(found, read_trajectory(tmp_path / "plain.csv", short_arm()))
     assert "the last row has no line end" in found.notes[0]
-    for cut in ("0.5e", "0.5e-", "-", "0.5,"):
+    for cut in ("0.5e", "0.5e-", "0.5e-0", "5e1", "5.E+0", "-", "0.5,"):
         message = refused(tmp_path, WHOLE.rstrip("\n").rpartition(",")[0] + "," + cut)
         assert "the line has no end: is the file cut short?" in message
+    for whole in ("1.5e-05", "0.5e-10", '"1e-5"'):
+        text = WHOLE.rstrip("\n").rpartition(",")[0] + "," + whole
+        (tmp_path / "t.csv").write_text(text)
+        read_trajectory(tmp_path / "t.csv", short_arm())
 
 
 def test_what_is_no_table_is_refused(tmp_path: Path) -> None:

@@ -34,6 +34,9 @@ PLAIN: Final = b"0123456789+-.eE, \r\n"
 
 _BETWEEN: Final = (",", ";", "\t")
 _NUMBER: Final = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*", re.ASCII)
+_CUT: Final = re.compile(r"\d\.?[eE][-+]?\d\Z", re.ASCII)
+"""A last number with one digit of an exponent, which most programs write with two."""
+
 _BLANK: Final = ' \t\n;,"'
 _NAMES_SHOWN: Final = 8
 
@@ -145,6 +148,9 @@ class Table:
                 if len(line) == MAX_LINE:
                     problem = f"is longer than {MAX_LINE} characters"
                     raise Row(self._file, number + i).invalid(problem)
+                if _CUT.search(line):
+                    problem = f"ends in {line[-8:]!r}, whose exponent may be cut short"
+                    raise Row(self._file, number + i, ended=False).invalid(problem)
                 self.open_ended = True
 
     def _blank(self, lines: list[str], number: int, before: int) -> int:
