@@ -60,6 +60,8 @@ def _change(holder: Any, step: Any, rng: np.random.Generator) -> None:
         case 3:
             holder[f"{step}_"] = value
         case 4 if isinstance(value, int | float):
+            # Whole numbers may be larger than any float.
+            value = value if abs(value) < 10**300 else 1.0
             holder[step] = value * 10.0 ** int(rng.integers(-9, 10))
         case _:
             others = list(holder) if isinstance(holder, dict) else range(len(holder))
