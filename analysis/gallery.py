@@ -29,7 +29,7 @@ QUALITY: Final = 85
 def run(script: Path, folder: Path) -> Path | None:
     """The first report that an example writes, if it writes one."""
     subprocess.run([sys.executable, str(script)], cwd=folder, check=True)
-    reports = sorted([*folder.glob("*.html"), *folder.glob("*_out/*/report.html")])
+    reports = sorted([*folder.glob("*.html"), *folder.glob("*_out/**/report.html")])
     return reports[0] if reports else None
 
 

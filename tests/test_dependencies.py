@@ -59,7 +59,7 @@ def ours() -> set[str]:
 @pytest.mark.parametrize(
     ("folder", "extras"),
     [
-        ("vdsm_pin", ("cluster", "parquet", "simulation")),
+        ("vdsm_pin", ("cluster", "parquet", "simulation", "xacro", "bags")),
         ("tests", ("dev", "docs")),
         ("analysis", ("dev",)),
         ("benchmarks", ("dev", "references")),

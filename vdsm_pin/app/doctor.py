@@ -20,6 +20,8 @@ USES: Final = {
     "cluster": "vdsm batch --scheduler: many machines",
     "parquet": "rows.parquet beside the folders of a batch",
     "simulation": "vdsm simulate: a plan in closed loop",
+    "xacro": "robots as xacro files",
+    "bags": "trajectories in ROS bags and MCAP files",
     "ompl": "benchmark of foreign plans",
     "references": "benchmarks beside other planners",
 }

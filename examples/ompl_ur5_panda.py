@@ -1,0 +1,60 @@
+"""OMPL plans for a UR5 and a Panda by samples; the proof judges what lies between."""
+
+import subprocess
+from pathlib import Path
+
+import coal
+import numpy as np
+import pinocchio as pin
+from ompl import base, geometric, util
+
+SHARE = Path(pin.__file__).parents[4] / "share"
+UR5 = ("ur", "ur5_robot", "ur5", [-1.2, -1.0, 1.4, -0.4, 0, 0])
+PANDA = ("panda", "panda", "panda", [-0.9, 0.4, 0, -1.8, 0, 2.2, 0.8])
+POST = "{name: post, shape: box, center: [0.5, 0, 0.4], size: [0.03, 0.03, 0.8]}"
+util.setLogLevel(util.LogLevel.LOG_NONE)
+util.RNG.setSeed(1)
+
+
+def planned(model: pin.Model, urdf: str, srdf: str, start: list[float]) -> np.ndarray:
+    """Waypoints of RRTConnect at its default resolution, to the mirrored start."""
+    solids = pin.buildGeomFromUrdf(model, urdf, pin.COLLISION, package_dirs=str(SHARE))
+    there = pin.SE3(np.eye(3), np.array([0.5, 0.0, 0.4])), coal.Box(0.03, 0.03, 0.8)
+    solids.addGeometryObject(pin.GeometryObject("post", 0, 0, *there))
+    solids.addAllCollisionPairs()
+    pin.removeCollisionPairs(model, solids, srdf)
+    data, seen, n = model.createData(), pin.GeometryData(solids), len(start)
+
+    def clear(state: base.State) -> bool:
+        q = np.array([*(state[k] for k in range(n)), *[0.0] * (model.nq - n)])
+        return not pin.computeCollisions(model, data, solids, seen, q, True)
+
+    space, bounds = base.RealVectorStateSpace(n), base.RealVectorBounds(n)
+    begin, end = space.allocState(), space.allocState()
+    for k in range(n):
+        bounds.setLow(k, float(model.lowerPositionLimit[k]))
+        bounds.setHigh(k, float(model.upperPositionLimit[k]))
+        begin[k], end[k] = float(start[k]), float(start[k] if k else -start[0])
+    space.setBounds(bounds)
+    setup = geometric.SimpleSetup(space)
+    setup.setStateValidityChecker(clear)
+    setup.setStartAndGoalStates(begin, end)
+    assert setup.solve(20.0)
+    setup.simplifySolution()
+    states = setup.getSolutionPath().getStates()
+    return np.array([[state[k] for k in range(n)] for state in states])
+
+
+Path("scene.yaml").write_text(f"length_unit: m\nobstacles: [{POST}]\n")
+for family, urdf, name, start in (UR5, PANDA):
+    folder = SHARE / "example-robot-data" / "robots" / f"{family}_description"
+    files = f"{folder}/urdf/{urdf}.urdf", f"{folder}/srdf/{name}.srdf"
+    model = pin.buildModelFromUrdf(files[0])
+    rows = planned(model, *files, start)
+    head = ",".join(f"{joint}_rad" for joint in [*model.names][1 : len(start) + 1])
+    np.savetxt(f"{name}.csv", rows, "%.17g", ",", header=head, comments="")
+    command = f"vdsm verify --urdf {files[0]} --srdf {files[1]} --package-dir {SHARE} "
+    command += f"--scene scene.yaml --trajectory {name}.csv --out {name}_out "
+    command += "--bodies parts"
+    command += " --lock panda_finger_joint1=0" * (name == "panda")
+    subprocess.run(command.split(), check=False)
