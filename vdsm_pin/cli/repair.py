@@ -21,6 +21,7 @@ from vdsm_pin.cli.robot import (
     Topic,
     Urdf,
 )
+from vdsm_pin.errors import InvalidInput
 from vdsm_pin.time_limit import Deadline, enforced
 
 commands = family()
@@ -38,7 +39,7 @@ def repair(
     trajectory: Trajectory,
     out: OutFolder,
     problem: Annotated[
-        Path | None,
+        str | None,
         typer.Argument(
             metavar="PROBLEM", help="A problem file with robot; none with --urdf."
         ),
@@ -84,7 +85,7 @@ def repair(
         joint_limits,
     )
     with enforced(deadline):
-        cell = options.cell(problem)
+        cell = options.cell(None if problem is None else _of_robot(problem))
         order = VerifyOrder(
             cell, trajectory, out, context.obj, deadline=deadline, topic=topic
         )
@@ -94,3 +95,22 @@ def repair(
         f"certified with {len(found.moved)} waypoints, {new} of them new; moved by "
         f"{found.moved.max():.6f} rad (m) at most; wrote {out}"
     )
+
+
+def _of_robot(problem: str) -> Path:
+    """The problem file of a robot.
+
+    Raises:
+        InvalidInput: If the problem is about a snake arm.
+    """
+    from vdsm_pin.io.problem_file import ProblemOfRobot, read_problem
+
+    try:
+        read_problem(problem)
+    except ProblemOfRobot as error:
+        return Path(error.file)
+    message = (
+        f"{problem} is about a snake arm, whose motions are not repaired; "
+        "vdsm plan makes a certified one"
+    )
+    raise InvalidInput(message)

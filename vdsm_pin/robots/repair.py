@@ -22,8 +22,14 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.records import Verdict
 
-MARGINS: Final = (1e-3, 2e-3, 4e-3, 8e-3, 8e-3, 8e-3, 8e-3, 8e-3)
-"""Beyond the required clearance, round by round; [m]."""
+FIRST: Final = 1e-3
+"""Room beyond the required clearance that a pair gets first; [m]."""
+
+WIDEST: Final = 8e-3
+"""The most, after it was doubled whenever the pair was still too near; [m]."""
+
+ROUNDS: Final = 12
+"""Of pushing and judging."""
 
 APART: Final = float(np.radians(1.0))
 """How far samples lie apart in the joint that moves most; [rad], [m]."""
@@ -74,13 +80,16 @@ class _Rows:
     given: IntArray
     fixed: BoolArray
 
-    def sampled(self) -> "_Rows":
-        """The same motion with samples between the waypoints."""
+    def sampled(self, moments: FloatArray) -> "_Rows":
+        """The same motion with samples between the waypoints, and at some moments."""
         parts = []
         for k, way in enumerate(np.diff(self.q, axis=0)):
             count = max(1, int(np.ceil(np.abs(way).max() / APART)))
             parts.append(k + np.arange(count) / count)
-        places = np.concatenate([*parts, [len(self.q) - 1.0]])
+        last = len(self.q) - 1.0
+        places = np.unique(
+            np.concatenate([*parts, [last], np.clip(moments, 0.0, last)])
+        )
         first = np.minimum(places.astype(np.int64), max(len(self.q) - 2, 0))
         share = (places - first)[:, None]
         after = np.minimum(first + 1, len(self.q) - 1)
@@ -129,41 +138,45 @@ def repair_robot(
             raise InvalidInput(message)
     fixed = np.isin(np.arange(n), [0, n - 1, *pinned])
     rows = _Rows(path.knots, path.knots, np.arange(n), fixed)
-    near: dict[int, None] = {}
+    near: dict[int, float] = {}
     found = verify_robot(cell, path, deadline)
-    for margin in MARGINS:
+    for _ in range(ROUNDS):
         bad = np.flatnonzero(found.least.verdict != CERTIFIED).tolist()
         if not bad or deadline.passed:
             break
-        near |= dict.fromkeys(bad)
-        rows = _pushed(rows, cell, [cell.pairs[k] for k in near], margin)
+        near |= {k: min(2.0 * near.get(k, 0.5 * FIRST), WIDEST) for k in bad}
+        slopes = _Slopes(
+            cell, [cell.pairs[k] for k in near], np.array([*near.values()])
+        )
+        moments = found.least.interval[bad] + found.least.time[bad]
+        rows = _pushed(rows.sampled(moments[moments >= 0.0]), slopes)
         found = verify_robot(cell, Path(rows.q), deadline)
     if found.verdict is not Verdict.CERTIFIED:
         raise Infeasible(_why(found))
     return Repaired(found, rows.given, np.abs(rows.q - rows.base).max(axis=1))
 
 
-def _pushed(rows: _Rows, cell: Cell, pairs: Sequence[Pair], margin: float) -> _Rows:
+def _pushed(rows: _Rows, slopes: "_Slopes") -> _Rows:
     """The motion with waypoints where pairs come too near, pushed apart.
 
     Raises:
         Infeasible: If a waypoint that stays is too near.
     """
-    rows, slopes = rows.sampled(), _Slopes(cell, pairs, margin)
     gaps = slopes.gaps(rows.q)
-    for k in np.flatnonzero(rows.fixed & (gaps.min(axis=1) < -margin)):
-        pair = pairs[int(np.argmin(gaps[k]))]
-        short = -MM_PER_M * (gaps[k].min() + margin)
+    room = gaps + slopes.margins
+    for k in np.flatnonzero(rows.fixed & (room.min(axis=1) < 0.0)):
+        words = slopes.words(int(np.argmin(room[k])))
+        short = -MM_PER_M * room[k].min()
         message = (
-            f"waypoint {rows.given[k]} stays, and there {cell.names(pair)} are "
+            f"waypoint {rows.given[k]} stays, and there {words} are "
             f"{short:.3f} mm nearer than required"
         )
         raise Infeasible(message)
     bad = (gaps.min(axis=1) < 0.0) & ~rows.fixed
     if bad.sum() > MOST:
-        pair = pairs[int(np.argmin(gaps.min(axis=0)))]
+        words = slopes.words(int(np.argmin(gaps.min(axis=0))))
         message = (
-            f"{int(bad.sum())} samples are too near, {cell.names(pair)} most: small "
+            f"{int(bad.sum())} samples are too near, {words} most: small "
             "changes do not lead round; expected a new plan"
         )
         raise Infeasible(message)
@@ -180,13 +193,18 @@ def _pushed(rows: _Rows, cell: Cell, pairs: Sequence[Pair], margin: float) -> _R
 
 
 class _Slopes:
-    """How much room pairs have beyond what is cell, and where it grows."""
+    """How much room pairs have beyond what is asked, and where it grows."""
 
-    def __init__(self, cell: Cell, pairs: Sequence[Pair], margin: float) -> None:
+    def __init__(self, cell: Cell, pairs: Sequence[Pair], margins: FloatArray) -> None:
         self._tree, self._coal, self._pairs = cell.robot.tree, cell.coal, pairs
-        self._target = np.array([pair.required + margin for pair in pairs])
+        self._cell, self.margins = cell, margins
+        self._target = np.array([pair.required for pair in pairs]) + margins
         joints = cell.robot.joints
         self._limits = [j.lower for j in joints], [j.upper for j in joints]
+
+    def words(self, k: int) -> str:
+        """Both bodies of a pair."""
+        return self._cell.names(self._pairs[k])
 
     def gaps(self, q: FloatArray) -> FloatArray:
         """Room of every pair at rows of q, shape (n_rows, n_pairs); [m]."""
@@ -195,9 +213,12 @@ class _Slopes:
 
     def up(self, q: FloatArray) -> FloatArray:
         """A row of q that has room, or what steps along slopes lead to."""
+        best, most = q, -np.inf
         for _ in range(PUSHES):
             gaps = self.gaps(q[None])[0]
             k = int(np.argmin(gaps))
+            if gaps[k] > most:
+                best, most = q, gaps[k]
             if not -np.inf < gaps[k] < 0.0:
                 break
             slope = (self._of(k, q + STEP * np.eye(len(q))) - gaps[k]) / STEP
@@ -207,7 +228,7 @@ class _Slopes:
             step = 1.02 * -gaps[k] * slope / squared
             step *= min(1.0, LONGEST / np.abs(step).max())
             q = np.clip(q + step, *self._limits)
-        return q
+        return best
 
     def _of(self, k: int, q: FloatArray) -> FloatArray:
         """Room of one pair at rows of q, shape (n_rows,); [m]."""

@@ -18,7 +18,9 @@ from vdsm_pin.io.schema_types import FileModel
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
 from vdsm_pin.problem.scene import Moving, Obstacle, Scene
+from vdsm_pin.robots.mjcf import read_mjcf
 from vdsm_pin.robots.places import Place
+from vdsm_pin.robots.scene_text import read_scene_text
 
 MAX_BYTES: Final = 32 << 20
 UNIT_NORM: Final = 1e-3
@@ -39,14 +41,21 @@ def read_scene(path: Path, robot_size: float) -> Scene:
 
     Args:
         path: A YAML file: `length_unit` and `obstacles` as in a problem file, or a
-            PlanningScene as MoveIt writes it.
+            PlanningScene as MoveIt writes it; its `.scene` text; or a world in MJCF
+            (`.xml`, `.mjcf`).
         robot_size: For judging the size of a mesh; [m].
 
     Raises:
         InvalidFile: If the file breaks its contract, or has what is not judged: meshes
             with an inside, attached objects.
     """
-    document = read_yaml(read_text(path, limit=MAX_BYTES), file=path)
+    kind = path.suffix.lower()
+    if kind in (".xml", ".mjcf"):
+        return read_mjcf(path)
+    text = read_text(path, limit=MAX_BYTES)
+    if kind == ".scene":
+        return _moveit(read_scene_text(path, text))
+    document = read_yaml(text, file=path)
     if isinstance(document.data, dict) and "world" in document.data:
         scene = _moveit(document)
     else:

@@ -1,0 +1,157 @@
+"""Scenes of other programs: MoveIt's text, MuJoCo's worlds."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.robots.test_robots import mutated, write
+from vdsm_pin.errors import InvalidFile, VdsmError
+from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Sphere
+from vdsm_pin.robots.scene_files import read_scene
+
+OLD = """(noname)+
+* big box
+1
+box
+0.1 0.2 0.4
+1 2 3
+0 0 0.70710678 0.70710678
+0 0 0 0
+* can
+2
+cylinder
+0.05 0.3
+0 0 1
+0 0 0 1
+0 0 0 0
+sphere
+0.1
+0 0 2
+0 0 0 1
+0 0 0 0
+.
+"""
+NEW = """(noname)+
+* big box
+1 2 3
+0 0 0.70710678 0.70710678
+1
+box
+0.1 0.2 0.4
+0 0 0
+0 0 0 1
+0 0 0 0
+1
+handle
+0 0 0.1
+0 0 0 1
+* floor
+0 0 0
+0 0 0 1
+1
+plane
+0 0 1 0.5
+0 0 0
+0 0 0 1
+0 0 0 0
+0
+.
+"""
+WORLD = """<mujoco>
+  <worldbody>
+    <geom name="floor" type="plane" size="0 0 1" pos="0 0 -1"/>
+    <geom name="picture" type="ellipsoid" size="1 1 1" contype="0" conaffinity="0"/>
+    <body pos="1 0 0" euler="0 0 90">
+      <geom name="crate" type="box" size="0.1 0.2 0.3"/>
+      <geom name="rod" type="capsule" fromto="0 0 0 0 0 1" size="0.05"/>
+      <body pos="0 1 0"><geom name="can" type="cylinder" size="0.05 0.2"/></body>
+      <geom type="sphere" size="0.1" pos="0 0 3"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def test_scene_text_is_read_in_both_forms(tmp_path: Path) -> None:
+    box, can, ball = read_scene(write(tmp_path, "old.scene", OLD), 1.0).obstacles
+    other, floor = read_scene(write(tmp_path, "new.scene", NEW), 1.0).obstacles
+    assert isinstance(box, Box)
+    assert isinstance(other, Box)
+    for one in (box, other):
+        assert one.name == "big box"
+        np.testing.assert_array_equal(one.centre, [1, 2, 3])
+        np.testing.assert_array_equal(one.half_size, [0.05, 0.1, 0.2])
+        np.testing.assert_allclose(one.rotation[:, 0], [0, 1, 0], atol=1e-8)
+    assert isinstance(can, Cylinder)
+    assert (can.radius, can.half_length) == (0.05, 0.15)
+    assert isinstance(ball, Sphere)
+    assert isinstance(floor, HalfSpace)
+    assert floor.normal @ floor.point == pytest.approx(-0.5)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        (
+            "box\n0.1",
+            "mesh\n0.1",
+            "line 4: is the shape 'mesh', expected one of sphere",
+        ),
+        ("0.2 0.4", "0.2 x", "line 5: is 'x', expected a number"),
+        ("\n.\n", "\n", "the file ends"),
+        ("* can", "can", "is 'can', expected"),
+        ("0.1 0.2 0.4", "0.1 -0.2 0.4", "half_size is"),
+        ("0 0 0.70710678 0.70710678", "0 0 1 1", "orientation of length 1.41"),
+    ],
+)
+def test_odd_scene_text_is_refused(
+    tmp_path: Path, old: str, new: str, expected: str
+) -> None:
+    with pytest.raises(InvalidFile) as caught:
+        read_scene(write(tmp_path, "s.scene", OLD.replace(old, new, 1)), 1.0)
+    assert expected in str(caught.value)
+
+
+def test_worlds_stand_where_mujoco_has_them(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    floor, crate, rod, ball, can = read_scene(
+        write(tmp_path, "world.xml", WORLD), 1.0
+    ).obstacles
+    assert isinstance(floor, HalfSpace)
+    assert floor.normal @ floor.point == pytest.approx(-1.0)
+    assert isinstance(crate, Box)
+    np.testing.assert_allclose(crate.rotation[:, 0], [0, 1, 0], atol=1e-12)
+    np.testing.assert_array_equal(crate.half_size, [0.1, 0.2, 0.3])
+    assert isinstance(rod, Capsule)
+    np.testing.assert_allclose(rod.centre, [1, 0, 0.5], atol=1e-12)
+    assert (rod.radius, rod.half_length) == (0.05, 0.5)
+    assert isinstance(can, Cylinder)
+    np.testing.assert_allclose(can.centre, [0, 0, 0], atol=1e-12)
+    assert isinstance(ball, Sphere)
+    joint = WORLD.replace(
+        "<body pos=", "<body><freejoint/><geom size='1'/></body>\n<body pos=", 1
+    )
+    for text, expected in (
+        (joint, "rides on a joint"),
+        (
+            WORLD.replace('"sphere" size="0.1"', '"ellipsoid" size="1 1 1"'),
+            "is a ellipsoid, expected plane",
+        ),
+        (WORLD[:200], "is refused by mujoco"),
+    ):
+        with pytest.raises(InvalidFile, match=expected):
+            read_scene(write(tmp_path, "world.xml", text), 1.0)
+
+
+def test_damaged_scenes_never_end_in_a_traceback(tmp_path: Path) -> None:
+    rng = np.random.default_rng(6)
+    refused = 0
+    for name, text in (("s.scene", OLD), ("n.scene", NEW), ("w.xml", WORLD)):
+        for _ in range(80):
+            try:
+                read_scene(write(tmp_path, name, mutated(text, rng)), 1.0)
+            except VdsmError as error:
+                refused += 1
+                assert len(str(error).splitlines()) == 1
+    assert refused > 100

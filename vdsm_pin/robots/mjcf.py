@@ -1,0 +1,70 @@
+"""What stands in a world of MuJoCo (MJCF), by mujoco (extra `mjcf`)."""
+
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Sphere
+from vdsm_pin.io.source import check_is_file
+from vdsm_pin.problem.scene import Obstacle, Scene
+
+
+def read_mjcf(file: Path) -> Scene:
+    """The geoms of a world that collide, where they stand.
+
+    Raises:
+        InvalidFile: If mujoco refuses the file, a geom rides on a joint, or is of
+            another type than plane, sphere, capsule, cylinder and box.
+    """
+    if find_spec("mujoco") is None:
+        problem = "MJCF needs mujoco: pip install 'vdsm-pin[mjcf]'"
+        raise InvalidFile(file=file, problem=problem)
+    check_is_file(file)
+    import mujoco
+
+    try:
+        model = mujoco.MjModel.from_xml_path(str(file))
+    except ValueError as error:
+        problem = f"is refused by mujoco: {' '.join(str(error).split())[:200]}"
+        raise InvalidFile(file=file, problem=problem) from None
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    found = [
+        _solid(file, model, data, k)
+        for k in range(model.ngeom)
+        if model.geom_contype[k] or model.geom_conaffinity[k]
+    ]
+    try:
+        return Scene(tuple(found))
+    except InvalidInput as error:
+        raise InvalidFile(file=file, problem=str(error)) from None
+
+
+def _solid(file: Path, model: Any, data: Any, k: int) -> Obstacle:
+    import mujoco
+
+    kind = mujoco.mjtGeom(model.geom_type[k]).name.removeprefix("mjGEOM_").lower()
+    name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, k) or f"{kind} {k}"
+    if model.body_weldid[model.geom_bodyid[k]] != 0:
+        problem = f"geom {name!r} rides on a joint, expected a world that stands still"
+        raise InvalidFile(file=file, problem=problem)
+    centre, size = np.array(data.geom_xpos[k]), np.array(model.geom_size[k])
+    turn = np.array(data.geom_xmat[k]).reshape(3, 3)
+    match kind:
+        case "plane":
+            return HalfSpace(name, centre, turn[:, 2])
+        case "sphere":
+            return Sphere(name, centre, float(size[0]))
+        case "capsule":
+            return Capsule(name, centre, turn[:, 2], float(size[1]), float(size[0]))
+        case "cylinder":
+            return Cylinder(name, centre, turn[:, 2], float(size[1]), float(size[0]))
+        case "box":
+            return Box(name, centre, turn, size)
+    problem = (
+        f"geom {name!r} is a {kind}, expected plane, sphere, capsule, cylinder or box"
+    )
+    raise InvalidFile(file=file, problem=problem)
