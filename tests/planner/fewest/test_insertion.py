@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem
 
+from benchmarks.hrm2000.curves import Bend, follow_the_leader, tip_curve
+from benchmarks.hrm2000.solids import Tube
+from benchmarks.hrm2000.sweeps import Sweep, least_bore
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import (
     CableLayout,
@@ -18,7 +21,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.charts import Directions, Projections
-from vdsm_pin.planner.fewest.follow_the_leader import followed
+from vdsm_pin.planner.fewest.follow_the_leader import followed, led_along
 from vdsm_pin.planner.fewest.insertion import insert
 from vdsm_pin.planner.fewest.insertion_population import Insertion, Layers
 from vdsm_pin.planner.fewest.judge import Judge
@@ -164,8 +167,13 @@ def test_the_tip_finds_windows_and_no_way_where_they_are_shut(half: float) -> No
     assert not list(space_of(shut).routes(goal, 1))
 
 
-def test_a_second_way_takes_the_other_window() -> None:
-    spans = ((-3.0, -0.4), (-0.2, 0.25), (0.45, 3.0))
+def two_ways(middle: float) -> PlanningProblem:
+    """A wall with windows on both sides, the wider one at positive y.
+
+    Args:
+        middle: Where it begins, 0.45 being its end; [m].
+    """
+    spans = ((-3.0, -0.4), (-0.2, middle), (0.45, 3.0))
     bars = [
         Box(f"bar{n}", np.array([1.0, (a + b) / 2, 0.0]), np.eye(3),
             np.array([0.02, (b - a) / 2, 3.0]))
@@ -176,13 +184,73 @@ def test_a_second_way_takes_the_other_window() -> None:
         for z in (-3.0, 3.0)
     ]
     ends = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
-    task = problem(
+    return problem(
         *bars, *lintels, points=ends[1:], start=(0.0, 0.0, 0.0), closed=False
     )
-    one, other = space_of(task).routes(ends[1], 2)
-    sides = [route[np.abs(route[:, 0] - 1.0).argmin(), 1] for route in (one, other)]
-    assert sorted(np.sign(sides)) == [-1.0, 1.0]
+
+
+def side_of(route: FloatArray) -> float:
+    """Where a way passes the wall; [m]."""
+    return float(route[np.abs(route[:, 0] - 1.0).argmin(), 1])
+
+
+def test_a_second_way_takes_the_other_window() -> None:
+    task = two_ways(0.25)
+    one, other = space_of(task).routes(task.path.points[0], 2)
+    assert sorted(np.sign([side_of(one), side_of(other)])) == [-1.0, 1.0]
     assert length_of(one) < length_of(other) + 0.2
+
+
+def test_ways_avoid_where_an_arm_got_stuck() -> None:
+    """The wider window, unless an arm got stuck in it."""
+    task = two_ways(0.15)
+    goal = task.path.points[0]
+    space, again = space_of(task), space_of(task)
+    (first,) = space.routes(goal, 1)
+    assert side_of(first) > 0.15
+    again.avoid(first[np.abs(first[:, 0] - 1.0).argmin()])
+    (other,) = again.routes(goal, 1)
+    assert side_of(other) < -0.2
+
+
+def test_an_arm_led_along_a_curve_lies_on_it() -> None:
+    """By the closed form of an arc: its joints are its chords."""
+    radius, lead = 1.2, 0.5
+    turn = np.linspace(0.0, 1.2, 400)
+    arc = np.stack([np.sin(turn), 1.0 - np.cos(turn), 0.0 * turn], axis=1) * radius
+    arc[:, 0] += lead
+    route = np.vstack([np.zeros((1, 3)), arc])
+    start = np.zeros((ARM.n_links + 1, 3))
+    start[:, 0] = ARM.stations - ARM.total_length
+    laid = led_along(route, start, ARM.link_lengths)
+    gaps = np.linalg.norm(np.diff(laid, axis=1), axis=2)
+    np.testing.assert_allclose(gaps, np.broadcast_to(ARM.link_lengths, gaps.shape))
+    np.testing.assert_array_equal(laid[:, -1], route)
+    np.testing.assert_array_equal(laid[:, 0, 1:], 0.0)
+    bent = laid[..., 0] > lead
+    off = np.linalg.norm(laid - [lead, radius, 0.0], axis=2) - radius
+    assert np.abs(off[bent]).max() < 1e-5
+    assert np.abs(laid[:, 1:][~bent[:, 1:]][:, 1:]).max() == 0.0
+
+
+def test_a_leader_is_followed_through_a_tube_where_chance_is_lost() -> None:
+    """A bore 0.5 mm wider than the arm that follows its curve exactly needs."""
+    curve = tip_curve([Bend(0.2, 0.5, 1.0, 0.3), Bend(0.1, 0.5, 1.0, 2.0)])
+    marks = np.linspace(-0.2, 1.3, 120)
+    centres = follow_the_leader(ARM, curve, marks)
+    span = (0.1, 1.35)
+    bore = least_bore(Sweep(ARM, centres), curve, span) + 0.0005
+    tube = Tube(curve, span, bore, 0.01, 32, 100).mesh("tube")
+    task = problem(tube, points=curve.at(marks[-1:]), start=(-0.2, 0, 0), closed=False)
+    layers = Layers(curve.at(marks), np.zeros(len(marks)))
+    for exactly in (True, False):
+        grown = Insertion(
+            judge_of(task), layers, np.random.default_rng(0), 2, Projections()
+        )
+        if not exactly:
+            grown._leader = lambda _, start: start  # type: ignore[method-assign]
+        chain = grown.grow(np.zeros((ARM.n_links + 1, 2)), 0)
+        assert (chain.layer[-1] == len(marks) - 1) == exactly
 
 
 def test_what_is_inserted_keeps_clearance_limits_and_layers() -> None:

@@ -42,6 +42,34 @@ def beyond(
 
 
 @compiled
+def _lay(
+    curve: FloatArray, begin: int, lengths: FloatArray, centres: FloatArray
+) -> None:
+    """Lay one arm on a curve.
+
+    Args:
+        curve: From the tip backwards, ending far back on the rail, shape (k, 3); [m].
+        begin: Corner that comes next after the tip.
+        lengths: Of the links, shape (N,); [m].
+        centres: Has the tip in its last row; set to the joint centres, NaN where there
+            is no such arm, shape (N + 1, 3); [m].
+    """
+    count, at = lengths.size, begin
+    place, found = centres[count].copy(), np.zeros(3)
+    for joint in range(count - 1, 0, -1):
+        at = beyond(curve, at, place, lengths[joint], found)
+        if at == curve.shape[0]:
+            break
+        centres[joint], place = found, found.copy()
+    square = lengths[0] ** 2 - place[1] ** 2 - place[2] ** 2
+    if at < curve.shape[0] and square >= 0.0:
+        centres[0, 0] = place[0] - np.sqrt(square)
+        centres[0, 1] = centres[0, 2] = 0.0
+    else:
+        centres[:] = np.nan
+
+
+@compiled
 def followed(centres: FloatArray, tips: FloatArray, lengths: FloatArray) -> FloatArray:
     """Arms whose joints have moved along the arm's own curve after the tip.
 
@@ -57,29 +85,43 @@ def followed(centres: FloatArray, tips: FloatArray, lengths: FloatArray) -> Floa
         Joint centres, shape (n, N + 1, 3), NaN where an arm cannot follow; [m].
     """
     count = lengths.size
-    result = np.full(centres.shape, np.nan)
-    total = lengths.sum()
+    result = np.zeros(centres.shape)
     for r in range(centres.shape[0]):
         curve = np.zeros((count + 2, 3))
         ahead = 0.0
         for i in range(count + 1):
             curve[i] = centres[r, count - i]
         curve[count + 1] = curve[count]
-        curve[count + 1, 0] -= 2.0 * total + np.abs(tips[r] - curve[0]).sum()
+        curve[count + 1, 0] -= 2.0 * lengths.sum() + np.abs(tips[r] - curve[0]).sum()
         for i in range(3):
             ahead += (tips[r, i] - curve[0, i]) * (curve[0, i] - curve[1, i])
-        at, place = 0 if ahead >= 0.0 else 1, tips[r].copy()
-        result[r, count] = place
-        for joint in range(count - 1, 0, -1):
-            found = np.zeros(3)
-            at = beyond(curve, at, place, lengths[joint], found)
-            if at == curve.shape[0]:
-                break
-            result[r, joint], place = found, found
-        square = lengths[0] ** 2 - place[1] ** 2 - place[2] ** 2
-        if at < curve.shape[0] and square >= 0.0:
-            result[r, 0, 0] = place[0] - np.sqrt(square)
-            result[r, 0, 1] = result[r, 0, 2] = 0.0
-        else:
-            result[r] = np.nan
+        result[r, count] = tips[r]
+        _lay(curve, 0 if ahead >= 0.0 else 1, lengths, result[r])
+    return result
+
+
+@compiled
+def led_along(route: FloatArray, start: FloatArray, lengths: FloatArray) -> FloatArray:
+    """The arm at every point of its tip's route, laid on what the tip has run along.
+
+    Args:
+        route: Of the tip, shape (k, 3); [m].
+        start: Joint centres at its first point, shape (N + 1, 3); [m].
+        lengths: Of the links, shape (N,); [m].
+
+    Returns:
+        Joint centres, shape (k, N + 1, 3), NaN where there is no such arm; [m].
+    """
+    count, points = lengths.size, route.shape[0]
+    curve = np.zeros((points + count + 1, 3))
+    for k in range(points):
+        curve[k] = route[points - 1 - k]
+    for i in range(count):
+        curve[points + i] = start[count - 1 - i]
+    curve[-1] = curve[-2]
+    curve[-1, 0] -= 2.0 * lengths.sum()
+    result = np.zeros((points, count + 1, 3))
+    for k in range(points):
+        result[k, count] = route[k]
+        _lay(curve, points - k, lengths, result[k])
     return result

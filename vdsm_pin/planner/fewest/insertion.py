@@ -24,6 +24,7 @@ from vdsm_pin.planner.fewest.search import Found
 from vdsm_pin.planner.fewest.start_node import checked_start
 from vdsm_pin.planner.fewest.stuck import Stuck
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
+from vdsm_pin.problem import Blocked
 from vdsm_pin.progress import say
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.units import in_mm
@@ -135,12 +136,10 @@ class _Search:
         visits: list[_Visit] = []
         skipped: list[int] = []
         k, failures, last = 0, 0, len(self.tips) - 1
+        # Where a part of the path is no answer, nobody need look for one.
+        most = 1 if self.judge.problem.path.blocked is Blocked.FAIL else FAILURES
         while k < last:
-            if (
-                self.route.closed[k + 1]
-                or failures == FAILURES
-                or (visits and soon.passed)
-            ):
+            if self.route.closed[k + 1] or failures == most or (visits and soon.passed):
                 k += 1
                 skipped.append(k)
                 continue
@@ -196,6 +195,8 @@ class _Search:
             )  # fmt: skip
             if best.last == end - 1:
                 break
+            if best.last < k:
+                self.space.avoid(route[min(int(chain.layer[-1]) + 1, before)])
         return best
 
     def _pull(

@@ -3,8 +3,9 @@
 From layer to layer of tips each arm has children. Some follow the leader: their joints
 move on along the arm's own curve. The others keep their shape, and bend a joint a
 little, add a knee or take one away (`growth.vary`). Children that are clear and can be
-reached from their parent live on, half of them the best, half by chance. Where none is
-left, the population of some layers before is varied and tries again.
+reached from their parent live on, half of them the best, half by chance. With them
+lives one arm that follows the tip's whole route exactly, as far as that is clear. Where
+none is left, the population of some layers before is varied and tries again.
 """
 
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.charts import Chart, turned_towards
-from vdsm_pin.planner.fewest.follow_the_leader import followed
+from vdsm_pin.planner.fewest.follow_the_leader import followed, led_along
 from vdsm_pin.planner.fewest.growth import FAMILY, lacking
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
@@ -146,10 +147,13 @@ class Insertion:
         clearances, _, _ = self.judge.look(tip, root[None])
         crowd = self._recorded(0, tip, root[None], clearances, none)
         crowds, last = [crowd], len(self.layers.tips) - 1
+        leader = self._leader(root, crowd)
         returns = 0
         best, farthest = 0, 0
         while len(crowds) - 1 < last:
             crowd = self._next(len(crowds) - 1, crowds[-1])
+            if len(crowds) < len(leader.number):
+                crowd = crowd.joined(leader.take(np.array([len(crowds)])))
             if len(crowd.number):
                 crowds.append(crowd)
                 if len(crowds) - 1 > farthest:
@@ -165,6 +169,44 @@ class Insertion:
                 crowds[-1] = self._varied(layer, crowds[-1])
             returns += 1
         return self._chain(best)
+
+    def _leader(self, root: FloatArray, start: _Crowd) -> _Crowd:
+        """The arm that follows the tip's route, layer by layer as far as it is clear.
+
+        Args:
+            root: Shape coordinates at the first layer.
+            start: The same arm, on record.
+        """
+        tips, judge = self.layers.tips, self.judge
+        still = Intervals(tips[:1], tips[:1], root[None], root[None])
+        centres = still.centres(self.arm, np.zeros(1, np.int64), np.zeros(1))[0]
+        laid = led_along(np.ascontiguousarray(tips), centres, self.arm.link_lengths)
+        fits = np.isfinite(laid).all(axis=(1, 2))
+        count = len(tips) if fits.all() else int(np.argmin(fits))
+        tips, offsets = tips[:count], self.chart.of_centres(self.arm, laid[:count])
+        offsets[:1] = root
+        aims = self._asked(count)
+        clearances, _, _ = judge.look(tips, offsets, aims)
+        clearances[0] = max(clearances[0], self.clearances[0])
+        looking = None if aims is None else np.stack([aims[:-1], aims[1:]], axis=1)
+        lines = Intervals(tips[:-1], tips[1:], offsets[:-1], offsets[1:], looking)
+        need = np.minimum(judge.required, clearances[:-1])
+        good = (clearances[1:] >= judge.required) & judge.clear(lines, need)
+        count = 1 + (len(good) if good.all() else int(np.argmin(good)))
+        first = len(self.layer)
+        number = np.append(start.number, first + np.arange(count - 1))
+        for k in range(1, count):
+            one = slice(k, k + 1)
+            parent = number[k - 1 : k]
+            self._recorded(k, tips[one], offsets[one], clearances[one], parent)
+        return _Crowd(number, tips[:count], offsets[:count])
+
+    def _asked(self, count: int) -> FloatArray | None:
+        """Where last links must look at the first layers, NaN for anywhere."""
+        aims, pull = self.layers.aims, self.layers.pull
+        if aims is None or pull is None:
+            return None
+        return np.where(pull[:count, None] >= 1.0, aims[:count], np.nan)
 
     def _chain(self, number: int) -> Chain:
         """The ancestors of an arm and itself."""

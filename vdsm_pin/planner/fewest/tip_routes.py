@@ -4,7 +4,8 @@ Space is cut into the cells of an octree. A cell costs its size, and more the na
 it is there for the body; where nobody knows yet, it is thought wide. Dijkstra's
 cheapest way is halved cell by cell until all of it is known to be clear. It is then
 pulled to the middle of the openings. A second way avoids the narrowest place of the
-first. These are proposals for the search of the arm's motion: nothing is proved here.
+first, and where an arm got stuck. These are proposals for the search of the arm's
+motion: nothing is proved here.
 """
 
 from collections.abc import Iterator
@@ -48,6 +49,10 @@ SHIFTS: Final = 8
 """Places tried for each point in a round by chance."""
 SIZES: Final = (0.5, 0.2, 0.1)
 """How far away they are, round after round, over the body's radius; [-]."""
+FINER: Final = (0.05, 0.02, 0.01)
+"""The same where it is narrow; [-]."""
+BOW: Final = 0.2
+"""Part of the room of a narrow place that the way between two points may bow; [-]."""
 
 
 @dataclass
@@ -201,6 +206,7 @@ class TipSpace:
         self.arm, self.start = problem.manipulator, problem.path.start
         self.clearance, self.required = clearance, required
         self.spacing, self.most = spacing, most
+        self.stuck: list[FloatArray] = []
         self.known: dict[bytes, list[FloatArray]] = {}
         self.searches: dict[bytes, Iterator[FloatArray]] = {}
 
@@ -230,11 +236,17 @@ class TipSpace:
         if not (start != goal).any():
             yield start[None]
             return
-        cells = self._cells(np.stack([start, goal]))
+        cells, narrow = self._cells(np.stack([start, goal])), list[FloatArray]()
+        cells.avoided = self.stuck
         while (route := cells.cheapest(start, goal)) is not None:
-            route = self._pulled(resampled(route, self.spacing))
-            yield resampled(route, self.spacing)
-            cells.avoided.append(self._narrowest(route))
+            route = self._pulled(resampled(route, self.spacing), SIZES)
+            yield self._refined(resampled(route, self.spacing))
+            narrow.append(self._narrowest(route))
+            cells.avoided = [*narrow, *self.stuck]
+
+    def avoid(self, place: FloatArray) -> None:
+        """Have ways that are looked for from now on avoid a place, shape (3,); [m]."""
+        self.stuck.append(place)
 
     def swing(self, goal: FloatArray) -> Iterator[FloatArray]:
         """The route round the rail, no straighter than a base with a short rail lets.
@@ -290,15 +302,40 @@ class TipSpace:
         inner = route[1:-1] if len(route) > 2 else route
         return np.asarray(inner[int(np.argmin(self._spare(inner)))])
 
-    def _pulled(self, route: FloatArray) -> FloatArray:
+    def _refined(self, route: FloatArray) -> FloatArray:
+        """A way with points so close, where it is narrow, that an arm can follow it.
+
+        A way that bends as much as the arm can bows between two points at a distance h
+        by h^2 / 8 R.
+
+        Args:
+            route: Shape (k, 3); [m].
+        """
+        spare = np.maximum(self._spare(route), LEAST * self.arm.most_radius)
+        radius = self.arm.link_lengths.max() / (
+            2.0 * np.sin(self.arm.max_link_angle / 2.0)
+        )
+        step = np.sqrt(8.0 * radius * BOW * np.minimum(spare[:-1], spare[1:]))
+        sides = np.linalg.norm(np.diff(route, axis=0), axis=1)
+        counts = np.maximum(1, np.ceil(sides / step).astype(np.int64))
+        if (counts == 1).all():
+            return route
+        at = np.repeat(np.arange(len(counts)), counts)
+        part = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        part = (part / counts[at])[:, None]
+        finer = (1.0 - part) * route[at] + part * route[at + 1]
+        return self._pulled(np.vstack([finer, route[-1:]]), FINER)
+
+    def _pulled(self, route: FloatArray, sizes: tuple[float, ...]) -> FloatArray:
         """A way straightened, and in the middle where it is narrow (elastic band).
 
         Args:
             route: Shape (k, 3), its ends stay; [m].
+            sizes: How far away places are tried, over the body's radius; [-].
         """
         rng, route = np.random.default_rng(len(route)), route.copy()
         for round_ in range(PULLS):
-            size = self.arm.most_radius * SIZES[round_ % len(SIZES)]
+            size = self.arm.most_radius * sizes[round_ % len(sizes)]
             for parity in (1, 2):
                 inner = np.arange(parity, len(route) - 1, 2)
                 if len(inner):
