@@ -49,7 +49,8 @@ class BroadPhase:
         cores: Capsules inside the obstacles, shape (c, 7); [m].
         surfaces: The meshes, which have no boxes.
         radius: Radius of the links; [m].
-        floor: Clearance below which -inf will do; [m].
+        floor: Clearance below which -inf will do; where that is -inf, all bounds from
+            meshes are exact; [m].
         far: A bound from boxes above this is left as it is; [m].
         deadline: When planning must have ended.
     """
@@ -72,7 +73,9 @@ class BroadPhase:
         clearances = _box_bounds(ends, self.boxes, self.planes, STRETCHES, enough)
         clearances -= self.radius
         low = self.floor + self.radius
-        mesh = self.surfaces.least(ends, low, enough, self.deadline) - self.radius
+        # Who asks for what is below 0 asks for what is far, too.
+        most = np.inf if self.floor == -np.inf else enough
+        mesh = self.surfaces.least(ends, low, most, self.deadline) - self.radius
         # A step below the distance will do, but not where it decides.
         near = clearances < self.far
         near |= mesh < min(self.far, self.floor + STEP)
