@@ -40,7 +40,9 @@ DETOUR: Final = 0.01
 MORE: Final = 5.0
 """How many times more that is at the largest number of cells; [-]."""
 AVOIDED: Final = 30.0
-"""Cost of the cells near the narrowest place of a way before, in their own; [-]."""
+"""Cost of the cells near a place that ways shall avoid, in their own; [-]."""
+AROUND: Final = 3.0
+"""How near that is, over the body's radius; [-]."""
 CAP: Final = 0.6
 """Room below this part of what is narrow costs no more; [-]."""
 PULLS: Final = 30
@@ -114,8 +116,9 @@ class _Cells:
         clearances = np.where(doubt, self.clearances + radius, self.clearances)
         narrow = NARROW * self.radius
         cost = 2.0 * half * (1.0 + (narrow / np.maximum(clearances, CAP * narrow)) ** 2)
+        around = AROUND * self.radius
         for place in self.avoided:
-            near = np.linalg.norm(centre - place, axis=1) < 2.0 * self.radius + half
+            near = np.linalg.norm(centre - place, axis=1) < around + half
             cost[near & ~doubt] *= AVOIDED
         return np.where(shut, np.inf, cost), doubt
 
@@ -239,7 +242,8 @@ class TipSpace:
         cells, narrow = self._cells(np.stack([start, goal])), list[FloatArray]()
         cells.avoided = self.stuck
         while (route := cells.cheapest(start, goal)) is not None:
-            route = self._pulled(resampled(route, self.spacing), SIZES)
+            route = resampled(self._shortened(route), self.spacing)
+            route = self._pulled(route, SIZES)
             yield self._refined(resampled(route, self.spacing))
             narrow.append(self._narrowest(route))
             cells.avoided = [*narrow, *self.stuck]
@@ -292,15 +296,33 @@ class TipSpace:
             self.most,
         )  # fmt: skip
 
-    def _spare(self, points: FloatArray) -> FloatArray:
-        """What the tip has to spare at points, shape (n,); [m]."""
-        clearances = self.clearance(np.stack([points, points], axis=1))[:, 0]
+    def _spare(self, points: FloatArray, ends: FloatArray | None = None) -> FloatArray:
+        """What the tip has to spare at points, or on lines to ends, shape (n,); [m]."""
+        ends = points if ends is None else ends
+        clearances = self.clearance(np.stack([points, ends], axis=1))[:, 0]
         return np.asarray(clearances - self.required)
 
     def _narrowest(self, route: FloatArray) -> FloatArray:
         """The inner place of a route with the least clearance, shape (3,)."""
         inner = route[1:-1] if len(route) > 2 else route
         return np.asarray(inner[int(np.argmin(self._spare(inner)))])
+
+    def _shortened(self, route: FloatArray) -> FloatArray:
+        """A way with corners cut where that leaves as much room as is worth having.
+
+        Args:
+            route: Shape (k, 3); [m].
+        """
+        worth = NARROW * self.arm.most_radius
+        own = np.minimum(self._spare(route[:-1], route[1:]), worth)
+        kept, last = [0], len(route) - 1
+        while kept[-1] < last:
+            at = kept[-1]
+            begins = np.broadcast_to(route[at], (last - at, 3))
+            room = self._spare(begins, route[at + 1 :])
+            good = room >= np.maximum(np.minimum.accumulate(own[at:]), 0.0)
+            kept.append(at + 1 + int(np.flatnonzero(good).max(initial=0)))
+        return route[kept]
 
     def _refined(self, route: FloatArray) -> FloatArray:
         """A way with points so close, where it is narrow, that an arm can follow it.
