@@ -84,25 +84,33 @@ class CoalCloud:
         low = np.minimum.reduceat(centres, self._first)
         high = np.maximum.reduceat(centres, self._first)
         self._middle = 0.5 * (low + high)
+        self._each = reach
         self._reach = np.linalg.norm(high - self._middle, axis=1) + reach
 
     def nearest_first(self, geometry: Any, pose: Any) -> Iterator["Group"]:
         """Groups of the bodies with a lower bound of their distance, least first."""
         geometry.computeLocalAABB()
-        box = geometry.aabb_local
-        place = (self._middle - pose.getTranslation()) @ pose.getRotation()
-        gaps = np.maximum(np.maximum(place - box.max_, box.min_ - place), 0.0)
-        bounds = np.linalg.norm(gaps, axis=1) - self._reach
+        bounds = _gaps(geometry.aabb_local, pose, self._middle) - self._reach
         for k in np.argsort(bounds):
             part = self._centres[self._first[k] : self._first[k] + GROUP]
-            yield Group(float(bounds[k]), self._bodies(part))
+            each = _gaps(geometry.aabb_local, pose, part) - self._each
+            yield Group(float(bounds[k]), self._bodies(part, each))
 
-    def _bodies(self, centres: FloatArray) -> Iterator[CoalBody]:
+    def _bodies(
+        self, centres: FloatArray, bounds: FloatArray
+    ) -> Iterator[tuple[float, CoalBody]]:
         import coal
 
-        for centre in centres:
-            pose = coal.Transform3s(np.array(self._rotation), centre)
-            yield CoalBody(self._shape, pose)
+        for k in np.argsort(bounds):
+            pose = coal.Transform3s(np.array(self._rotation), centres[k])
+            yield float(bounds[k]), CoalBody(self._shape, pose)
+
+
+def _gaps(box: Any, pose: Any, points: FloatArray) -> FloatArray:
+    """How far points (n, 3) lie off a placed coal.AABB, shape (n,); [m]."""
+    place = (points - pose.getTranslation()) @ pose.getRotation()
+    gaps = np.maximum(np.maximum(place - box.max_, box.min_ - place), 0.0)
+    return np.asarray(np.linalg.norm(gaps, axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,11 +119,11 @@ class Group:
 
     Args:
         bound: Lower bound of their distance; [m].
-        bodies: Made as they are asked for.
+        bodies: Made as they are asked for, with a lower bound each, least first.
     """
 
     bound: float
-    bodies: Iterable[CoalBody]
+    bodies: Iterable[tuple[float, CoalBody]]
 
 
 CoalObstacle: TypeAlias = tuple[CoalBody, ...] | CoalCloud
@@ -270,8 +278,11 @@ def measure(request: Any, geometry: Any, pose: Any, bodies: CoalObstacle) -> Mea
     for group in bodies.nearest_first(geometry, pose):
         if group.bound > max(best.distance, 0.0):
             break  # where they meet the sign is known
-        found = _nearest(request, geometry, pose, group.bodies)
-        best = min(best, found, key=lambda one: one.distance)
+        for bound, body in group.bodies:
+            if bound > max(best.distance, 0.0):
+                break
+            found = _nearest(request, geometry, pose, (body,))
+            best = min(best, found, key=lambda one: one.distance)
     return best
 
 
