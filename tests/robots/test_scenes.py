@@ -155,3 +155,12 @@ def test_damaged_scenes_never_end_in_a_traceback(tmp_path: Path) -> None:
                 refused += 1
                 assert len(str(error).splitlines()) == 1
     assert refused > 100
+
+
+def test_whole_numbers_of_any_size_are_refused(tmp_path: Path) -> None:
+    text = (
+        f"world: {{collision_objects: [{{id: a, pose: {{position: [0, 0, {10**400}]}}"
+    )
+    text += ", primitives: [], primitive_poses: []}]}"
+    with pytest.raises(InvalidFile, match="expected 3 numbers"):
+        read_scene(write(tmp_path, "m.yaml", text), 1.0)

@@ -135,14 +135,14 @@ def _values(file: Path, points: list[Any], key: str, count: int) -> FloatArray |
     if not any(rows):
         return None
     for k, row in enumerate(rows):
-        if (numbers := _numbers(row, count)) is None:
+        if (numbers := finite_numbers(row, count)) is None:
             problem = f"is {str(row)[:60]}, expected {count} finite numbers"
             raise InvalidFile(file=file, where=f"points[{k}].{key}", problem=problem)
         rows[k] = numbers
     return np.array(rows, dtype=np.float64)
 
 
-def _numbers(row: Any, count: int) -> list[float] | None:
+def finite_numbers(row: Any, count: int) -> list[float] | None:
     """So many finite numbers; None where it is another thing."""
     if not isinstance(row, list) or len(row) != count:
         return None
@@ -166,7 +166,7 @@ def _times(file: Path, points: list[Any]) -> FloatArray | None:
         if isinstance(stated, dict):
             part = stated.get("nanosec", stated.get("nsecs", 0))
             time = [stated.get("sec", stated.get("secs", 0)), part]
-        numbers = _numbers(time, len(time))
+        numbers = finite_numbers(time, len(time))
         if numbers is None:
             where = f"points[{k}].time_from_start"
             problem = f"is {str(stated)[:60]}, expected seconds"
@@ -214,7 +214,7 @@ def _transform(file: Path, where: str, transform: Any) -> FloatArray:
     for part, keys in (("translation", "xyz"), ("rotation", "xyzw")):
         stated = transform.get(part) if isinstance(transform, dict) else None
         values = [stated.get(key) for key in keys] if isinstance(stated, dict) else None
-        if (numbers := _numbers(values, len(keys))) is None:
+        if (numbers := finite_numbers(values, len(keys))) is None:
             problem = (
                 f"{part} is {str(stated)[:60]}, expected numbers {', '.join(keys)}"
             )

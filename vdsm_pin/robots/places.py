@@ -7,6 +7,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.joint_trajectory import finite_numbers
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
 
 
@@ -74,11 +75,9 @@ class Place:
         Raises:
             InvalidFile: If it is another thing.
         """
-        values = self.value
-        good = isinstance(values, list) and len(values) >= count
-        good = good and all(type(v) in (int, float) for v in values)
-        if not good or len(values) > count or not np.isfinite(values).all():
-            problem = f"is {str(values)[:60]}, expected {count} numbers"
+        values = finite_numbers(self.value, count)
+        if values is None:
+            problem = f"is {str(self.value)[:60]}, expected {count} numbers"
             raise self.invalid(problem)
         return np.array(values, dtype=np.float64)
 
