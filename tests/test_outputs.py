@@ -164,6 +164,11 @@ def test_a_problem_may_have_the_name_of_any_file_of_a_batch(here: Path) -> None:
     assert not set(names.values()) & set(OWN)
 
 
+def test_a_folder_made_by_vdsm_new_gives_its_problem_the_name() -> None:
+    names = folder_names(("a/mine/problem.yaml", "vessel/problem.yaml", "problem.yaml"))
+    assert list(names.values()) == ["mine", "vessel", "problem"]
+
+
 def test_names_that_meet_a_hash_stay_apart() -> None:
     twins = ("a/x.yaml", "b/x.yaml")
     met = folder_names(twins)["a/x.yaml"]

@@ -56,10 +56,8 @@ class Given:
         files = [self.trajectory, self.centres, self.cables]
         given = [file for file in files if file is not None]
         if len(given) != 1:
-            message = (
-                f"{len(given)} files to convert, expected one: --trajectory, --centres "
-                "or --cables"
-            )
+            few = "none of them is" if not given else f"{len(given)} of them are"
+            message = f"expected one of --trajectory, --centres, --cables; {few} given"
             raise InvalidInput(message)
         return given[0]
 

@@ -56,6 +56,7 @@ WRITTEN: Final = frozenset(
 """Every file of a problem's folder."""
 
 
+NEW: Final = "problem"
 LONGEST_NAME: Final = 100
 """Bytes of a folder's name that come from the problem's."""
 
@@ -278,6 +279,8 @@ def folder_names(
 def _plain_name(problem: str) -> str:
     path = Path(problem)
     stem = path.stem if path.suffix in (".yaml", ".yml") else problem.strip("/")
+    if stem == NEW and path.parent.name:  # as vdsm new makes them: FOLDER/problem.yaml
+        stem = path.parent.name
     kept = "".join(c if c.isalnum() or c in "-_." else "-" for c in stem).strip(".-")
     return kept.encode()[:LONGEST_NAME].decode(errors="ignore") or "problem"
 
