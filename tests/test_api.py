@@ -168,7 +168,7 @@ def test_a_certificate_states_a_turn_of_the_base(tmp_path: Path) -> None:
     assert result.verdict is vp.Verdict.CERTIFIED
     vp.write_trajectory(tmp_path / "t.csv", motion)
     vp.write_certificate(result, tmp_path / "c", tmp_path / "t.csv")
-    assert certificate_lines(tmp_path / "c")[0]["errors"]["base_rad"] == 1e-4
+    assert certificate_lines(tmp_path / "c")[0]["errors"]["base"] == [0.0, 1e-4]
     assert problem.source is not None
     source = problem.source.path
     found = check_certificate(tmp_path / "c", source, tmp_path / "t.csv")

@@ -23,7 +23,6 @@ from oracles.certificate_mutations import (
     forged,
     numbers_in,
     other_files,
-    place,
     raw,
 )
 from oracles.certificate_oracle import (
@@ -201,9 +200,9 @@ def test_a_closed_path_is_covered(past_the_seam: bool, tmp_path: Path) -> None:
     )
     outcome = judge(case)
     assert outcome.accepted, outcome.reason
-    assert case.lines[0]["coverage"] > 1.0 - 1e-9
-    higher = edited(case, lambda lines: lines[0].update(coverage=1.0 + 1e-8))
-    assert "coverage" in refused(case, sealed(higher))
+    short = {"x0": x0[:-1], "path_m": station[:-1], "on_path": np.ones(8)}
+    rows = straight_rows(short.pop("x0"))
+    assert "coverage" in refused(Case(tmp_path, data, rows, NO_ERRORS, **short))
 
 
 def test_too_little_drawn_is_rejected(tmp_path: Path) -> None:
@@ -245,7 +244,7 @@ def test_a_fixed_base_is_certified_where_it_stands(tmp_path: Path) -> None:
         if good:
             assert judge(case).accepted
         else:
-            assert "x0_max_m" in refused(case)
+            assert "x0 is" in refused(case)
 
 
 def test_a_tip_that_strays_between_rows_is_rejected(tmp_path: Path) -> None:
@@ -257,27 +256,18 @@ def test_a_tip_that_strays_between_rows_is_rejected(tmp_path: Path) -> None:
     length = float(np.linalg.norm(np.subtract(*tips)))
     drawn = {"on_path": [1, 1], "path_m": [0.0, length]}
     case = Case(tmp_path, STRAIGHT | {"tip_path": path}, q, NO_ERRORS, **drawn)
-    assert "tip_deviation_m" in refused(case)
+    assert "the tip strays" in refused(case)
 
 
-def test_a_motion_that_shall_draw_nothing_claims_nothing_of_a_path(
-    tmp_path: Path,
-) -> None:
+def test_a_motion_that_shall_draw_nothing_is_accepted(tmp_path: Path) -> None:
     data = {key: value for key, value in STRAIGHT.items() if key != "tip_path"}
-    case = Case(tmp_path, data, straight_rows([0.0, 0.1]), NO_ERRORS)
-    assert (case.lines[0]["coverage"], case.lines[0]["tip_deviation_m"]) == (None, None)
-    assert judge(case).accepted
-    for key in ("coverage", "tip_deviation_m"):
-        claimed = edited(case, lambda lines, key=key: lines[0].update({key: 0.0}))
-        assert "the problem has none" in refused(case, sealed(claimed))
+    assert judge(Case(tmp_path, data, straight_rows([0.0, 0.1]), NO_ERRORS)).accepted
 
 
-def test_a_path_cannot_be_claimed_away(tmp_path: Path) -> None:
+def test_what_is_not_known_is_refused(tmp_path: Path) -> None:
     case = Case(tmp_path, STRAIGHT, straight_rows([0.0, 0.1]), NO_ERRORS)
-    assert judge(case).accepted
-    none = {"coverage": None, "tip_deviation_m": None}
-    away = edited(case, lambda lines: lines[0].update(none))
-    refused(case, sealed(away))
+    more = edited(case, lambda lines: lines[0].update(coverage=1.0))
+    assert "has other keys" in refused(case, sealed(more))
 
 
 @pytest.mark.parametrize(("on_path", "good"), [([0, 1], True), ([0, 0], False)])
@@ -468,11 +458,16 @@ def test_another_problem_is_rejected(kind: str, tmp_path: Path) -> None:
     elif kind == "unit":
         data["length_unit"] = "mm" if data["length_unit"] == "m" else "m"
     elif kind == "moved":
-        data["obstacles"][1]["center"][1] *= 1.0 + 1e-6
+        data["obstacles"][1]["center"][1] *= 1.0 - 1e-6
     elif kind == "gone":
         del data["obstacles"][1]
     elif kind == "clearance":
-        data["required_clearance"] *= 1.001
+        proofs = case.lines[1]["proofs"]
+        pairs = zip(case.lines[0]["pairs"], proofs, strict=True)
+        claims = [p[2][0][5] for names, p in pairs if names[1][:4] != "link" for p in p]
+        scale = 1e3 if data["length_unit"] == "mm" else 1.0
+        data["required_clearance"] = scale * max(claims)
+        data["required_clearance"] += 1e-6
     else:
         data["manipulator"]["link_radius"] *= 1.0 + 1e-6
     case.problem.write_text(json.dumps(data))
@@ -483,20 +478,24 @@ def test_another_problem_is_rejected(kind: str, tmp_path: Path) -> None:
 def test_another_trajectory_is_rejected(tmp_path: Path) -> None:
     case = random_case(np.random.default_rng(6), tmp_path, ["box"])
     q = case.writer.q[: case.writer.trajectory.n_samples].copy()
-    q[-1, 2] += 1e-6
-    write_rows(case.trajectory, q)
-    assert "another trajectory" in refused(case)
-    assert "claims" in refused(case, rehashed(case))
+    reasons = []
+    for change in (1e-6, -1e-6):  # one of them brings some link nearer
+        q[-1, 2] += change
+        write_rows(case.trajectory, q)
+        assert "another trajectory" in refused(case)
+        reasons.append(judge(case, rehashed(case)).reason)
+        q[-1, 2] -= change
+    assert any("claims" in reason for reason in reasons)
 
 
 def test_a_limit_that_is_passed_is_rejected(tmp_path: Path) -> None:
     q = straight_rows([0.0, 0.0])
     q[1, 1] = np.deg2rad(50.0) + 1e-8
-    assert "alpha_rad" in refused(Case(tmp_path, STRAIGHT, q, NO_ERRORS))
+    assert "alpha1" in refused(Case(tmp_path, STRAIGHT, q, NO_ERRORS))
     q[1, 1:3] = np.deg2rad(45.1)
-    assert "psi_rad" in refused(Case(tmp_path, STRAIGHT, q, NO_ERRORS))
+    assert "psi1" in refused(Case(tmp_path, STRAIGHT, q, NO_ERRORS))
     q[1] = [2.1, 0, 0, 0, 0, 0, 0]
-    assert "x0_max" in refused(Case(tmp_path, STRAIGHT, q, NO_ERRORS))
+    assert "x0 is" in refused(Case(tmp_path, STRAIGHT, q, NO_ERRORS))
 
 
 @pytest.mark.parametrize(
@@ -552,17 +551,7 @@ def test_exit_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
 # ---- mutations -----------------------------------------------------------------------
 
 STATED = 1e-9
-"""How far a claim may lie from what is proved (docs/certificate.md)."""
-
-CLOSING = (
-    "limits",
-    "tip_deviation_m",
-    "coverage",
-    "errors",
-    "required_clearance_m",
-    "required_self_clearance_m",
-    "pieces",
-)
+"""How far a half-space's direction may be off (docs/certificate.md)."""
 
 
 def assert_still_true(
@@ -570,24 +559,21 @@ def assert_still_true(
 ) -> None:
     """A certificate accepted after a change claims nothing but what is true.
 
-    Whatever is not a clearance is what it was but for the tolerance; the clearances
-    are proved again by the writer's own formulas, and held against samples.
+    The clearances are proved again by the writer's own formulas, and held against
+    samples.
     """
     every |= lines[0]["pieces"] != case.lines[0]["pieces"]
     if lines[0]["errors"] != case.lines[0]["errors"]:  # proved for those as well
         box = lines[0]["errors"]
-        assert 0.0 <= box["base_rad"] <= 1e-8  # as much as claims may be off
-        assert box["obstacles"] == {}
-        errors = box["joints_rad"], box["base_m"], box["obstacle_m"]
+        off = np.array([box["base"], *box["obstacles"].values()])
+        assert (off[:, 1] <= 1e-8).all()  # what rounding of claims leaves
+        errors = box["joints_rad"], off[0, 0], off[1:, 0].max(initial=0.0)
         case, every = beside(case, errors), True
     for number, (old, new) in enumerate(zip(case.lines, lines, strict=True)):
         places = changes(old, new)
         assert places is not None, "another structure"
         for where in places if number == 0 else ():
-            assert where[0] in CLOSING, where
-            before, after = (place(line, where)[0][where[-1]] for line in (old, new))
-            if where[0] not in ("pieces", "errors"):
-                assert abs(before - after) <= 2.0 * STATED
+            assert where[0] in ("errors", "pieces"), where
         if number and every:
             places = [p for p in numbers_in(new) if len(p) == 6]
         for where in places if number else ():
@@ -611,7 +597,7 @@ def pieces_of(case: Case, lines: Any, obstacle: Any) -> Any:
 def assert_proved(
     case: Case, lines: Any, number: int, pair: int, at: int, plane: int
 ) -> None:
-    """One plane proves what it claims and hardly more, in doubles."""
+    """One plane proves what it claims, in doubles."""
     writer, line = case.writer, lines[number]
     k = line["k"]
     link, other = writer.partners()[pair]
@@ -626,7 +612,7 @@ def assert_proved(
             assert np.abs(n + pieces[0].normal).max() <= STATED
             n = -pieces[0].normal
         proved = writer.proved_of_pieces(k, a, b, link, pieces, n)
-    assert -1e-12 <= proved - lower <= STATED + 1e-12
+    assert proved - lower >= -1e-12
 
 
 def gap(writer: Any, link: int, pieces: Any, q: Any) -> float:
@@ -655,12 +641,12 @@ def assert_samples_hold(case: Case, lines: Any, rng: np.random.Generator) -> Non
             q = writer.q[k - 1] + time * (writer.q[k] - writer.q[k - 1])
             joints = np.ravel(errors["joints_rad"])
             q[1:] += joints * rng.choice([-1, 0, 1], joints.size)
-            q[0] += errors["base_m"] * rng.choice([-1, 0, 1])
+            q[0] += errors["base"][0] * rng.choice([-1, 0, 1])
             for first, last, *_, lower in planes:
                 if not isinstance(other, int):
                     pieces = pieces_of(case, lines, other)[first:last]
                     near = gap(writer, link, pieces, q)
-                    assert lower <= near - errors["obstacle_m"] + 1e-7
+                    assert lower <= near - errors["obstacles"][other.name][0] + 1e-7
 
 
 class Counts(NamedTuple):
@@ -694,7 +680,7 @@ def run_mutations(folder: Path, seed: int, n_cases: int, n_each: int) -> Counts:
             what = with_other_files(case, rng)
             assert not accepts(case, content), what
             if accepts(case, rehashed(case)):
-                assert what.startswith("a row"), what
+                assert what.startswith(("a row", "more clearance")), what
                 assert_still_true(beside(case), case.lines, rng, every=True)
             counts[3] += 1
     return Counts(*map(int, counts))

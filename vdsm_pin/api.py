@@ -242,7 +242,6 @@ def write_certificate(
     hashes = certificate_writer.Hashes(
         problem=source.sha256,
         trajectory=sha256_of_file(Path(trajectory)),
-        urdf=load_robot(problem.manipulator).urdf_sha256,
     )
     certificate_writer.write_certificate(Path(path), result, hashes)
 

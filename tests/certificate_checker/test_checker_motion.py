@@ -19,7 +19,7 @@ ARM = {
 }
 
 
-def swing(folder: Path, angle: float) -> Case:
+def swing(folder: Path, angle: float, spacing: float = 1.0) -> Case:
     """The stretched arm turns about its base, the tip 1 m away, along the chord."""
     q = np.zeros((2, 7))
     q[:, 1] = -angle, angle
@@ -33,6 +33,7 @@ def swing(folder: Path, angle: float) -> Case:
         "tip_path": {
             "start": {"joints": start | {"theta_deg": [0, 0, 0]}},
             "points": tips,
+            "spacing": spacing,
         },
         "required_clearance": 0.0,
     }
@@ -46,7 +47,10 @@ def test_the_deviation_of_a_swing_is_its_sagitta(angle: float, tmp_path: Path) -
     outcome = check_certificate(case.certificate, case.problem, case.trajectory)
     assert outcome.accepted, outcome.reason
     sagitta = 1.0 - np.cos(angle)
-    assert case.lines[0]["tip_deviation_m"] == pytest.approx(sagitta, rel=1e-2)
+    for spacing, good in ((1.01 * sagitta, True), (0.99 * sagitta, False)):
+        case = swing(tmp_path, angle, spacing)
+        found = refusal(case)
+        assert found == "" if good else "the tip strays" in found
 
 
 def along(folder: Path, x0: list[float], **asked: Any) -> Case:
@@ -100,18 +104,24 @@ def edited(case: Case, change: Any) -> str:
     return refusal(case)
 
 
-@pytest.mark.parametrize(
-    ("claimed", "good"), [(0.0, True), (1e-9, True), (2e-9, False)]
-)
-@pytest.mark.parametrize("key", ["alpha_rad", "theta_rad", "x0_max_m"])
-def test_a_limit_is_claimed_to_a_billionth(
-    key: str, claimed: float, good: bool, tmp_path: Path
+@pytest.mark.parametrize(("past", "good"), [(0.9e-9, True), (2e-9, False)])
+@pytest.mark.parametrize("column", range(5))
+def test_a_limit_is_kept_to_a_billionth(
+    column: int, past: float, good: bool, tmp_path: Path
 ) -> None:
-    """The arm stands straight at 0: what is claimed is what it is off."""
-    case = along(tmp_path, [0.0, 0.0])
-    found = edited(case, lambda lines: lines[0]["limits"].update({key: claimed}))
-    assert (found == "") is good
-    assert good or found.startswith(f"header: {key} is 2e-09")
+    """Rail, yaw, pitch, and yaw and pitch of which the link turns by their sum."""
+    data = {"vdsm_problem": 1, "length_unit": "m", "obstacles": []}
+    data |= {"required_clearance": 0.0, "manipulator": ARM | {"base_range": [-1, 1]}}
+    q, most = np.zeros((2, 7)), np.deg2rad(50)
+    if column < 3:
+        q[1, column] = (1.0 if column == 0 else most) + past
+    else:
+        yaw = np.deg2rad(40)
+        q[1, 1:3] = yaw, np.arccos(np.cos(np.deg2rad(60) + past) / np.cos(yaw))
+        q[1, 1:3] = q[1, 1:3] if column == 3 else -q[1, 2:0:-1]
+    found = refusal(Case(tmp_path, data, q, (0.0, 0.0, 0.0)))
+    name = ("x0", "alpha1", "theta1", "psi1", "psi1")[column]
+    assert found == "" if good else found.startswith(f"interval 0: {name} is")
 
 
 @pytest.mark.parametrize(("less", "good"), [(0.0, True), (1e-12, False)])

@@ -93,7 +93,7 @@ class Motion:
         found = verify(file.problem, self.motion, load_robot(arm), errors=errors)
         if found.verdict.value != "certified":
             return False
-        hashes = Hashes(file.sha256, sha256(self.rows.read_bytes()), "0" * 64)
+        hashes = Hashes(file.sha256, sha256(self.rows.read_bytes()))
         write_certificate(self.certificate, found, hashes)
         self.lines = certificate_lines(self.certificate)[:-1]
         return True
@@ -127,10 +127,10 @@ def random_errors(rng: Rng) -> ErrorBox:
     )
 
 
-def moved_later(case: Motion, rng: Rng) -> None:
-    """The first obstacle that moves is elsewhere than it was."""
-    motion = case.data["obstacles"][1]["motion"]
-    motion["positions"] = (np.array(motion["positions"]) + 1e-3).tolist()
+def move_nearer(case: Motion) -> None:
+    """The first obstacle that moves is nearer than it was."""
+    for row in case.data["obstacles"][1]["motion"]["positions"]:
+        row[2] -= np.sign(row[2])
     case.write_problem()
 
 
@@ -144,33 +144,51 @@ def run(folder: Path, seed: int, count: int) -> tuple[int, int]:
             continue
         assert case.reason() == "", seed
         accepted += 1
-        for kind in ("linear", "interval", "turned", "more", "error"):
-            if kind == "linear" and not case.motion.is_smooth:
-                continue
-            assert case.forge(lambda lines, kind=kind: damage(lines, kind, rng)), kind
+        assert_no_more_is_claimed(case, rng)
+        for kind in ("linear", "interval", "turned", "error"):
+            reason = case.forge(lambda lines, kind=kind: damage(lines, kind, rng))
+            if kind == "linear" and not reason:
+                found = check_certificate(case.certificate, case.problem, case.rows)
+                assert found.notes[-1] == "linear pieces join the rows"
+            else:
+                assert reason, kind
             forged += 1
-        moved_later(case, rng)
+        move_nearer(case)
         assert case.forge(lambda _: None)
         forged += 1
     return accepted, forged
 
 
-def damage(lines: Any, kind: str, rng: Rng) -> None:
-    """Change what is claimed."""
+def any_plane(lines: Any, rng: Rng) -> Any:
     line = lines[int(rng.integers(1, len(lines)))]
     proof = line["proofs"][int(rng.integers(len(line["proofs"])))]
-    plane = proof[int(rng.integers(len(proof)))][2][0]
+    return proof[int(rng.integers(len(proof)))][2][0]
+
+
+def assert_no_more_is_claimed(case: Motion, rng: Rng) -> None:
+    """As much as a plane proves may be claimed, and not a hair more."""
+    plane = any_plane(case.lines, rng)
+    kept, plane[5] = plane[5], 1e3
+    reason = case.forge(lambda _: None)
+    most = float(reason.split("proves ")[1].split(" mm")[0]) / 1e3
+    for claimed, good in ((most - 1e-9, True), (most + 1e-9, False)):
+        plane[5] = claimed
+        assert (case.forge(lambda _: None) == "") is good
+    plane[5] = kept
+
+
+def damage(lines: Any, kind: str, rng: Rng) -> None:
+    """Change what is claimed."""
+    plane = any_plane(lines, rng)
     if kind == "linear":
         lines[0]["interpolation"] = "linear"
     elif kind == "interval":
         lines.pop()
     elif kind == "turned":
         plane[2:5] = [-x for x in plane[2:5]]
-    elif kind == "more":
-        plane[5] = plane[5] + 100 if isinstance(plane[5], int) else plane[5] + 1e-8
     else:
-        lines[0]["errors"]["obstacle_m"] += 1e-6
-        lines[0]["errors"]["base_m"] += 1e-6
+        for off in lines[0]["errors"]["obstacles"].values():
+            off[0] += 1e-3
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -14,6 +14,7 @@ from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
 from vdsm_pin.verification.pointing import NAME
@@ -21,6 +22,7 @@ from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
 ARM = built_in("hrm8")
+NO_ERRORS = ErrorBox()
 
 
 class Looking:
@@ -68,13 +70,13 @@ class Looking:
         data |= {"obstacles": [], "required_clearance": 0.0, "tip_path": path}
         self.problem.write_text(json.dumps(data))
 
-    def look(self) -> float:
+    def look(self, errors: ErrorBox = NO_ERRORS) -> float:
         """Write a certificate; the proved bound of the angle; [deg]."""
-        file, arm = read_problem(self.problem), ARM
-        found = verify(file.problem, read_trajectory(self.rows, arm), load_robot(arm))
+        file, rows = read_problem(self.problem), read_trajectory(self.rows, ARM)
+        found = verify(file.problem, rows, load_robot(ARM), errors=errors)
         row = next(check for check in found.checks if check.name == NAME)
         assert found.verdict.value == "certified", found.checks
-        hashes = Hashes(file.sha256, sha256(self.rows.read_bytes()), "0" * 64)
+        hashes = Hashes(file.sha256, sha256(self.rows.read_bytes()))
         write_certificate(self.certificate, found, hashes)
         self.lines = certificate_lines(self.certificate)[:-1]
         return float(np.rad2deg(row.worst))
@@ -105,3 +107,28 @@ def test_a_narrower_cone_is_refused(kind: str, smooth: bool, tmp_path: Path) -> 
             case.forge()
             assert (case.reason() == "") is good, (seed, worst)
             assert good or "last link" in case.reason()
+
+
+@pytest.mark.parametrize("kind", ["target", "direction", "directions"])
+@pytest.mark.parametrize(
+    "errors",
+    [ErrorBox(joint=1e-3), ErrorBox(base_turn=0.01), ErrorBox(base=0.05)],
+    ids=["joint", "turn", "base"],
+)
+def test_a_cone_is_proved_under_the_errors(
+    kind: str, errors: ErrorBox, tmp_path: Path
+) -> None:
+    """Accepted in the cone that the verifier proves; not in what is kept without."""
+    case = Looking(tmp_path, 4)
+    case.ask(30.0, kind)
+    nominal = case.look()
+    worst = case.look(errors)
+    assert case.reason() == ""
+    felt = worst > nominal + 0.2
+    assert felt or (kind != "target" and errors.base > 0.0)
+    for cone in (1.02 * worst + 0.06, nominal + 0.06):
+        case.ask(cone, kind)
+        case.forge()
+        good = cone > worst + 0.05 or not felt
+        assert (case.reason() == "") is good
+        assert good or "within the errors" in case.reason()

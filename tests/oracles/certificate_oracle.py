@@ -285,59 +285,7 @@ class OracleWriter:
                 ]
         return found
 
-    def tip_and_coverage(self) -> tuple[float, float]:
-        """The tip's deviation and the coverage, by dense breakpoints and a grid."""
-        path, rows = self.problem.path, self.trajectory
-        length = path.length
-        closed = path.closed and len(path.points) > 1
-        on, s = np.array(rows.on_path), np.array(rows.path_m)
-        if len(s) == 1:
-            on, s = np.repeat(on, 2), np.repeat(s, 2)
-
-        def at(u: Any) -> Any:
-            local = np.mod(u, length) if closed else np.clip(u, 0.0, length)
-            return path.at(np.atleast_1d(local))
-
-        deviation, parts = 0.0, []
-        for k in range(len(s) - 1):
-            if not (on[k] and on[k + 1]):
-                continue
-            step = s[k + 1] - s[k]
-            if closed:
-                step -= length * np.floor(step / length + 0.5)
-            low, high = sorted((s[k], s[k] + step))
-            tips = [self.pose(k, t)[1][-1] for t in (0.0, 1.0)]
-            laps = np.arange(-3, 4)[:, None] * length if closed else np.zeros((1, 1))
-            corners = (np.array(path.corner_stations) + laps).ravel()
-            corners = corners[(corners > low) & (corners < high)]
-            times = np.concatenate(
-                [[0.0, 1.0], (corners - s[k]) / step if step else []]
-            )
-            chord = tips[0] + times[:, None] * (tips[1] - tips[0])
-            gap = np.linalg.norm(chord - at(s[k] + times * step), axis=1).max()
-            deviation = max(deviation, gap + self.bends(k, 0)[0][-1] / 8)
-            if closed:
-                start = low - np.floor(low / length) * length
-                parts += [(start, min(start + abs(step), length))]
-                parts += [(0.0, max(start + abs(step) - length, 0.0))]
-            else:
-                parts.append((np.clip(low, 0, length), np.clip(high, 0, length)))
-        total, reached = 0.0, 0.0
-        for low, high in sorted(parts):
-            total += max(0.0, high - max(low, reached))
-            reached = max(reached, high)
-        return deviation, total / length if length else float(on.any())
-
     def header(self) -> dict[str, Any]:
-        tip = {"tip_deviation_m": None, "coverage": None}
-        if self.problem.tip_path is not None:
-            deviation, coverage = self.tip_and_coverage()
-            tip = {"tip_deviation_m": deviation + 1e-11, "coverage": coverage - 1e-11}
-        alpha, theta = self.q[:, 1::2], self.q[:, 2::2]
-        psi = np.arctan2(
-            np.hypot(np.sin(theta), np.cos(theta) * np.sin(alpha)),
-            np.cos(theta) * np.cos(alpha),
-        )
         pairs = [
             [f"link {other + 1}", f"link {i + 1}"]
             if isinstance(other, int)
@@ -345,33 +293,23 @@ class OracleWriter:
             for i, other in self.partners()
         ]
         return {
-            "vdsm_certificate": 5,
+            "vdsm_certificate": 6,
             "problem_sha256": self.file.sha256,
             "trajectory_sha256": sha256(self.trajectory_path.read_bytes()),
-            "urdf_sha256": "0" * 64,
             "versions": {"vdsm_pin": "0", "numpy": np.__version__},
-            "required_clearance_m": self.problem.required_clearance,
-            "required_self_clearance_m": self.problem.required_self_clearance,
             "errors": {
-                "joints_rad": self.joint_errors.reshape(-1, 2).tolist(),
-                "base_m": self.errors[1],
-                "base_rad": 0.0,
-                "obstacle_m": self.errors[2],
-                "obstacles": {},
+                "joints_rad": self.joint_errors.tolist(),
+                "base": [self.errors[1], 0.0],
+                "obstacles": {
+                    one.name: [self.errors[2], 0.0]
+                    for one in self.problem.scene.obstacles
+                },
             },
-            "n_rows": self.trajectory.n_samples,
             "interpolation": "linear",
             "pairs": pairs,
             "pieces": self.pieces(),
             "joined": {},
-            "limits": {
-                "alpha_rad": float(np.abs(alpha).max()),
-                "theta_rad": float(np.abs(theta).max()),
-                "psi_rad": float(psi.max()) + 1e-12,
-                "x0_min_m": float(self.q[:, 0].min()),
-                "x0_max_m": float(self.q[:, 0].max()),
-            },
-        } | tip
+        }
 
     def lines(self) -> list[Any]:
         """The certificate's lines but the last one."""

@@ -3,13 +3,12 @@
 from typing import Any
 
 import numpy as np
-from flint import arb
 from oracles.tree_queries import TreeQuery
 
-from vdsm_pin.certificate_checker.balls import column
-from vdsm_pin.certificate_checker.motion import Branch, Interval, Path
+from vdsm_pin.certificate_checker.claims import Clearances
+from vdsm_pin.certificate_checker.motion import Branch, Path
 from vdsm_pin.certificate_checker.solids import Body, Pair, Solid
-from vdsm_pin.certificate_checker.tree import SLIDES, Joint, Tree
+from vdsm_pin.certificate_checker.tree import Joint, Tree
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece
 from vdsm_pin.proof.bodies import Pair as Asked
 from vdsm_pin.proof.bodies import PairTable
@@ -25,28 +24,23 @@ def solid_of(name: str, piece: Any) -> Solid:
     """One convex piece."""
     if isinstance(piece, HalfSpacePiece):
         found = Solid(name, [[piece.offset * piece.normal]])
-        found.normal = column(*piece.normal.tolist())
+        found.normal = np.array(piece.normal)
         return found
     if isinstance(piece, FlatCylinder):
         half = piece.half_length * piece.axis
-        found = Solid(name, [[piece.centre - half, piece.centre + half]])
-        found.disc_axis = column(*piece.axis.tolist())
-        found.disc_radius = arb(piece.radius)
-        return found
+        ends = [[piece.centre - half, piece.centre + half]]
+        return Solid(name, ends, disc=(piece.axis, piece.radius))
     return Solid(name, [piece.points], radius=piece.radius)
 
 
-def tree_of(query: TreeQuery, box: ErrorBox, path: Path) -> Tree:
-    """The joints with their errors, and how far those that slide reach."""
-    joints, reach = [], path.reach()
+def tree_of(query: TreeQuery, box: ErrorBox) -> Tree:
+    """The joints with their errors."""
+    joints = []
     for k, one in enumerate(query.tree.joints):
         moved = one.column, one.ratio, one.offset
-        joint = Joint(one.parent, one.kind.name, one.axis, one.placement, *moved)
-        joint.err(*(arb(float(x[k])) for x in (box.joints, box.shifts, box.tilts)))
-        if joint.kind == SLIDES:
-            most = 0 if one.column is None else reach[one.column]
-            joint.stroke = abs(joint.ratio) * most + abs(joint.offset)
-        joints.append(joint)
+        errors = [float(x[k]) for x in (box.joints, box.shifts, box.tilts)]
+        place = one.parent, one.kind.name, one.axis, one.placement
+        joints.append(Joint(*place, moved, (errors[0], errors[1], errors[2])))
     return Tree(joints)
 
 
@@ -56,17 +50,17 @@ class Core:
     def __init__(self, query: TreeQuery, box: ErrorBox, required: float) -> None:
         motion = query.path
         inner = motion.inner if motion.inner.size else None
-        self.path = Path(Branch(motion.knots, None, inner, []), [])
-        tree, (one, other) = tree_of(query, box, self.path), query.bodies
+        self.path = Path(Branch(motion.knots, None, inner))
+        self.tree, (one, other) = tree_of(query, box), query.bodies
         body = Body(one.frame, solid_of(one.name, one.pieces[0]))
-        lost = body.solid.radius + tree.slip(other.frame, one.frame)
-        rests = solid_of(other.name, other.pieces[0])
-        self.pair = Pair(body, rests, other.frame, arb(required), lost)
-        self.tree = tree
+        rests, lost = solid_of(other.name, other.pieces[0]), 0.0
+        lost += self.tree.slip(other.frame, one.frame)
+        self.pair = Pair(body, rests, other.frame, required, lost)
 
-    def interval(self, k: int) -> Interval:
-        """The motion between two knots."""
-        return Interval(self.tree, self.path.controls(k))
+    def check(self, proofs: list[Any]) -> None:
+        """Check the proofs of all intervals."""
+        lines = ({"k": k, "proofs": [proof]} for k, proof in enumerate(proofs))
+        Clearances(self.tree, self.path, [self.pair]).check(lines)
 
 
 def proofs_of(query: TreeQuery, box: ErrorBox, required: float) -> list[Any] | None:

@@ -307,7 +307,7 @@ def certificate(folder: Path, problem: Path, rows: Path) -> Path:
     assert found.verdict is Verdict.CERTIFIED, found.checks
     path = folder / "c.certificate"
     digest = sha256(rows.read_bytes())
-    write_certificate(path, found, Hashes(file.sha256, digest, "0" * 64))
+    write_certificate(path, found, Hashes(file.sha256, digest))
     return path
 
 

@@ -91,9 +91,7 @@ def certificate(folder: Path, corners: FloatArray, solid: bool | None) -> Path:
     problem, rows = written(folder, corners, solid)
     file, found = verified(problem, rows)
     path = folder / "c.certificate"
-    write_certificate(
-        path, found, Hashes(file.sha256, sha256(rows.read_bytes()), "0" * 64)
-    )
+    write_certificate(path, found, Hashes(file.sha256, sha256(rows.read_bytes())))
     return path
 
 
@@ -345,7 +343,8 @@ def test_the_checker_names_what_was_assumed_of_a_mesh(tmp_path: Path) -> None:
     corners[corners.mean(axis=1)[:, 2] > 2.0] += [0.0, 0.0, 1e-5]
     path = certificate(tmp_path, corners, None)
     notes = check_certificate(path, tmp_path / "None.yaml", tmp_path / "t.csv").notes
-    size, gaps = notes
+    size, gaps, joined = notes
     assert size == "housing is taken to be 1 x 1 x 1 m; no unit is stated"
     assert gaps == "gaps of housing, up to 0.01 mm wide, are joined"
+    assert joined == "linear pieces join the rows"
     assert main([str(path), str(tmp_path / "None.yaml"), str(tmp_path / "t.csv")]) == 0

@@ -143,7 +143,7 @@ def test_a_certificate_that_is_late_is_no_file(tmp_path: Path) -> None:
     )
     file = tmp_path / "late.certificate"
     with pytest.raises(OutOfTime):
-        write_certificate(file, good, Hashes(*3 * ("0" * 64,)), PASSED)
+        write_certificate(file, good, Hashes(*2 * ("0" * 64,)), PASSED)
     assert not list(tmp_path.iterdir())
 
 

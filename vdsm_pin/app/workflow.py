@@ -315,7 +315,6 @@ def _certify(order: VerifyOrder, verification: Verification, record: RunRecord) 
     hashes = Hashes(
         problem=record.problem_sha256,
         trajectory=record.trajectory_sha256,
-        urdf=record.urdf_sha256,
     )
     try:
         write_certificate(order.certificate, verification, hashes, order.deadline)

@@ -9,36 +9,28 @@ from itertools import combinations
 from typing import Any, Final
 
 import numpy as np
-from flint import arb
 
-from vdsm_pin.certificate_checker.balls import Ball, claim, number
+from vdsm_pin.certificate_checker.balls import claim, column, number
 from vdsm_pin.certificate_checker.motion import Branch, Path
-from vdsm_pin.certificate_checker.solids import Body, Pair, Solid, solid
-from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Tree
+from vdsm_pin.certificate_checker.solids import Body, Mesh, Pair, Solid, solid
+from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Tree, hung
 from vdsm_pin.problem import scene
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 
-ERRORS: Final = "joints_rad", "base_m", "base_rad", "obstacle_m", "obstacles"
+ERRORS: Final = {"joints_rad", "base", "obstacles"}
 
 
-def arm_joints(lengths: list[float]) -> Iterator[Joint]:
-    """Rail, then yaw and pitch of every link."""
-    yield Joint(0, SLIDES, (1, 0, 0), np.eye(4), column_of_q=0)
-    for i, before in enumerate([0.0, *lengths[:-1]]):
+def arm_joints(lengths: list[float], angles: list[float], base: Any) -> list[Joint]:
+    """Rail, then yaw and pitch of every link; the base is off by a shift and a turn."""
+    rail = Joint(0, SLIDES, (1, 0, 0), np.eye(4), (0, 1.0, 0.0), (0.0, *base))
+    joints = [rail]
+    for k, error in enumerate(angles, start=1):
         place = np.eye(4)
-        place[0, 3] = before
-        yield Joint(2 * i + 1, TURNS, (0, 0, 1), place, column_of_q=2 * i + 1)
-        yield Joint(2 * i + 2, TURNS, (0, 1, 0), np.eye(4), column_of_q=2 * i + 2)
-
-
-def hung(joints: Any, base: int, columns: int) -> Iterator[Joint]:
-    """Joints of another tree behind so many, their columns of q behind so many."""
-    for joint in joints:
-        parent = joint.parent + base if joint.parent else 0
-        moves = None if joint.column is None else joint.column + columns
-        kind, axis, place = joint.kind.name, joint.axis, joint.placement
-        yield Joint(parent, kind, axis, place, moves, joint.ratio, joint.offset)
+        place[0, 3] = lengths[k // 2 - 1] if k % 2 and k > 1 else 0.0
+        axis = (0, 0, 1) if k % 2 else (0, 1, 0)
+        joints.append(Joint(k, TURNS, axis, place, (k, 1.0, 0.0), (error, 0.0, 0.0)))
+    return joints
 
 
 def frame_of(link: int) -> int:
@@ -63,104 +55,107 @@ def own_bodies(arm: Any) -> Iterator[Body]:
 
 
 class Arm:
-    """What the two files ask about.
+    """What the two files ask about, under the errors that a certificate states.
 
     Args:
         problem: As it was read.
         rows: As they were read.
+        header: Of the certificate.
     """
 
-    def __init__(self, problem: PlanningProblem, rows: Trajectory) -> None:
+    def __init__(
+        self, problem: PlanningProblem, rows: Trajectory, header: Mapping[str, Any]
+    ) -> None:
         self.problem, self.arm = problem, problem.manipulator
         self.lengths = self.arm.link_lengths.tolist()
-        joints = [*arm_joints(self.lengths)]
-        self.n_own = columns = len(joints)
-        others, first = list[Branch](), dict[Any, int]()
-        self.frames: list[int] = []
+        self.solids = [solid(one) for one in problem.scene.obstacles]
+        self.meshes = {s.name: s for s in self.solids if isinstance(s, Mesh)}
+        angles, base, self.grown = self._errors(header["errors"])
+        joints = arm_joints(self.lengths, angles, base)
+        rates = [x for x in (rows.rates, rows.changes) if x is not None]
+        own, first = Branch(rows.joints, rows.times, rates=rates), dict[Any, int]()
+        self.own, branches = (Tree(joints), Path(own)), [own]
+        columns, joints = len(joints), [*joints]
         for carrier in problem.scene.carriers:
             path, first[carrier] = carrier.path, len(joints)
             joints += hung(carrier.tree.joints, len(joints), columns)
             columns += path.knots.shape[1]
             inner = path.inner if path.inner.size else None
-            others.append(Branch(path.knots, path.times, inner, []))
-        for one in problem.scene.obstacles:
-            rides = isinstance(one, scene.Moving) and first[one.carrier] + one.frame
-            self.frames.append(int(rides))
-        self.solids = [solid(one) for one in problem.scene.obstacles]
-        timed = not others or rows.times is not None
+            branches.append(Branch(path.knots, path.times, inner))
+        timed = len(branches) == 1 or rows.times is not None
         claim(timed, "rows beside what moves have no times")
-        rates = [x for x in (rows.rates, rows.changes) if x is not None]
-        own = Branch(rows.joints, rows.times, None, rates)
-        self.path, self.tree = Path(own, others), Tree(joints)
-        self.bodies: list[Body] = []
-        self.pairs: list[Pair] = []
+        self.tree, self.path = Tree(joints), Path(*branches)
+        self.frames = [
+            first[one.carrier] + one.frame if isinstance(one, scene.Moving) else 0
+            for one in problem.scene.obstacles
+        ]
+        self._cover(dict(header["pieces"]), header["joined"])
+        self.pairs = [*self._pairs()]
+        expected = [pair.names for pair in self.pairs]
+        claim(header["pairs"] == expected, "the pairs are not those of the problem")
 
-    def take_errors(self, errors: dict[str, Any]) -> None:
-        """Take the errors, which cover those that the problem asks for."""
-        claim(set(errors) == set(ERRORS), f"errors: expected {ERRORS}")
-        asked, count = self.problem.errors, 2 * len(self.lengths)
-        joints = [number(e) for both in errors["joints_rad"] for e in both]
-        claim(len(joints) == count, f"errors: expected {count // 2} joints")
+    def _errors(self, stated: dict[str, Any]) -> tuple[list[float], Any, Any]:
+        """Errors of angles and base, and how far obstacles may be off.
+
+        Those stated cover those that the problem asks for.
+        """
+        claim(set(stated) == ERRORS, f"errors: expected {sorted(ERRORS)}")
+        asked, names = self.problem.errors, [one.name for one in self.solids]
+        known = set(stated["obstacles"]) == set(names)
+        claim(known, "errors: the obstacles are not those of the problem")
+        angles, base = (
+            [*map(number, stated["joints_rad"])],
+            [*map(number, stated["base"])],
+        )
+        off = [[*map(number, stated["obstacles"][name])] for name in names]
+        single = {one.name: (one.shift, one.turn) for one in asked.obstacles}
+        least = [[asked.base, asked.base_turn]]
+        for name in names:
+            shift, turn = single.get(name, (0.0, 0.0))
+            least.append([max(shift, asked.obstacle), turn])
         each = [e for pair in asked.joints for e in pair]
-        each += [0.0] * (count - len(each))
-        base, turn = number(errors["base_m"]), number(errors["base_rad"])
-        known, single = number(errors["obstacle_m"]), errors["obstacles"]
-        names = {one.name: one for one in self.solids}
-        claim(set(single) <= set(names), "errors: an obstacle is unknown")
-        grown = {name: (known, arb(0)) for name in names}
-        grown |= {k: (known.max(number(s)), number(t)) for k, (s, t) in single.items()}
-        pairs = [(base, asked.base), (turn, asked.base_turn)]
-        pairs += zip(joints, [max(asked.joint, e) for e in each], strict=True)
-        pairs += [(shift, asked.obstacle) for shift, _ in grown.values()]
-        for one in asked.obstacles:
-            pairs += zip(grown[one.name], (one.shift, one.turn), strict=True)
-        pairs += [(turn, 0.0) for _, turn in grown.values()]
-        covered = all(e >= least and e >= 0 for e, least in pairs)
+        each += [0.0] * (2 * len(self.lengths) - len(each))
+        least.append([max(asked.joint, e) for e in each])
+        given = [base, *off, angles]
+        covered = all(
+            len(one) == len(other)
+            and all(a >= b >= 0.0 for a, b in zip(one, other, strict=True))
+            for one, other in zip(given, least, strict=True)
+        )
         claim(covered, "errors: less than the problem asks for")
-        for name, (_, angle) in grown.items():
-            flat = angle > 0 and names[name].normal is not None
-            claim(not flat, f"errors: {name} has no end and is turned")
-        for joint, error in zip(self.tree.joints[1:], joints, strict=False):
-            joint.err(error, arb(0), arb(0))
-        self.tree.joints[0].err(arb(0), base, turn)
-        self._grow({k: s + t * names[k].size() for k, (s, t) in grown.items()})
+        grown = [
+            shift + (turn * one.size() if turn > 0.0 else 0.0)
+            for (shift, turn), one in zip(off, self.solids, strict=True)
+        ]
+        return angles, base, grown
 
-    def _grow(self, grown: Mapping[str, Ball]) -> None:
-        """Take how far obstacles may be off, and how far slides reach."""
-        self.grown = grown
-        reach = self.path.reach()
-        for joint in self.tree.joints:
-            if joint.kind == SLIDES and joint.column is not None:
-                joint.stroke = abs(joint.ratio) * reach[joint.column] + abs(
-                    joint.offset
-                )
-
-    def pair_up(self, pieces: dict[str, Any]) -> None:
-        """Find the bodies and the pairs that the problem asks about, in order."""
-        self.bodies, problem = [*own_bodies(self.arm)], self.problem
+    def _cover(self, pieces: dict[str, Any], joined: dict[str, Any]) -> None:
+        """Take the bodies, and the pieces that cover them and the obstacles."""
+        self.bodies, named = [*own_bodies(self.arm)], {s.name: s for s in self.solids}
         for carried in self.arm.bodies:
             parts = solid(carried.solid).parts(pieces.pop(carried.solid.name, None))
             frame = frame_of(carried.link)
             self.bodies += [Body(frame, part, own=False) for part in parts]
-        named = {one.name: one for one in self.solids}
         for name in pieces:
             named[name].cut(pieces[name])
-        required = arb(problem.required_clearance)
-        for one, rest in zip(self.solids, self.frames, strict=True):
+        for name, (corners, seams) in joined.items():
+            claim(name in self.meshes, f"{name} is no mesh: nothing is joined")
+            self.meshes[name].surface.join(corners, seams)
+
+    def _pairs(self) -> Iterator[Pair]:
+        """What the problem holds apart, in order."""
+        required = self.problem.required_clearance
+        for one, rest, off in zip(self.solids, self.frames, self.grown, strict=True):
             for body in self.bodies:
                 if not self._ignored(body.solid.name, one.name):
-                    lost = body.solid.radius + self.grown[one.name]
-                    self._add(Pair(body, one, rest, required, lost))
-        required = arb(problem.required_self_clearance)
+                    lost = off + self.tree.slip(rest, body.frame)
+                    yield Pair(body, one, rest, required, lost)
+        required = self.problem.required_self_clearance
         for both in combinations(self.bodies, 2):
             near, far = sorted(both, key=lambda body: body.frame)
             if self._parts(near, far):
-                lost = far.solid.radius
-                self._add(Pair(far, near.solid, near.frame, required, lost))
-
-    def _add(self, pair: Pair) -> None:
-        slip = self.tree.slip(pair.rest, pair.body.frame)
-        self.pairs.append(pair._replace(lost=pair.lost + slip))
+                lost = self.tree.slip(near.frame, far.frame)
+                yield Pair(far, near.solid, near.frame, required, lost)
 
     def _ignored(self, one: str, other: str) -> bool:
         """Whether the problem leaves two names, or parts of what they name, out."""
@@ -176,7 +171,37 @@ class Arm:
         if far.frame == near.frame + 2 and near.own and far.own:
             length = [0.0, *self.lengths][near.frame // 2]
             start, end = far.solid.points[0, 0, 0], near.solid.points[0, 1, 0]
-            if (length - end) + start <= float(near.solid.radius + far.solid.radius):
+            if (length - end) + start <= near.solid.radius + far.solid.radius:
                 return False  # they meet at the joint in every pose
         names = near.solid.name, far.solid.name
         return near.frame < far.frame and not self._ignored(*names)
+
+    def check_outside(self, first: Any) -> None:
+        """Check that the arm is clear of a mesh's hull, or begins outside.
+
+        A body never meets the mesh's triangles, so one point of it decides; that at O_1
+        for links, tool and feed where all of them are held off the mesh.
+
+        Args:
+            first: The pose as the motion begins.
+        """
+        own = [body for body in self.bodies if body.own]
+        thinnest = min(body.solid.radius for body in own)
+        for mesh in self.meshes.values():
+            if mesh.surface_only or mesh.whole:
+                continue
+            mine = [pair.body for pair in self.pairs if pair.solid is mesh]
+            points = []
+            if all(body in mine for body in own):
+                points = [(1, column(0, 0, 0), thinnest)]
+                mine = [body for body in mine if not body.own]
+            for body in mine:
+                middle = column(*body.solid.points[0].mean(axis=0).tolist())
+                kept = body.solid.radius + self.problem.required_clearance
+                points.append((body.frame, middle, kept))
+            zero, axes = first[self.frames[self.solids.index(mesh)]]
+            for frame, at, radius in points:
+                origin, turned = first[frame]
+                seen = axes.transpose() * (origin + turned * at - zero)
+                why = mesh.surface.not_outside([*map(float, seen.entries())], radius)
+                claim(not why, f"the arm is not proved outside {mesh.name}: {why}")

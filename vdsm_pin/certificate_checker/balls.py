@@ -1,4 +1,4 @@
-"""Vectors of flint balls, and the one way to refuse, for the certificate checker.
+"""Balls, and the one way to refuse, for the certificate checker.
 
 A ball surely holds the real number it stands for. Comparisons of balls are true only
 where they are certain: rounding can reject a certificate and never accept one.
@@ -7,21 +7,14 @@ where they are certain: rounding can reject a certificate and never accept one.
 from math import isfinite
 from typing import Any, Final, TypeAlias
 
-from flint import arb, arb_mat
+from flint import arb_mat
 
 Ball: TypeAlias = Any  # flint.arb and flint.arb_mat carry no types
 Matrix: TypeAlias = Any  # a vector is a column
 
-
-ROUNDING: Final = 2.0**-46
-"""Error of a height in doubles over the extent of the points; [-].
-
-A point is a sum of four terms and off by 28 units of 2^-53 at most, its product with a
-rounded n by seven: 35 in all, and this is 128.
-"""
-
 MM: Final = 1000  # messages tell lengths in millimetres
-SLACK: Final = 1e-9  # claims may understate by this, limits be passed; [m], [rad], [-]
+SLACK: Final = 1e-9  # limits may be passed by this; [m], [rad], [-]
+UP: Final = 1 + 2.0**-40  # lifts bounds above what rounding loses of all made of them
 
 
 class Rejected(Exception):
@@ -39,11 +32,11 @@ def claim(holds: object, reason: str, *numbers: Ball) -> None:
         raise Rejected(reason.format(*shown) if shown else reason)
 
 
-def number(value: Any) -> Ball:
+def number(value: Any) -> float:
     """A number of a certificate, which is the nearest double."""
     if type(value) not in (int, float) or not isfinite(value):
         claim(False, f"{value!r} is not a finite number")
-    return arb(float(value))
+    return float(value)
 
 
 def column(x: Ball, y: Ball, z: Ball) -> Matrix:

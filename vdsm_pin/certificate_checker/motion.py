@@ -1,25 +1,22 @@
-"""How a tree moves, and how far its bodies reach meanwhile (docs/certificate.md)."""
+"""How a tree moves between two knots, and how far bodies reach meanwhile.
 
-from collections import defaultdict
+The bound is that of docs/certificate.md. Joints and frames are balls. What is worked
+out of them for planes are doubles, many slices at once: bounds are lifted by `UP`
+before, heights come with what they may be off.
+"""
+
 from collections.abc import Sequence
-from functools import reduce, wraps
+from functools import cached_property, reduce
 from itertools import pairwise
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from flint import arb, arb_mat
 
-from vdsm_pin.certificate_checker.balls import ROUNDING, Ball, Matrix, cross, dot, norm
-from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Pose, Tree, pose
-
-SCREEN: Final = 1e-9
-"""Corners are looked at that doubles find as near to the farthest; [m].
-
-Doubles are off by some 1e-13 m within the extent that files may have.
-"""
+from vdsm_pin.certificate_checker.balls import UP, Ball
+from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Pose, Tree
 
 Points: TypeAlias = Sequence[Ball]  # the control points of a column of q
-WHOLE: Final = 0.0, 1.0
 
 
 def blossom(points: Points, shares: Sequence[Ball]) -> Ball:
@@ -44,11 +41,6 @@ def raised(points: Points, degree: int) -> Points:
     return points
 
 
-def largest(values: Points) -> Ball:
-    """The largest size of some balls."""
-    return reduce(arb.max, map(abs, values))
-
-
 class Branch:
     """Rows of some columns of q, joined by straight lines or smooth pieces.
 
@@ -60,7 +52,7 @@ class Branch:
     """
 
     def __init__(
-        self, knots: Any, times: Any, inner: Any, rates: Sequence[Any]
+        self, knots: Any, times: Any, inner: Any = None, rates: Sequence[Any] = ()
     ) -> None:
         self.knots, self.inner, self.rates = knots, inner, rates
         self.times = np.arange(float(len(knots))) if times is None else times
@@ -69,32 +61,31 @@ class Branch:
             self.degree = 1 + 2 * len(rates)
 
     def controls(self, k: int) -> list[Points]:
-        """Control points of every column over interval k."""
-        first, last = self._rows(self.knots, k)
-        rows = [first, last]
+        """Control points of every column over interval k; a single row stands still."""
+
+        def ends(values: Any) -> Any:
+            last = min(k + 1, len(values) - 1)
+            return (arb_mat([values[row].tolist()]) for row in (k, last))
+
+        rows = [*ends(self.knots)]
         if self.inner is not None:
             rows[1:1] = [arb_mat([row]) for row in self.inner[k].tolist()]
         elif self.degree > 1:
             step = arb(self.times[k + 1]) - arb(self.times[k])
-            v = [rate * (step / self.degree) for rate in self._rows(self.rates[0], k)]
-            rows[1:1] = [first + v[0], last - v[1]]
+            first, last = rows
+            v, w = (rate * (step / self.degree) for rate in ends(self.rates[0]))
+            rows[1:1] = [first + v, last - w]
             if self.degree == 5:
-                a = [c * (step * step / 20) for c in self._rows(self.rates[1], k)]
-                rows[2:2] = [first + 2 * v[0] + a[0], last - 2 * v[1] + a[1]]
+                a, b = (c * (step * step / 20) for c in ends(self.rates[1]))
+                rows[2:2] = [first + 2 * v + a, last - 2 * w + b]
         return [*map(list, zip(*(row.entries() for row in rows), strict=True))]
-
-    def _rows(self, values: Any, k: int) -> list[Matrix]:
-        ends = k, min(k + 1, len(values) - 1)  # a single row stands still
-        return [arb_mat([values[row].tolist()]) for row in ends]
 
     def between(self, start: float, end: float) -> list[Points]:
         """Control points between two times; it rests before its first and last."""
-        k, last = (
-            int(np.searchsorted(self.times, start, "right")) - 1,
-            len(self.knots) - 1,
-        )
-        if not 0 <= k < last:
-            return [[arb(q)] * 2 for q in self.knots[min(max(k, 0), last)].tolist()]
+        k, last = int(np.searchsorted(self.times, start, "right")) - 1, len(self.knots)
+        if not 0 <= k < last - 1:
+            row = self.knots[min(max(k, 0), last - 1)]
+            return [[arb(q)] * 2 for q in row.tolist()]
         if (start, end) == (self.times[k], self.times[k + 1]):
             return self.controls(k)
         own, step = arb(self.times[k]), arb(self.times[k + 1]) - arb(self.times[k])
@@ -108,100 +99,88 @@ class Path:
     What the others do meanwhile adds knots.
     """
 
-    def __init__(self, first: Branch, others: Sequence[Branch]) -> None:
-        self.branches = [first, *others]
-        self.degree = max(branch.degree for branch in self.branches)
-        times = np.unique(np.concatenate([branch.times for branch in self.branches]))
-        inside = (times >= first.times[0]) & (times <= first.times[-1])
-        self.times, self.size = times[inside], max(1, int(inside.sum()) - 1)
-
-    def ends(self, k: int) -> tuple[float, float]:
-        """When an interval begins and ends."""
-        return self.times[k], self.times[min(k + 1, len(self.times) - 1)]
+    def __init__(self, *branches: Branch) -> None:
+        self.branches = branches
+        self.degree = max(branch.degree for branch in branches)
+        times = np.unique(np.concatenate([branch.times for branch in branches]))
+        first, last = branches[0].times[[0, -1]]
+        self.times = times[(times >= first) & (times <= last)]
+        self.size = max(1, len(self.times) - 1)
 
     def controls(self, k: int) -> list[Points]:
         """Control points of every column of q over interval k."""
-        found = [p for b in self.branches for p in b.between(*self.ends(k))]
+        ends = self.times[k], self.times[min(k + 1, len(self.times) - 1)]
+        found = [points for one in self.branches for points in one.between(*ends)]
         return [raised(points, self.degree) for points in found]
-
-    def reach(self) -> list[Ball]:
-        """How large each column of q gets at most."""
-        if self.degree == 1 and len(self.branches) == 1:
-            knots = self.branches[0].knots
-            return [arb(x) for x in abs(knots).max(axis=0).tolist()]
-        every = (self.controls(k) for k in range(self.size))
-        sizes = ([largest(points) for points in columns] for columns in every)
-        return reduce(lambda a, b: [*map(arb.max, a, b)], sizes)
 
 
 class Sweep(NamedTuple):
-    """Bounds of how a frame moves as seen from another, and of what errors add.
+    """Bounds of how a point moves as seen from a frame, and of what errors add.
+
+    Numbers, or arrays of one for each slice.
 
     Args:
-        turn: W, how fast it turns.
+        turn: W, how fast the point's frame turns.
         swing: A, how fast that changes.
         erring: E, the sum of the errors of angles.
         turned: C, that and the turns of placements.
-        origin: Of its origin: speed, M, D, first and second order of the errors.
+        speed: Of the point.
+        bend: M, of its acceleration.
+        tilting: What turns of placements add to that.
+        drift: D, how fast the first order of errors of angles changes.
+        first: How far errors carry it in the first order.
+        second: Q, and beyond it.
     """
 
-    turn: Ball
-    swing: Ball
-    erring: Ball
-    turned: Ball
-    origin: Points
+    turn: Any = 0.0
+    swing: Any = 0.0
+    erring: Any = 0.0
+    turned: Any = 0.0
+    speed: Any = 0.0
+    bend: Any = 0.0
+    tilting: Any = 0.0
+    drift: Any = 0.0
+    first: Any = 0.0
+    second: Any = 0.0
 
-    def at(self, lever: Ball) -> Points:
-        """As `origin`, of a point so far from it."""
-        w, a, e, c, (speed, bend, drift, one, two) = self
-        speed, bend = speed + lever * w, bend + lever * (w * w + a)
-        if c == 0:
-            return speed, bend, drift, one, two
-        drift, one = drift + lever * e * w, one + lever * c
-        return speed, bend, drift, one, two + lever * c * c / 2
+    def at(self, far: Any, rate: Any = 0.0, change: Any = 0.0) -> "Sweep":
+        """Of a point so far from it in its frame, or as far at most as it slides.
 
-    def past(self, joint: Joint, up: bool, value: Sequence[Ball]) -> "Sweep":
-        """The same of the frame behind one more joint, passed upwards or not.
+        Args:
+            far: A distance, or an array of some.
+            rate: How fast that changes at most.
+            change: How fast the rate does.
+        """
+        w, a, e, c, speed, bend, tilting, drift, first, second = self
+        bent = far * (w * w + a) + 2.0 * w * rate + change
+        return Sweep(
+            *(w, a, e, c),
+            speed=speed + far * w + rate,
+            bend=bend + bent,
+            tilting=tilting + bent * (c - e),
+            drift=drift + far * e * w + e * rate,
+            first=first + far * c,
+            second=second + far * c * c / 2.0,
+        )
+
+    def past(self, joint: Joint, up: bool, value: Sequence[Any]) -> "Sweep":
+        """Of the frame behind one more joint, passed upwards or not.
 
         Args:
             joint: The joint.
             up: Whether the frame is the one that it hangs on.
             value: Bounds of its value, of its rate and of how fast that changes.
         """
-        far, rate, change = value
-        w, a, e, c, origin = self
-        if joint.kind == TURNS:
-            w, a, e = w + rate, a + change, e + joint.turn_error
-        c = c + joint.turn_error + joint.tilt
-        now = Sweep(w, a, e, c, origin)
-        if not joint.lever == 0:
-            origin = (now if up else self).at(joint.lever)
-            now = Sweep(w, a, e, c, origin)
-        if joint.kind == SLIDES:
-            (speed, bend, drift, _, _), (*_, one, two) = map(
-                now.at, (far, joint.stroke)
-            )
-            bend, drift = bend + 2 * w * rate + change, drift + e * rate
-            now = Sweep(w, a, e, c, (speed + rate, bend, drift, one, two))
-        return now
-
-
-STILL: Final = Sweep(arb(0), arb(0), arb(0), arb(0), [arb(0)] * 5)
-
-
-def kept(method: Any) -> Any:
-    """Keep what a method of an interval finds, some thousands at a time."""
-
-    @wraps(method)
-    def found(self: "Interval", *key: Any) -> Any:
-        memo = self.memo[method]
-        if key not in memo:
-            if len(memo) > 1_000:
-                memo.clear()
-            memo[key] = method(self, *key)
-        return memo[key]
-
-    return found
+        now = self if up or joint.lever == 0.0 else self.at(joint.lever)
+        rate, change = value[1:] if joint.kind == TURNS else (0.0, 0.0)
+        now = now._replace(
+            turn=now.turn + rate,
+            swing=now.swing + change,
+            erring=now.erring + joint.turn_error,
+            turned=now.turned + joint.turn_error + joint.tilt,
+        )
+        now = now.at(joint.lever) if up and joint.lever > 0.0 else now
+        return now.at(*value) if joint.kind == SLIDES else now
 
 
 class Interval:
@@ -216,126 +195,132 @@ class Interval:
     def __init__(
         self, tree: Tree, controls: Sequence[Points], before: Pose | None = None
     ) -> None:
-        self.tree, self.controls, self.before = tree, controls, before
+        self.tree, self.controls = tree, controls
         self.degree = max(map(len, controls), default=2) - 1
-        self.straight = self.degree == 1
-        self.err = any(joint.turn_error + joint.tilt > 0 for joint in tree.joints)
-        self.memo: dict[Any, Any] = defaultdict(dict)
+        self.poses = {} if before is None else {0.0: before}
 
-    @kept
     def pose(self, time: float) -> Pose:
-        """All frames at a time in [0, 1]; pairs share most of their times."""
-        if time == 0.0 and self.before is not None:
-            return self.before
-        shares = [arb(time)] * self.degree
-        return pose(self.tree.joints, [blossom(p, shares) for p in self.controls])
+        """All frames at a time in [0, 1]."""
+        if time not in self.poses:
+            shares = [arb(time)] * self.degree
+            q = [blossom(points, shares) for points in self.controls]
+            self.poses[time] = self.tree.pose(q)
+        return self.poses[time]
 
-    @kept
-    def value(self, number: int, times: Any) -> Sequence[Ball]:
-        """Bounds of a joint's value, of its rate and of how fast that changes."""
-        joint, bounds = self.tree.joints[number], [arb(0)] * 3
-        if joint.column is not None:
-            points = self.controls[joint.column]
-            for order in range(min(3, len(points))):
-                here = points if times == WHOLE else part(points, *map(arb, times))
-                bounds[order] = largest(here) * abs(joint.ratio)
-                n = len(points) - 1
-                points = [(b - a) * n for a, b in pairwise(points)]
-        return [bounds[0] + abs(joint.offset), *bounds[1:]]
+    def frames(self, time: float) -> list[list[float]]:
+        """Of all frames origin and rotation, in doubles, shape (n_frames, 12)."""
+        pose = self.pose(time)
+        return [[*map(float, o.entries() + turn.entries())] for o, turn in pose]
 
-    @kept
-    def sweep(self, rest: int, frame: int, times: Any) -> Sweep:
-        """How a frame moves over a slice [a, b] as seen from another."""
-        steps = self.tree.way(rest, frame)
-        if not steps:
-            return STILL
-        number, up = steps[-1]
-        joint = self.tree.joints[number]
-        before: Sweep = self.sweep(rest, number + 1 if up else joint.parent, times)
-        return before.past(joint, up, self.value(number, times))
+    def rates(self, low: float, high: float) -> list[list[float]]:
+        """Of a slice bounds of joints' values, rates and how fast those change."""
+        bounds = []
+        for points in self.controls:
+            sizes, cut = [0.0] * 3, (low, high) != (0.0, 1.0)
+            orders, n = [points], len(points) - 1
+            for k in range(n, max(n - 2, 0), -1):
+                orders.append([(b - a) * k for a, b in pairwise(orders[-1])])
+            for order, values in enumerate(orders):
+                here = part(values, arb(low), arb(high)) if cut else values
+                sizes[order] = UP * float(reduce(arb.max, map(abs, here)))
+            bounds.append(sizes)
+        found = []
+        for joint in self.tree.joints:
+            sizes = [0.0] * 3 if joint.column is None else bounds[joint.column]
+            far, rate, change = (joint.gain * size for size in sizes)
+            found.append([far + joint.past, rate, change])
+        return found
 
-    @kept
-    def corner(self, body: Any, i: int, rest: int, times: Any) -> tuple[Sweep, Any]:
-        """How a corner's frame moves, and the corner with a disc about it.
 
-        The origin of a joint that turns also rides on the frame that it hangs on.
-        """
-        frame, lever = body.frame, body.solid.corner(i)[1]
-        while lever == 0 and (steps := self.tree.way(rest, frame)):
-            joint = self.tree.joints[frame - 1]
-            if steps[-1][1] or joint.kind == SLIDES:
-                break
-            frame, lever = joint.parent, joint.lever
-        sweep = self.sweep(rest, frame, times)
-        return sweep, sweep.at(lever)
+class Slices:
+    """Slices of intervals, as arrays with one entry for each.
 
-    def reach(self, body: Any, rest: int, times: Any, n: Matrix) -> Ball:
-        """Largest n.x over a body without its ball, a slice [a, b] and all errors.
+    Args:
+        tree: The joints, with their errors.
+        slices: Each an interval, and times a and b in it.
+    """
+
+    def __init__(
+        self, tree: Tree, slices: Sequence[tuple[Interval, float, float]]
+    ) -> None:
+        self.tree, self.slices = tree, slices
+        self.numbers = {one: i for i, one in enumerate(slices)}
+        self.widths = np.array([b - a for _, a, b in slices])
+        rates = np.array([one.rates(*times) for one, *times in slices])
+        self.rates = rates.reshape(-1, len(tree.joints), 3).transpose(1, 2, 0)
+        self.sweeps = dict[tuple[int, int], Sweep]()
+
+    @cached_property
+    def frames(self) -> tuple[Any, Any]:
+        """Origins and rotations of all frames at both ends, in doubles."""
+        ends = [[one.frames(t) for t in times] for one, *times in self.slices]
+        shape = len(ends), 2, len(self.tree.joints) + 1
+        flat = np.array(ends).reshape(*shape, 12)
+        return flat[..., :3], flat[..., 3:].reshape(*shape, 3, 3)
+
+    def sweep(self, rest: int, frame: int) -> Sweep:
+        """How the origin of a frame moves as seen from another one."""
+        if (rest, frame) not in self.sweeps:
+            sweep, steps = Sweep(), self.tree.way(rest, frame)
+            if steps:
+                number, up = steps[-1]
+                joint = self.tree.joints[number]
+                sweep = self.sweep(rest, number + 1 if up else joint.parent)
+                sweep = sweep.past(joint, up, self.rates[number])
+            self.sweeps[rest, frame] = sweep
+        return self.sweeps[rest, frame]
+
+    def reach(self, body: Any, rest: int, at: Any, n: Any) -> tuple[Any, Any]:
+        """Largest n.x over a body, slices and all errors, as seen from a frame.
 
         Args:
             body: Its frame and its solid of one piece.
             rest: The frame that n and x are in.
-            times: a and b.
-            n: A unit vector.
+            at: Numbers of slices, shape (m,).
+            n: Of unit length for each, shape (m, 3).
+
+        Returns:
+            Heights, and bounds of all that they are made of; shape (m,); [m].
         """
-        solid, h, top = body.solid, arb(times[1]) - times[0], arb(-np.inf)
-        poses, slice_ = [*map(self.pose, times)], WHOLE if self.straight else times
-        toward = [frames[rest][1] * n for frames in poses]
-        views = []  # how high the body's frame is, and n in it
-        for frames, turned in zip(poses, toward, strict=True):
-            origin, rotation = frames[body.frame]
-            away = dot(turned, origin - frames[rest][0])
-            views.append((away, rotation.transpose() * turned))
-        doubt = arb(0, solid.extent * ROUNDING)  # in which doubles the corners are
-        discs = [z + solid.across(m) + doubt for z, m in views]
-        for i in self._extreme(body, rest, slice_, h, views):
-            corner = solid.corner(i)[0]
-            sweep, (_, bend, drift, _, second) = self.corner(body, i, rest, slice_)
-            ends = [z + dot(corner, m) for z, (_, m) in zip(discs, views, strict=True)]
-            sag = bend * h * h / 8
-            height = ends[0].max(ends[1]) + sag
-            if self.err:
-                at = [p[body.frame][0] + p[body.frame][1] * corner for p in poses]
-                height += self._strayed(
-                    self.tree.way(rest, body.frame), poses, toward, at
-                )
-                height += sag * (sweep.turned - sweep.erring) + h * drift / 2 + second
-                height += solid.disc_radius * sweep.turned
-            top = top.max(height)
-        return top
+        solid, (origins, turns) = body.solid, (both[at] for both in self.frames)
+        points, mine = solid.points[0].T, turns[:, :, body.frame]
+        n = np.einsum("stij,sj->sti", turns[:, :, rest], n)
+        offset = origins[:, :, body.frame] - origins[:, :, rest]
+        seen = np.einsum("stij,sti->stj", mine, n)
+        heights = seen @ points + (n * offset).sum(axis=2)[:, :, None]
+        if solid.disc_radius > 0.0:
+            away = np.linalg.norm(np.cross(seen, solid.disc_axis), axis=2)
+            heights += solid.disc_radius * away[:, :, None]
+        every, sweep = self.widths.shape, self.sweep(rest, body.frame)
+        sweep = Sweep(*(np.broadcast_to(x, every)[at, None] for x in sweep))
+        sweep, h = sweep.at(solid.levers), self.widths[at, None]
+        more = (sweep.bend + sweep.tilting) * h * h / 8.0 + h * sweep.drift / 2.0
+        more = more + sweep.second + solid.disc_radius * sweep.turned
+        more = more + self._strayed(body, rest, at, n)
+        size = np.abs(origins).max() + solid.extent + (more + sweep.first).max(axis=1)
+        return (heights.max(axis=1) + more).max(axis=1), size
 
-    def _extreme(
-        self, body: Any, rest: int, times: Any, h: Ball, views: Any
-    ) -> Sequence[int]:
-        """The corners of a body that may be the farthest, as doubles tell."""
-        points = body.solid.points[0]
-        if len(points) <= 2:
-            return range(len(points))
-        far = self.sweep(rest, body.frame, times)
-        lever = body.solid.extent * 2 + body.solid.disc_radius
-        _, bend, drift, first, second = far.at(lever)
-        spare = (1 + far.turned) * bend * h * h / 8 + h * drift + first + second
-        normals = [[float(x) for x in m.entries()] for _, m in views]
-        heights = [float(z) for z, _ in views]
-        rough = (points @ np.array(normals).T + heights).max(axis=1)
-        near = rough >= rough.max() - (float(spare) + SCREEN)
-        return [int(i) for i in np.flatnonzero(near)]
+    def _strayed(self, body: Any, rest: int, at: Any, n: Any) -> Any:
+        """First order of how far errors carry corners along n, shape (m, n_corners).
 
-    def _strayed(self, steps: Any, poses: Any, toward: Any, at: Any) -> Ball:
-        """First order of how far errors carry a point along n, at both ends."""
-        along = far = arb(0)
-        for frames, turned, point in zip(poses, toward, at, strict=True):
-            tilted = arb(0)
-            for number, _ in steps:
-                joint = self.tree.joints[number]
-                if not joint.turn_error + joint.tilt > 0:
-                    continue
-                origin, rotation = frames[number + 1]
-                if joint.kind == SLIDES:
-                    place, axes = frames[joint.parent]
-                    origin = place + axes * joint.shift
-                axis, arm = rotation * joint.axis, point - origin
-                along += joint.turn_error * abs(dot(turned, cross(axis, arm))) / 2
-                tilted += joint.tilt * norm(arm)
-            far = far.max(tilted)
-        return along + far
+        Args:
+            body: As for `reach`, and so are `rest` and `at`.
+            rest: The same.
+            at: The same.
+            n: In the world's frame at both ends, shape (m, 2, 3).
+        """
+        origins, turns = (both[at] for both in self.frames)
+        points, mine = body.solid.points[0].T, turns[:, :, body.frame]
+        along, tilted = np.zeros((2, *n.shape[:2], points.shape[1]))
+        for number, _ in self.tree.way(rest, body.frame):
+            joint = self.tree.joints[number]
+            if joint.turn_error + joint.tilt > 0.0:
+                place = turns[:, :, joint.parent] @ joint.line
+                lever = origins[:, :, body.frame] - origins[:, :, joint.parent]
+                lever, g = lever - place[..., 0], np.cross(n, place[..., 1])
+                seen, gone = np.einsum("stij,ksti->kstj", mine, [g, lever])
+                swing = seen @ points + (g * lever).sum(axis=2)[:, :, None]
+                along += joint.turn_error / 2.0 * np.abs(swing)
+                away = np.linalg.norm(points + gone[..., None], axis=2)
+                tilted += joint.tilt * away
+        return along.sum(axis=1) + tilted.max(axis=1)

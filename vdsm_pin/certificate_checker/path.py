@@ -29,9 +29,11 @@ class Drawing:
         self.here: Ball | None = None  # station of the latest row on the path
         self.advanced = arb(0)  # from the first row on the path to that one
         self.left = False  # whether rows off the path lie in between
-        self.aims: list[Matrix] = []  # where the last link shall look at each corner
-        if path.pointing is not None and path.pointing.directions is not None:
-            self.aims = [column(*one) for one in path.pointing.directions.tolist()]
+        self.looks = looks = path.pointing
+        self.target = None if looks is None else looks.target
+        self.aims = list[Matrix]()  # where the last link shall look at each corner
+        if looks is not None and looks.directions is not None:
+            self.aims = [column(*one) for one in looks.directions.tolist()]
             self.aims *= len(self.corners) if len(self.aims) == 1 else 1
 
     def laps(self, station: Ball) -> int:
@@ -50,9 +52,11 @@ class Drawing:
         """The point of the path at a station."""
         return self._blend(self.corners, station)
 
-    def aim(self, station: Ball) -> Matrix:
+    def aim(self, station: Ball, tip: Matrix) -> Matrix:
         """Along which the last link shall look there, of any length."""
-        return self._blend(self.aims, station)
+        if self.target is None:
+            return self._blend(self.aims, station)
+        return column(*self.target.tolist()) - tip
 
     def _blend(self, values: list[Matrix], station: Ball) -> Matrix:
         """Vectors given at the corners, straight from each to the next one."""

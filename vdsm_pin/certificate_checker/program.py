@@ -14,18 +14,26 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 from flint import ctx
 
+from vdsm_pin.certificate_checker.arm import Arm
 from vdsm_pin.certificate_checker.balls import Rejected, claim
-from vdsm_pin.certificate_checker.claims import Check
+from vdsm_pin.certificate_checker.claims import Clearances
+from vdsm_pin.certificate_checker.rows import Rows
 from vdsm_pin.errors import InvalidFile, InvalidInput
-from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.io.problem_file import ProblemFile, read_problem
 from vdsm_pin.io.source import bounded_lines, check_is_file, sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.text import printable, show_everything
 
-VERSION: Final = 5
+VERSION: Final = 6
+KEYS: Final = set(
+    "vdsm_certificate problem_sha256 trajectory_sha256 versions interpolation errors "
+    "pairs pieces joined".split()
+)
 PRECISION: Final = 128
 """Bits of a ball: lengths are known to about 1e-35 m."""
 
@@ -37,8 +45,8 @@ DAMAGE: Final = (
 
 
 JUDGED: Final = (
-    "clearance, limits, start, goal, path and pointing hold as the problem asks; "
-    "cables are not judged"
+    "clearance and pointing hold as the problem asks under the errors stated, limits, "
+    "start, goal and path without them; cables are not judged"
 )
 """What an accepted certificate says, and what it does not."""
 
@@ -91,14 +99,47 @@ def _unique(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
     return dict(pairs)
 
 
-def _rows(header: dict[str, Any], file: Path, arm: Any) -> Trajectory:
+def _joined(header: dict[str, Any], file: Path, problem: PlanningProblem) -> Trajectory:
     """The trajectory, its rows joined as the certificate says."""
     version, kinds = header.get("vdsm_certificate"), ("linear", "cubic", "quintic")
     by = f"as vdsm-pin {header.get('versions', {}).get('vdsm_pin')} writes and reads it"
     claim(version == VERSION, f"is of version {version}, {by}; expected {VERSION}")
-    joined: Any = header.get("interpolation")
+    claim(set(header) == KEYS, f"has other keys than {sorted(KEYS)}")
+    joined = header["interpolation"]
     claim(joined in kinds, f"interpolation is {joined}, expected one of {kinds}")
-    return read_trajectory(file, arm, joined)
+    return read_trajectory(file, problem.manipulator, joined)
+
+
+class _Run:
+    """One run of the checker on an arm's certificate; `place` says where it is."""
+
+    def __init__(self, problem: ProblemFile, trajectory: Path) -> None:
+        self.problem, self.trajectory = problem, trajectory
+        self.parts = list[Any]()  # those that are checked, and where they are
+        self.notes = list[str]()
+
+    @property
+    def place(self) -> str:
+        return self.parts[-1].place if self.parts else "header"
+
+    def check(self, lines: Iterator[dict[str, Any]]) -> None:
+        header, problem = next(lines, {}), self.problem.problem
+        rows = _joined(header, self.trajectory, problem)
+        hashes = {
+            "problem": self.problem.sha256,
+            "trajectory": sha256_of_file(self.trajectory),
+        }
+        for kind, sha256 in hashes.items():
+            known = header[f"{kind}_sha256"] == sha256
+            claim(known, f"the certificate is of another {kind} file")
+        arm = Arm(problem, rows, header)
+        self.parts.append(Clearances(arm.tree, arm.path, arm.pairs))
+        self.parts[0].check(lines)
+        self.parts.append(Rows(arm, rows))
+        arm.check_outside(self.parts[0].first)
+        self.parts[1].check()
+        self.notes = [note for mesh in arm.meshes.values() for note in mesh.notes()]
+        self.notes.append(f"{rows.interpolation} pieces join the rows")
 
 
 def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Outcome:
@@ -117,31 +158,18 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
     """
     check_is_file(certificate)
     check_is_file(trajectory)
-    source, lines, check = read_problem(problem), _lines(certificate), None
-    hashes = {
-        "problem_sha256": source.sha256,
-        "trajectory_sha256": sha256_of_file(trajectory),
-    }
-    reason = ""
-    with ctx.workprec(PRECISION):
+    run, reason = _Run(read_problem(problem), trajectory), ""
+    with ctx.workprec(PRECISION), np.errstate(all="ignore"):
         try:
-            header = next(lines, {})
-            rows = _rows(header, trajectory, source.problem.manipulator)
-            check = Check(source.problem, rows, hashes)
-            check.run(header, lines)
+            run.check(_lines(certificate))
         except Rejected as error:
-            reason = printable(f"{check.place if check else 'header'}: {error}")
+            reason = printable(f"{run.place}: {error}")
         except DAMAGE as error:
             text = f"cannot be read as a certificate: {error}"
-            at = check.place if check else "header"
-            raise InvalidFile(file=certificate, where=at, problem=text) from None
-    if check is None:
-        return Outcome(False, reason, 0, 0, ())
-    notes = [note for mesh in check.meshes.values() for note in mesh.notes()]
-    if check.smooth != "linear":
-        notes.append(f"{check.smooth} pieces join the rows")
-    counts = check.n_intervals, check.n_claims
-    return Outcome(not reason, reason, *counts, tuple(notes))
+            raise InvalidFile(file=certificate, where=run.place, problem=text) from None
+    first = run.parts[0] if run.parts else None
+    counts = (first.n_intervals, first.n_claims) if first else (0, 0)
+    return Outcome(not reason, reason, counts[0], counts[1], tuple(run.notes))
 
 
 def main(arguments: Sequence[str]) -> int:

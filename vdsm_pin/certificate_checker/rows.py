@@ -1,6 +1,5 @@
-"""The rows of an arm's trajectory and what is said of the whole motion."""
+"""The rows of an arm's trajectory against what the problem asks of the whole motion."""
 
-from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -17,16 +16,14 @@ from vdsm_pin.certificate_checker.balls import (
     cross,
     dot,
     norm,
-    number,
 )
-from vdsm_pin.certificate_checker.motion import Interval, part
+from vdsm_pin.certificate_checker.motion import Interval, Slices, Sweep, part
 from vdsm_pin.certificate_checker.path import Drawing
 from vdsm_pin.problem.planning_problem import Order, Posture
 from vdsm_pin.problem.trajectory import Trajectory
 
 PARTS: Final = 32  # of a smooth piece, whose control points hold what lies between
 HALVINGS: Final = 24
-LIMITS: Final = "alpha_rad", "theta_rad", "psi_rad", "x0_min_m", "x0_max_m"
 
 
 class Rows:
@@ -39,21 +36,54 @@ class Rows:
 
     def __init__(self, arm: Arm, rows: Trajectory) -> None:
         self.arm, self.rows, self.problem = arm, rows, arm.problem
-        path = self.problem.tip_path
+        self.place, path = "header", self.problem.tip_path
         self.drawing = None if path is None else Drawing(path)
-        self.looks = None if path is None else path.pointing
         self.ordered = path is not None and path.order is Order.AS_GIVEN
-        self.link, self.last = frame_of(len(arm.lengths)), arb(arm.lengths[-1])
-        self.smooth, self.parts = arm.path.branches[0].degree > 1, 1
-        # Largest |alpha| and |theta|, least cos(psi), largest -x0 and x0.
-        self.most = [arb(-np.inf)] * 2 + [arb(1)] + [arb(-np.inf)] * 2
+        self.link, self.last = frame_of(len(arm.lengths)), arm.lengths[-1]
 
-    def take(self, rows: tuple[int, int], motion: Interval) -> None:
-        """Take the interval between two rows into what is said of the motion."""
-        self._stretch(motion)
-        drawn = self.drawing is not None and self.rows.on_path[[*rows]].all()
-        self.parts = PARTS if drawn and not motion.straight else 1
-        tips = [self._tip(motion, i / self.parts) for i in range(self.parts + 1)]
+    def check(self) -> None:
+        """Check them all.
+
+        Raises:
+            Rejected: At the first thing that is not as asked; `place` says where.
+        """
+        (tree, path), before = self.arm.own, None
+        for k in range(path.size):
+            self.place = f"interval {k}"
+            motion = Interval(tree, path.controls(k), before)
+            self._limits(motion)
+            self._tips((k, min(k + 1, self.rows.n_samples - 1)), motion)
+            before = motion.pose(1.0)
+        self.place = "header"
+        if self.drawing is not None:
+            self._drawn(self.drawing)
+
+    def _limits(self, motion: Interval) -> None:
+        """Check the control points, and the change from row to row."""
+        arm, columns = self.problem.manipulator, motion.controls
+        if (most := self.problem.max_row_change) is not None:
+            for points in columns[1:]:
+                turn = max(points, key=float) - min(points, key=float)
+                claim(turn <= most + SLACK, "a joint turns by {} deg", _deg(turn))
+        if motion.degree > 1:
+            edges = [(arb(i) / PARTS, arb(i + 1) / PARTS) for i in range(PARTS)]
+            columns = [[q for e in edges for q in part(p, *e)] for p in columns]
+        low, high = arm.base_range
+        for x0 in columns[0]:
+            claim(low - SLACK <= x0 <= high + SLACK, "x0 is {} mm", MM * x0)
+        most, link = arm.max_joint_angle + SLACK, arb(arm.max_link_angle + SLACK).cos()
+        for i in range(1, len(columns), 2):
+            for alpha, theta in zip(*columns[i : i + 2], strict=True):
+                for name, q in (("alpha", alpha), ("theta", theta)):
+                    claim(abs(q) <= most, f"{name}{i // 2 + 1} is {{}} deg", _deg(q))
+                psi = alpha.cos() * theta.cos()
+                claim(psi >= link, f"psi{i // 2 + 1} is {{}} deg", _deg(psi.acos()))
+
+    def _tips(self, rows: tuple[int, int], motion: Interval) -> None:
+        """Check the tip between two rows."""
+        on = self.rows.on_path[[*rows]]
+        parts = PARTS if on.all() and motion.degree > 1 else 1
+        tips = [self._tip(motion, i / parts) for i in range(parts + 1)]
         if rows[0] == 0:
             self._end("start", self.problem.begin, 0, tips[0])
         if rows[1] == self.rows.n_samples - 1:
@@ -65,27 +95,6 @@ class Rows:
         origin, turned = motion.pose(time)[self.link]
         return origin + turned * column(self.last, 0, 0)
 
-    def _stretch(self, motion: Interval) -> None:
-        """The extremes over the control points, and the change from row to row."""
-        columns = [[*points] for points in motion.controls[: self.arm.n_own]]
-        if self.smooth:
-            edges = [(arb(i) / PARTS, arb(i + 1) / PARTS) for i in range(PARTS)]
-            columns = [[q for e in edges for q in part(p, *e)] for p in columns]
-        alphas, thetas = columns[1::2], columns[2::2]
-        alpha, theta, cosine, low, high = self.most
-        for yaws, pitches in zip(alphas, thetas, strict=True):
-            for yaw, pitch in zip(yaws, pitches, strict=True):
-                alpha, theta = alpha.max(abs(yaw)), theta.max(abs(pitch))
-                cosine = cosine.min(yaw.cos() * pitch.cos())
-        for x0 in columns[0]:
-            low, high = low.max(-x0), high.max(x0)
-        self.most = [alpha, theta, cosine, low, high]
-        if self.problem.max_row_change is not None:
-            limit = self.problem.max_row_change + SLACK
-            for points in columns[1:]:
-                turn = max(points, key=float) - min(points, key=float)
-                claim(turn <= limit, "a joint turns by {} deg", np.rad2deg(float(turn)))
-
     def _end(self, name: str, end: Posture | None, row: int, tip: Matrix) -> None:
         """Check a row at the start or goal: its tip, and joints that are stated."""
         if end is None:
@@ -93,10 +102,8 @@ class Rows:
         away, most = norm(tip - column(*end.tip.tolist())), self.problem.tip_tolerance
         claim(away <= most, f"the tip is {{}} mm off its {name}", MM * away)
         if end.joints is not None:
-            pairs = zip(
-                self.rows.joints[row].tolist(), end.joints.tolist(), strict=True
-            )
-            off = [abs(arb(found) - stated) for found, stated in pairs]
+            found, stated = (x.tolist() for x in (self.rows.joints[row], end.joints))
+            off = [abs(arb(a) - b) for a, b in zip(found, stated, strict=True)]
             lever = sum(map(arb, self.arm.lengths), arb(0))  # moves the tip at most so
             for way in (off[0], *(lever * angle for angle in off[1:])):
                 claim(way <= most, f"the joints are {{}} mm off their {name}", MM * way)
@@ -106,101 +113,104 @@ class Rows:
     ) -> None:
         """Take what the tip does at both rows and in between into the drawing."""
         stations = [arb(float(self.rows.path_m[row])) for row in rows]
-        on, same = self.rows.on_path[list(rows)], arb(self.problem.tip_tolerance)
+        on, same = self.rows.on_path[[*rows]], arb(self.problem.tip_tolerance)
         for i in (0, 1):
             if not on[i]:
                 continue
             away = norm(tips[-i] - drawing.point(stations[i]))
             claim(away <= same, "the tip is {} mm off the path", MM * away)
-            self._angle(motion, float(i), stations[i])
             if i == 1 or rows[0] == 0:  # else it was taken in with the interval before
                 ahead = drawing.visit(stations[i], bool(on[0]), same)
                 forwards = ahead >= -same - SLACK or not self.ordered
                 claim(forwards, "the path is drawn {} mm backwards", -MM * ahead)
+            self._look(drawing, motion, (stations[i], arb(0)), (float(i), float(i)))
         if not on.all():
             drawing.last = None
             return
         begin, run = drawing.begin(stations[0]), drawing.step(*stations)
-        self._look(motion, begin, run)
-        for k in range(self.parts):
-            times = k / self.parts, (k + 1) / self.parts
-            bend = motion.sweep(0, self.link, times).at(self.last)[1]
-            bend /= 8 * self.parts**2
-            start, step = begin + run * times[0], run / self.parts
-            drawing.draw(start, step, tips[k : k + 2], bend)
+        self._look(drawing, motion, (begin, run), (0.0, 1.0))
+        parts = len(tips) - 1
+        times = [(k / parts, (k + 1) / parts) for k in range(parts)]
+        slices = Slices(motion.tree, [(motion, *both) for both in times])
+        bends = slices.sweep(0, self.link).at(self.last).bend / (8 * parts**2)
+        for k, bend in enumerate(bends.tolist()):
+            start = begin + run * times[k][0]
+            drawing.draw(start, run / parts, tips[k : k + 2], bend)
 
-    def _angle(self, motion: Interval, time: float, station: Ball) -> tuple[Ball, Ball]:
-        """Angle of the last link to where it shall look, and how far away that is."""
-        if self.looks is None or self.drawing is None:
-            return arb(0), arb(1)
-        axis = motion.pose(time)[self.link][1] * column(1, 0, 0)
-        if self.looks.target is None:
-            aim = self.drawing.aim(station)
-        else:
-            aim = column(*self.looks.target.tolist()) - self._tip(motion, time)
-        angle = arb.atan2(norm(cross(axis, aim)), dot(axis, aim))
-        limit = self.looks.cone + SLACK
-        claim(
-            angle <= limit, "the last link looks {} deg aside", np.rad2deg(float(angle))
-        )
-        return angle, norm(aim)
+    def _look(
+        self, drawing: Drawing, motion: Interval, way: tuple[Ball, Ball], times: Any
+    ) -> None:
+        """Check that the last link looks into its cone all through a slice.
 
-    def _look(self, motion: Interval, begin: Ball, run: Ball) -> None:
-        """Check that the last link looks into its cone all through an interval.
-
-        Over a slice the angle is the mean of those at its ends at most and half of what
-        the axis and the aim turn; slices are halved until that is enough.
+        The angle is the mean of those at both ends at most, half of what the axis and
+        the aim turn in between, and what errors turn both; slices are halved until
+        that is enough.
         """
-        if self.looks is None or self.drawing is None:
+        if (looks := drawing.looks) is None:
             return
-        slices, limit = [(0.0, 1.0)], self.looks.cone + SLACK
+        begin, run = way
+        slices, limit = [times], looks.cone + SLACK
+        astray, moved = self._astray(motion)
         while slices:
             times = slices.pop()
-            h, moves = times[1] - times[0], motion.sweep(0, self.link, times)
-            seen = [self._angle(motion, t, begin + run * t) for t in times]
-            speed = self.drawing.steepest * abs(run)
-            if self.looks.target is not None:
-                speed = moves.at(self.last)[0]
-            nearest = (seen[0][1] + seen[1][1] - speed * h) / 2
-            if nearest > 0:
-                turned = moves.turn * h + speed * h / nearest
-                if (seen[0][0] + seen[1][0] + turned) / 2 <= limit:
+            h = times[1] - times[0]
+            moves = Slices(motion.tree, [(motion, *times)]).sweep(0, self.link)
+            moves = Sweep(*(float(np.max(x)) for x in moves.at(self.last)))
+            speed, off = drawing.steepest * abs(run), 0.0
+            if drawing.target is not None:
+                speed, off = moves.speed, moved
+            ends = [self._seen(drawing, motion, t, begin + run * t) for t in times]
+            angle, away = (sum(both) / 2 for both in zip(*ends, strict=True))
+            nearest = away - speed * h / 2
+            worst = angle + moves.turn * h / 2 + astray
+            if nearest > off:
+                worst += speed * h / nearest / 2 + off / (nearest - off)
+                if worst <= limit:
                     continue
-            claim(h > 2.0**-HALVINGS, "the last link may look aside between rows")
+            for one, _ in ends:
+                claim(one <= limit, "the last link looks {} deg aside", _deg(one))
+            claim(h > 2.0**-HALVINGS, "the last link may look aside within the errors")
             middle = (times[0] + times[1]) / 2
             slices += [(times[0], middle), (middle, times[1])]
 
-    def close(self, header: Mapping[str, Any]) -> None:
-        """Check what is said of the whole motion, and its limits; -x bounds x below."""
-        arm = self.problem.manipulator
-        claim(set(header["limits"]) == set(LIMITS), f"limits: expected {LIMITS}")
-        alpha, theta, psi, low, high = (header["limits"][key] for key in LIMITS)
-        cosine = self.most[2]
-        widest = arb.atan2((1 - cosine * cosine).nonnegative_part().sqrt(), cosine)
-        claims = [
-            ("alpha_rad", alpha, self.most[0], arm.max_joint_angle),
-            ("theta_rad", theta, self.most[1], arm.max_joint_angle),
-            ("psi_rad", psi, widest, arm.max_link_angle),
-            ("-x0_min_m", -low, self.most[3], -arm.base_range[0]),
-            ("x0_max_m", high, self.most[4], arm.base_range[1]),
-        ]
-        tip, share = header["tip_deviation_m"], header["coverage"]
-        drawing = self.drawing
-        if drawing is None:
-            claim(tip is share is None, "claims a desired path, the problem has none")
-        else:
-            path, drawn = self.problem.path, drawing.coverage()
-            past = drawing.advanced - drawing.length - self.problem.tip_tolerance
-            again = self.ordered and drawing.left and drawing.closed
-            once = past <= SLACK or not again
-            claim(once, "the path is begun again, {} mm past its end", MM * past)
-            claims += [
-                ("tip_deviation_m", tip, drawing.deviation, path.spacing),
-                ("-coverage", -share, -drawn, -path.required_coverage),
-            ]
-        for name, claimed, proved, limit in claims:
-            bound, value = arb(proved), number(claimed)
-            rough = name == "tip_deviation_m" and self.smooth  # it may be cut less fine
-            holds = bound <= value and (value <= bound + SLACK or rough)
-            claim(holds, name + " is {}, proved is {}", value, bound)
-            claim(bound <= limit + SLACK, name + " is {}, the limit {}", bound, limit)
+    def _astray(self, motion: Interval) -> tuple[Ball, Ball]:
+        """What errors turn the last link by, and move the tip.
+
+        Errors a and b of a joint's two axes, at right angles, turn what follows by t
+        with cos(t / 2) = cos(a / 2) cos(b / 2).
+        """
+        rail, *joints = motion.tree.joints[: 2 * len(self.arm.lengths) + 1]
+        lever = sum(map(arb, self.arm.lengths), arb(0))
+        x0 = max(motion.controls[0], key=lambda q: float(abs(q)))
+        turned, moved = arb(rail.tilt), rail.slip + rail.tilt * (abs(x0) + lever)
+        sines = [(arb(one.turn_error) / 2).sin() ** 2 for one in joints]
+        both = zip(sines[::2], sines[1::2], self.arm.lengths, strict=True)
+        for a, b, length in both:
+            turn = 2 * (a + b - a * b).sqrt().asin()
+            turned, moved, lever = turned + turn, moved + turn * lever, lever - length
+        return turned, moved
+
+    def _seen(
+        self, drawing: Drawing, motion: Interval, time: float, station: Ball
+    ) -> tuple[Ball, Ball]:
+        """Angle of the last link to where it shall look, and how far away that is."""
+        axis = motion.pose(time)[self.link][1] * column(1, 0, 0)
+        aim = drawing.aim(station, self._tip(motion, time))
+        return arb.atan2(norm(cross(axis, aim)), dot(axis, aim)), norm(aim)
+
+    def _drawn(self, drawing: Drawing) -> None:
+        """Check how much of the path is drawn, how well, and that it is drawn once."""
+        path, drawn = self.problem.path, drawing.coverage()
+        past = drawing.advanced - drawing.length - self.problem.tip_tolerance
+        again = self.ordered and drawing.left and drawing.closed
+        once = past <= SLACK or not again
+        claim(once, "the path is begun again, {} mm past its end", MM * past)
+        strays, most = drawing.deviation, path.spacing
+        told = "the tip strays {} mm from the path, {} are allowed"
+        claim(strays <= most + SLACK, told, MM * strays, MM * most)
+        enough = drawn >= path.required_coverage - SLACK
+        claim(enough, "coverage is {}, required is {}", drawn, path.required_coverage)
+
+
+def _deg(angle: Ball) -> float:
+    return float(np.rad2deg(float(angle)))

@@ -6,74 +6,60 @@ ball or a disc. Of a half-space the point that its plane goes through is enough.
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from functools import cache
 from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
-from flint import arb
 
-from vdsm_pin.certificate_checker.balls import (
-    ROUNDING,
-    Ball,
-    Matrix,
-    claim,
-    column,
-    dot,
-    norm,
-    unit,
-)
+from vdsm_pin.certificate_checker.balls import UP, claim, column, dot, unit
 from vdsm_pin.certificate_checker.inside import Surface
 from vdsm_pin.geometry import solids
 from vdsm_pin.problem import scene
 
 
 class Solid:
-    """An obstacle, or a link in its own frame.
+    """An obstacle, or what rides on a frame, in its coordinates.
 
     Args:
         name: Name in the certificate.
         points: Of each piece, shape (n_pieces, k, 3); [m].
         origin: What the points were computed from, shape (3,); [m].
         radius: Of the ball that grows the pieces; [m].
+        disc: Of a cylinder, axis and radius of the discs that do; [m].
     """
 
     def __init__(
-        self, name: str, points: Any, *, origin: Any = 0.0, radius: float = 0.0
+        self,
+        name: str,
+        points: Any,
+        origin: Any = 0.0,
+        radius: float = 0.0,
+        disc: tuple[Any, float] = ((0.0, 0.0, 1.0), 0.0),
     ) -> None:
-        self.name, self.points, self.radius = name, np.array(points), arb(radius)
+        self.name, self.points, self.radius = name, np.array(points, float), radius
+        self.disc_axis, self.disc_radius = np.array(disc[0]), disc[1]
         self.whole = True  # whether every plane so far serves all pieces
-        self.disc_axis, self.disc_radius = column(0, 0, 1), arb(0)  # of a cylinder
-        self.normal: Matrix | None = None  # of a half-space
+        self.normal: Any = None  # of a half-space
         self.ends: Any = None  # of a prism: its corners at both, shape (2, c, 3)
-        self.extent = float(np.abs(self.points).max() + np.abs(origin).max())
+        far = np.abs(self.points).max() + np.abs(origin).max()
+        self.extent = float(far + self.radius + self.disc_radius)
+        self.levers = UP * (np.linalg.norm(self.points[0], axis=1) + self.disc_radius)
 
-    @cache  # noqa: B019  (solids live as long as the check)
-    def corner(self, i: int) -> tuple[Matrix, Ball]:
-        """A corner of the first piece, and how far it is with a disc about it."""
-        corner = column(*self.points[0][i].tolist())
-        return corner, norm(corner) + self.disc_radius
-
-    def support(self, n: Matrix, first: int, last: int) -> Ball:
+    def support(self, n: Any, first: int, last: int) -> float:
         """Least n.x over the pieces first..last-1, for a unit n."""
-        rounded = np.array([float(entry) for entry in n.entries()])
-        least = (self.points[first:last].reshape(-1, 3) @ rounded).min()
-        height = arb(float(least), self.extent * ROUNDING)
-        return height - self.radius - self.across(n)
+        least = (self.points[first:last].reshape(-1, 3) @ n).min() - self.radius
+        if self.disc_radius > 0.0:
+            least -= self.disc_radius * np.linalg.norm(np.cross(self.disc_axis, n))
+        return float(least)
 
-    def across(self, n: Matrix) -> Ball:
-        """Support of a cylinder's disc about its centre, 0 of other solids."""
-        if not self.disc_radius > 0:
-            return arb(0)
-        cosine = dot(self.disc_axis, n)
-        return self.disc_radius * (1 - cosine * cosine).nonnegative_part().sqrt()
-
-    def size(self) -> Ball:
+    def size(self) -> float:
         """Largest distance from the middle of the box around the corners, at most."""
+        if self.normal is not None:
+            return np.inf
         points = self.points.reshape(-1, 3)
         middle = (points.min(axis=0) + points.max(axis=0)) / 2
-        away = float(np.linalg.norm(points - middle, axis=1).max())
-        return arb(away, self.extent * ROUNDING) + self.radius + self.disc_radius
+        away = np.linalg.norm(points - middle, axis=1).max()
+        return float(away + self.radius + self.disc_radius) * UP
 
     def parts(self, pieces: Any) -> "list[Solid]":
         """The solids of one piece that a body on a link is covered by.
@@ -82,30 +68,25 @@ class Solid:
             pieces: As for `cut`; of a mesh the triangles under each hull. None where
                 the whole is one piece.
         """
-        if not isinstance(self, Mesh):
-            if pieces is not None:
-                self.cut(pieces)
-            groups = list(self.points)
-        else:
-            count = len(self.points)
-            groups = [[*range(count)]] if pieces is None else pieces
-            missing = set(range(count)) - {k for group in groups for k in group}
+        groups = [[k] for k in range(len(self.points))]
+        if isinstance(self, Mesh):
+            groups = [[k for one in groups for k in one]] if pieces is None else pieces
+            missing = set(range(len(self.points))) - {k for one in groups for k in one}
             claim(not missing, f"pieces of {self.name} do not make up the whole")
-            groups = [self.points[np.array(g)].reshape(-1, 3) for g in groups]
-        found = [Solid(self.name, [group], origin=self.extent) for group in groups]
-        for k, one in enumerate(found, start=1):
-            one.name += f" part {k}" if len(found) > 1 else ""
-            one.radius, one.disc_axis = self.radius, self.disc_axis
-            one.disc_radius = self.disc_radius
-        return found
-
-    def direction(self, n: Matrix) -> Matrix:
-        """The exact direction that n stands for: a half-space has only one."""
-        if self.normal is None:
-            return n
-        off = (n + self.normal).entries()
-        claim(all(abs(x) <= 1e-9 for x in off), "n is not the half-space's -normal")
-        return -self.normal
+        elif pieces is not None:
+            self.cut(pieces)
+            groups = [[k] for k in range(len(self.points))]
+        several = len(groups) > 1
+        return [
+            Solid(
+                f"{self.name} part {k}" if several else self.name,
+                [self.points[np.array(group)].reshape(-1, 3)],
+                self.extent,
+                self.radius,
+                (self.disc_axis, self.disc_radius),
+            )
+            for k, group in enumerate(groups, start=1)
+        ]
 
     def cut(self, pieces: list[Any]) -> None:
         """Take the certificate's pieces: parts of a prism, or the mesh's in its order.
@@ -161,41 +142,38 @@ def solid(obstacle: Any) -> Solid:
     """The solid of an obstacle as it was read, in the frame that carries it."""
     if isinstance(obstacle, scene.Moving):
         obstacle = obstacle.solid
-    name = obstacle.name
+    name, cube = obstacle.name, np.array([*product((-1, 1), repeat=3)])
     match obstacle:
         case solids.Sphere():
-            found = Solid(name, [[obstacle.centre]], radius=obstacle.radius)
+            return Solid(name, [[obstacle.centre]], radius=obstacle.radius)
         case solids.Capsule() | solids.Cylinder():
-            half, radius = obstacle.half_length * obstacle.axis, arb(obstacle.radius)
-            found = Solid(name, [[obstacle.centre - half, obstacle.centre + half]])
+            half, centre = obstacle.half_length * obstacle.axis, obstacle.centre
+            ends, radius = [[centre - half, centre + half]], obstacle.radius
             if isinstance(obstacle, solids.Capsule):
-                found.radius = radius
-            else:
-                found.disc_axis = unit(column(*obstacle.axis.tolist()))
-                found.disc_radius = radius
+                return Solid(name, ends, radius=radius)
+            axis = unit(column(*obstacle.axis.tolist())).entries()
+            return Solid(name, ends, disc=([*map(float, axis)], radius))
         case solids.Box():
-            corners = np.array([*product((-1, 1), repeat=3)]) * obstacle.half_size
-            corners = obstacle.centre + corners @ obstacle.rotation.T
-            found = Solid(name, [corners], origin=obstacle.centre)
+            corners = cube * obstacle.half_size @ obstacle.rotation.T + obstacle.centre
+            return Solid(name, [corners], obstacle.centre)
+        case solids.Voxels():
+            corners = cube * obstacle.half_size @ obstacle.rotation.T
+            corners = obstacle.centres[:, None] + corners
+            return Solid(name, corners, obstacle.centres)
         case solids.Prism():
             flat = [[[*uv, s] for uv in obstacle.polygon] for s in obstacle.span]
             both = obstacle.origin + np.array(flat) @ obstacle.rotation.T
-            corners = both.reshape(1, -1, 3)
-            found = Solid(name, corners, origin=obstacle.origin)
+            found = Solid(name, both.reshape(1, -1, 3), obstacle.origin)
             found.ends = both
-        case solids.HalfSpace():
-            normal = unit(column(*obstacle.normal.tolist()))
-            foot = normal * dot(normal, column(*obstacle.point.tolist()))
-            found = Solid(name, [[[float(entry) for entry in foot.entries()]]])
-            found.normal = normal
+            return found
         case solids.PointCloud():
-            found = Solid(name, obstacle.points[:, None], radius=obstacle.radius)
-        case solids.Voxels():
-            corners = np.array([*product((-1, 1), repeat=3)]) * obstacle.half_size
-            corners = obstacle.centres[:, None] + corners @ obstacle.rotation.T
-            found = Solid(name, corners, origin=obstacle.centres)
+            return Solid(name, obstacle.points[:, None], radius=obstacle.radius)
         case solids.Mesh():
             return Mesh(obstacle)
+    normal = unit(column(*obstacle.normal.tolist()))
+    foot = normal * dot(normal, column(*obstacle.point.tolist()))
+    found = Solid(name, [[[*map(float, foot.entries())]]])
+    found.normal = np.array([*map(float, normal.entries())])
     return found
 
 
@@ -221,14 +199,14 @@ class Pair(NamedTuple):
         solid: Of any number of pieces.
         rest: The frame.
         required: Least clearance; [m].
-        lost: Radius of the body and errors that do not turn; [m].
+        lost: Errors that do not turn; [m].
     """
 
     body: Body
     solid: Solid
     rest: int
-    required: Ball
-    lost: Ball
+    required: float
+    lost: float
 
     @property
     def names(self) -> list[str]:

@@ -4,12 +4,13 @@ A tree is a list of joints, parents first. Joint j, from 0, carries frame j + 1;
 is the world. A frame stands as a pair of its origin and its rotation.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, TypeAlias
 
+import numpy as np
 from flint import arb, arb_mat
 
-from vdsm_pin.certificate_checker.balls import Ball, Matrix, column, norm, unit
+from vdsm_pin.certificate_checker.balls import UP, Ball, Matrix, column, norm, unit
 
 Pose: TypeAlias = list[tuple[Matrix, Matrix]]
 
@@ -24,9 +25,9 @@ class Joint:
         kind: FIXED, TURNS or SLIDES.
         axis: In its own frame, of any length.
         placement: T_parent_joint, shape (4, 4); [m].
-        column: Column of q that moves it, None for none.
-        ratio: Its value is ratio q + offset.
-        offset: The same; [rad] or [m].
+        moves: Column of q that moves it, None for none, ratio and offset: its value is
+            ratio q + offset; [rad] or [m].
+        errors: Of its value, and a shift and a turn of its placement; [rad] or [m].
     """
 
     def __init__(
@@ -35,55 +36,38 @@ class Joint:
         kind: str,
         axis: Any,
         placement: Any,
-        column_of_q: int | None = None,
-        ratio: float = 1.0,
-        offset: float = 0.0,
+        moves: tuple[int | None, float, float],
+        errors: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
-        self.parent, self.kind, self.column = parent, kind, column_of_q
-        self.ratio, self.offset = arb(ratio), arb(offset)
-        self.axis = unit(column(*map(float, axis)))
+        self.parent, self.kind = parent, kind
+        self.column, self.ratio, self.offset = moves[0], *map(arb, moves[1:])
         rows = [[float(x) for x in row] for row in placement]
         self.shift = column(*(row[3] for row in rows[:3]))
         turned = [row[:3] for row in rows[:3]]
-        whole = turned == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
-        self.rotation = None if whole else arb_mat(turned)
-        self.lever, self.stroke = norm(self.shift), arb(0)
+        self.rotation = None if turned == np.eye(3).tolist() else arb_mat(turned)
+        self.lever = float(norm(self.shift)) * UP
+        self.axis = unit(column(*map(float, axis)))
+        along = self.axis if self.rotation is None else self.rotation * self.axis
+        line = [[*map(float, x.entries())] for x in (self.shift, along)]
+        self.line = np.array(line).T  # shift and axis in the frame that it hangs on
+        self.gain, self.past = abs(moves[1]), UP * abs(moves[2])
         x, y, z = self.axis.entries()
         self.cross = arb_mat([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         self.square = self.cross * self.cross
-        self.turn_error = self.tilt = self.slip = arb(0)
-
-    def err(self, error: Ball, moved: Ball, tilt: Ball) -> None:
-        """Take errors of its value, and a shift and a turn of its placement."""
-        self.turn_error = error if self.kind == TURNS else arb(0)
-        self.slip = moved + (error if self.kind == SLIDES else 0)
-        self.tilt = tilt
-
-    def value(self, q: Sequence[Ball]) -> Ball:
-        """Its value at a row of q."""
-        if self.column is None:
-            return self.offset
-        return self.ratio * q[self.column] + self.offset
+        value, moved, self.tilt = (UP * error for error in errors)
+        self.turn_error = value if kind == TURNS else 0.0
+        self.slip = moved + (value if kind == SLIDES else 0.0)
 
 
-def pose(joints: Sequence[Joint], q: Sequence[Ball]) -> Pose:
-    """All frames at a row of q."""
-    still = arb_mat(3, 3, 1)
-    frames = [(column(0, 0, 0), still)]
-    for joint in joints:
-        origin, turned = frames[joint.parent]
-        if not joint.lever == 0:
-            origin = origin + turned * joint.shift
-        if joint.rotation is not None:
-            turned = turned * joint.rotation
-        if joint.kind == TURNS:
-            sine, cosine = joint.value(q).sin_cos()
-            turn = still + joint.cross * sine + joint.square * (1 - cosine)
-            turned = turned * turn
-        elif joint.kind == SLIDES:
-            origin = origin + turned * (joint.axis * joint.value(q))
-        frames.append((origin, turned))
-    return frames
+def hung(given: Iterable[Any], base: int, columns: int) -> list[Joint]:
+    """Joints as a reader gives them, behind so many others and columns of q."""
+    joints = []
+    for one in given:
+        parent = one.parent + base if one.parent else 0
+        moves = None if one.column is None else one.column + columns
+        more = (moves, one.ratio, one.offset)
+        joints.append(Joint(parent, one.kind.name, one.axis, one.placement, more))
+    return joints
 
 
 class Tree:
@@ -96,6 +80,28 @@ class Tree:
     def __init__(self, joints: Sequence[Joint]) -> None:
         self.joints = joints
         self._ways: dict[tuple[int, int], list[tuple[int, bool]]] = {}
+
+    def pose(self, q: Sequence[Ball]) -> Pose:
+        """All frames at a row of q."""
+        still = arb_mat(3, 3, 1)
+        frames = [(column(0, 0, 0), still)]
+        for joint in self.joints:
+            origin, turned = frames[joint.parent]
+            if joint.lever > 0.0:
+                origin = origin + turned * joint.shift
+            if joint.rotation is not None:
+                turned = turned * joint.rotation
+            value = joint.offset
+            if joint.column is not None:
+                value = joint.ratio * q[joint.column] + value
+            if joint.kind == TURNS:
+                sine, cosine = value.sin_cos()
+                turn = still + joint.cross * sine + joint.square * (1 - cosine)
+                turned = turned * turn
+            elif joint.kind == SLIDES:
+                origin = origin + turned * (joint.axis * value)
+            frames.append((origin, turned))
+        return frames
 
     def way(self, rest: int, frame: int) -> list[tuple[int, bool]]:
         """The joints from one frame to another, and whether each is passed upwards."""
@@ -111,6 +117,6 @@ class Tree:
             self._ways[rest, frame] = up + down[::-1]
         return self._ways[rest, frame]
 
-    def slip(self, rest: int, frame: int) -> Ball:
-        """How far errors that do not turn carry a frame, as seen from another."""
-        return sum((self.joints[k].slip for k, _ in self.way(rest, frame)), arb(0))
+    def slip(self, rest: int, frame: int) -> float:
+        """How far errors that do not turn carry a frame, as seen from another; [m]."""
+        return sum(self.joints[k].slip for k, _ in self.way(rest, frame))

@@ -8,6 +8,7 @@ Number = Annotated[int, Field(ge=0)]
 Share = Annotated[FiniteFloat, Field(ge=0.0, le=1.0)]
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Error = Annotated[FiniteFloat, Field(ge=0.0)]
+ShiftAndTurn = tuple[Error, Error]
 Pair = tuple[str, str]
 Normal = FiniteFloat
 Plane = tuple[Number, Number, Normal, Normal, Normal, int | FiniteFloat]
@@ -23,40 +24,27 @@ class LineModel(BaseModel):
 class ErrorLimits(LineModel):
     """The errors that every clearance is proved under."""
 
-    joints_rad: list[tuple[Error, Error]] = Field(
-        description="by joint of alpha and theta, either way"
+    joints_rad: list[Error] = Field(
+        description="of alpha and theta of each joint in turn, either way"
     )
-    base_m: Error = Field(description="displacement of the base, in any direction")
-    base_rad: Error = Field(description="turn of the base about its origin")
-    obstacle_m: Error = Field(description="of every surface")
-    obstacles: dict[str, tuple[Error, Error]] = Field(
-        description="by name of single ones, displacement [m] and turn about the "
-        "middle of the box around their corners [rad]"
+    base: ShiftAndTurn = Field(
+        description="displacement of the base, in any direction [m], and turn about "
+        "its origin [rad]"
     )
-
-
-class ClaimedLimits(LineModel):
-    """Largest values over the motion, rounded outwards, and the range of x0."""
-
-    alpha_rad: FiniteFloat = Field(description="largest absolute yaw angle")
-    theta_rad: FiniteFloat = Field(description="largest absolute pitch angle")
-    psi_rad: FiniteFloat = Field(description="largest link angle")
-    x0_min_m: FiniteFloat = Field(description="smallest base position")
-    x0_max_m: FiniteFloat = Field(description="largest base position")
+    obstacles: dict[str, ShiftAndTurn] = Field(
+        description="by name, of each: displacement of its surface [m] and turn about "
+        "the middle of the box around its corners [rad]"
+    )
 
 
 class HeaderLine(LineModel):
     """Line 1."""
 
-    vdsm_certificate: Literal[5] = Field(default=5, description="version of the format")
+    vdsm_certificate: Literal[6] = Field(default=6, description="version of the format")
     problem_sha256: Sha256 = Field(description="problem file and the meshes it names")
     trajectory_sha256: Sha256 = Field(description="trajectory.csv")
-    urdf_sha256: Sha256 = Field(description="told, not proved")
     versions: dict[str, str] = Field(description="of the writer; told, not proved")
-    required_clearance_m: FiniteFloat = Field(description="from obstacles")
-    required_self_clearance_m: FiniteFloat = Field(description="between links")
     errors: ErrorLimits
-    n_rows: int = Field(ge=1, description="rows of the trajectory")
     interpolation: Literal["linear", "cubic", "quintic"] = Field(
         description="what joins the rows: straight lines or smooth pieces"
     )
@@ -77,14 +65,6 @@ class HeaderLine(LineModel):
         description="by mesh the corners joined to close it, [corner, the one it is "
         "joined with], and seams, [three corners, where the edge beside them begins]; "
         "corner 3 k + i is corner i of triangle k, both from 0"
-    )
-    limits: ClaimedLimits
-    tip_deviation_m: Annotated[FiniteFloat, Field(ge=0.0)] | None = Field(
-        description="of the tip from the path between waypoints, at most; null where "
-        "there is no desired path"
-    )
-    coverage: Share | None = Field(
-        description="of the desired path, at least; null where there is none"
     )
 
 

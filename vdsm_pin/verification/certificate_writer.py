@@ -25,7 +25,6 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.geometry.solids import Mesh, Prism
 from vdsm_pin.io.atomic import atomic_path
-from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import solid_of, with_hulls
 from vdsm_pin.proof.budget import Budget
@@ -35,16 +34,13 @@ from vdsm_pin.proof.recording import record
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.workspace import new_workspace
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.certificate_file import (
-    ClaimedLimits,
     ErrorLimits,
     HeaderLine,
     LastLine,
     Pair,
 )
 from vdsm_pin.verification.inside import locate_start, unlocated
-from vdsm_pin.verification.limits import extremes
 from vdsm_pin.verification.moving import whole_motion
 from vdsm_pin.verification.records import ArmVerification, Verdict
 from vdsm_pin.verification.task import all_pairs, make_task
@@ -69,12 +65,10 @@ class Hashes:
     Args:
         problem: Of the problem file and its mesh files.
         trajectory: Of the trajectory file.
-        urdf: Of the arm's URDF.
     """
 
     problem: str
     trajectory: str
-    urdf: str
 
 
 def write_certificate(
@@ -133,45 +127,22 @@ def _header(
     verification: ArmVerification, hashes: Hashes, pieces: PackedPieces
 ) -> HeaderLine:
     problem, trajectory = verification.problem, verification.trajectory
-    box, found = verification.errors, extremes(trajectory)
-    drawn = problem.tip_path is not None
-    # Control points within a smooth piece are rounded, rows are exact.
-    pad = TOLERANCES.arithmetic if trajectory.is_smooth else 0.0
+    box = verification.errors
+    off = [box.of_obstacle(one.name) for one in problem.scene.obstacles]
     return HeaderLine(
         problem_sha256=hashes.problem,
         trajectory_sha256=hashes.trajectory,
-        urdf_sha256=hashes.urdf,
         versions={"vdsm_pin": __version__, "numpy": np.__version__},
-        required_clearance_m=problem.required_clearance,
-        required_self_clearance_m=problem.required_self_clearance,
         errors=ErrorLimits(
-            joints_rad=box.angles(trajectory.n_links).tolist(),
-            base_m=box.base,
-            base_rad=box.base_turn,
-            obstacle_m=box.obstacle,
-            obstacles=_single_errors(box),
+            joints_rad=box.angles(trajectory.n_links).ravel().tolist(),
+            base=(box.base, box.base_turn),
+            obstacles={one.name: (one.shift, one.turn) for one in off},
         ),
-        n_rows=trajectory.n_samples,
         interpolation=trajectory.interpolation,
         pairs=_pairs(problem),
         pieces=_pieces(problem, pieces),
         joined=_joined(problem),
-        limits=ClaimedLimits(
-            alpha_rad=found.alpha + pad,
-            theta_rad=found.theta + pad,
-            psi_rad=found.psi + TOLERANCES.arithmetic,
-            x0_min_m=found.x0_min - pad,
-            x0_max_m=found.x0_max + pad,
-        ),
-        tip_deviation_m=verification.tip_deviation if drawn else None,
-        coverage=verification.coverage if drawn else None,
     )
-
-
-def _single_errors(box: ErrorBox) -> dict[str, tuple[float, float]]:
-    """The errors of single obstacles, shift and turn."""
-    named = (box.of_obstacle(one.name) for one in box.obstacles)
-    return {one.name: (one.shift, one.turn) for one in named}
 
 
 def _pairs(problem: PlanningProblem) -> list[Pair]:
