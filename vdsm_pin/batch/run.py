@@ -4,7 +4,8 @@ import fcntl
 import json
 import shutil
 import signal
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -49,6 +50,12 @@ SECONDS: Final = "timing.js"
 _ASIDE: Final = ".unfinished"
 _LOCK: Final = ".lock"
 
+GIVEN: Final = "given"
+"""What a row has for a strategy where the motion was given."""
+
+MOTIONS: Final = ".csv", ".yaml", ".yml", ".json", ".bag", ".mcap"
+"""Endings of trajectories."""
+
 OWN: Final = SUMMARY, RUNNING, COLUMNS, JUNIT, INDEX, SECONDS, _ASIDE, _LOCK
 """What a batch writes beside the folders of its problems."""
 
@@ -68,6 +75,8 @@ class Batch:
         keep: Whose files stay: "all", "failed" (all that did not pass) or "none".
         proving: What each problem is proved for and written besides.
         quiet: Whether nothing is said of problems that end.
+        trajectories: Given motions, files or folders of them, each of which is verified
+            for each problem; none to plan.
     """
 
     problems: tuple[str, ...]
@@ -80,6 +89,7 @@ class Batch:
     keep: str = ALL
     proving: Proving = field(default_factory=Proving)
     quiet: bool = False
+    trajectories: tuple[str, ...] = ()
 
 
 class Interrupted(VdsmError):
@@ -167,18 +177,22 @@ def _tasks(batch: Batch) -> list[Task]:
     Raises:
         InvalidFile: If a folder to be written holds something else.
     """
-    names = folder_names(expanded(batch.problems), OWN)
+    problems = expanded(batch.problems)
+    given = _motions(batch.trajectories) if batch.trajectories else (None,)
+    jobs = _jobs(problems, given)
+    names = folder_names(tuple(jobs), OWN)
     _check_own(batch.folder)
     files = [batch.folder / name for name in OWN if name != _ASIDE]
-    check_kept(files, map(Path, names))
+    check_kept(files, map(Path, (*problems, *filter(None, given))))
     tasks = []
-    for problem, name in names.items():
+    for job, name in names.items():
+        problem, motion = jobs[job]
         final = batch.folder / name
         _check_replaceable(final)
         aside = batch.folder / _ASIDE / name
         task = Task(
             problem,
-            batch.strategy,
+            batch.strategy if motion is None else GIVEN,
             name,
             final,
             aside,
@@ -186,6 +200,7 @@ def _tasks(batch: Batch) -> list[Task]:
             batch.keep,
             batch.time_limit,
             batch.proving,
+            motion,
         )
         tasks.append(task)
     return tasks
@@ -203,6 +218,44 @@ def _check_own(folder: Path) -> None:
         if file.exists():
             what = "exists and is not a result of a batch; nothing was overwritten"
             raise InvalidFile(file=file, problem=what)
+
+
+def _jobs(
+    problems: Sequence[str], given: Sequence[str | None]
+) -> dict[str, tuple[str, str | None]]:
+    """Problems and motions by what their folder is named after."""
+    both = [(problem, motion) for problem in problems for motion in given]
+    short, jobs = Counter(map(_stems, both)), {}
+    for problem, motion in both:
+        name = problem
+        if motion is not None:
+            name = _stems((problem, motion))
+            name = name if short[name] == 1 else f"{problem}/{motion}"
+        jobs[name] = problem, motion
+    return jobs
+
+
+def _stems(job: tuple[str, str | None]) -> str:
+    return "-".join(Path(name).stem for name in job if name is not None)
+
+
+def _motions(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Every trajectory once, in one order.
+
+    Raises:
+        InvalidFile: If a folder holds none.
+    """
+    found: set[str] = set()
+    for name in names:
+        if not Path(name).is_dir():
+            found.add(name)
+            continue
+        inside = [p for p in Path(name).iterdir() if p.suffix in MOTIONS]
+        if not inside:
+            problem = f"holds no trajectory; expected {', '.join(MOTIONS)}"
+            raise InvalidFile(file=name, problem=problem)
+        found.update(str(path) for path in inside)
+    return tuple(sorted(found))
 
 
 def _check_replaceable(final: Path) -> None:

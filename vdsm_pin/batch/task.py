@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from pydantic import ValidationError
 
@@ -29,7 +29,7 @@ from vdsm_pin.errors import (
     VdsmError,
     VerificationFailed,
 )
-from vdsm_pin.io.problem_file import ProblemFile, read_problem
+from vdsm_pin.io.problem_file import ProblemFile, ProblemOfRobot, read_problem
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.refinement import HANDED_OUT
@@ -40,7 +40,10 @@ from vdsm_pin.report.run_record import versions
 from vdsm_pin.report.words import TIME_LIMIT, outcome
 from vdsm_pin.text import printable
 from vdsm_pin.time_limit import Deadline
-from vdsm_pin.verification.records import ArmVerification, Verdict
+from vdsm_pin.verification.records import Verdict
+
+if TYPE_CHECKING:  # whoever plans for an arm needs no robots
+    from vdsm_pin.robots.cell import Cell
 
 MANIFEST: Final = "manifest.json"
 TIMING: Final = "timing.json"
@@ -120,6 +123,7 @@ class Task:
         keep: Which problems keep their files: "all", "failed" or "none".
         time_limit: From when a worker begins; None for none; [s].
         proving: What is proved besides, and written.
+        trajectory: A given motion, which is verified as it is; None to plan one.
     """
 
     problem: str
@@ -131,17 +135,32 @@ class Task:
     keep: str = ALL
     time_limit: float | None = None
     proving: Proving = field(default_factory=Proving)
+    trajectory: str | None = None
 
     @property
     def settings(self) -> dict[str, str]:
         """What a finished folder must agree with to be kept."""
         besides = {name: str(value) for name, value in asdict(self.proving).items()}
-        return {"strategy": self.strategy, "keep": self.keep} | besides | versions()
+        given = {} if self.trajectory is None else {"trajectory": self.given_sha256}
+        own = {"strategy": self.strategy, "keep": self.keep}
+        return own | besides | given | versions()
+
+    @property
+    def given_sha256(self) -> str:
+        """Of the given motion; empty where it cannot be read."""
+        try:
+            return sha256_of_file(Path(self.trajectory or ""))
+        except (OSError, VdsmError):
+            return ""
 
     @property
     def command(self) -> str:
         """A command that repeats exactly this problem."""
-        words = ["vdsm", "batch", self.problem, "--strategy", self.strategy]
+        words = ["vdsm", "batch", self.problem]
+        if self.trajectory is None:
+            words += ["--strategy", self.strategy]
+        else:
+            words += ["--trajectories", self.trajectory]
         return shlex.join([*words, *self.proving.options, "--out", "out"])
 
 
@@ -164,14 +183,14 @@ def perform(task: Task) -> Done:
     shutil.rmtree(task.aside, ignore_errors=True)
     digest = ""
     try:
-        source = read_problem(task.problem)
-        digest = source.sha256
+        source = _read(task)
+        digest = source.source.sha256 if source.source else ""
         _check_apart(task, source)
         if task.resume:
             kept = finished(task, digest)
             if kept is not None:
                 return Done(kept, kept=True)
-        row = _plan_and_verify(task, source, deadline)
+        row = _done(task, source, deadline)
     except Infeasible as error:
         row = failed_row(task, "infeasible", str(error))
     except OutOfTime as error:
@@ -197,14 +216,36 @@ def _clear(folder: Path) -> None:
             path.unlink()
 
 
-def _check_apart(task: Task, source: ProblemFile) -> None:
+def _read(task: Task) -> "ProblemFile | Cell":
+    """The problem of an arm, under the errors asked for, or of any other robot.
+
+    Raises:
+        InvalidFile: If it is bad, or asks for a robot what only arms have.
+    """
+    try:
+        return read_problem(task.problem).under(task.proving.errors)
+    except ProblemOfRobot as error:
+        refusal = error
+    if task.trajectory is None:
+        raise refusal
+    if task.proving.certificate or task.proving.errors != ErrorBox():
+        problem = "is about a robot, of which neither errors nor certificates are"
+        raise InvalidFile(file=task.problem, problem=f"{problem} judged")
+    from vdsm_pin.robots.cell import read_cell
+
+    return read_cell(Path(refusal.file))
+
+
+def _check_apart(task: Task, source: "ProblemFile | Cell") -> None:
     """Refuse a problem with files in the folder that its results replace.
 
     Raises:
         InvalidFile: If there is one.
     """
     final = task.final.resolve()
-    for file in source.source.files:
+    files = list(source.source.files) if source.source else []
+    files += [] if task.trajectory is None else [Path(task.trajectory)]
+    for file in files:
         if final in file.resolve().parents:
             problem = f"lies in {task.final}, which the results would replace"
             raise InvalidFile(file=file, problem=problem)
@@ -289,15 +330,17 @@ def _hash(problem: str) -> str:
     return hashlib.sha256(os.fsencode(problem)).hexdigest()
 
 
-def _plan_and_verify(task: Task, source: ProblemFile, deadline: Deadline) -> BatchRow:
-    asked = task.proving
-    source = source.under(asked.errors)
-    plan = plan_to_folder(
-        source, task.strategy, task.aside, task.command, deadline, report=False
-    )
+def _done(task: Task, source: "ProblemFile | Cell", deadline: Deadline) -> BatchRow:
+    """Plan where no motion is given, verify, and tell."""
+    asked, plan = task.proving, None
+    if task.trajectory is None:
+        assert isinstance(source, ProblemFile)
+        plan = plan_to_folder(
+            source, task.strategy, task.aside, task.command, deadline, report=False
+        )
     order = VerifyOrder(
         source,
-        task.aside / TRAJECTORY,
+        Path(task.trajectory) if task.trajectory else task.aside / TRAJECTORY,
         task.aside,
         task.command,
         certificate=task.aside / CERTIFICATE if asked.certificate else None,
@@ -309,12 +352,13 @@ def _plan_and_verify(task: Task, source: ProblemFile, deadline: Deadline) -> Bat
     if asked.certificate and certified and verified.no_certificate:
         message = f"certified, but without a certificate: {verified.no_certificate}"
         raise VerificationFailed(message)
-    if deadline.passed and verified.records.verdict not in HANDED_OUT:
+    planned = task.trajectory is None
+    if planned and deadline.passed and verified.records.verdict not in HANDED_OUT:
         raise OutOfTime(deadline.limit, "a plan was found and proved, but not reported")
-    assert isinstance(verified.records, ArmVerification)
     drawing = picture(verified.records)
     (task.aside / PICTURE).write_text(drawing, encoding="utf-8")
     row = batch_row(task.folder, task.strategy, verified.file)
     # The planner knows why it left something out, the verification does not.
-    same = plan.verdict == verified.file.verdict == "incomplete"
-    return row.model_copy(update={"reason": plan.reason}) if same else row
+    if plan is not None and plan.verdict == row.outcome == "incomplete":
+        return row.model_copy(update={"reason": plan.reason})
+    return row

@@ -29,6 +29,7 @@ commands = family()
     epilog=examples(
         "vdsm batch --out out/demo",
         "vdsm batch problems/*.yaml --out out/night --jobs 8 --time-limit 60 --resume",
+        "vdsm batch cell.yaml --trajectories plans --out out/plans",
     ),
 )
 def batch(
@@ -42,6 +43,14 @@ def batch(
         ),
     ] = None,
     strategy: Strategy = DEFAULT_STRATEGY,
+    trajectories: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FILE",
+            help="Given motions, or folders of them: each is verified for each "
+            "problem, nothing is planned; robots of a URDF need it.",
+        ),
+    ] = None,
     jobs: Annotated[int, typer.Option(min=1, metavar="NUMBER", help="Processes.")] = 1,
     resume: Annotated[
         bool,
@@ -99,6 +108,7 @@ def batch(
             base_error_deg=base_error_deg,
         ),
         quiet=quiet or as_json,
+        trajectories=tuple(trajectories or ()),
     )
     try:
         rows = run_batch(asked)

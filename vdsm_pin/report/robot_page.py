@@ -76,6 +76,20 @@ def robot_motion(verification: RobotVerification, shown: Thinned) -> dict[str, A
     }
 
 
+def placed_corners(verification: RobotVerification) -> list[FloatArray]:
+    """Corners of each link where the motion comes nearest, shape (n, 3); [m]."""
+    cell, path = verification.problem, verification.trajectory
+    near = verification.approaches[:1]
+    interval = np.array([one.interval for one in near] or [0])
+    share = np.array([one.share for one in near] or [0.0])
+    poses = cell.robot.tree.poses(path.within(interval, share))[0]
+    found = []
+    for body in cell.robot.bodies:
+        pose = poses[body.frame]
+        found.append(_skin(body).vertices @ pose[:3, :3].T + pose[:3, 3])
+    return found
+
+
 def _moments(path: Path, shown: Thinned) -> FloatArray:
     rows = shown.rows.astype(np.float64)
     if len(rows) < 2:

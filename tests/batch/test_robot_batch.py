@@ -1,0 +1,98 @@
+"""Given motions of robots and arms in a batch: rows, pages, JUnit, resumed."""
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+from vdsm_pin.batch.run import Batch, run_batch
+from vdsm_pin.batch.task import Proving
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.report.files import VerificationFile
+
+URDF = """<robot name="r"><link name="foot"/><link name="arm"><collision>
+<origin xyz="1 0 0"/><geometry><sphere radius="0.1"/></geometry></collision></link>
+<joint name="turn" type="revolute"><parent link="foot"/><child link="arm"/>
+<axis xyz="0 0 1"/><limit lower="-3" upper="3" velocity="1" effort="1"/></joint>
+</robot>"""
+PROBLEM = """vdsm_problem: 1
+length_unit: mm
+robot: {urdf: r.urdf}
+required_clearance: 10
+obstacles: [{name: ball, shape: sphere, center: [0, 1000, 0], radius: 100}]
+"""
+PLANS = {
+    "clear.csv": "turn_deg\n-90\n60\n",
+    "through.csv": "turn_deg\n0\n120\n",
+    "other.csv": "elbow_deg\n0\n120\n",
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "r.urdf").write_text(URDF)
+    (tmp_path / "cell.yaml").write_text(PROBLEM)
+    (tmp_path / "plans").mkdir()
+    for name, text in PLANS.items():
+        (tmp_path / "plans" / name).write_text(text)
+    return tmp_path
+
+
+def asked(folder: Path, **more: object) -> Batch:
+    plans, out = (str(folder / "plans"),), folder / "out"
+    words = {"trajectories": plans, "quiet": True} | more
+    return Batch((str(folder / "cell.yaml"),), out, "fewest", **words)  # type: ignore[arg-type]
+
+
+def test_each_motion_gets_a_row_a_page_and_a_test_case(folder: Path) -> None:
+    rows = {row.folder: row for row in run_batch(asked(folder))}
+    outcomes = {name: row.outcome for name, row in rows.items()}
+    assert outcomes == {
+        "cell-clear": "certified",
+        "cell-through": "refuted",
+        "cell-other": "error",
+    }
+    assert "no column for joint 'turn'" in rows["cell-other"].reason
+    assert "arm and ball" in rows["cell-through"].reason
+    assert rows["cell-through"].strategy == "given"
+    for name in ("cell-clear", "cell-through"):
+        kept = folder / "out" / name
+        file = VerificationFile.model_validate_json(
+            (kept / "verification.json").read_text()
+        )
+        assert file.verdict == outcomes[name]
+        assert "<canvas" not in (kept / "report.html").read_text()[:100]
+        picture = ET.fromstring((kept / "picture.svg").read_text())
+        assert len(picture) == 2  # the ball and the arm
+    cases = ET.parse(folder / "out" / "junit.xml").getroot().iter("testcase")
+    bad = {case.get("name"): [mark.tag for mark in case] for case in cases}
+    assert bad == {
+        "cell-clear": [],
+        "cell-through": ["failure"],
+        "cell-other": ["error"],
+    }
+    page = (folder / "out" / "index.html").read_text()
+    assert "cell-clear/report.html" in page
+
+
+def test_what_changed_is_done_again(folder: Path) -> None:
+    """A motion that is another one now is not taken from the earlier batch."""
+    before = {row.folder: row for row in run_batch(asked(folder))}
+    (folder / "plans" / "clear.csv").write_text(PLANS["through.csv"])
+    after = {row.folder: row for row in run_batch(asked(folder, resume=True))}
+    assert after["cell-clear"].outcome == "refuted"
+    assert after["cell-through"] == before["cell-through"]
+
+
+def test_what_is_not_judged_of_robots_is_refused(folder: Path) -> None:
+    """Nothing green that covers less than was asked; and what is missing is named."""
+    for proving in (Proving(joint_error_deg=1.0), Proving(certificate=True)):
+        rows = run_batch(asked(folder, proving=proving))
+        assert {row.outcome for row in rows} == {"error"}
+        assert "neither errors nor certificates" in rows[0].reason
+    (row,) = run_batch(asked(folder, trajectories=()))
+    assert row.outcome == "error"
+    assert "expected manipulator" in row.reason
+    (folder / "none").mkdir()
+    with pytest.raises(InvalidFile, match="holds no trajectory"):
+        run_batch(asked(folder, trajectories=(str(folder / "none"),)))
