@@ -302,6 +302,9 @@ def test_the_command_ends_with_the_verdict(
     assert run("verify", "paper/obs1", *asked[1:], "--out", out) == 2
     assert "PROBLEM has no meaning with --urdf" in capsys.readouterr().err
     assert run("verify", "--trajectory", rows, "--out", out) == 2
+    bad, nowhere = write(tmp_path, "bad.csv", "turn_rad\n0\n"), tmp_path / "nowhere"
+    assert run(*asked[:-1], bad, "--out", nowhere) == 2
+    assert not nowhere.exists()
     assert run("verify", "paper/obs1", "--lock", "a=1", *asked[5:], "--out", out) == 2
 
 

@@ -4,7 +4,9 @@ Nothing is judged here: problems are read, planned, verified and written down.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -20,7 +22,9 @@ from vdsm_pin.io.trajectory_file import (
     write_trajectory,
 )
 from vdsm_pin.problem.planning_problem import PlanningProblem, ProblemSource
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import step
+from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.report.browser import find_browser
 from vdsm_pin.report.facts import plan_file, verification_file
 from vdsm_pin.report.files import PlanFile, VerificationFile
@@ -42,7 +46,7 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.coal_clearance import reach_of
 from vdsm_pin.verification.moving import untimed
 from vdsm_pin.verification.records import ArmVerification, Verdict, Verification
-from vdsm_pin.verification.robot_model import load_robot
+from vdsm_pin.verification.robot_model import RobotModel, load_robot
 from vdsm_pin.verification.task import all_pairs
 from vdsm_pin.verification.verify import verify
 
@@ -212,13 +216,9 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
     from vdsm_pin.report.html import write_report
 
     _check_outputs(order)
-    source = order.source
+    judged = _judgement(order)
     with staged(order.folder) as aside:
-        verification: Verification
-        if isinstance(source, ProblemFile):
-            urdf, verification = _judge_arm(order, source.problem, aside)
-        else:
-            urdf, verification = _judge_robot(order, source, aside)
+        urdf, verification = judged(aside)
         record = _record(order, urdf)
         file = verification_file(verification, record)
         (aside / VERIFICATION).write_text(file.text(), encoding="utf-8")
@@ -230,16 +230,32 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
     return Verified(file, verification, missing)
 
 
-def _judge_arm(
-    order: VerifyOrder, problem: PlanningProblem, aside: Path
-) -> tuple[str, Verification]:
-    """The SHA-256 of the arm's URDF and the judgement; its tables stand aside."""
+def _judgement(order: VerifyOrder) -> Callable[[Path], tuple[str, Verification]]:
+    """What judges the motion, which is read before anything is written."""
+    if not isinstance(order.source, ProblemFile):
+        from vdsm_pin.robots.trajectory_files import read_path
+
+        cell = order.source
+        motion = read_path(order.trajectory, cell.robot, order.topic)
+        return partial(_judge_robot, order, cell, motion)
+    problem = order.source.problem
     robot = load_robot(problem.manipulator)
     trajectory = read_trajectory(
         order.trajectory, problem.manipulator, order.interpolation
     )
     if why := untimed(problem.scene, trajectory):
         raise InvalidFile(file=order.trajectory, where="line 1", problem=why)
+    return partial(_judge_arm, order, problem, robot, trajectory)
+
+
+def _judge_arm(
+    order: VerifyOrder,
+    problem: PlanningProblem,
+    robot: RobotModel,
+    trajectory: Trajectory,
+    aside: Path,
+) -> tuple[str, Verification]:
+    """The SHA-256 of the arm's URDF and the judgement; its tables stand aside."""
     pairs = all_pairs(problem)
     reach = math.inf if order.all_pairs else reach_of(problem)
     with ClearanceCsv(aside / CLEARANCE, problem, pairs, reach) as clearance:
@@ -261,13 +277,11 @@ def _judge_arm(
 
 
 def _judge_robot(
-    order: VerifyOrder, cell: "Cell", aside: Path
+    order: VerifyOrder, cell: "Cell", motion: Motion, aside: Path
 ) -> tuple[str, Verification]:
     """The same of any other robot."""
     from vdsm_pin.robots.judgement import verify_robot
-    from vdsm_pin.robots.trajectory_files import read_path
 
-    motion = read_path(order.trajectory, cell.robot, order.topic)
     verification = verify_robot(cell, motion, order.deadline)
     step("writing the results")
     with ClearanceCsv(aside / CLEARANCE, cell, verification.pairs) as clearance:
