@@ -9,7 +9,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import new_body
 from vdsm_pin.geometry.kernels import BRACKET, NORMAL, SCRATCH_ROWS, UPPER
 from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
-from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
+from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -61,11 +61,11 @@ def upper_clearance(problem: PlanningProblem, segments: FloatArray) -> FloatArra
     Returns:
         Shape (n, n_obstacles); [m].
     """
-    obstacles = problem.scene.obstacles
-    if not obstacles:
+    if not problem.scene.obstacles:
         return np.full((len(segments), 0), np.inf)
-    pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
-    upper = upper_bounds(pieces, np.ascontiguousarray(segments), np.inf)
+    upper = upper_bounds(
+        problem.packed_obstacles, np.ascontiguousarray(segments), np.inf
+    )
     return np.asarray(upper - problem.manipulator.least_radius)
 
 

@@ -335,6 +335,13 @@ class PlanningProblem(Summarised):
         return pack_pieces([*obstacles, *bodies])
 
     @property
+    def packed_obstacles(self) -> "PackedPieces":
+        """The obstacles alone, as views of the same."""
+        from vdsm_pin.geometry.pieces import first_groups
+
+        return first_groups(self.packed, len(self.scene.obstacles))
+
+    @property
     def path(self) -> DesiredPath:
         """What the tip shall draw, of a problem that says so.
 

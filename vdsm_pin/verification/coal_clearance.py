@@ -19,7 +19,7 @@ import numpy as np
 
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.pieces import PackedPieces, first_groups
+from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.geometry.row_bounds import coarse_bounds, row_brackets
 from vdsm_pin.geometry.solids import Solid
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -107,7 +107,7 @@ class CoalScene:
             OutOfTime: If the time is over.
         """
         obstacles = problem.scene.obstacles
-        pieces = first_groups(problem.packed, len(obstacles))
+        pieces = problem.packed_obstacles
         bodies = (_bodies_of(solid_of(one), deadline) for one in obstacles)
         return cls(pieces, tuple(bodies))
 

@@ -10,7 +10,7 @@ import numpy as np
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.links import link_clearances
-from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
+from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import covers_of
 from vdsm_pin.proof.budget import rounding_pad
@@ -59,7 +59,7 @@ def link_clearance(problem: PlanningProblem) -> Callable[[FloatArray], FloatArra
         )
         raise InvalidInput(message)
     obstacles = problem.scene.obstacles
-    pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
+    pieces = problem.packed_obstacles
     covers, pad = covers_of(obstacles, pieces), arithmetic_pad(problem, pieces)
     arm, goal = problem.manipulator, TOLERANCES.bracket_gap
     alike = arm.least_radius == arm.most_radius
