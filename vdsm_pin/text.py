@@ -5,7 +5,9 @@ there that move a cursor, hide or turn text round, or that no encoding can write
 message passes through here first.
 """
 
+import os
 import sys
+from pathlib import Path
 from typing import Final
 
 LONGEST: Final = 4_000
@@ -29,8 +31,14 @@ def printable(text: str) -> str:
 
 
 def show_everything() -> None:
-    """Let this process's output spell what the terminal's encoding cannot write."""
-    for stream in (sys.stdout, sys.stderr):
+    """Let this process's output spell what the terminal's encoding cannot write.
+
+    What whoever started the process has closed goes nowhere, as a verdict is no other.
+    """
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))
+        stream = getattr(sys, name)
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
             reconfigure(errors="backslashreplace")
