@@ -247,6 +247,23 @@ def test_an_arm_that_leaves_a_mesh_is_inside_until_it_meets_the_surface(
     assert (chunk.upper[3:] > 0.09).all()
 
 
+def test_a_link_that_reaches_out_of_a_mesh_has_its_distance_from_it(
+    tmp_path: Path,
+) -> None:
+    shifted = box(0.5) - np.array([0.494, 0.0, 0.0])  # its end 6 mm before O_1
+    _, found = verified(*written(tmp_path, shifted))
+    assert found.verdict is Verdict.REFUTED
+    pairs = [pair.own for pair in found.pairs if pair.obstacle]
+    first, second = pairs.index("link 1"), pairs.index("link 2")
+    assert found.least.upper[first] < 0.0
+    apart = 0.010 - 0.006 - RADIUS
+    assert found.least.lower[second] <= apart <= found.least.upper[second] + 1e-9
+    assert found.least.lower[second] > 0.0
+    assert not any(
+        one.pair.own == "link 2" and one.upper < 0 for one in found.approaches
+    )
+
+
 @pytest.mark.parametrize("solid", [None, True, False])
 def test_what_an_open_mesh_is_the_problem_says(
     solid: bool | None, tmp_path: Path

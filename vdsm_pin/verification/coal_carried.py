@@ -190,7 +190,7 @@ def _at_approaches(
 ) -> Iterator[tuple[float, float, float]]:
     """The same where the two come nearest, upper bounds included."""
     for k, near in enumerate(log.approaches):
-        if (near.pair.own, near.pair.label) != names:
+        if (near.pair.own, near.pair.label) != names or names[1] in log.around:
             continue
         moments = np.array([near.moment])
         distance = float(_distances(robot, trajectory, both, moments)[0])

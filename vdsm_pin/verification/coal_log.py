@@ -32,7 +32,7 @@ class CoalLog:
         around: Sequence[str],
     ) -> None:
         self.pairs, self.approaches = tuple(pairs), tuple(approaches)
-        self._around = tuple(around)
+        self.around = tuple(around)
         names = np.array([pair.obstacle for pair in pairs])
         self._surfaces = np.flatnonzero(np.isin(names, around))
         self._parts: list[tuple[IntArray, IntArray, FloatArray]] = []
@@ -50,7 +50,7 @@ class CoalLog:
                 k
                 for k, near in enumerate(self.approaches)
                 if near.pair.obstacle in partners
-                and near.pair.obstacle not in self._around
+                and near.pair.obstacle not in self.around
                 and {near.pair.body, near.pair.other_body} <= {"", TOOL}
             ],
             dtype=np.int64,

@@ -2,20 +2,21 @@
 
 What is proved is the distance from the mesh's surface. Of a solid the clearance is
 negative all over its inside: as for every other obstacle around a link's axis it is
-reported as minus the link's radius, whatever the depth.
+reported as minus the link's radius, whatever the depth. That is said of what begins
+inside; what reaches out through the surface has its distance from that.
 """
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from math import nan
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, frozen
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.verification.inside import Enclosed
 from vdsm_pin.verification.records import (
     Check,
     ClearanceChunk,
@@ -32,6 +33,11 @@ REFUTED: Final = 1
 """In `ClearanceChunk.verdict`."""
 
 
+def _begins_inside(pair: Pair, around: Enclosed) -> bool:
+    """Whether the obstacle of a pair is a mesh, and its body begins inside."""
+    return pair.own in around.get(pair.obstacle, ())
+
+
 class EnclosedSink:
     """Corrects chunks for the meshes around the arm and passes them on.
 
@@ -40,18 +46,19 @@ class EnclosedSink:
     Args:
         sink: Receives the corrected chunks.
         problem: The arm.
-        around: Names of the meshes.
+        around: What begins inside the meshes around it.
     """
 
     def __init__(
-        self,
-        sink: ClearanceSink,
-        problem: PlanningProblem,
-        around: Collection[str],
+        self, sink: ClearanceSink, problem: PlanningProblem, around: Enclosed
     ) -> None:
         self.sink, self.least = sink, -problem.manipulator.least_radius
-        partners = np.array([pair.obstacle for pair in all_pairs(problem)])
-        self.columns = [np.flatnonzero(partners == name) for name in around]
+        pairs = list(enumerate(all_pairs(problem)))
+        self.columns = [
+            np.array([k for k, pair in pairs if _begins_inside(pair, {name: inside})])
+            for name, inside in around.items()
+            if inside
+        ]
         self.left = [False] * len(self.columns)
 
     def __call__(self, chunk: ClearanceChunk) -> None:
@@ -78,27 +85,26 @@ class EnclosedSink:
 
 
 def enclosed_profile(
-    profile: ClearanceProfile, problem: PlanningProblem, around: Collection[str]
+    profile: ClearanceProfile, problem: PlanningProblem, around: Enclosed
 ) -> ClearanceProfile:
     """The profile with the meshes around the arm as solids."""
     if not around:
         return profile
     least = -problem.manipulator.least_radius
     lower, upper = profile.obstacle_lower.copy(), profile.obstacle_upper.copy()
-    inside = np.zeros(len(lower), np.bool_)
-    for name in around:
+    link_lower, link_upper = profile.link_lower.copy(), profile.link_upper.copy()
+    for name, bodies in around.items():
         column = problem.scene.names.index(name)
         mine: BoolArray = ~np.logical_or.accumulate(lower[:, column] <= least)
         lower[:, column] = upper[mine, column] = least
-        inside |= mine
-
-    def of_links(values: FloatArray, rows: BoolArray) -> FloatArray:
-        return frozen(np.where(rows[:, None], np.minimum(values, least), values))
-
+        for link in range(problem.manipulator.n_links):
+            if f"link {link + 1}" in bodies:
+                link_lower[:, link] = np.minimum(link_lower[:, link], least)
+                link_upper[mine, link] = np.minimum(link_upper[mine, link], least)
     return replace(
         profile,
-        link_lower=of_links(profile.link_lower, np.ones_like(inside)),
-        link_upper=of_links(profile.link_upper, inside),
+        link_lower=frozen(link_lower),
+        link_upper=frozen(link_upper),
         obstacle_lower=frozen(lower),
         obstacle_upper=frozen(upper),
     )
@@ -108,31 +114,38 @@ def enclosed_least(
     least: LeastClearances,
     pairs: Sequence[Pair],
     problem: PlanningProblem,
-    around: Collection[str],
+    around: Enclosed,
 ) -> LeastClearances:
     """The least clearances with the meshes around the arm as solids."""
-    if not around:
+    numbers = [k for k, pair in enumerate(pairs) if _begins_inside(pair, around)]
+    if not numbers:
         return least
-    inside = np.array([pair.obstacle in around for pair in pairs], bool)
+    points = [around[pairs[k].obstacle][pairs[k].own] for k in numbers]
     depth = -problem.manipulator.least_radius
+
+    def put(values: FloatArray | IntArray, inside: ArrayLike) -> Any:
+        changed: Any = values.copy()
+        changed[numbers] = inside
+        changed.flags.writeable = False
+        return changed
+
     return replace(
         least,
-        lower=frozen(np.where(inside, depth, least.lower)),
-        upper=frozen(np.where(inside, depth, least.upper)),
-        verdict=frozen(np.where(inside, REFUTED, least.verdict), np.int64),
-        other_point=frozen(
-            np.where(inside[:, None], least.link_point, least.other_point)
-        ),
+        interval=put(least.interval, 0),
+        time=put(least.time, 0.0),
+        lower=put(least.lower, depth),
+        upper=put(least.upper, depth),
+        verdict=put(least.verdict, REFUTED),
+        link_point=put(least.link_point, points),
+        other_point=put(least.other_point, points),
     )
 
 
 def enclosed_approaches(
-    problem: PlanningProblem, trajectory: Trajectory, around: Collection[str]
+    problem: PlanningProblem, around: Enclosed
 ) -> tuple[ClosestApproach, ...]:
-    """Each link inside each mesh as the motion begins: the start of its axis is."""
-    arm, first = problem.manipulator, slice(0, 1)
-    rows = trajectory.x0[first], trajectory.alpha[first], trajectory.theta[first]
-    centres = joint_centres(arm, *rows)[0]
+    """Each link that begins inside a mesh, by its middle."""
+    arm = problem.manipulator
     return tuple(
         ClosestApproach(
             interval=0,
@@ -140,13 +153,14 @@ def enclosed_approaches(
             pair=Pair(link=link, obstacle=name),
             lower=-arm.least_radius,
             upper=-arm.least_radius,
-            station=0.0,
-            link_point=frozen(centres[link - 1]),
-            other_point=frozen(centres[link - 1]),
+            station=float(arm.axis_spans[link - 1].mean()),
+            link_point=frozen(bodies[f"link {link}"]),
+            other_point=frozen(bodies[f"link {link}"]),
             deeper=True,
         )
-        for name in around
+        for name, bodies in around.items()
         for link in range(1, arm.n_links + 1)
+        if f"link {link}" in bodies
     )
 
 

@@ -9,11 +9,11 @@ it is proved to keep its clearance from the mesh's hull.
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
-from vdsm_pin.arm.bodies import arm_bodies
+from vdsm_pin.arm.bodies import ArmBody, arm_bodies
 from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
@@ -32,6 +32,9 @@ from vdsm_pin.verification.records import Check, Problem, Verdict, combine
 
 NAME: Final = "arm outside the meshes"
 """Name of the row."""
+
+Enclosed: TypeAlias = Mapping[str, Mapping[str, FloatArray]]
+"""Bodies inside a mesh, by its name and theirs, each with a point there; base frame."""
 
 VERDICTS: Final = {
     Side.INSIDE: Verdict.REFUTED,
@@ -74,25 +77,71 @@ def _points(
     O_1 for links, tool and feed where all of them are held off the mesh, otherwise the
     middle of each that is; the middle of everything that is carried.
     """
-    arm, row = problem.manipulator, [0]
-    joints = trajectory.x0[row], trajectory.alpha[row], trajectory.theta[row]
-    centres = joint_centres(arm, *joints)[0]
-    frames = link_frames(*joints[1:])[0]
-    points = [(centres[0], arm.least_radius)]
-    bodies = arm_bodies(arm)
-    own = [body for body in bodies if not body.carried]
+    arm = problem.manipulator
+    bodies = _middles(problem, trajectory)
+    own = [body for body, _ in bodies if not body.carried]
+    points = []
     if not any(arm.ignores(body.name, mesh) for body in own):
-        bodies = tuple(body for body in bodies if body.carried)
-    else:
-        points = []
-    for body in bodies:
-        if not arm.ignores(body.name, mesh):
-            turned = frames[body.link - 1] if body.link else np.eye(3)
-            middle = turned @ body.corners.mean(axis=0)
-            origin = centres[max(0, body.link - 1)]
-            points.append((origin + middle, body.ball + problem.required_clearance))
+        points.append((_origin(problem, trajectory), arm.least_radius))
+        bodies = [one for one in bodies if one[0].carried]
+    points += [
+        (middle, body.ball + problem.required_clearance)
+        for body, middle in bodies
+        if not arm.ignores(body.name, mesh)
+    ]
     pose = _pose_at_start(problem, trajectory, mesh)
-    return [((p - pose[:3, 3]) @ pose[:3, :3], off) for p, off in points]
+    return [(_seen_from(pose, point), off) for point, off in points]
+
+
+def _origin(problem: PlanningProblem, trajectory: Trajectory) -> FloatArray:
+    """O_1 at the first row, shape (3,); [m]."""
+    return np.array([trajectory.x0[0], 0.0, 0.0])
+
+
+def _middles(
+    problem: PlanningProblem, trajectory: Trajectory
+) -> list[tuple[ArmBody, FloatArray]]:
+    """Each body of the arm with the middle of its corners at the first row; [m]."""
+    row = [0]
+    joints = trajectory.x0[row], trajectory.alpha[row], trajectory.theta[row]
+    centres = joint_centres(problem.manipulator, *joints)[0]
+    frames = link_frames(*joints[1:])[0]
+    found = []
+    for body in arm_bodies(problem.manipulator):
+        turned = frames[body.link - 1] if body.link else np.eye(3)
+        middle = turned @ body.corners.mean(axis=0)
+        found.append((body, centres[max(0, body.link - 1)] + middle))
+    return found
+
+
+def _seen_from(pose: FloatArray, point: FloatArray) -> FloatArray:
+    """A point of the base frame in the frame that stands at a pose, shape (3,); [m]."""
+    return np.asarray((point - pose[:3, 3]) @ pose[:3, :3])
+
+
+def bodies_inside(
+    problem: PlanningProblem, trajectory: Trajectory, meshes: Collection[str]
+) -> Enclosed:
+    """What of the arm begins inside the meshes that it is inside of.
+
+    The rest reaches out through their surface, and has its distance from that.
+    """
+    solids = {one.name: solid_of(one) for one in problem.scene.obstacles}
+    middles = _middles(problem, trajectory)
+    found: dict[str, dict[str, FloatArray]] = {}
+    for name in meshes:
+        mesh, pose = solids[name], _pose_at_start(problem, trajectory, name)
+        assert isinstance(mesh, Mesh)
+        sides = [
+            locate(mesh.closed_mesh, _seen_from(pose, middle), np.inf).side
+            for _, middle in middles
+        ]
+        found[name] = {
+            body.name: middle
+            for (body, middle), side in zip(middles, sides, strict=True)
+            if side is Side.INSIDE
+        }
+    return found
 
 
 def _pose_at_start(

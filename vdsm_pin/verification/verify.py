@@ -44,7 +44,9 @@ from vdsm_pin.verification.enclosed import (
 )
 from vdsm_pin.verification.first_contact import FirstContact, TooClose, first_contacts
 from vdsm_pin.verification.inside import (
+    Enclosed,
     arm_inside,
+    bodies_inside,
     check_inside,
     locate_arm,
     locate_start,
@@ -115,7 +117,8 @@ def verify(
     box = problem.errors.widened(errors or ErrorBox())
     _check_input(problem, trajectory, box)
     located = locate_arm(problem, trajectory, box, deadline)
-    around, kept = arm_inside(located), _Lowers(problem, trajectory)
+    around = bodies_inside(problem, trajectory, arm_inside(located))
+    kept = _Lowers(problem, trajectory)
     wanted = [EnclosedSink(sink, problem, around) if around else sink for sink in sinks]
     noted: TooClose | None = None
     if sinks or kept.fits:
@@ -155,7 +158,7 @@ def verify(
         besides.note(f"clearance.csv from interval {proof.sent} on", deadline)
     tip = check_tip(problem, trajectory)
     near_misses = closest_approaches(problem, trajectory, proof, around)
-    proved, log = kept.proved(proof), CoalLog(proof.pairs, near_misses, around)
+    proved, log = kept.proved(proof), CoalLog(proof.pairs, near_misses, tuple(around))
     checks = [
         *_by_pinocchio(robot, problem, trajectory, centres, deadline),
         *check_limits(problem, trajectory),
@@ -397,7 +400,7 @@ def closest_approaches(
     problem: PlanningProblem,
     trajectory: Trajectory,
     proof: ClearanceProof,
-    around: Sequence[str] = (),
+    around: Enclosed | None = None,
 ) -> tuple[ClosestApproach, ...]:
     """The pairs that come nearest, by their upper bounds; obstacles first.
 
@@ -408,14 +411,15 @@ def closest_approaches(
         problem: Arm and scene.
         trajectory: The motion.
         proof: Of its distances.
-        around: Names of the meshes that the arm is inside of.
+        around: What begins inside the meshes that the arm is inside of.
     """
-    rows = list(enclosed_approaches(problem, trajectory, around))
+    around = around or {}
+    rows = list(enclosed_approaches(problem, around))
     of_links = np.array([not pair.obstacle for pair in proof.pairs])
     seen = np.flatnonzero(np.isfinite(proof.best[:, UP]))
     for k in seen[np.lexsort((proof.best[seen, UP], of_links[seen]))][:CLOSEST]:
         pair, row = proof.pairs[k], proof.best[k]
-        if pair.obstacle in around:
+        if pair.own in around.get(pair.obstacle, ()):
             continue
         points = row[OWN:OTHER], row[OTHER : OTHER + 3]
         # In a pair of links the sweep moves the second one against the first.
