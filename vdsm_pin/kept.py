@@ -13,8 +13,8 @@ from typing import Final
 
 _DIGEST: Final = hashlib.sha256
 
-FEW: Final = 30
-"""Functions; planning needs more."""
+PLANNED: Final = "planned"
+"""What is kept once a plan has been made to its end."""
 
 
 def folders() -> Iterator[Path]:
@@ -31,8 +31,14 @@ def functions(folder: Path) -> int:
 
 
 def is_cold() -> bool:
-    """Whether most machine code is still to be made, which takes about a minute."""
-    return sum(functions(folder) for folder in folders()) < FEW
+    """Whether no plan was made to its end here yet, so that much is to be compiled."""
+    return read(PLANNED) is None
+
+
+def note_planned() -> None:
+    """Keep that a plan was made to its end, so that machine code is there."""
+    if is_cold():
+        keep(PLANNED, b"")
 
 
 def read(name: str) -> bytes | None:

@@ -87,7 +87,7 @@ PlanningTime = Annotated[
     typer.Option(
         min=0.001,
         metavar="SECONDS",
-        help="When to give up; 60 by default, 600 where machine code is not made yet, "
+        help="When to give up; 60 by default, 600 until a first plan has been made, "
         "inf for never.",
     ),
 ]

@@ -30,7 +30,7 @@ from vdsm_pin.time_limit import Deadline, enforced
 
 LIMIT: Final = 60.0
 COLD_LIMIT: Final = 600.0
-"""Seconds to plan by default; more where machine code is made, once and for all."""
+"""Seconds to plan by default; more until a first plan has made the machine code."""
 
 commands = family()
 
@@ -64,7 +64,7 @@ def plan(
     """
     from vdsm_pin.app.workflow import NO_PLAN, plan_to_folder
     from vdsm_pin.io.problem_file import read_problem
-    from vdsm_pin.kept import is_cold
+    from vdsm_pin.kept import is_cold, note_planned
     from vdsm_pin.progress import shown
     from vdsm_pin.report.terminal import show_plan
     from vdsm_pin.report.words import outcome
@@ -86,10 +86,14 @@ def plan(
             source = read_problem(problem).under(errors)
             with nullcontext() if quiet or as_json else shown(limit=limit):
                 file = plan_to_folder(source, strategy, out, context.obj, deadline)
+        note_planned()
     except OutOfTime as error:  # which tells its time itself
+        if limit == COLD_LIMIT:
+            note_planned()
         error.args = (f"no plan found: {error}; {page}",)
         raise
     except NoPlanFound as error:
+        note_planned()
         spent = time.monotonic() - begin
         error.args = (f"no plan found: {error}; searched for {spent:.1f} s; {page}",)
         raise
