@@ -171,6 +171,7 @@ class _Body:
 
     name: str
     pieces: tuple[Any, ...]
+    reach: float = 0.0
 
 
 def whole(batch: Batch) -> tuple[Any, Any]:

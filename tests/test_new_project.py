@@ -22,7 +22,7 @@ def test_what_is_made_is_read_under_its_name(
     files = new_project(tmp_path / "a" / name, kind)
     folder = tmp_path / "a" / name
     if kind == "robot":
-        assert read_cell(folder / "problem.yaml").asked.robot.joints
+        assert read_cell(folder / "problem.yaml").robot.joints
     else:
         problem = read_problem(folder / "problem.yaml").problem
         assert problem.name == name

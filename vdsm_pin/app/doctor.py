@@ -22,6 +22,7 @@ USES: Final = {
     "simulation": "vdsm simulate: a plan in closed loop",
     "xacro": "robots as xacro files",
     "bags": "trajectories in ROS bags and MCAP files",
+    "mjcf": "scenes of robots as worlds of MuJoCo",
     "ompl": "benchmark of foreign plans",
     "references": "benchmarks beside other planners",
 }
