@@ -12,7 +12,11 @@ ByteArray: TypeAlias = npt.NDArray[np.uint8]
 
 
 def frozen(value: Any, dtype: type[Any] = np.float64) -> npt.NDArray[Any]:
-    """A read-only C-ordered copy of an array-like value."""
+    """A read-only C-ordered copy of an array-like value; itself where it is one."""
+    if isinstance(value, np.ndarray) and value.dtype == dtype:
+        flags = value.flags
+        if flags.owndata and flags.c_contiguous and not flags.writeable:
+            return value
     array = np.array(value, dtype=dtype, order="C")
     array.setflags(write=False)
     return array

@@ -116,14 +116,16 @@ class Trajectory(Summarised):
         """Number of links N."""
         return int(self.alpha.shape[1])
 
-    @property
+    @cached_property
     def joints(self) -> FloatArray:
         """All joint values q = (x0, alpha1, theta1, ..), shape (n_samples, 1 + 2N).
 
         Metres in the first column, radians in the others.
         """
-        angles = np.stack([self.alpha, self.theta], axis=2).reshape(self.n_samples, -1)
-        return np.concatenate([self.x0[:, None], angles], axis=1)
+        rows = np.zeros((self.n_samples, 1 + 2 * self.n_links))
+        rows[:, 0], rows[:, 1::2], rows[:, 2::2] = self.x0, self.alpha, self.theta
+        rows.setflags(write=False)
+        return rows
 
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Its size and what it moves."""

@@ -62,9 +62,12 @@ class Path:
     @property
     def controls(self) -> FloatArray:
         """All control points, shape (n_rows - 1, degree + 1, n_columns)."""
-        ends = self.knots[:-1, None], self.knots[1:, None]
-        shape = len(self.knots) - 1, self.degree - 1, self.knots.shape[1]
-        inner = self.inner.reshape(shape)
+        return self.pieces(np.arange(len(self.knots) - 1))
+
+    def pieces(self, k: IntArray) -> FloatArray:
+        """The same of some pieces (m,), shape (m, degree + 1, n_columns)."""
+        ends = self.knots[k, None], self.knots[k + 1, None]
+        inner = self.inner[k] if self.inner.size else ends[0][:, :0]
         return np.concatenate([ends[0], inner, ends[1]], axis=1)
 
     @property
@@ -117,7 +120,7 @@ class Path:
         """Rows of q at shares, 0 to 1, of intervals, both (m,): (m, n_columns)."""
         if len(self.knots) == 1:
             return np.repeat(self.knots, len(intervals), axis=0)
-        found = value(self.controls[intervals], shares)
+        found = value(self.pieces(intervals), shares)
         at_end = shares == 1.0
         found[at_end] = self.knots[intervals[at_end] + 1]
         return found
