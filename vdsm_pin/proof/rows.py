@@ -164,16 +164,14 @@ def _turn_askew(
 
 
 @compiled
-def _place_rotation(
-    tree: PackedTree, rows: Rows, joint: int, n: int, before: FloatArray
-) -> None:
+def _place_rotation(tree: PackedTree, rows: Rows, joint: int, n: int) -> None:
     """One frame's rotations as the joint's placement leaves them, to its own array."""
     placed, new = tree.rotation[joint], rows.frames[joint + 1]
     old = rows.frames[tree.parent[joint]]
     for c in range(3):
+        x, y, z = old[c, 0], old[c, 1], old[c, 2]
         for d in range(3):
-            before[0], before[1], before[2] = placed[0, d], placed[1, d], placed[2, d]
-            blend(old[c, 0, :n], old[c, 1, :n], old[c, 2, :n], before, new[c, d, :n])
+            blend(x, y, z, placed[:, d], new[c, d, :n])
 
 
 @compiled
@@ -216,7 +214,7 @@ def _move_frame(
     origin, new = rows.origins[joint + 1], rows.frames[joint + 1]
     carry(rows.origins[parent], rows.frames[parent], tree.shift[joint], n, origin)
     if tree.turned[joint]:
-        _place_rotation(tree, rows, joint, n, rows.work[6, :3])
+        _place_rotation(tree, rows, joint, n)
     elif kind != REVOLUTE:
         new[:, :, :n] = rows.frames[parent, :, :, :n]
     if kind == REVOLUTE:
