@@ -108,10 +108,150 @@ def test_points_without_a_measurement_are_told(tmp_path: Path) -> None:
     assert cloud.notes == ("points without a measurement (NaN) left out: 1",)
 
 
-def test_copies_of_what_came_before_are_unpacked() -> None:
-    # "abc", then 9 bytes from 3 back: an overlapping copy; then a short copy.
-    packed = bytes([2]) + b"abc" + bytes([7 << 5, 0, 2]) + bytes([1 << 5, 11])
-    assert _from_lzf(packed, 15) == b"abc" * 4 + b"abc"
+def copying_lzf(data: bytes, rng: np.random.Generator) -> bytes:
+    """Packed with a copy, near or far, wherever three bytes were there before."""
+    packed, at = b"", 0
+    while at < len(data):
+        farthest = max(at - 8192, 0)
+        places = [data.find(data[at : at + 3], farthest, at + 2)]
+        places.append(data.rfind(data[at : at + 3], farthest, at + 2))
+        back = at - places[int(rng.integers(2))] - 1
+        length = 0
+        while length < 264 and at + length < len(data):
+            if data[at + length] != data[at + length - back - 1]:
+                break
+            length += 1
+        if places[0] < 0 or length < 3:
+            packed, at = packed + bytes([0, data[at]]), at + 1
+            continue
+        at, length = at + length, length - 2
+        head = min(length, 7) << 5 | back >> 8
+        more = [length - 7] if length >= 7 else []
+        packed += bytes([head, *more, back & 255])
+    return packed
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_copies_of_what_came_before_are_unpacked(seed: int) -> None:
+    """A writer of every kind of copy; what is cut short is not of the size promised."""
+    rng = np.random.default_rng(seed)
+    words = [rng.bytes(int(rng.integers(1, 12))) for _ in range(5)]
+    data = b"".join(
+        words[k] * int(rng.integers(1, 60)) for k in rng.integers(5, size=40)
+    )
+    data = data + rng.bytes(seed * 2000) + data[:3000]
+    packed = copying_lzf(data, rng)
+    assert _from_lzf(packed, len(data)) == data
+    assert _from_lzf(literal_lzf(data), len(data)) == data
+    for end in range(0, len(packed), 1 + len(packed) // 60):
+        assert len(_from_lzf(packed[:end], len(data))) < len(data)
+
+
+@pytest.mark.parametrize(
+    "packed",
+    [
+        bytes([0, 7, 1 << 5, 1]),  # from before the beginning
+        bytes([0, 7, 1 << 5]),  # without the place of the copy
+        bytes([0, 7, 7 << 5, 1]),  # a long one without it
+    ],
+)
+def test_copies_of_nothing_are_damage(packed: bytes) -> None:
+    assert _from_lzf(packed, 100) == b""
+
+
+PCD_KINDS = {
+    **{f"I{n}": f"<i{n}" for n in (1, 2, 4, 8)},
+    **{f"U{n}": f"<u{n}" for n in (1, 2, 4, 8)},
+    **{f"F{n}": f"<f{n}" for n in (4, 8)},
+}
+
+
+@pytest.mark.parametrize("form", ["ascii", "binary", "binary_compressed"])
+@pytest.mark.parametrize("seed", range(8))
+def test_pcd_of_any_fields_is_what_numpy_reads(
+    form: str, seed: int, tmp_path: Path
+) -> None:
+    """Oracle: a structured array of numpy, other fields before, between and behind."""
+    rng = np.random.default_rng(seed)
+    names = rng.permutation(["x", "y", "z", "rgb", "normal"]).tolist()
+    kinds = [str(kind) for kind in rng.choice(list(PCD_KINDS), 5)]
+    counts = [1 if name in "xyz" else int(rng.integers(1, 4)) for name in names]
+    fields = [
+        (n, PCD_KINDS[k], (c,)) for n, k, c in zip(names, kinds, counts, strict=True)
+    ]
+    table = np.zeros(9, np.dtype(fields))
+    for name in names:
+        table[name] = rng.integers(0, 100, table[name].shape)
+    columns = b"".join(table[name].tobytes() for name in names)
+    rows = [" ".join(f"{v:g}" for name in names for v in row[name]) for row in table]
+    body = {
+        "ascii": "\n".join(rows).encode() + b"\n",
+        "binary": table.tobytes() + b"more",
+        "binary_compressed": struct.pack(
+            "<II", len(packed := copying_lzf(columns, rng)), len(columns)
+        ) + packed,
+    }[form]  # fmt: skip
+    text = (
+        f"VERSION .7\nFIELDS {' '.join(names)}\nSIZE {' '.join(k[1] for k in kinds)}\n"
+        f"TYPE {' '.join(k[0] for k in kinds)}\nCOUNT {' '.join(map(str, counts))}\n"
+        f"WIDTH 3\nHEIGHT 3\nPOINTS 9\nDATA {form}\n"
+    )
+    found = read(tmp_path / "a.pcd", text.encode() + body).points
+    expected = np.column_stack([table[axis][:, 0] for axis in "xyz"])
+    np.testing.assert_array_equal(found, expected)
+
+
+PCD_HEADER = {
+    "FIELDS": "x y z", "SIZE": "4 4 4", "TYPE": "F F F", "COUNT": "1 1 1",
+    "POINTS": "1", "DATA": "ascii",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "good"),
+    [
+        ("FIELDS", "x y", False),
+        ("FIELDS", "x y z x", False),
+        ("FIELDS", "x y y", False),
+        ("SIZE", "4 4 3", False),
+        ("SIZE", "4 4 -4", False),
+        ("SIZE", "4 4 2", False),  # floating numbers of two bytes, or of one
+        ("SIZE", "4 4 1", False),
+        ("SIZE", "4 4 8", True),
+        ("TYPE", "F F D", False),
+        ("TYPE", "I U F", True),
+        ("COUNT", "1 1", False),
+        ("COUNT", None, True),
+        ("POINTS", None, False),
+        ("POINTS", "1 1", False),
+        ("POINTS", "00000000001", True),
+        ("POINTS", "000000000001", False),
+        ("DATA", "text", False),
+        ("HEIGHT", "1", True),
+    ],
+)
+def test_headers_of_pcd_are_whole_or_refused(
+    key: str, value: str | None, good: bool, tmp_path: Path
+) -> None:
+    said = {key: value} | PCD_HEADER | {key: value}
+    lines = [f"{k} {v}" for k, v in said.items() if v is not None and k != "DATA"]
+    text = "\n".join([*lines, f"DATA {said['DATA']}", "1 2 3", ""])
+    if good:
+        assert read(tmp_path / "a.pcd", text.encode()).points.tolist() == [[1, 2, 3]]
+        return
+    with pytest.raises(InvalidFile, match="no PCD's"):
+        read(tmp_path / "a.pcd", text.encode())
+
+
+def test_odd_lines_of_points_are_told_apart(tmp_path: Path) -> None:
+    """The first line may be a title or a number of points, and no other."""
+    path = tmp_path / "a.xyz"
+    for first in (b"2", b"x y z", b"X,Y,Z,i", b"# 7"):
+        found = read(path, first + b"\n1 2 3 # one\n\n4;5;6;7 // two\n").points
+        assert found.tolist() == [[1, 2, 3], [4, 5, 6]]
+    for text in (b"1 2 3\n2\n", b"1 2 3\nx y z\n", b"1 2\n", b"1 2 y\n"):
+        with pytest.raises(InvalidFile, match=r"line \d: found"):
+            read(path, text)
 
 
 BAD = {

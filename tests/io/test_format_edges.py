@@ -264,3 +264,65 @@ def test_a_name_that_a_ply_has_twice_is_refused(
     head += ["element face 1", "property list uchar int vertex_indices", "end_header"]
     with pytest.raises(InvalidFile, match=said):
         read_mesh(write(tmp_path, "a.ply", "\n".join(head) + "\n" + "0 " * 60))
+
+
+def test_strips_and_fans_are_unrolled_as_they_turn(tmp_path: Path) -> None:
+    """Of a strip every other triangle is named the other way round; a fan has none."""
+    strip = [[0, 1, 2], [2, 1, 3], [2, 3, 4], [4, 3, 5], [4, 5, 6]]
+    fan = [[0, k, k + 1] for k in range(1, 6)]
+    points = np.random.default_rng(0).normal(size=(7, 3)).astype(np.float32)
+    order = " ".join(map(str, range(7)))
+    for kind, mode, triangles in (("tristrips", 5, strip), ("trifans", 6, fan)):
+        content = made(points, list(range(7))).replace(
+            b'"indices": 1}', f'"mode":{mode:5}}}'.encode()
+        )
+        root = f"<{kind}>{INPUT}<p>{order}</p></{kind}>"
+        numbers = " ".join(map(repr, points.astype(float).ravel().tolist()))
+        text = dae(HERE, root=root).replace("0 0 0 1 0 0 0 1 0 0 0 1", numbers)
+        text = text.replace('count="4" st', 'count="7" st')
+        for name, data in (("a.glb", content), ("a.dae", text)):
+            mesh = read_mesh(write(tmp_path, name, data))
+            found = {cycle(t) for t in mesh.vertices[mesh.triangles].tolist()}
+            expected = {cycle(t) for t in points.astype(float)[triangles].tolist()}
+            assert found == expected
+
+
+def cycle(triangle: list[list[float]]) -> tuple[tuple[float, ...], ...]:
+    """A triangle from its least corner on, the same way round."""
+    a, b, c = map(tuple, triangle)
+    return min((a, b, c), (b, c, a), (c, a, b))
+
+
+@pytest.mark.parametrize("corner", ["x", "", "1.0", "1_0", "0", "4", "-4", "/1", "1e0"])
+def test_a_corner_of_obj_names_a_vertex_above(corner: str, tmp_path: Path) -> None:
+    text = f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 {corner or '//'}\n"
+    with pytest.raises(InvalidFile, match="line 4: the face corner"):
+        read_mesh(write(tmp_path, "a.obj", text))
+
+
+def test_a_note_of_dae_counts_the_lists_that_cross_themselves(tmp_path: Path) -> None:
+    crossed = f"<polygons>{INPUT}<p>0 1 2 0 2 1</p></polygons>"
+    bow = f"<polylist>{INPUT}<vcount>4</vcount><p>0 1 2 3</p></polylist>"
+    text = dae(HERE, root=bow * 2 + crossed).replace(
+        "0 0 0 1 0 0 0 1 0 0 0 1", "0 0 0 1 1 0 1 0 0 0 1 0"
+    )
+    notes = read_mesh(write(tmp_path, "a.dae", text)).notes
+    assert notes[0] == "1 face crosses itself and may be covered too widely: 3"
+
+
+@pytest.mark.parametrize("place", range(16))
+@pytest.mark.parametrize("value", [5e11, 2e12, float("nan")])
+def test_a_place_of_a_part_is_affine_and_finite(
+    place: int, value: float, tmp_path: Path
+) -> None:
+    """One number of a matrix is large, or too large, or none."""
+    matrix = np.eye(4)
+    matrix.flat[place] = value
+    numbers = " ".join(map(repr, matrix.ravel().tolist()))
+    node = HERE.replace("<instance", f"<matrix>{numbers}</matrix><instance")
+    path = write(tmp_path, "a.dae", dae(node))
+    if value == 5e11 and place < 12:
+        assert len(read_mesh(path).triangles) == 4
+        return
+    with pytest.raises(InvalidFile, match="not affine or not finite"):
+        read_mesh(path)

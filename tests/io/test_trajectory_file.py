@@ -363,3 +363,60 @@ def test_memory_stays_near_that_of_the_arrays(tmp_path: Path) -> None:
     chunk = tables.CHUNK_ROWS * 20 * 150
     assert writing < chunk
     assert reading < 2 * arrays_size + chunk
+
+
+def smooth_file(folder: Path, *, quintic: bool = True) -> Path:
+    rng = np.random.default_rng(5)
+    q, rates, changes = rng.uniform(-0.2, 0.2, (3, 4, 17))
+    motion = Trajectory(
+        np.zeros(4, bool), np.zeros(4), q[:, 0], q[:, 1::2], q[:, 2::2],
+        times=np.array([0.0, 0.25, 1.0, 1.5]),
+        rates=rates,
+        changes=changes if quintic else None,
+    )  # fmt: skip
+    write_trajectory(folder / "t.csv", motion)
+    return folder / "t.csv"
+
+
+def test_velocities_and_accelerations_are_read_to_the_last_bit(tmp_path: Path) -> None:
+    path, arm = smooth_file(tmp_path), built_in("hrm8")
+    motion = read_trajectory(path, arm)
+    assert motion.is_smooth and motion.changes is not None
+    copy = tmp_path / "again.csv"
+    write_trajectory(copy, motion)
+    assert copy.read_bytes() == path.read_bytes()
+    cubic = read_trajectory(path, arm, "cubic")
+    assert cubic.rates is not None and cubic.changes is None
+    assert "x0_acceleration_m_s2" in cubic.notes[0]
+    linear = read_trajectory(path, arm, "linear")
+    assert not linear.is_smooth
+    assert "x0_velocity_m_s" in linear.notes[0]
+
+
+@pytest.mark.parametrize(
+    "drop, interpolation, words",
+    [
+        ("time_s", "auto", "no column 'time_s'"),
+        ("theta3_velocity_rad_s", "auto", "no column 'theta3_velocity_rad_s'"),
+        ("x0_velocity_m_s", "cubic", "no column 'x0_velocity_m_s'"),
+        ("alpha2_acceleration_rad_s2", "quintic", "'alpha2_acceleration_rad_s2'"),
+        ("alpha2_acceleration_rad_s2", "auto", "'alpha2_acceleration_rad_s2'"),
+    ],
+)
+def test_a_curve_that_lacks_a_column_is_refused(
+    tmp_path: Path, drop: str, interpolation: str, words: str
+) -> None:
+    path = smooth_file(tmp_path)
+    lines = [line.split(",") for line in path.read_text().splitlines()]
+    k = lines[0].index(drop)
+    path.write_text("".join(",".join(x[:k] + x[k + 1 :]) + "\n" for x in lines))
+    with pytest.raises(InvalidFile, match=words) as caught:
+        read_trajectory(path, built_in("hrm8"), interpolation)  # type: ignore[arg-type]
+    assert "line 1" in str(caught.value)
+
+
+def test_a_file_without_velocities_makes_no_curve(tmp_path: Path) -> None:
+    path = smooth_file(tmp_path, quintic=False)
+    with pytest.raises(InvalidFile, match="x0_acceleration_m_s2"):
+        read_trajectory(path, built_in("hrm8"), "quintic")
+    assert read_trajectory(path, built_in("hrm8")).changes is None

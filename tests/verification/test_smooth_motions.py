@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from vdsm_pin.arm.manipulator import built_in
-from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.limits import check_limits
@@ -301,58 +299,3 @@ def test_parts_of_a_curve_are_the_curve(quintic: bool) -> None:
     assert part.times is not None
     some = np.linspace(*part.times, 50)
     np.testing.assert_allclose(curve(part, some), curve(motion, some), atol=1e-12)
-
-
-# ---- files ---------------------------------------------------------------------------
-
-
-def smooth_file(folder: Path, *, quintic: bool = True) -> Path:
-    rng = np.random.default_rng(5)
-    q, rates, changes = rng.uniform(-0.2, 0.2, (3, 4, 17))
-    path, times = folder / "t.csv", np.array([0.0, 0.25, 1.0, 1.5])
-    write_trajectory(path, motion_of(q, times, rates, changes if quintic else None))
-    return path
-
-
-def test_velocities_and_accelerations_are_read_to_the_last_bit(tmp_path: Path) -> None:
-    path, arm = smooth_file(tmp_path), built_in("hrm8")
-    motion = read_trajectory(path, arm)
-    assert motion.is_smooth and motion.changes is not None
-    copy = tmp_path / "again.csv"
-    write_trajectory(copy, motion)
-    assert copy.read_bytes() == path.read_bytes()
-    cubic = read_trajectory(path, arm, "cubic")
-    assert cubic.rates is not None and cubic.changes is None
-    assert "x0_acceleration_m_s2" in cubic.notes[0]
-    linear = read_trajectory(path, arm, "linear")
-    assert not linear.is_smooth
-    assert "x0_velocity_m_s" in linear.notes[0]
-
-
-@pytest.mark.parametrize(
-    "drop, interpolation, words",
-    [
-        ("time_s", "auto", "no column 'time_s'"),
-        ("theta3_velocity_rad_s", "auto", "no column 'theta3_velocity_rad_s'"),
-        ("x0_velocity_m_s", "cubic", "no column 'x0_velocity_m_s'"),
-        ("alpha2_acceleration_rad_s2", "quintic", "'alpha2_acceleration_rad_s2'"),
-        ("alpha2_acceleration_rad_s2", "auto", "'alpha2_acceleration_rad_s2'"),
-    ],
-)
-def test_a_curve_that_lacks_a_column_is_refused(
-    tmp_path: Path, drop: str, interpolation: str, words: str
-) -> None:
-    path = smooth_file(tmp_path)
-    lines = [line.split(",") for line in path.read_text().splitlines()]
-    k = lines[0].index(drop)
-    path.write_text("".join(",".join(x[:k] + x[k + 1 :]) + "\n" for x in lines))
-    with pytest.raises(InvalidFile, match=words) as caught:
-        read_trajectory(path, built_in("hrm8"), interpolation)  # type: ignore[arg-type]
-    assert "line 1" in str(caught.value)
-
-
-def test_a_file_without_velocities_makes_no_curve(tmp_path: Path) -> None:
-    path = smooth_file(tmp_path, quintic=False)
-    with pytest.raises(InvalidFile, match="x0_acceleration_m_s2"):
-        read_trajectory(path, built_in("hrm8"), "quintic")
-    assert read_trajectory(path, built_in("hrm8")).changes is None

@@ -53,7 +53,7 @@ def _first(column: FloatArray) -> FloatArray:
 
 def _header(stream: MeshStream) -> _Header:
     said: dict[str, list[str]] = {}
-    for number in range(1, _MOST_LINES):
+    for number in range(1, _MOST_LINES + 1):
         words = stream.content.readline(MAX_LINE).decode("latin-1").split()
         if not words and number == 1:
             break

@@ -43,11 +43,6 @@ class _Element:
     count: int
     properties: list[_Property] = field(default_factory=list)
 
-    @property
-    def least(self) -> int:
-        """Smallest size of one; [bytes]."""
-        return sum(int((p.count_kind or p.kind)[1]) for p in self.properties)
-
 
 @dataclass(frozen=True)
 class _Header:
@@ -135,7 +130,7 @@ def _header(stream: MeshStream) -> _Header:
     order: Literal["", "little", "big"] | None = None
     elements = dict[str, _Element]()
     latest: list[_Property] | None = None
-    for number in range(1, _MOST_LINES):
+    for number in range(1, _MOST_LINES + 1):
         raw = stream.content.readline(MAX_LINE).decode("latin-1")
         match raw.split():
             case ["ply"] if number == 1:
@@ -228,9 +223,6 @@ class _Binary:
         """Every element by name."""
         found = {}
         for element in self._elements:
-            room = len(self._data) - self._offset
-            if element.count * element.least > room:
-                raise self._cut_short(element)
             columns = self._alike(element)
             if columns is None:
                 columns = self._one_by_one(element, element.count)
