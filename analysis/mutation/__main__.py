@@ -22,11 +22,14 @@ from pathlib import Path
 from typing import Final
 
 from analysis.mutation.changes import Change, changes
-from analysis.mutation.coverage_map import PLAIN, CoverageMap, coverage_map
+from analysis.mutation.coverage_map import PLAIN, Asked, CoverageMap, coverage_map
 from analysis.mutation.trial import Trial, copy_checkout, import_libraries, try_change
 
 ROOT: Final = Path(__file__).parents[2]
 EQUIVALENT: Final = Path(__file__).with_name("equivalent.txt")
+MAPS: Final = Path(tempfile.gettempdir()) / "mutation-maps"
+"""Which tests run which lines, kept for the next run."""
+
 BUDGET: Final = 12.0
 """Tests are asked for a change until their usual times come to this; [s]."""
 
@@ -53,18 +56,31 @@ GROUPS: Final = (
             "tests/io/test_two_readers.py",
         ),
     ),
-    Group("readers", ("vdsm_pin/io/**/*.py",), ("tests/io",)),
+    Group(
+        "readers",
+        ("vdsm_pin/io/**/*.py",),
+        ("tests/io", "tests/verification/test_other_arms.py"),
+    ),
     Group(
         "verification",
         (
-            "vdsm_pin/verification/*.py",
+            "vdsm_pin/verification/[!p]*.py",
+            "vdsm_pin/verification/p[!a]*.py",
             "vdsm_pin/geometry/closed_meshes.py",
             "vdsm_pin/geometry/mesh_*.py",
             "vdsm_pin/geometry/winding.py",
         ),
         ("tests/verification", "tests/geometry/test_closed_meshes.py"),
     ),
-    Group("proof", ("vdsm_pin/proof/*.py",), ("tests/verification", "tests/geometry")),
+    Group(
+        "slopes",
+        ("vdsm_pin/verification/pair_slopes.py",),
+        (
+            "tests/verification/test_pair_slopes.py",
+            "tests/verification/test_counterexample.py",
+        ),
+    ),
+    Group("proof", ("vdsm_pin/proof/*.py",), ("tests/proof",)),
     Group(
         "arm",
         (
@@ -111,13 +127,15 @@ def sampled(groups: list[Group], size: int, seed: int) -> dict[str, list[Change]
     return {g.name: [c for name, c in chosen if name == g.name] for g in groups}
 
 
-def maps_of(group: Group, chosen: list[Change]) -> dict[bool, CoverageMap]:
+def maps_of(
+    group: Group, tests: list[str], chosen: list[Change], asked: argparse.Namespace
+) -> dict[bool, CoverageMap]:
     """What tests cover, of machine code as Python and of the rest."""
     maps = {}
-    for plain in (False, True):
-        modules = sorted({c.module for c in chosen if is_compiled(c.module) is plain})
-        if modules:
-            maps[plain] = coverage_map(ROOT, modules, list(group.tests), plain)
+    for plain in {is_compiled(change.module) for change in chosen}:
+        modules = [m for m in modules_of(group) if is_compiled(m) is plain]
+        what = Asked(ROOT, modules, plain)
+        maps[plain] = coverage_map(what, tests, asked.jobs, asked.maps)
     return maps
 
 
@@ -138,21 +156,23 @@ def _as_it_is(module: str) -> Change:
     return Change(module, 0, "", "", "", content)
 
 
-def tried(group: Group, chosen: list[Change], jobs: int) -> Iterator[Trial]:
+def tried(
+    group: Group, chosen: list[Change], asked: argparse.Namespace
+) -> Iterator[Trial]:
     """Try changes on so many processes; as they end."""
-    maps = maps_of(group, chosen)
+    maps = maps_of(group, asked.tests or list(group.tests), chosen, asked)
     chosen = [*map(_as_it_is, sorted({c.module for c in chosen})), *chosen]
     tasks: multiprocessing.Queue = multiprocessing.Queue()
     done: multiprocessing.Queue = multiprocessing.Queue()
     stop = multiprocessing.Event()
     for change in chosen:
         plain = is_compiled(change.module)
-        tests = maps[plain].asked(change.module, change.lines, BUDGET)
-        usual = sum(maps[plain].seconds[test] for test in tests)
-        tasks.put((change, tests, usual, PLAIN if plain else None))
+        names = maps[plain].asked(change.module, change.lines, BUDGET)
+        usual = sum(maps[plain].seconds[name] for name in names)
+        tasks.put((change, names, usual, PLAIN if plain else None))
     with tempfile.TemporaryDirectory(prefix="mutants-") as place:
         workers = []
-        for k in range(jobs):
+        for k in range(asked.jobs):
             copy_checkout(ROOT, Path(place) / str(k))
             tasks.put(None)
             words = (Path(place) / str(k), tasks, done, stop)
@@ -188,7 +208,7 @@ def results(
     before = noticed_before(asked.noticed)
     yield from (Trial(c, True, 0, 0.0) for c in chosen if c.key in before)
     left = [c for c in chosen if c.key not in before]
-    for trial in tried(group, left, asked.jobs) if left else ():
+    for trial in tried(group, left, asked) if left else ():
         yield trial
         if trial.noticed and asked.noticed:
             with asked.noticed.open("a", encoding="utf-8") as file:
@@ -237,11 +257,14 @@ def main() -> None:
         help="only these; " + ", ".join(g.name for g in GROUPS),
     )
     parser.add_argument("--module", default="", help="part of the modules' paths")
+    parser.add_argument("--tests", nargs="*", help="files and folders, not all")
+    parser.add_argument("--maps", type=Path, default=MAPS, help="what tests cover")
     parser.add_argument("--minutes", type=float, default=float("inf"), help="no more")
     parser.add_argument("--noticed", type=Path, help="what earlier runs noticed")
     parser.add_argument("--save", type=Path)
     asked = parser.parse_args()
     groups = [g for g in GROUPS if not asked.group or g.name in asked.group]
+    asked.maps.mkdir(parents=True, exist_ok=True)
     known, trials = equivalent_changes(), {}
     ends = time.monotonic() + 60.0 * asked.minutes
     for name, chosen in sampled(groups, asked.sample, asked.seed).items():

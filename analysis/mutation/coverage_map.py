@@ -1,15 +1,20 @@
 """Which tests run which lines, and how long each test takes."""
 
+import hashlib
 import json
 import os
 import signal
 import subprocess
 import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import coverage
+import pytest
 
 SLOW: Final = 6.0
 """Tests that take longer are ended, and not asked; [s]."""
@@ -33,12 +38,12 @@ class CoverageMap:
     def asked(self, module: str, lines: tuple[int, ...], budget: float) -> list[str]:
         """The quickest tests of lines that take no more than a budget.
 
-        Where no test runs any of the lines, all that run the module are asked: what
-        runs at import has an effect anywhere.
+        Where no test runs any of the lines, all may be asked: what runs at import has
+        an effect anywhere.
         """
         by_line = self.tests.get(module, {})
         known = set().union(*(by_line.get(line, []) for line in lines))
-        known = known or set().union(*by_line.values())
+        known = known or {name for name, used in self.seconds.items() if used < SLOW}
         chosen, total = [], 0.0
         for test in sorted(known, key=lambda name: (self.seconds[name], name)):
             total += self.seconds[test]
@@ -48,9 +53,12 @@ class CoverageMap:
         return chosen
 
 
+class TooSlow(BaseException):
+    """A test takes too long to be asked; no `except Exception` of a test sees it."""
+
+
 def _end_test(*_: object) -> None:
-    message = "is too slow to be asked"
-    raise TimeoutError(message)
+    raise TooSlow
 
 
 class Recorder:
@@ -60,28 +68,34 @@ class Recorder:
         self._running = running
         self.seconds: dict[str, float] = {}
 
-    def pytest_runtest_logstart(self, nodeid: str) -> None:
-        """A test begins."""
-        self._running.switch_context(nodeid)
-        self.seconds[nodeid] = 0.0
-        signal.signal(signal.SIGPROF, _end_test)
-        signal.setitimer(signal.ITIMER_PROF, SLOW)  # of this process's computing
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
+        """Note what a test runs and how long it computes, fixtures included."""
+        self._running.switch_context(item.nodeid)
+        begun = time.process_time()
+        self.seconds[item.nodeid] = 0.0
+        result = yield
+        self.seconds[item.nodeid] += time.process_time() - begun
+        return result
 
-    def pytest_runtest_logfinish(self) -> None:
-        """A test ends."""
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_call(self) -> Iterator[None]:
+        """End a test that computes for too long."""
+        signal.signal(signal.SIGPROF, _end_test)
+        signal.setitimer(signal.ITIMER_PROF, SLOW)
+        try:
+            return (yield)
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
 
     def pytest_runtest_logreport(self, report: Any) -> None:
-        """A part of a test is done."""
-        self.seconds[report.nodeid] += report.duration
+        """A test that fails is not asked."""
         if report.failed:
             self.seconds[report.nodeid] = float("inf")
 
 
 def record(root: Path, modules: list[str], tests: list[str]) -> None:
     """Run tests under coverage in this process and print what was seen as JSON."""
-    import pytest
-
     sys.path.insert(0, str(root))
     running = coverage.Coverage(
         data_file=None, include=[str(root / module) for module in modules]
@@ -89,8 +103,10 @@ def record(root: Path, modules: list[str], tests: list[str]) -> None:
     recorder = Recorder(running)
     running.start()
     words = ["-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-m", "not slow"]
-    pytest.main([*words, *tests], plugins=[recorder])
+    status = pytest.main([*words, *tests], plugins=[recorder])
     running.stop()
+    if status not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED):
+        raise RuntimeError(status)
     data = running.get_data()
     found: dict[str, dict[int, list[str]]] = {}
     for module in modules:
@@ -104,42 +120,97 @@ def record(root: Path, modules: list[str], tests: list[str]) -> None:
     print(json.dumps({"tests": found, "seconds": recorder.seconds}))
 
 
-def coverage_map(
-    root: Path, modules: list[str], tests: list[str], plain: bool
-) -> CoverageMap:
-    """Run tests in a process of their own and note which lines each runs.
+@dataclass(frozen=True)
+class Asked:
+    """Whose lines are to be mapped, and how.
 
     Args:
         root: Of the checkout.
         modules: Paths of the modules whose lines count.
-        tests: Files and folders of tests.
         plain: Whether compiled functions run in Python, where coverage sees them.
+    """
+
+    root: Path
+    modules: list[str]
+    plain: bool
+
+    def kept(self, folder: Path, file: str) -> Path:
+        """Where the map of one file of tests is kept while nothing changes."""
+        sources = (self.root / name for name in (*self.modules, file))
+        digest = hashlib.sha256(str(self.plain).encode())
+        for source in sources:
+            digest.update(source.read_bytes())
+        return folder / f"{digest.hexdigest()[:24]}.json"
+
+
+def coverage_map(asked: Asked, tests: list[str], jobs: int, kept: Path) -> CoverageMap:
+    """Run tests in processes of their own and note which lines each runs.
+
+    Args:
+        asked: What is mapped.
+        tests: Files and folders of tests.
+        jobs: Number of processes; each runs some of the files.
+        kept: Folder of what earlier runs found; the files that changed run again.
 
     Raises:
         RuntimeError: If the tests could not be run.
     """
-    words = json.dumps({"modules": modules, "tests": tests})
-    environment = (
-        os.environ | {"PYTHONPATH": str(root)} | ({PLAIN: "1"} if plain else {})
-    )
+    places = {file: asked.kept(kept, file) for file in _test_files(asked.root, tests)}
+    missing = [file for file, place in places.items() if not place.exists()]
+    with ThreadPoolExecutor(jobs) as pool:
+        parts = [missing[k::jobs] for k in range(jobs) if missing[k::jobs]]
+        for part, seen in zip(
+            parts, pool.map(lambda part: _seen(asked, part), parts), strict=True
+        ):
+            for file in part:
+                places[file].write_text(json.dumps(_of_file(seen, file)))
+    whole = CoverageMap({module: {} for module in asked.modules}, {})
+    for place in places.values():
+        one = json.loads(place.read_text())
+        whole.seconds.update(one["seconds"])
+        for module, by_line in one["tests"].items():
+            for line, names in by_line.items():
+                whole.tests[module].setdefault(int(line), []).extend(names)
+    return whole
+
+
+def _test_files(root: Path, tests: list[str]) -> list[str]:
+    paths = [p for name in tests for p in sorted((root / name).glob("test_*.py"))]
+    paths += [root / name for name in tests if name.endswith(".py")]
+    return [str(path.relative_to(root)) for path in paths]
+
+
+def _of_file(seen: dict[str, Any], file: str) -> dict[str, Any]:
+    """What was seen of the tests of one file."""
+    begin = f"{file}::"
+    seconds = {n: s for n, s in seen["seconds"].items() if n.startswith(begin)}
+    tests = {
+        module: {
+            line: [n for n in names if n.startswith(begin)]
+            for line, names in by_line.items()
+        }
+        for module, by_line in seen["tests"].items()
+    }
+    return {"seconds": seconds, "tests": tests}
+
+
+def _seen(asked: Asked, files: list[str]) -> dict[str, Any]:
+    """What `record` prints in a process of its own."""
+    words = json.dumps({"modules": asked.modules, "tests": files})
+    more = {"PYTHONPATH": str(asked.root)} | ({PLAIN: "1"} if asked.plain else {})
     ended = subprocess.run(
         [sys.executable, "-m", "analysis.mutation.coverage_map", words],
-        cwd=root, env=environment, capture_output=True, text=True, check=False,
+        cwd=asked.root, env=os.environ | more, capture_output=True, text=True,
+        check=False,
     )  # fmt: skip
-    lines = ended.stdout.strip().splitlines()
-    if not lines or not lines[-1].startswith("{"):
+    if ended.returncode != 0:
         message = (
             f"the tests could not be run: {ended.stdout[-2000:]}{ended.stderr[-2000:]}"
         )
         raise RuntimeError(message)
-    seen = json.loads(lines[-1])
-    tests_of = {
-        module: {int(line): names for line, names in by_line.items()}
-        for module, by_line in seen["tests"].items()
-    }
-    return CoverageMap(tests_of, seen["seconds"])
+    return dict(json.loads(ended.stdout.strip().splitlines()[-1]))
 
 
 if __name__ == "__main__":
-    asked = json.loads(sys.argv[1])
-    record(Path.cwd(), asked["modules"], asked["tests"])
+    words = json.loads(sys.argv[1])
+    record(Path.cwd(), words["modules"], words["tests"])

@@ -246,7 +246,7 @@ def test_headers_of_pcd_are_whole_or_refused(
 def test_odd_lines_of_points_are_told_apart(tmp_path: Path) -> None:
     """The first line may be a title or a number of points, and no other."""
     path = tmp_path / "a.xyz"
-    for first in (b"2", b"x y z", b"X,Y,Z,i", b"# 7"):
+    for first in (b"2", b"x y z", b"x_m,y_m,z_m,i", b"# 7"):
         found = read(path, first + b"\n1 2 3 # one\n\n4;5;6;7 // two\n").points
         assert found.tolist() == [[1, 2, 3], [4, 5, 6]]
     for text in (b"1 2 3\n2\n", b"1 2 3\nx y z\n", b"1 2\n", b"1 2 y\n"):

@@ -326,3 +326,17 @@ def test_a_place_of_a_part_is_affine_and_finite(
         return
     with pytest.raises(InvalidFile, match="not affine or not finite"):
         read_mesh(path)
+
+
+def test_places_of_parts_multiply_up_to_a_size(tmp_path: Path) -> None:
+    """1e16 is too large on the way, though a smaller node stands below it."""
+    scale = "<scale>{0} {0} {0}</scale>"
+    for sizes, good in (((1e6, 1e5, 1e-9), True), ((1e8, 1e8, 1e-15), False)):
+        begin = "".join(f"<node>{scale.format(size)}" for size in sizes)
+        text = dae(begin + HERE + "</node>" * 3)
+        path = write(tmp_path, "a.dae", text)
+        if good:
+            assert read_mesh(path).vertices.max() == pytest.approx(100.0)
+            continue
+        with pytest.raises(InvalidFile, match="not affine or not finite"):
+            read_mesh(path)

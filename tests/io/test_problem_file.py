@@ -126,6 +126,14 @@ def test_every_field_arrives_in_si(tmp_path: Path) -> None:
     )  # fmt: skip
 
 
+def test_an_arm_is_as_thick_as_its_thickest_link(tmp_path: Path) -> None:
+    text = EVERYTHING.replace("link_radius: 50", "link_radius: [50, 45, 60, 42, 41]")
+    write_everything(tmp_path)
+    arm = read_text(tmp_path, text).manipulator
+    assert arm.link_radius == 0.06
+    np.testing.assert_allclose(arm.radii, [0.05, 0.045, 0.06, 0.042, 0.041], rtol=1e-15)
+
+
 def test_without_a_path_start_and_goal_stand_on_their_own(tmp_path: Path) -> None:
     text = edited(MINIMAL, ("tip_path",))
     free = read_text(tmp_path, text)

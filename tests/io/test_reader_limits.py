@@ -12,6 +12,7 @@ import yaml
 from problem_texts import EVERYTHING, write_everything
 from test_mesh_formats import HERE, dae
 
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io import (
     clouds,
@@ -32,9 +33,8 @@ from vdsm_pin.io.points_file import read_points
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.io.waypoint_tables import read_centres
-from vdsm_pin.manipulator import built_in
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.tables import write_centres
-from vdsm_pin.trajectory import Trajectory
 
 Reader = Callable[[Path], object]
 Made = Callable[[Path], Path]

@@ -15,6 +15,7 @@ from vdsm_pin.proof.paths import Path, cubic_path, together
 from vdsm_pin.proof.prover import Proof, prove
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.proof.tree import Joint, Kind, Tree, free_tree, shifted
+from vdsm_pin.tolerances import TOLERANCES
 
 MM = 1e-3
 
@@ -58,6 +59,8 @@ def held(query: object, proof: Proof, swapped: bool = False) -> None:
     if proof.upper[0] < 0.0 or found < 0.0:
         return  # below zero the sign alone is meant
     assert proof.upper[0] == pytest.approx(found, abs=1e-7)
+    narrow = TOLERANCES.least_bracket + 2.0 * TOLERANCES.bracket_gap
+    assert proof.lower[0] >= proof.upper[0] - narrow
     one, other = proof.points[0][::-1] if swapped else proof.points[0]
     assert np.linalg.norm(one - other) == pytest.approx(found, abs=1e-7)
     assert proof.verdict[0] != REFUTED or found < query.nearest + 1e-9  # type: ignore[attr-defined]

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem.planning_problem import PlanningProblem

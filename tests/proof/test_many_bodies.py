@@ -1,0 +1,122 @@
+"""Many bodies, where boxes settle most pairs: oracle, distances at many times."""
+
+import numpy as np
+import pytest
+from oracles.tree_queries import (
+    SHAPES,
+    at,
+    clearances,
+    random_path,
+    random_pieces,
+    random_placement,
+    random_tree,
+    wrong_poses,
+)
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.proof.bodies import Body, Pair
+from vdsm_pin.proof.broad_phase import FEW
+from vdsm_pin.proof.error_box import ErrorBox
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.prover import Proof, prove
+from vdsm_pin.proof.terms import CERTIFIED, REFUTED
+from vdsm_pin.proof.tree import Joint, Kind, Tree
+from vdsm_pin.tolerances import TOLERANCES
+
+
+def random_scene(rng: np.random.Generator) -> tuple[Tree, list[Body], Path]:
+    """A small arm with two bodies, a third that moves by itself, many at rest."""
+    arm = random_tree(rng, int(rng.integers(2, 5)))
+    other = Tree((Joint(0, Kind.PRISMATIC, column=0, placement=random_placement(rng)),))
+    tree, bodies = arm.joined(other), []
+    for frame in (
+        arm.n_frames - 1,
+        int(rng.integers(1, arm.n_frames)),
+        tree.n_frames - 1,
+    ):
+        bodies.append(Body(frame, random_pieces(rng, str(rng.choice(SHAPES[:2])))))
+    for k in range(FEW + 4):
+        away = 3.0 * rng.normal(size=3) * rng.choice([0.2, 1.0, 5.0])
+        shape = str(rng.choice(SHAPES[:5])) if k else "half-space"
+        bodies.append(Body(0, tuple(moved(p, away) for p in random_pieces(rng, shape))))
+    path = random_path(rng, tree, int(rng.integers(1, 5)), int(rng.choice([1, 3])))
+    return tree, bodies, path
+
+
+def moved(piece: object, away: FloatArray) -> object:
+    """The same piece elsewhere; a half-space farther off."""
+    fields = {name: getattr(piece, name) for name in piece.__dataclass_fields__}  # type: ignore[attr-defined]
+    if "points" in fields:
+        fields["points"] = fields["points"] + away
+    elif "centre" in fields:
+        fields["centre"] = fields["centre"] + away
+    else:
+        fields["offset"] = fields["offset"] - 3.0
+    return type(piece)(**fields)
+
+
+def pairs_of(bodies: list[Body]) -> list[Pair]:
+    """Each that moves with each at rest, and with the last that moves."""
+    found = [Pair(k, m) for k in range(3) for m in range(3, len(bodies))]
+    return [*found, Pair(0, 2), Pair(2, 1)]
+
+
+def sampled(
+    tree: Tree, bodies: list[Body], path: Path, pairs: list[Pair]
+) -> FloatArray:
+    """Least clearances at many times of every interval, shape (n_pairs,)."""
+    rows = [path.knots]
+    for k in range(len(path.knots) - 1):
+        part = Path(path.knots[k : k + 2], path.inner[k : k + 1])
+        rows.append(at(part, np.linspace(0.0, 1.0, 101)))
+    poses = tree.poses(np.concatenate(rows))
+    found = [
+        clearances(tree, (bodies[p.one], bodies[p.other]), poses).min() for p in pairs
+    ]
+    return np.array(found)
+
+
+def holds(proof: Proof, met: FloatArray) -> None:
+    """Brackets hold what was met; witnesses are no farther than the upper bound."""
+    apart = met > 0.0
+    assert (proof.lower[apart] <= met[apart] + 1e-9).all()
+    assert (proof.lower <= proof.upper).all()
+    gap = np.linalg.norm(np.diff(proof.points, axis=1)[:, 0], axis=1)[apart]
+    assert (gap <= proof.upper[apart] + 1e-7).all()
+    assert (gap >= met[apart] - 1e-3).all()
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_all_at_once_are_judged_as_each_alone(seed: int) -> None:
+    rng = np.random.default_rng([31, seed])
+    tree, bodies, path = random_scene(rng)
+    pairs = pairs_of(bodies)
+    met = sampled(tree, bodies, path, pairs)
+    proof = prove(tree, bodies, path, pairs)
+    holds(proof, met)
+    assert ((proof.verdict == REFUTED) == (met < 0.0)).all()
+    nearest = int(np.argmin(proof.upper))
+    if met.min() > 0.0:
+        narrow = TOLERANCES.least_bracket + 2.0 * TOLERANCES.bracket_gap
+        assert proof.lower[nearest] >= proof.upper[nearest] - narrow
+        assert proof.upper[nearest] <= met.min() + narrow
+    limits = np.maximum(met, 0.0) + rng.choice([-2e-3, 1e-5, -0.3, -5.0], len(met))
+    asked = [Pair(p.one, p.other, r) for p, r in zip(pairs, limits, strict=True)]
+    again = prove(tree, bodies, path, asked)
+    assert (again.verdict[limits > np.maximum(met, 0.0)] == REFUTED).all()
+    far = (limits < met - 1.9e-3) & (met > 0.0)
+    assert (again.verdict[far] == CERTIFIED).all()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_wrong_pose_comes_nearer_than_is_proved(seed: int) -> None:
+    rng = np.random.default_rng([32, seed])
+    tree, bodies, path = random_scene(rng)
+    pairs, n = pairs_of(bodies), len(tree.joints)
+    box = ErrorBox(*(rng.choice([0.0, 0.02], n) for _ in range(3)))
+    proof = prove(tree, bodies, path, pairs, box)
+    for k in range(len(path.knots)):
+        poses = wrong_poses(tree, path.knots[k], box, rng)
+        for pair, lower in zip(pairs, proof.lower, strict=True):
+            two = bodies[pair.one], bodies[pair.other]
+            assert clearances(tree, two, poses[None])[0] >= lower - 1e-9 or lower < 0.0
