@@ -55,7 +55,7 @@ def test_a_million_rows_fit_into_a_gibibyte(tmp_path: Path) -> None:
     with (tmp_path / "cables.csv").open("rb") as file:
         assert sum(1 for _ in file) == rows + 1
     last = (tmp_path / "clearance.csv").read_bytes()[-200:].splitlines()[-1]
-    assert last.startswith(b"999998,")
+    assert rows // 2 < int(last.partition(b",")[0]) < rows - 1  # a pair's least
 
 
 @pytest.mark.slow

@@ -89,7 +89,7 @@ class Path:
     @property
     def reach(self) -> FloatArray:
         """How large each column gets at most, shape (n_columns,)."""
-        most = np.abs(self.knots).max(axis=0)
+        most = np.maximum(self.knots.max(axis=0), -self.knots.min(axis=0))
         if self.inner.size:
             most = np.maximum(most, np.abs(self.inner).max(axis=(0, 1)))
         return np.asarray(most)
