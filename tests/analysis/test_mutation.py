@@ -9,7 +9,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from analysis.mutation.changes import changes  # noqa: E402
-from analysis.mutation.coverage_map import coverage_map  # noqa: E402
+from analysis.mutation.coverage_map import Asked, coverage_map  # noqa: E402
 
 MODULE = '''"""A module."""
 
@@ -86,11 +86,12 @@ def test_the_map_knows_which_test_runs_a_line(tmp_path: Path) -> None:
     test = "from module import one\n\ndef test_one():\n    assert one() == 1\n"
     (tmp_path / "test_one.py").write_text(test)
     (tmp_path / "analysis").symlink_to(ROOT / "analysis")
-    seen = coverage_map(tmp_path, ["module.py"], ["test_one.py"], plain=False)
+    asked, kept = Asked(tmp_path, ["module.py"], plain=False), tmp_path / "kept"
+    kept.mkdir()
+    seen = coverage_map(asked, ["test_one.py"], 1, kept)
     assert seen.asked("module.py", (2,), budget=1.0) == ["test_one.py::test_one"]
-    # No test runs line 3: all that run the module may see what it does at import.
+    # No test runs line 3: what a module does at import, any test may see.
     assert seen.asked("module.py", (3,), budget=1.0) == ["test_one.py::test_one"]
-    assert seen.asked("other.py", (1,), budget=1.0) == []
 
 
 TRIED = """
