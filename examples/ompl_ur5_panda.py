@@ -1,6 +1,7 @@
-"""OMPL plans for a UR5 and a Panda by samples; the proof judges what lies between."""
+"""OMPL samples a UR5's and a Panda's meshes; the proof judges hulls of their parts."""
 
 import subprocess
+import sys
 from pathlib import Path
 
 import coal
@@ -53,8 +54,7 @@ for family, urdf, name, start in (UR5, PANDA):
     rows = planned(model, *files, start)
     head = ",".join(f"{joint}_rad" for joint in [*model.names][1 : len(start) + 1])
     np.savetxt(f"{name}.csv", rows, "%.17g", ",", header=head, comments="")
-    command = f"vdsm verify --urdf {files[0]} --srdf {files[1]} --package-dir {SHARE} "
-    command += f"--scene scene.yaml --trajectory {name}.csv --out {name}_out "
-    command += "--bodies parts"
-    command += " --lock panda_finger_joint1=0" * (name == "panda")
-    subprocess.run(command.split(), check=False)
+    command = f"-m vdsm_pin verify --urdf {files[0]} --srdf {files[1]} --bodies parts "
+    command += f"--package-dir {SHARE} --scene scene.yaml --trajectory {name}.csv "
+    command += f"--out {name}_out" + " --lock panda_finger_joint1=0" * (name == "panda")
+    subprocess.run([sys.executable, *command.split()], check=False)

@@ -104,9 +104,9 @@ def verification(
         for i, pair in enumerate(pairs[:10])
     )
     checks = (
-        Check("forward_kinematics", Verdict.CERTIFIED, n * 9, 4e-16, 1e-9, "m"),
+        Check("forward kinematics", Verdict.CERTIFIED, n * 9, 4e-16, 1e-9, "m"),
         Check("clearance", verdict, intervals * len(pairs), 0.0041, 0.0035, "m", "x"),
-        Check("link_angle_cone", Verdict.CERTIFIED, n * 8, 0.65, 0.7418, "rad", "ψ5"),
+        Check("link angle cone", Verdict.CERTIFIED, n * 8, 0.65, 0.7418, "rad", "ψ5"),
     )
     return ArmVerification(
         problem=task,

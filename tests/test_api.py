@@ -7,6 +7,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import made_up
 import numpy as np
 import pytest
 from oracles.certificate_cases import certificate_lines
@@ -185,3 +186,11 @@ def test_the_profile_has_the_same_least_by_link_and_by_obstacle(scene: str) -> N
         of_obstacles = getattr(result.profile, f"obstacle_{side}")[:, 0]
         np.testing.assert_array_equal(of_links, of_obstacles)
     assert result.profile.link_lower.min() == result.min_clearance
+
+
+def test_a_motion_without_a_path_says_nothing_of_drawing() -> None:
+    judged = made_up.verification()
+    assert "drawn" in repr(judged)
+    task = replace(judged.problem, tip_path=None)
+    judged = replace(judged, problem=task, coverage=float("nan"))
+    assert "drawn" not in repr(judged)

@@ -15,7 +15,7 @@ def test_the_check_that_decides_comes_first() -> None:
     bad = Check("bad_one", Verdict.REFUTED, 1, 2.0, 1.0, "m", moment=4.5)
     judged = replace(judged, checks=(*judged.checks, late, bad))
     first, second = failing(judged)
-    assert (first.name, first.verdict, first.moment) == ("bad one", "refuted", 4.5)
+    assert (first.name, first.verdict, first.moment) == ("bad_one", "refuted", 4.5)
     assert (second.name, second.moment) == ("late", 3.0)
     assert failing(made_up.verification()) == ()
 

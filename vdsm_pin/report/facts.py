@@ -33,7 +33,7 @@ from vdsm_pin.report.files import (
 )
 from vdsm_pin.report.inputs import assumed_sizes, assumption, input_notes
 from vdsm_pin.report.run_record import RunRecord, machine, versions
-from vdsm_pin.report.words import check_title, depth, percent, place, quantity
+from vdsm_pin.report.words import depth, percent, place, quantity
 from vdsm_pin.tolerances import TOLERANCES, UNITS
 from vdsm_pin.verification.fk import PLANNED
 from vdsm_pin.verification.inside import NAME as INSIDE
@@ -202,8 +202,7 @@ def failing(verification: Verification) -> tuple[Failing, ...]:
     bad = [check for check in verification.checks if check.verdict is not _PASSED]
     bad.sort(key=lambda check: check.verdict is not verification.verdict)
     return tuple(
-        Failing(check_title(check.name), check.verdict.value, finite(check.moment))
-        for check in bad
+        Failing(check.name, check.verdict.value, finite(check.moment)) for check in bad
     )
 
 
@@ -284,13 +283,11 @@ def reason(verification: Verification) -> str:
     if not bad:
         return "No check was carried out, so nothing is proved."
     first = bad[0]
-    found = (
-        f"{check_title(first.name)} is {depth(first.worst, first.deeper, first.unit)}"
-    )
+    found = f"{first.name} is {depth(first.worst, first.deeper, first.unit)}"
     if first.name == INSIDE:
         found = first.where
     elif math.isnan(first.worst):
-        found = f'there is no evidence for "{check_title(first.name)}"'
+        found = f'there is no evidence for "{first.name}"'
     elif not math.isnan(first.limit):
         found += f" against a limit of {quantity(first.limit, first.unit)}"
     where = "" if first.name == INSIDE else first.where

@@ -8,7 +8,6 @@ import typer
 from vdsm_pin.report.files import CheckRow, PlanFile, VerificationFile
 from vdsm_pin.report.inputs import assumption
 from vdsm_pin.report.words import (
-    check_title,
     depth,
     errors,
     limit,
@@ -106,7 +105,7 @@ def _headline(file: PlanFile | VerificationFile, subject: str) -> str:
 def _cells(check: CheckRow) -> tuple[str, str, str, str, str]:
     known = outcome(check.verdict)
     return (
-        check_title(check.name),
+        check.name,
         depth(check.worst, check.deeper, check.unit),
         limit(check.limit, check.unit),
         str(check.count),

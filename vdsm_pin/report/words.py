@@ -221,8 +221,3 @@ def moment_text(moment: float | None, time: float | None = None) -> str:
 def place(moment: float | None, where: str, time: float | None = None) -> str:
     """When and where something happens, in words; empty if neither is known."""
     return ", ".join(part for part in (moment_text(moment, time), where) if part)
-
-
-def check_title(name: str) -> str:
-    """A check's name as a heading: underscores become spaces."""
-    return name.replace("_", " ")

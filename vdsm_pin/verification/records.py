@@ -405,5 +405,6 @@ class ArmVerification(Verification):
     undrawn: FloatArray
 
     def _drawn(self) -> tuple[tuple[str, str], ...]:
-        drawn = (("drawn", in_percent(self.coverage)),)
-        return drawn if self.problem.tip_path else ()
+        if self.problem.tip_path is None:
+            return ()
+        return (("drawn", in_percent(self.coverage)),)
