@@ -12,15 +12,17 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.bags import is_bag, read_bag, write_bag
 from vdsm_pin.io.joint_trajectory import (
-    ENDINGS as MESSAGE_ENDINGS,
-)
-from vdsm_pin.io.joint_trajectory import (
+    ENDINGS,
     JointTrajectory,
     read_joint_trajectory,
     text_of,
 )
 from vdsm_pin.io.problem_file import ProblemFile
-from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
+from vdsm_pin.io.trajectory_file import (
+    joint_names,
+    read_trajectory,
+    write_trajectory,
+)
 from vdsm_pin.io.waypoint_tables import read_cables, read_centres
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
@@ -71,7 +73,7 @@ class Given:
             return read_centres(self.centres, source.problem)
         if self.cables is not None:
             return read_cables(self.cables, source.problem)
-        if is_bag(self.file) or self.file.suffix.lower() in MESSAGE_ENDINGS:
+        if is_bag(self.file) or self.file.suffix.lower() in ENDINGS:
             return read_arm_message(self.file, source.problem.manipulator)
         return read_trajectory(self.file, source.problem.manipulator)
 
@@ -159,7 +161,7 @@ def read_arm_message(file: Path, arm: Manipulator) -> Trajectory:
         InvalidFile: If a joint is missing, or a value so large that its unit is wrong.
     """
     found = read_bag(file) if is_bag(file) else read_joint_trajectory(file)
-    names = arm_joints(arm.n_links)
+    names = joint_names(arm.n_links)
     missing = [name for name in names if name not in found.names]
     if missing:
         problem = f"has no joint {missing[0]!r}"
@@ -183,14 +185,8 @@ def read_arm_message(file: Path, arm: Manipulator) -> Trajectory:
         raise InvalidFile(file=file, problem=str(error)) from None
 
 
-def arm_joints(n_links: int) -> list[str]:
-    """Names of the joints of an arm's URDF that move."""
-    pairs = ((f"alpha{i}", f"theta{i}") for i in range(1, n_links + 1))
-    return ["x0", *(name for pair in pairs for name in pair)]
-
-
 def arm_message(motion: Trajectory) -> JointTrajectory:
     """A motion of the arm by the joints of its URDF: x0, alpha1, theta1, .."""
-    names = tuple(arm_joints(motion.n_links))
+    names = joint_names(motion.n_links)
     times, rates, changes = motion.times, motion.rates, motion.changes
-    return JointTrajectory(names, np.asarray(motion.joints), times, rates, changes)
+    return JointTrajectory(names, motion.joints, times, rates, changes)

@@ -1,6 +1,7 @@
 """Trajectories of named joints: JointTrajectory and RobotTrajectory as YAML or JSON."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -44,7 +45,7 @@ class JointTrajectory:
     rates: FloatArray | None = None
     changes: FloatArray | None = None
 
-    def of(self, names: list[str]) -> "JointTrajectory":
+    def of(self, names: Sequence[str]) -> "JointTrajectory":
         """The columns of some of its joints, in their order."""
         order = [self.names.index(name) for name in names]
         parts = (self.rates, self.changes)

@@ -37,19 +37,22 @@ _FIXED: Final = ("waypoint", "on_path", "path_m", "x0_m")
 _JOINT: Final = re.compile(r"(alpha|theta)[0-9]+_rad")
 
 
+def joint_names(n_links: int) -> tuple[str, ...]:
+    """Names of the joints of an arm of N links, as in its URDF: x0, alpha1, .."""
+    pairs = ((f"alpha{i}", f"theta{i}") for i in range(1, n_links + 1))
+    return ("x0", *(name for pair in pairs for name in pair))
+
+
 def column_names(n_links: int) -> tuple[str, ...]:
     """The header of a trajectory of an arm of N links."""
-    pairs = ((f"alpha{i}_rad", f"theta{i}_rad") for i in range(1, n_links + 1))
-    return _FIXED + tuple(name for pair in pairs for name in pair)
+    return _FIXED + tuple(f"{name}_rad" for name in joint_names(n_links)[1:])
 
 
 def rate_names(n_links: int, order: int) -> tuple[str, ...]:
     """Names of the velocities (order 1) or accelerations (2) of all joints."""
     what, power = ("velocity", "s") if order == 1 else ("acceleration", "s2")
-    angles = [
-        name for i in range(1, n_links + 1) for name in (f"alpha{i}", f"theta{i}")
-    ]
-    return (f"x0_{what}_m_{power}", *(f"{name}_{what}_rad_{power}" for name in angles))
+    x0, *angles = joint_names(n_links)
+    return (f"{x0}_{what}_m_{power}", *(f"{a}_{what}_rad_{power}" for a in angles))
 
 
 def write_trajectory(path: str | Path, trajectory: Trajectory) -> None:
