@@ -171,7 +171,16 @@ class _Body:
 
     name: str
     pieces: tuple[Any, ...]
-    reach: float = 0.0
+
+    @property
+    def reach(self) -> float:
+        """Largest distance of a hull's points from the base's origin; [m]."""
+        hulls = (one for one in self.pieces if isinstance(one, Hull))
+        return max((_far(hull) for hull in hulls), default=0.0)
+
+
+def _far(hull: Hull) -> float:
+    return float(np.linalg.norm(hull.points, axis=1).max()) + hull.radius
 
 
 def whole(batch: Batch) -> tuple[Any, Any]:

@@ -15,10 +15,12 @@ from typing import Any
 
 import numpy as np
 
+from vdsm_pin import __version__
+
 Results = dict[str, dict[str, float]]
 """Figures by name; the unit stands in the name, in brackets."""
 
-LIBRARIES = ("vdsm-pin", "numpy", "numba", "pin", "coal")
+LIBRARIES = ("numpy", "numba", "pin", "coal")
 MICRO, MILLI = 1e6, 1e3
 
 
@@ -34,7 +36,7 @@ def cpu_model() -> str:
 
 def surroundings() -> dict[str, Any]:
     """Processor, cores, load and versions."""
-    known = {}
+    known = {"vdsm-pin": __version__}  # of the code that runs
     for name in LIBRARIES:
         try:
             known[name] = version(name)
