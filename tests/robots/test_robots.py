@@ -13,7 +13,7 @@ from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.geometry.solids import Cylinder, HalfSpace, Sphere
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.report.files import VerificationFile
-from vdsm_pin.robots.cell import Cell, read_cell
+from vdsm_pin.robots.cell import Cell, RobotFiles, cell_of, read_cell
 from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.scene_files import read_scene
@@ -134,6 +134,51 @@ def test_what_meets_is_refuted_though_nothing_is_required(
         found = verify_robot(Cell(robot, read_scene(scene, 1.0)), rows)
         k = [str(pair) for pair in found.pairs].index("base and crate")
         assert found.least.verdict[k] == (verdict is Verdict.REFUTED)
+
+
+def test_of_bodies_that_meet_the_depth_is_told_as_the_least(
+    tmp_path: Path, robot: Robot
+) -> None:
+    crate = "{name: crate, shape: box, center: [0.15, 0, 0], size: [0.2, 1, 0.05]}"
+    text = f"length_unit: m\nobstacles: [{crate}]\n"
+    scene = read_scene(write(tmp_path, "s.yaml", text), 1.0)
+    rows = read_path(write(tmp_path, "t.csv", ROWS), robot)
+    found = verify_robot(Cell(robot, scene, required_clearance=0.01), rows)
+    (row,) = (one for one in found.checks if one.name == "clearance from obstacles")
+    assert row.verdict is Verdict.REFUTED
+    assert row.deeper
+    assert -0.05 <= row.worst < -0.005  # they share a slab of 50 mm
+    near = next(one for one in found.approaches if str(one.pair) == "base and crate")
+    assert (near.upper, near.deeper) == (row.worst, True)
+    ball = read_scene(write(tmp_path, "s.yaml", SCENE), 1.0)
+    apart = verify_robot(Cell(robot, ball, required_clearance=0.151), rows)
+    assert apart.verdict is Verdict.REFUTED
+    assert not any(one.deeper for one in (*apart.checks, *apart.approaches))
+
+
+def test_the_hash_covers_the_meshes_of_links_and_scene(tmp_path: Path) -> None:
+    """One bit of any file that is read changes it; the scene may name files too."""
+    corner = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 2 3\nf 1 2 4\nf 2 3 4\n"
+    sphere = '<sphere radius="0.1"/>'
+    files = {
+        "two.urdf": URDF.replace(sphere, '<mesh filename="arm.obj"/>'),
+        "arm.obj": corner,
+        "part.obj": corner,
+        "s.yaml": "length_unit: m\nobstacles:\n  - {name: part, shape: mesh, "
+        "file: part.obj, solid: false, check_size: false, center: [5, 0, 0]}\n",
+    }
+    for name, content in files.items():
+        write(tmp_path, name, content)
+    asked = RobotFiles(tmp_path / "two.urdf"), tmp_path / "s.yaml"
+    before = cell_of(*asked).source
+    assert before is not None
+    assert {path.name for path in before.files} == files.keys()
+    for name, content in files.items():
+        write(tmp_path, name, content + "\n")
+        changed = cell_of(*asked).source
+        assert changed is not None
+        assert changed.sha256 != before.sha256, name
+        write(tmp_path, name, content)
 
 
 def test_limits_are_checked_at_and_between_waypoints(

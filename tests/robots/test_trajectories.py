@@ -9,6 +9,7 @@ import pytest
 from tests.robots.test_robots import CELL, SCENE, URDF, mutated, write
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile, VdsmError
+from vdsm_pin.io import bags
 from vdsm_pin.io.bags import read_bag, write_bag
 from vdsm_pin.io.joint_trajectory import JointTrajectory, text_of
 from vdsm_pin.io.problem_file import read_problem
@@ -94,6 +95,21 @@ def test_topics_are_chosen(tmp_path: Path, robot: Robot) -> None:
         file.write_bytes(data[:end])
         with pytest.raises(InvalidFile, match=r"has no|cannot"):
             read_bag(file)
+
+
+def test_sizes_of_bags_are_held_before_they_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("rosbags")
+    file = tmp_path / "t.mcap"
+    write_bag(JointTrajectory(("a",), np.zeros((3, 1))), file)
+    assert len(read_bag(file).q) == 3
+    monkeypatch.setattr(bags, "MOST", 0)
+    with pytest.raises(InvalidFile, match="more than 0 messages under topic"):
+        read_bag(file)
+    monkeypatch.setattr(bags, "LARGEST", file.stat().st_size - 1)
+    with pytest.raises(InvalidFile, match="GiB that are read of a bag"):
+        read_bag(file)
 
 
 def test_joints_of_several_degrees_turn_about_z(tmp_path: Path) -> None:

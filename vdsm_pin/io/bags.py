@@ -26,7 +26,7 @@ LARGEST: Final = 4 << 30
 """Largest bag; [bytes]."""
 
 MOST: Final = 10_000_000
-"""Messages that are looked at."""
+"""Messages of a topic that are read."""
 
 TOPIC: Final = "/joint_trajectory"
 
@@ -52,6 +52,10 @@ def read_bag(file: Path, topic: str | None = None) -> JointTrajectory:
         raise InvalidFile(file=file, problem=problem)
     if not file.exists():
         raise InvalidFile(file=file, problem="does not exist")
+    parts = [file] if file.is_file() else list(file.iterdir())
+    if not sum(one.stat().st_size for one in parts) <= LARGEST:
+        problem = f"has more than the {LARGEST >> 30} GiB that are read of a bag"
+        raise InvalidFile(file=file, problem=problem)
     try:
         return _read(file, topic)
     except InvalidInput:
@@ -77,6 +81,9 @@ def _read(file: Path, topic: str | None) -> JointTrajectory:
             what = f"has no trajectory under topic {name!r}" if name else "has several"
             what = "has no trajectory" if not found else what
             problem = f"{what}; topics: {known or 'none'}; choose with --topic"
+            raise InvalidFile(file=file, problem=problem)
+        if sum(one.msgcount for one in wanted) > MOST:
+            problem = f"has more than {MOST} messages under topic {topics.pop()}"
             raise InvalidFile(file=file, problem=problem)
         messages = [
             reader.deserialize(raw, connection.msgtype)

@@ -1,6 +1,7 @@
 """Problem files by path or built-in name: the only reader of the YAML contract."""
 
 import hashlib
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -8,6 +9,7 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from vdsm_pin.errors import InvalidFile, UnknownName
+from vdsm_pin.io.motion_schema import MovableModel
 from vdsm_pin.io.obstacle_schema import FromFileModel
 from vdsm_pin.io.path_schema import FilePart
 from vdsm_pin.io.problem_builder import build_problem
@@ -100,9 +102,8 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
         model, document, name=stem, folder=path.parent, digest=digest
     )
     named = tuple(path.parent / name for name in _files_named(model))
-    source = ProblemSource(
-        path, digest.hexdigest(), named, _files_of_obstacles(model, path.parent)
-    )
+    of_obstacles = files_of_obstacles(model.obstacles, path.parent)
+    source = ProblemSource(path, digest.hexdigest(), named, of_obstacles)
     return ProblemFile(problem.read_from(source), source)
 
 
@@ -127,10 +128,11 @@ def _files_of_arm(
     return [one.file for one in bodies if isinstance(one, FromFileModel)]
 
 
-def _files_of_obstacles(
-    model: ProblemModel, folder: Path
+def files_of_obstacles(
+    obstacles: Iterable[MovableModel], folder: Path
 ) -> tuple[tuple[str, Path], ...]:
-    files = ((one.name, getattr(one, "file", "")) for one in model.obstacles)
+    """Names of the obstacles that have a file of their own, with it."""
+    files = ((one.name, getattr(one, "file", "")) for one in obstacles)
     return tuple((name, folder / file) for name, file in files if file)
 
 

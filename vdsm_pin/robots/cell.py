@@ -17,8 +17,8 @@ from vdsm_pin.io.body_schema import MAX_PARTS
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.motion_schema import MovableModel
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
-from vdsm_pin.io.obstacle_schema import FromFileModel
 from vdsm_pin.io.problem_errors import first_error
+from vdsm_pin.io.problem_file import files_of_obstacles
 from vdsm_pin.io.problem_schema import BasePoseModel, not_bool
 from vdsm_pin.io.schema_types import FileModel, Name, NotNegative, Number
 from vdsm_pin.io.source import read_text
@@ -30,7 +30,12 @@ from vdsm_pin.proof.terms import WORLD
 from vdsm_pin.robots.coal_pairs import CoalPairs
 from vdsm_pin.robots.link_solids import HULLS, PARTS, MeshCover, Solids
 from vdsm_pin.robots.model import Robot
-from vdsm_pin.robots.scene_files import MAX_BYTES, SceneModel, check_judged, read_scene
+from vdsm_pin.robots.scene_files import (
+    MAX_BYTES,
+    SceneModel,
+    check_judged,
+    read_scene_with_files,
+)
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.units import MM_PER_M
 
@@ -171,8 +176,12 @@ def cell_of(
         InvalidInput: If a file is bad or a value makes no sense.
     """
     robot = files.read()
-    solids = Scene() if scene is None else read_scene(scene, _size(robot))
-    source = _source((*files.files, *filter(None, (scene,))))
+    named = (*files.files, *robot.meshes)
+    if scene is None:
+        source = _source(named, ())
+        return Cell(robot, Scene(), required, required_self, source=source)
+    solids, of_files = read_scene_with_files(scene, _size(robot))
+    source = _source((*named, scene), of_files)
     return Cell(robot, solids, required, required_self, source=source)
 
 
@@ -278,12 +287,8 @@ def read_cell(path: Path) -> Cell:
     check_judged(document, scene)
     required = float(frame.metres(model.required_clearance))
     required_self = float(frame.metres(model.required_self_clearance))
-    of_files = tuple(
-        (name, folder / one.file)
-        for name, one in zip(scene.names, model.obstacles, strict=True)
-        if isinstance(one, FromFileModel)
-    )
-    files = (path, *robot_files.files, *(file for _, file in of_files))
+    of_files = files_of_obstacles(model.obstacles, folder)
+    files = (path, *robot_files.files, *robot.meshes)
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = rotation, frame.metres(model.base.position)
     return Cell(
@@ -298,13 +303,13 @@ def read_cell(path: Path) -> Cell:
 
 
 def _source(
-    files: tuple[Path, ...], of_obstacles: tuple[tuple[str, Path], ...] = ()
+    files: tuple[Path, ...], of_obstacles: tuple[tuple[str, Path], ...]
 ) -> ProblemSource:
     """The files that a cell was read from, the robot or the problem first."""
-    digest = sha256()
-    for file in files:
+    read, digest = (*files, *(file for _, file in of_obstacles)), sha256()
+    for file in read:
         digest.update(file.read_bytes())
-    return ProblemSource(files[0], digest.hexdigest(), files[1:], of_obstacles)
+    return ProblemSource(read[0], digest.hexdigest(), read[1:], of_obstacles)
 
 
 def locks(words: tuple[str, ...]) -> dict[str, float]:

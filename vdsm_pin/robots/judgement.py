@@ -1,6 +1,6 @@
 """The judgement of a robot's trajectory: every check, one row each."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from math import inf, nan
 from typing import Final
 
@@ -12,7 +12,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import Proof, prove
-from vdsm_pin.proof.terms import REFUTED, UNDECIDED
+from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.contacts import common_ball
 from vdsm_pin.robots.model import Robot
@@ -135,8 +135,8 @@ def _least(cell: Cell, proof: Proof) -> LeastClearances:
 
 
 def _met(cell: Cell, path: Path, least: LeastClearances) -> LeastClearances:
-    """The same, refuted where a ball is proved to lie in both bodies."""
-    near = (least.verdict == UNDECIDED) & (least.upper <= MEETING)
+    """The same, refuted and so deep where a ball is proved to lie in both bodies."""
+    near = (least.verdict != CERTIFIED) & (least.upper <= MEETING)
     changed = {one.name: getattr(least, one.name).copy() for one in fields(least)}
     for k in np.flatnonzero(near):
         moment = least.interval[k] + least.time[k]
@@ -174,6 +174,7 @@ def _closest(
             station=nan,
             link_point=least.link_point[k],
             other_point=least.other_point[k],
+            deeper=bool(least.verdict[k] == REFUTED and least.upper[k] <= MEETING),
             coal=float(coal[k]),
         )
         for k in order[:CLOSEST]
@@ -266,7 +267,9 @@ def _clearances(
             where += f"; {int(left.sum())} of {mine.size} pairs undecided{late}"
         moment = float(moments[k]) if np.isfinite(least.upper[k]) else nan
         worst = float(values.min())
-        rows.append(Check(name, verdict, mine.size, worst, needed, "m", where, moment))
+        meet = bool(lost.any() and worst <= MEETING)
+        row = Check(name, verdict, mine.size, worst, needed, "m", where, moment)
+        rows.append(replace(row, deeper=meet))
     return rows
 
 

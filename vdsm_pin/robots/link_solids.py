@@ -78,6 +78,19 @@ class LinkReader:
         collisions = link.findall("collision")
         return tuple(p for one in collisions for p in self._of(name, one))
 
+    def meshes(self, document: ET.Element) -> tuple[Path, ...]:
+        """The mesh files of all links, each once.
+
+        Raises:
+            InvalidFile: If one is missing.
+        """
+        found = [
+            self._found(link.get("name", ""), mesh.get("filename", ""))
+            for link in document.findall("link")
+            for mesh in link.findall("collision/geometry/mesh")
+        ]
+        return tuple(dict.fromkeys(found))
+
     def _of(self, link: str, collision: ET.Element) -> Iterator[LinkPiece]:
         placement = origin_of(collision)
         turn, shift = placement[:3, :3], placement[:3, 3]

@@ -1,6 +1,7 @@
 """A robot of any kind: a tree of joints and the solids of its links."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -68,6 +69,7 @@ class Robot:
         base: The joint between world and root link; None where it stands.
         solids: What stands for the meshes of links.
         notes: What else a reader should know, a sentence each.
+        meshes: The files of its links' meshes.
     """
 
     name: str
@@ -81,6 +83,7 @@ class Robot:
     base: Base | None = None
     solids: Solids = HULLS
     notes: tuple[str, ...] = ()
+    meshes: tuple[Path, ...] = ()
 
     def poses(self, q: FloatArray) -> dict[str, FloatArray]:
         """T_world_link of every link at rows of q, shape (n_rows, 4, 4); [m]."""

@@ -14,6 +14,7 @@ from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.motion_schema import MovableModel
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.problem_errors import first_error
+from vdsm_pin.io.problem_file import files_of_obstacles
 from vdsm_pin.io.schema_types import FileModel
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
@@ -37,6 +38,13 @@ class SceneModel(FileModel):
 
 
 def read_scene(path: Path, robot_size: float) -> Scene:
+    """The obstacles alone, see `read_scene_with_files`."""
+    return read_scene_with_files(path, robot_size)[0]
+
+
+def read_scene_with_files(
+    path: Path, robot_size: float
+) -> tuple[Scene, tuple[tuple[str, Path], ...]]:
     """The obstacles of a scene file, in the robot's base frame.
 
     Args:
@@ -45,23 +53,23 @@ def read_scene(path: Path, robot_size: float) -> Scene:
             (`.xml`, `.mjcf`).
         robot_size: For judging the size of a mesh; [m].
 
+    Returns:
+        The obstacles, and the names of those that have a file of their own, with it.
+
     Raises:
         InvalidFile: If the file breaks its contract, or has what is not judged: meshes
             with an inside, attached objects.
     """
     kind = path.suffix.lower()
     if kind in (".xml", ".mjcf"):
-        return read_mjcf(path)
+        return read_mjcf(path), ()
     text = read_text(path, limit=MAX_BYTES)
     if kind == ".scene":
-        return _moveit(read_scene_text(path, text))
+        return _moveit(read_scene_text(path, text)), ()
     document = read_yaml(text, file=path)
     if isinstance(document.data, dict) and "world" in document.data:
-        scene = _moveit(document)
-    else:
-        scene = _ours(document, path, robot_size)
-    check_judged(document, scene)
-    return scene
+        return _moveit(document), ()
+    return _ours(document, path, robot_size)
 
 
 def check_judged(document: YamlDocument, scene: Scene) -> None:
@@ -82,7 +90,9 @@ def check_judged(document: YamlDocument, scene: Scene) -> None:
             raise document.invalid(("obstacles", k, "solid"), problem)
 
 
-def _ours(document: YamlDocument, path: Path, robot_size: float) -> Scene:
+def _ours(
+    document: YamlDocument, path: Path, robot_size: float
+) -> tuple[Scene, tuple[tuple[str, Path], ...]]:
     try:
         model = SceneModel.model_validate(document.data)
     except ValidationError as error:
@@ -90,7 +100,9 @@ def _ours(document: YamlDocument, path: Path, robot_size: float) -> Scene:
     frame = Frame(model.length_unit, np.eye(3), np.zeros(3))
     digest = hashlib.sha256()
     builder = ObstacleBuilder(document, path.parent, frame, robot_size, digest)
-    return Scene(builder.build_all(model.obstacles, ("obstacles",)))
+    scene = Scene(builder.build_all(model.obstacles, ("obstacles",)))
+    check_judged(document, scene)
+    return scene, files_of_obstacles(model.obstacles, path.parent)
 
 
 def _moveit(document: YamlDocument) -> Scene:

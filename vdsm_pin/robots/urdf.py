@@ -60,7 +60,8 @@ def read_robot(
     base = more.base() if more is not None else None
     reader = JointReader(urdf, Moving(moves, lock or {}, limits, base))
     reader.read(document)
-    bodies = _bodies(LinkReader(urdf, package_dirs, solids), document, reader)
+    links = LinkReader(urdf, package_dirs, solids)
+    bodies = _bodies(links, document, reader)
     tree = Tree(tuple(reader.joints))
     disabled = more.disabled() if more is not None else {}
     held, left_out = held_pairs(tree, bodies, disabled, more is None)
@@ -76,6 +77,7 @@ def read_robot(
         base=base,
         solids=solids,
         notes=tuple(reader.notes),
+        meshes=links.meshes(document),
     )
 
 
