@@ -25,7 +25,8 @@ from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.verification import coal_clearance
+from vdsm_pin.verification import coal_check
+from vdsm_pin.verification import coal_distances as measuring
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.robot_model import load_robot
@@ -144,14 +145,14 @@ def test_coal_is_asked_where_it_adds_evidence(
     planned: Trajectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     problem, asked = near(), 0
-    measure = coal_clearance.measure
+    measure = measuring.measure
 
     def counting(*arguments: object) -> object:
         nonlocal asked
         asked += 1
         return measure(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(coal_clearance, "measure", counting)
-    coal_clearance.check_coal(load_robot(problem.manipulator), problem, planned)
+    monkeypatch.setattr(measuring, "measure", counting)
+    coal_check.check_coal_obstacles(load_robot(problem.manipulator), problem, planned)
     pairs = planned.n_samples * problem.manipulator.n_links
     assert 8 <= asked <= 0.4 * pairs

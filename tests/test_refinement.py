@@ -21,8 +21,8 @@ from vdsm_pin.problem.planning_problem import Approach, PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.time_limit import NO_LIMIT
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification import coal_clearance, coal_missing
-from vdsm_pin.verification.coal_clearance import CoalDistances, coal_distances
+from vdsm_pin.verification import coal_check, coal_missing
+from vdsm_pin.verification.coal_distances import CoalDistances, coal_distances
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
@@ -185,7 +185,7 @@ def test_with_a_coal_that_reports_more_no_plan_is_returned(
 ) -> None:
     problem = short("obs3")
     robot = load_robot(problem.manipulator)
-    for module in (coal_missing, coal_clearance):
+    for module in (coal_missing, coal_check):
         monkeypatch.setattr(module, "coal_distances", off_by(0.005))
     with pytest.raises(NoPlanFound, match="Coal"):
         refinement.plan_and_verify(problem, name, robot)

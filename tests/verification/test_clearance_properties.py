@@ -26,7 +26,7 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_bodies import coal_bodies, distance_request, measure
-from vdsm_pin.verification.coal_clearance import capsule_transforms
+from vdsm_pin.verification.coal_distances import capsule_transforms
 from vdsm_pin.verification.counterexample import find_counterexamples
 from vdsm_pin.verification.records import ClearanceChunk
 from vdsm_pin.verification.robot_model import RobotModel, load_robot

@@ -17,9 +17,10 @@ from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification import coal_links
+from vdsm_pin.verification import coal_distances as measuring
 from vdsm_pin.verification.coal_bodies import Measured
-from vdsm_pin.verification.coal_links import check_coal_links, link_distances
+from vdsm_pin.verification.coal_check import check_coal_links
+from vdsm_pin.verification.coal_distances import link_distances
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
 
@@ -83,7 +84,7 @@ def test_links_that_meet_are_measured_as_meeting() -> None:
     still = np.zeros(60)
     motion = Trajectory(still, still, still, rings, np.zeros((60, 8)))
     found = list(link_distances(load_robot(arm), motion, 0.0))
-    meeting = np.concatenate([chunk.distance[chunk.expected < 0.0] for chunk in found])
+    meeting = np.concatenate([chunk.distance[chunk.upper < 0.0] for chunk in found])
     assert meeting.size > 20
     assert (meeting <= 0.0).all()
 
@@ -101,14 +102,14 @@ def test_two_links_have_no_pair() -> None:
 def test_a_wrong_distance_is_noticed(
     excess: float, sign: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    honest = coal_links.measure
+    honest = measuring.measure
 
     def lying(*arguments: object) -> Measured:
         found = honest(*arguments)
         error = sign * excess * TOLERANCES.coal_agreement
         return Measured(found.distance + error, found.near, found.far)
 
-    monkeypatch.setattr(coal_links, "measure", lying)
+    monkeypatch.setattr(measuring, "measure", lying)
     arm = built_in("hrm8")
     motion = trajectory_of(arm, 5, 0.3)
     (check,) = check_coal_links(load_robot(arm), problem_for(arm), motion)

@@ -43,7 +43,7 @@ from vdsm_pin.report.tables import (
     write_link_angles,
 )
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.verification.coal_clearance import reach_of
+from vdsm_pin.verification.coal_distances import reach_of
 from vdsm_pin.verification.moving import untimed
 from vdsm_pin.verification.records import ArmVerification, Verdict, Verification
 from vdsm_pin.verification.robot_model import RobotModel, load_robot

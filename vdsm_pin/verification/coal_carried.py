@@ -17,7 +17,6 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Moving, solid_of
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.coal_bodies import (
     CoalBody,
@@ -27,12 +26,15 @@ from vdsm_pin.verification.coal_bodies import (
     distance_request,
     measure,
 )
-from vdsm_pin.verification.coal_clearance import ProvedLowers
+from vdsm_pin.verification.coal_check import Evidence
 from vdsm_pin.verification.coal_log import CoalLog
-from vdsm_pin.verification.records import Check, Pair, Verdict
+from vdsm_pin.verification.proved_lowers import ProvedLowers
+from vdsm_pin.verification.records import Check, Pair
 from vdsm_pin.verification.robot_model import RobotModel
 
-NAME: Final = "distances of feed, carried and moving bodies by Coal against the proof"
+CARRIED: Final = (
+    "distances of feed, carried and moving bodies by Coal against the proof"
+)
 """Name of the row."""
 
 ROWS: Final = 32
@@ -54,23 +56,6 @@ class _Rider:
     link: int
     parts: CoalObstacle
     moving: Moving | None = None
-
-
-@dataclass(frozen=True)
-class _Answer:
-    """What Coal says of one pair of bodies at one moment.
-
-    Args:
-        names: Of the bodies.
-        moment: In waypoints.
-        distance: -inf where it is unusable; [m].
-        excess: How far it is outside of what was proved; [m].
-    """
-
-    names: Names
-    moment: float
-    distance: float
-    excess: float
 
 
 def check_coal_carried(
@@ -101,7 +86,7 @@ def check_coal_carried(
     if not groups:
         return ()
     riders = _riders(robot, problem)
-    count, worst = 0, _Answer(("", ""), float("nan"), 0.0, -np.inf)
+    evidence = Evidence(CARRIED)
     meshes = tuple(
         b.name for b in problem.manipulator.bodies if isinstance(b.solid, Mesh)
     )
@@ -110,23 +95,11 @@ def check_coal_carried(
         both = riders[names[0]], riders[names[1]]
         rows = _at_rows(robot, trajectory, both, proved, groups[names])
         near = _at_approaches(robot, trajectory, both, log, names, meshes)
-        for answer in (*rows, *near):
-            found = _Answer(names, *answer)
-            count += 1
-            if found.excess > worst.excess:
-                worst = found
-    agreed = worst.excess <= TOLERANCES.coal_agreement
-    row = Check(
-        name=NAME,
-        verdict=Verdict.CERTIFIED if agreed else Verdict.UNDECIDED,
-        count=count,
-        worst=worst.excess,
-        limit=TOLERANCES.coal_agreement,
-        unit="m",
-        where=f"{' and '.join(worst.names)}: Coal {worst.distance * MM_PER_M:.6f} mm",
-        moment=worst.moment,
-    )
-    return (row,)
+        for moment, distance, excess in (*rows, *near):
+            where = f"{' and '.join(names)}: Coal {distance * MM_PER_M:.6f} mm"
+            evidence.count += 1
+            evidence.add(excess, where, moment)
+    return (evidence.check(),)
 
 
 def _groups(

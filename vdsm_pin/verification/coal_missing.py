@@ -12,7 +12,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.verification.coal_clearance import CoalDistances, coal_distances
+from vdsm_pin.verification.coal_distances import CoalDistances, coal_distances
 from vdsm_pin.verification.robot_model import RobotModel
 
 NEAR: Final = 0.5
@@ -85,7 +85,7 @@ def _missing(found: CoalDistances, k: int, n_links: int) -> Missing:
     return Missing(
         waypoint=int(found.waypoint[k]),
         link=min(int(found.link[k]) + 1, n_links),
-        obstacle=int(found.obstacle[k]),
+        obstacle=int(found.other[k]),
         distance=float(found.distance[k]),
         normal=towards / length if length > 0.0 else np.zeros(3),
     )

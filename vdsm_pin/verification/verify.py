@@ -22,8 +22,7 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification import (
     cable_check,
     coal_carried,
-    coal_clearance,
-    coal_links,
+    coal_check,
     fk,
     pointing,
 )
@@ -33,6 +32,7 @@ from vdsm_pin.verification.clearance import (
     prove_clearance,
 )
 from vdsm_pin.verification.clearance_check import check_clearance
+from vdsm_pin.verification.coal_distances import reach_of
 from vdsm_pin.verification.coal_log import CoalLog
 from vdsm_pin.verification.counterexample import find_counterexamples
 from vdsm_pin.verification.enclosed import (
@@ -54,10 +54,10 @@ from vdsm_pin.verification.inside import (
 )
 from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.moving import check_timed
+from vdsm_pin.verification.proved_lowers import LowersSink, ProvedLowers
 from vdsm_pin.verification.records import (
     ArmVerification,
     Check,
-    ClearanceChunk,
     ClearanceSink,
     ClosestApproach,
     Counterexample,
@@ -74,9 +74,6 @@ T = TypeVar("T")
 
 CLOSEST: Final = 10
 """Pairs listed as the closest approaches."""
-
-COMPARED: Final = 2_000_000
-"""Most proved bounds kept to hold Coal's distances against."""
 
 
 def verify(
@@ -118,13 +115,13 @@ def verify(
     _check_input(problem, trajectory, box)
     located = locate_arm(problem, trajectory, box, deadline)
     around = bodies_inside(problem, trajectory, arm_inside(located))
-    kept = _Lowers(problem, trajectory)
+    kept = LowersSink(problem, trajectory)
     wanted = [EnclosedSink(sink, problem, around) if around else sink for sink in sinks]
     noted: TooClose | None = None
     if sinks or kept.fits:
         noted = TooClose(all_pairs(problem), max(1, trajectory.n_samples - 1))
         wanted += [kept.keep, noted]
-    near = coal_clearance.reach_of(problem) if reach is None else reach
+    near = reach_of(problem) if reach is None else reach
     near = math.inf if around else near
     proof = prove_clearance(
         problem, trajectory, box, wanted, deadline=deadline, reach=near
@@ -293,59 +290,24 @@ def _by_coal(
     robot: RobotModel,
     problem: PlanningProblem,
     trajectory: Trajectory,
-    proved: coal_clearance.ProvedLowers,
+    proved: ProvedLowers,
     deadline: Deadline,
     log: CoalLog,
 ) -> tuple[Check, ...]:
     """The second opinions on distances."""
-    return (
-        *_guarded(
-            coal_clearance.NAME,
-            lambda: coal_clearance.check_coal(
-                robot, problem, trajectory, proved, deadline, log
-            ),
+    motion = problem, trajectory
+    checks = {
+        coal_check.OBSTACLES: lambda: coal_check.check_coal_obstacles(
+            robot, *motion, proved, deadline, log
         ),
-        *_guarded(
-            coal_links.NAME,
-            lambda: coal_links.check_coal_links(
-                robot, problem, trajectory, deadline, log
-            ),
+        coal_check.LINKS: lambda: coal_check.check_coal_links(
+            robot, *motion, deadline, log
         ),
-        *_guarded(
-            coal_carried.NAME,
-            lambda: coal_carried.check_coal_carried(
-                robot, problem, trajectory, proved, log, deadline
-            ),
+        coal_carried.CARRIED: lambda: coal_carried.check_coal_carried(
+            robot, *motion, proved, log, deadline
         ),
-    )
-
-
-class _Lowers:
-    """Collects the proved bounds of the intervals, where they fit into memory."""
-
-    def __init__(self, problem: PlanningProblem, trajectory: Trajectory) -> None:
-        n_intervals = max(1, trajectory.n_samples - 1)
-        columns = len(problem.scene.obstacles) * problem.manipulator.axis_radii.size
-        self.fits = 0 < n_intervals * columns <= COMPARED
-        self._parts: list[FloatArray] = []
-        self._pairs, self._size = np.zeros(0, np.int64), 0
-
-    def keep(self, chunk: ClearanceChunk) -> None:
-        """Receive a chunk."""
-        self._size += chunk.lower.size
-        if self._size <= COMPARED and chunk.pairs is not None:
-            self._parts.append(chunk.lower)
-            self._pairs = chunk.pairs
-
-    def proved(self, proof: ClearanceProof) -> coal_clearance.ProvedLowers:
-        """The bounds of the intervals, and of the whole motion for other pairs."""
-        column = np.full(len(proof.best), -1)
-        lower = np.zeros((1, 1))
-        whole = proof.sent == proof.n_intervals and self._size <= COMPARED
-        if self._pairs.size and whole:
-            column[self._pairs] = np.arange(self._pairs.size)
-            lower = np.concatenate(self._parts)
-        return coal_clearance.ProvedLowers(proof.best[:, LOW], column, lower)
+    }
+    return tuple(row for name, run in checks.items() for row in _guarded(name, run))
 
 
 def _check_input(

@@ -14,7 +14,7 @@ from vdsm_pin.planner.paper.steps import PaperSteps
 from vdsm_pin.refinement import Refinement, plan_and_verify
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.html import rendered
-from vdsm_pin.verification.coal_clearance import coal_distances
+from vdsm_pin.verification.coal_distances import coal_distances
 from vdsm_pin.verification.robot_model import RobotModel, load_robot
 
 PAGE: Final = "explain.html"
@@ -93,7 +93,7 @@ def _checks(robot: RobotModel, found: Refinement, row: int) -> Part:
         rows += [
             (
                 names[seen.link[k]],
-                problem.scene.names[seen.obstacle[k]],
+                problem.scene.names[seen.other[k]],
                 mm(seen.distance[k]),
                 mm(seen.lower[k]),
                 mm(seen.upper[k]),

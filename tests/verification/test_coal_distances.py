@@ -16,14 +16,16 @@ from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification import coal_clearance
+from vdsm_pin.verification import coal_check
+from vdsm_pin.verification import coal_distances as measuring
 from vdsm_pin.verification.coal_bodies import Measured
-from vdsm_pin.verification.coal_clearance import (
+from vdsm_pin.verification.coal_check import check_coal_obstacles
+from vdsm_pin.verification.coal_distances import (
     CoalDistances,
-    check_coal,
     coal_distances,
     reach_of,
 )
+from vdsm_pin.verification.proved_lowers import ProvedLowers
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import CLOSEST, verify
@@ -152,7 +154,7 @@ def test_rows_close_to_each_other_are_seen_once(
     assert len(seen) == pytest.approx(shift / travel + 1, abs=1)
     assert seen[0] == 0
     np.testing.assert_allclose(np.diff(along[seen]), travel, atol=2e-5)
-    monkeypatch.setattr("vdsm_pin.verification.coal_clearance.CHUNK_BOUNDS", 800)
+    monkeypatch.setattr("vdsm_pin.verification.coal_distances.CHUNK_BOUNDS", 800)
     assert rows() == seen, "in parts or at once"
     everything = list(coal_distances(ROBOT, problem, motion, reach))
     assert sum(int((chunk.link == 3).sum()) for chunk in everything) == n
@@ -161,7 +163,7 @@ def test_rows_close_to_each_other_are_seen_once(
 def test_verdict_and_count_of_an_honest_scene() -> None:
     rng = np.random.default_rng(3)
     problem = problem_with(*(obstacle_of(shape, rng) for shape in SHAPES))
-    (check,) = check_coal(ROBOT, problem, trajectory_of(40))
+    (check,) = check_coal_obstacles(ROBOT, problem, trajectory_of(40))
     assert check.verdict is Verdict.CERTIFIED
     assert check.worst <= check.limit == TOLERANCES.coal_agreement
     assert 8 * len(SHAPES) <= check.count <= 40 * 8 * len(SHAPES)
@@ -169,7 +171,7 @@ def test_verdict_and_count_of_an_honest_scene() -> None:
 
 
 def test_no_obstacles_no_row() -> None:
-    assert check_coal(ROBOT, problem_with(), trajectory_of(3)) == ()
+    assert check_coal_obstacles(ROBOT, problem_with(), trajectory_of(3)) == ()
 
 
 def ball_near_link_4(gap: float) -> PlanningProblem:
@@ -189,15 +191,15 @@ STRAIGHT = Trajectory(
 def test_a_wrong_distance_is_noticed_on_both_sides(
     excess: float, sign: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    honest = coal_clearance.measure
+    honest = measuring.measure
 
     def lying(*arguments: object) -> Measured:
         found = honest(*arguments)
         error = sign * excess * TOLERANCES.coal_agreement
         return Measured(found.distance + error, found.near, found.far)
 
-    monkeypatch.setattr(coal_clearance, "measure", lying)
-    (check,) = check_coal(ROBOT, ball_near_link_4(0.01), STRAIGHT)
+    monkeypatch.setattr(measuring, "measure", lying)
+    (check,) = check_coal_obstacles(ROBOT, ball_near_link_4(0.01), STRAIGHT)
     expected = Verdict.CERTIFIED if excess < 1.0 else Verdict.UNDECIDED
     assert check.verdict is expected
 
@@ -205,7 +207,7 @@ def test_a_wrong_distance_is_noticed_on_both_sides(
 def test_a_lie_leaves_the_whole_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
     """One of Coal's distances 0.1 mm off: the row says which, nothing is certified."""
     problem, drawn = ball_near_link_4(0.01), replace(STRAIGHT, on_path=np.ones(2))
-    honest = coal_clearance.measure
+    honest = measuring.measure
 
     def lying(*arguments: object) -> Measured:
         found = honest(*arguments)
@@ -213,9 +215,9 @@ def test_a_lie_leaves_the_whole_undecided(monkeypatch: pytest.MonkeyPatch) -> No
         return Measured(found.distance + off, found.near, found.far)
 
     for tell, verdict in ((honest, Verdict.CERTIFIED), (lying, Verdict.UNDECIDED)):
-        monkeypatch.setattr(coal_clearance, "measure", tell)
+        monkeypatch.setattr(measuring, "measure", tell)
         found = verify(problem, drawn, ROBOT)
-        row = next(c for c in found.checks if c.name == coal_clearance.NAME)
+        row = next(c for c in found.checks if c.name == coal_check.OBSTACLES)
         assert row.verdict is verdict
         others = {c.verdict for c in found.checks if c is not row}
         assert others == {Verdict.CERTIFIED}
@@ -231,21 +233,21 @@ def test_no_answer_is_no_agreement(
     import coal
 
     monkeypatch.setattr(coal, "distance", lambda *arguments: answer)
-    (check,) = check_coal(ROBOT, ball_near_link_4(0.01), STRAIGHT)
+    (check,) = check_coal_obstacles(ROBOT, ball_near_link_4(0.01), STRAIGHT)
     assert check.verdict is Verdict.UNDECIDED
     assert check.worst == np.inf
 
 
 def test_a_wrong_sign_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    honest = coal_clearance.measure
+    honest = measuring.measure
 
     def flipped(*arguments: object) -> Measured:
         found = honest(*arguments)
         return Measured(-found.distance, found.near, found.far)
 
-    monkeypatch.setattr(coal_clearance, "measure", flipped)
+    monkeypatch.setattr(measuring, "measure", flipped)
     for gap in (0.01, -0.01):
-        (check,) = check_coal(ROBOT, ball_near_link_4(gap), STRAIGHT)
+        (check,) = check_coal_obstacles(ROBOT, ball_near_link_4(gap), STRAIGHT)
         assert check.verdict is Verdict.UNDECIDED
         assert check.worst >= 0.01
 
@@ -257,11 +259,11 @@ def test_an_interval_proof_above_coal_is_noticed() -> None:
     least = interval[0].copy()
     # A bound of the interval, or of the whole motion where there is none.
     for column, bound in ((np.arange(8), interval[0]), (none, least)):
-        proved = coal_clearance.ProvedLowers(least, column, interval)
-        (check,) = check_coal(ROBOT, problem, STRAIGHT, proved)
+        proved = ProvedLowers(least, column, interval)
+        (check,) = check_coal_obstacles(ROBOT, problem, STRAIGHT, proved)
         assert check.verdict is Verdict.CERTIFIED
         bound[3] = 0.01 + 1e-5
-        (check,) = check_coal(ROBOT, problem, STRAIGHT, proved)
+        (check,) = check_coal_obstacles(ROBOT, problem, STRAIGHT, proved)
         assert check.verdict is Verdict.UNDECIDED
         assert "link 4 and ball" in check.where
 
@@ -329,10 +331,10 @@ def test_a_lie_of_coal_at_a_closest_approach_is_seen(
             found = replace(found, distance=found.distance + 2e-5)
         return found
 
-    measured = coal_clearance._measured
-    monkeypatch.setattr(coal_clearance, "_measured", lying)
+    measured = measuring._measured
+    monkeypatch.setattr(measuring, "_measured", lying)
     judged = verify(problem, plan.trajectory, ROBOT)
-    row = next(check for check in judged.checks if check.name == coal_clearance.NAME)
+    row = next(check for check in judged.checks if check.name == coal_check.OBSTACLES)
     assert row.verdict is Verdict.UNDECIDED
     assert row.moment in [near.moment for near in judged.approaches]
 

@@ -1,0 +1,369 @@
+"""Coal's distances of links at the rows of a trajectory, with our brackets beside them.
+
+Poses come from Pinocchio, shapes from the URDF and distances from Coal; the brackets
+come from the closed-form kinematics and our own kernels.
+
+Pairs that are far apart add no evidence. A chain of balls along each link against the
+boxes of the obstacles bounds every distance from below at a hundredth of the price; a
+row is measured where that bound is within reach, and every pair at its nearest row. Nor
+does a row add any at which the arm has hardly moved since the row before.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.arm.manipulator import Manipulator
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.pieces import PackedPieces
+from vdsm_pin.geometry.row_bounds import coarse_bounds, link_gaps, row_brackets
+from vdsm_pin.geometry.solids import Solid
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import solid_of
+from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.coal_bodies import (
+    CoalBody,
+    CoalObstacle,
+    coal_bodies,
+    distance_request,
+    measure,
+)
+from vdsm_pin.verification.robot_model import LinkPoses, RobotModel
+
+CHUNK_BOUNDS: Final = 1 << 17
+"""Coarse bounds held in memory at a time: rows times links times obstacles."""
+
+CHUNK_GAPS: Final = 1 << 20
+"""Closed forms held in memory at a time: rows times links times links."""
+
+CHUNK_PAIRS: Final = 1 << 10
+"""Pairs measured between two looks at the time."""
+
+MANY: Final = 10_000
+"""Of more obstacles than this only the nearest link of each is measured when far."""
+
+
+@dataclass(frozen=True)
+class CoalDistances:
+    """Measured distances of links, with our own brackets beside them.
+
+    Args:
+        waypoint: Row of the trajectory, from 0, shape (m,).
+        link: Link, from 0, or N for the tool, shape (m,).
+        other: Number of the obstacle in the scene, or the other link, shape (m,).
+        distance: By Coal; -inf where its answer is unusable, shape (m,); [m].
+        lower: Our lower bound at the row, shape (m,); [m].
+        upper: Our upper bound; the lower one where there is a closed form; [m].
+        link_point: Coal's witness on the link, base frame, shape (m, 3); [m].
+        other_point: Coal's witness on the other body, shape (m, 3); [m].
+    """
+
+    waypoint: IntArray
+    link: IntArray
+    other: IntArray
+    distance: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    link_point: FloatArray
+    other_point: FloatArray
+
+    @property
+    def disagreement(self) -> FloatArray:
+        """How far Coal lies outside the bracket, inf if unusable, shape (m,); [m].
+
+        Where bodies meet only the sign counts, on both sides.
+        """
+        value, lower, upper = (
+            np.maximum(number, 0.0)
+            for number in (self.distance, self.lower, self.upper)
+        )
+        outside = np.maximum(np.maximum(lower - value, value - upper), 0.0)
+        return np.where(np.isfinite(self.distance), outside, np.inf)
+
+
+@dataclass(frozen=True)
+class CoalScene:
+    """The obstacles, as the proof and as Coal see them.
+
+    Args:
+        pieces: Convex pieces for the proof's kernels.
+        bodies: Coal's, obstacle by obstacle.
+    """
+
+    pieces: PackedPieces
+    bodies: tuple[CoalObstacle, ...]
+
+    @classmethod
+    def of(cls, problem: PlanningProblem, deadline: Deadline) -> "CoalScene":
+        """The obstacles of a problem, none of which moves.
+
+        Raises:
+            OutOfTime: If the time is over.
+        """
+        obstacles = problem.scene.obstacles
+        pieces = problem.packed_obstacles
+        bodies = (_bodies_of(solid_of(one), deadline) for one in obstacles)
+        return cls(pieces, tuple(bodies))
+
+
+def reach_of(problem: PlanningProblem) -> float:
+    """Distance up to which pairs are measured at every row; [m].
+
+    The required clearance and the arm's own radius past it.
+    """
+    return problem.required_clearance + problem.manipulator.most_radius
+
+
+def coal_distances(
+    robot: RobotModel,
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    reach: float,
+    travel: float = 0.0,
+    deadline: Deadline = NO_LIMIT,
+    scene: CoalScene | None = None,
+) -> Iterator[CoalDistances]:
+    """Measure the pairs within reach, chunk by chunk, then every pair not yet seen.
+
+    Args:
+        robot: The arm in Pinocchio and Coal.
+        problem: The scene.
+        trajectory: The rows.
+        reach: Measure where the coarse bound is at most this; inf for everything; [m].
+        travel: Look at one row of each stretch in which the joint centres move by this
+            much; 0 for every row; [m].
+        deadline: When to give up.
+        scene: The obstacles, where they are there already.
+
+    Yields:
+        Distances in the order of the rows; last the pairs that were not measured, each
+        at the row where its coarse bound is least; of more than `MANY` obstacles each
+        with the link that is nearest then.
+
+    Raises:
+        OutOfTime: If the time is over.
+    """
+    arm, obstacles = problem.manipulator, problem.scene.obstacles
+    if not obstacles:
+        return
+    ready = scene or CoalScene.of(problem, deadline)
+    every = np.ones((arm.axis_radii.size, len(obstacles)), dtype=np.bool_)
+
+    def bounds(axes: FloatArray) -> FloatArray:
+        return coarse_bounds(ready.pieces, axes, arm.axis_radii)
+
+    near = _Nearness(arm, bounds, every, CHUNK_BOUNDS)
+    for pairs in near.pairs(trajectory, reach, travel, deadline):
+        yield against_obstacles(robot, trajectory, ready, pairs)
+
+
+def link_distances(
+    robot: RobotModel,
+    trajectory: Trajectory,
+    reach: float,
+    deadline: Deadline = NO_LIMIT,
+) -> Iterator[CoalDistances]:
+    """Measure the pairs of links within reach, then every pair not yet seen.
+
+    Args:
+        robot: The arm in Pinocchio and Coal.
+        trajectory: The rows.
+        reach: Measure where the closed form is at most this; inf for everything; [m].
+        deadline: When to give up.
+
+    Yields:
+        Distances in the order of the rows, of a link and one farther out; last the
+        pairs that never came within reach, each at the row where it is nearest.
+
+    Raises:
+        OutOfTime: If the time is over.
+    """
+    arm = robot.manipulator
+    n_axes = arm.axis_radii.size
+    every = np.ones((n_axes, n_axes), dtype=np.bool_)
+
+    def bounds(axes: FloatArray) -> FloatArray:
+        return link_gaps(axes, arm.axis_radii)
+
+    near = _Nearness(arm, bounds, np.triu(every, k=2), CHUNK_GAPS)
+    for pairs in near.pairs(trajectory, reach, 0.0, deadline):
+        yield between_links(robot, trajectory, pairs)
+
+
+def _bodies_of(obstacle: Solid, deadline: Deadline) -> CoalObstacle:
+    deadline.check()
+    return coal_bodies(obstacle)
+
+
+def in_turns(pairs: IntArray, deadline: Deadline) -> Iterator[IntArray]:
+    """The same pairs, so many at a time that a deadline is heard in between."""
+    for first in range(0, len(pairs), CHUNK_PAIRS):
+        deadline.check()
+        yield pairs[first : first + CHUNK_PAIRS]
+
+
+@dataclass(frozen=True)
+class _Nearness:
+    """Picks the pairs of a motion that are worth a measurement.
+
+    Args:
+        arm: Its links and tool are the one side.
+        bounds: Lower bounds of the clearance at ends of links and tool, shape
+            (n, n_axes + 1, 3), for each of them and each partner; [m].
+        apart: Which pairs to look at, shape (n_axes, n_partners).
+        held: Bounds held in memory at a time.
+    """
+
+    arm: Manipulator
+    bounds: Callable[[FloatArray], FloatArray]
+    apart: BoolArray
+    held: int
+
+    def pairs(
+        self, trajectory: Trajectory, reach: float, travel: float, deadline: Deadline
+    ) -> Iterator[IntArray]:
+        """(waypoint, link, partner) triples within reach, then one of each other pair.
+
+        Raises:
+            OutOfTime: If the time is over.
+        """
+        least = np.full(self.apart.shape, np.inf)
+        nearest = np.zeros(least.shape, dtype=np.int64)
+        seen = ~self.apart
+        moved = _Moved(travel)
+        step = max(1, self.held // least.size)
+        for first in range(0, trajectory.n_samples, step):
+            deadline.check()
+            axes = _axes(self.arm, trajectory, slice(first, first + step))
+            bounds = self.bounds(axes)
+            here = np.argmin(bounds, axis=0)
+            value = np.take_along_axis(bounds, here[None], axis=0)[0]
+            nearer = value < least
+            least[nearer], nearest[nearer] = value[nearer], here[nearer] + first
+            within = (bounds <= reach) & moved(axes)[:, None, None] & self.apart
+            seen |= within.any(axis=0)
+            close = np.argwhere(within)
+            close[:, 0] += first
+            yield from in_turns(close, deadline)
+        if self.apart.shape[1] > MANY:  # of the far ones the nearest link alone
+            seen |= np.arange(len(least))[:, None] != np.argmin(least, axis=0)
+        far = np.argwhere(~seen)
+        yield from in_turns(np.column_stack([nearest[~seen], far]), deadline)
+
+
+class _Moved:
+    """Picks the first row of each stretch of a motion, part after part.
+
+    Args:
+        travel: How far the joint centres move in a stretch; [m].
+    """
+
+    def __init__(self, travel: float) -> None:
+        self._travel = travel
+        self._way, self._last = 0.0, np.zeros((0, 0, 3))
+
+    def __call__(self, centres: FloatArray) -> BoolArray:
+        """Which rows of the next part to look at, shape (n,).
+
+        Args:
+            centres: Ends of links and tool at the rows, shape (n, n_axes + 1, 3); [m].
+        """
+        if self._travel == 0.0:
+            return np.ones(len(centres), dtype=np.bool_)
+        begin = self._last if len(self._last) else centres[:1]
+        steps = np.linalg.norm(np.diff(centres, axis=0, prepend=begin), axis=2)
+        ways = self._way + np.cumsum(steps.max(axis=1))
+        marks = np.floor(np.append(self._way, ways) / self._travel)
+        found = np.diff(marks) > 0.0
+        found[0] |= not len(self._last)
+        self._way, self._last = float(ways[-1]), centres[-1:]
+        return np.asarray(found)
+
+
+def against_obstacles(
+    robot: RobotModel, trajectory: Trajectory, scene: CoalScene, pairs: IntArray
+) -> CoalDistances:
+    """Ask both about (waypoint, link, obstacle) triples, shape (m, 3)."""
+    rows, place = np.unique(pairs[:, 0], return_inverse=True)
+    link, obstacle = pairs[:, 1], pairs[:, 2]
+    axes = _axes(robot.manipulator, trajectory, rows)
+    ends = np.stack([axes[place, link], axes[place, link + 1]], axis=1)
+    bounds = row_brackets(scene.pieces, ends, obstacle, TOLERANCES.bracket_gap)
+    bounds -= robot.manipulator.axis_radii[link, None]
+    others = (scene.bodies[o] for o in obstacle)
+    return _measured(robot, trajectory, pairs, others, bounds)
+
+
+def between_links(
+    robot: RobotModel, trajectory: Trajectory, pairs: IntArray
+) -> CoalDistances:
+    """Ask both about (waypoint, link, other link) triples, shape (m, 3)."""
+    rows, place = np.unique(pairs[:, 0], return_inverse=True)
+    link, other = pairs[:, 1], pairs[:, 2]
+    axes = _axes(robot.manipulator, trajectory, rows)
+    gaps = link_gaps(axes, robot.manipulator.axis_radii)[place, link, other]
+    poses = robot.link_poses(*_joints(trajectory, rows))
+    others = (
+        (CoalBody(robot.capsules[k], pose),)
+        for k, pose in zip(
+            other, capsule_transforms(robot, poses, place, other), strict=True
+        )
+    )
+    return _measured(robot, trajectory, pairs, others, np.column_stack([gaps, gaps]))
+
+
+def _measured(
+    robot: RobotModel,
+    trajectory: Trajectory,
+    pairs: IntArray,
+    others: Iterator[CoalObstacle],
+    bounds: FloatArray,
+) -> CoalDistances:
+    """Coal's distances of (waypoint, link, other) triples beside our bounds (m, 2)."""
+    rows, place = np.unique(pairs[:, 0], return_inverse=True)
+    poses = robot.link_poses(*_joints(trajectory, rows))
+    link, request = pairs[:, 1], distance_request()
+    distance = np.zeros(len(pairs))
+    near, far = np.zeros((2, len(pairs), 3))
+    mine = capsule_transforms(robot, poses, place, link)
+    for k, (pose, other) in enumerate(zip(mine, others, strict=True)):
+        found = measure(request, robot.capsules[link[k]], pose, other)
+        distance[k], near[k], far[k] = found.distance, found.near, found.far
+    return CoalDistances(
+        pairs[:, 0], link, pairs[:, 2], distance, bounds[:, 0], bounds[:, 1], near, far
+    )
+
+
+def _joints(
+    trajectory: Trajectory, rows: IntArray | slice
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    return trajectory.x0[rows], trajectory.alpha[rows], trajectory.theta[rows]
+
+
+def _axes(
+    arm: Manipulator, trajectory: Trajectory, rows: IntArray | slice
+) -> FloatArray:
+    """Ends of the links and of the tool at some rows, shape (m, n_axes + 1, 3); [m]."""
+    centres = joint_centres(arm, *_joints(trajectory, rows))
+    return np.ascontiguousarray(arm.axes(centres))
+
+
+def capsule_transforms(
+    robot: RobotModel, poses: LinkPoses, row: IntArray, link: IntArray
+) -> Iterator[Any]:
+    """Coal's pose of a link's capsule for each (row, link), one after the other."""
+    import coal
+
+    on = np.minimum(link, robot.manipulator.n_links - 1)  # the tool is on the last one
+    rotations = poses.rotations[row, on]
+    local = robot.T_link_capsule[link]
+    turned = rotations @ local[:, :3, :3]
+    shifted = poses.origins[row, on] + np.einsum(
+        "nij,nj->ni", rotations, local[:, :3, 3]
+    )
+    return (coal.Transform3s(R, p) for R, p in zip(turned, shifted, strict=True))
