@@ -1,7 +1,7 @@
 """Certificates beside what moves and of smooth pieces: accepted, and forgeries not."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -127,11 +127,26 @@ def random_errors(rng: Rng) -> ErrorBox:
     )
 
 
-def move_nearer(case: Motion) -> None:
-    """The first obstacle that moves is nearer than it was."""
-    for row in case.data["obstacles"][1]["motion"]["positions"]:
-        row[2] -= np.sign(row[2])
+def assert_the_motion_of_the_file_counts(case: Motion, rng: Rng) -> None:
+    """A plane that proves no more than is claimed does not survive both ways.
+
+    What a plane loses is convex in the place of the obstacle: there or back it is more.
+    """
+    beside = [k for k, pair in enumerate(case.lines[0]["pairs"]) if "one 0" in pair]
+    plane = any_plane(case.lines, rng, beside)
+    plane[5] = proved_by(case, plane) - 1e-9
+    there, back = (moved(case, by_mm) for by_mm in (1.0, -1.0))
+    assert there or back
+
+
+def moved(case: Motion, by_mm: float) -> str:
+    """Why the certificate is refused with the first obstacle that moves elsewhere."""
+    motion = case.data["obstacles"][1]["motion"]
+    kept = motion["positions"]
+    motion["positions"] = [[x, y, z + by_mm] for x, y, z in kept]
     case.write_problem()
+    motion["positions"] = kept
+    return case.forge(lambda _: None)
 
 
 def run(folder: Path, seed: int, count: int) -> tuple[int, int]:
@@ -153,24 +168,30 @@ def run(folder: Path, seed: int, count: int) -> tuple[int, int]:
             else:
                 assert reason, kind
             forged += 1
-        move_nearer(case)
-        assert case.forge(lambda _: None)
-        forged += 1
+        assert_the_motion_of_the_file_counts(case, rng)
+        forged += 2
     return accepted, forged
 
 
-def any_plane(lines: Any, rng: Rng) -> Any:
+def any_plane(lines: Any, rng: Rng, pairs: Sequence[int] = ()) -> Any:
+    """A random plane, of one of some pairs."""
     line = lines[int(rng.integers(1, len(lines)))]
-    proof = line["proofs"][int(rng.integers(len(line["proofs"])))]
+    proof = line["proofs"][rng.choice(pairs or range(len(line["proofs"])))]
     return proof[int(rng.integers(len(proof)))][2][0]
+
+
+def proved_by(case: Motion, plane: Any) -> float:
+    """What the checker says that a plane proves; [m]."""
+    kept, plane[5] = plane[5], 1e3
+    reason = case.forge(lambda _: None)
+    plane[5] = kept
+    return float(reason.split("proves ")[1].split(" mm")[0]) / 1e3
 
 
 def assert_no_more_is_claimed(case: Motion, rng: Rng) -> None:
     """As much as a plane proves may be claimed, and not a hair more."""
     plane = any_plane(case.lines, rng)
-    kept, plane[5] = plane[5], 1e3
-    reason = case.forge(lambda _: None)
-    most = float(reason.split("proves ")[1].split(" mm")[0]) / 1e3
+    kept, most = plane[5], proved_by(case, plane)
     for claimed, good in ((most - 1e-9, True), (most + 1e-9, False)):
         plane[5] = claimed
         assert (case.forge(lambda _: None) == "") is good

@@ -46,6 +46,13 @@ def test_such_signs_stand_in_values_and_keys_as_they_are(
     assert read_yaml(text, file="f").data == {f"k{a}": f"x{a}y{b}{b}\U000f0000z"}
 
 
+@pytest.mark.parametrize(
+    "end", ["---", "---\n", "--- \n---\n", "---\n# no more\n", "...\n---\n...\n"]
+)
+def test_empty_documents_may_follow(end: str) -> None:
+    assert read_yaml(f"---\na: 1\n{end}", file="f").data == {"a": 1}
+
+
 def test_texts_without_such_signs_are_read_as_before() -> None:
     rng = np.random.default_rng(0)
     letters = "ab: -\n'\"#\U000f0000é"

@@ -78,7 +78,9 @@ def spelled(location: Location) -> str:
 
 
 def read_yaml(text: str, *, file: object) -> YamlDocument:
-    """One YAML document as plain data.
+    """One YAML document as plain data; empty ones after it are no others.
+
+    What ROS prints ends in `---`, which begins an empty document.
 
     Args:
         text: The whole file.
@@ -139,9 +141,11 @@ class _Builder:
             raise InvalidFile(file=self.file, problem="holds no data")
         data = self._value(next(self.events), ())
         next(self.events)  # the end of the document
-        after = next(self.events)
-        if not isinstance(after, yaml.StreamEndEvent):
-            raise self._invalid(after, "a second document starts here, expected one")
+        while not isinstance(after := next(self.events), yaml.StreamEndEvent):
+            if not _is_empty(next(self.events)):
+                problem = "a second document starts here, expected one"
+                raise self._invalid(after, problem)
+            next(self.events)  # the end of the empty document
         return YamlDocument(self.file, data, self.lines)
 
     def _bounded(self, events: Iterator[yaml.Event]) -> Iterator[yaml.Event]:
@@ -208,6 +212,13 @@ def _scalar(text: str) -> Scalar:
     if _INTEGER.fullmatch(text) and len(text) <= MAX_INTEGER_DIGITS:
         return int(text)
     return float(text) if _FLOAT.fullmatch(text) else text
+
+
+def _is_empty(event: yaml.Event) -> bool:
+    """Whether nothing is written where a value could stand."""
+    if not isinstance(event, yaml.ScalarEvent) or event.anchor or event.tag:
+        return False
+    return bool(event.implicit[0] and not event.value)
 
 
 def _line(event: yaml.Event) -> int:
