@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 import vdsm_pin
+from vdsm_pin.planner.strategies import STRATEGIES
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs").rglob("*.md"))
@@ -88,6 +89,13 @@ def test_every_public_name_is_on_the_page_about_python() -> None:
     page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
     shown = set(re.findall(r"auto\w+:: vdsm_pin\.(\w+)", page))
     assert shown == set(vdsm_pin.__all__)
+
+
+def test_every_strategy_is_on_the_page_about_them() -> None:
+    page = (ROOT / "docs" / "strategies.md").read_text(encoding="utf-8")
+    assert re.findall(r"^\| `([\w-]+)`(?: \(default\))? \|", page, re.MULTILINE)[
+        : len(STRATEGIES)
+    ] == list(STRATEGIES)
 
 
 def test_no_page_of_the_site_is_left_without_a_way_to_it() -> None:
