@@ -9,9 +9,8 @@ from tests.robots.test_robots import URDF, mutated, write
 from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
-from vdsm_pin.robots.cell import solids_of
+from vdsm_pin.robots.files import Solids, solids_of
 from vdsm_pin.robots.joint_limits import read_limits
-from vdsm_pin.robots.link_solids import Solids
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.second_opinion import link_shapes, pose_difference
 from vdsm_pin.robots.urdf import read_robot

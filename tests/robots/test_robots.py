@@ -13,7 +13,8 @@ from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.geometry.solids import Cylinder, HalfSpace, Sphere
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.report.files import VerificationFile
-from vdsm_pin.robots.cell import Cell, RobotFiles, cell_of, read_cell
+from vdsm_pin.robots.cell import Cell, cell_of, read_cell
+from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.scene_files import read_scene

@@ -62,7 +62,7 @@ def test_what_is_written_is_read_back(
 ) -> None:
     given = motion(smooth)
     file = written(tmp_path, ending, given, robot)
-    found = read_motion(file, robot)
+    found = read_motion(file, robot.joints)
     for one, other in zip(
         (given.q, given.times, given.rates, given.changes),
         (found.q, found.times, found.rates, found.changes),
@@ -89,7 +89,7 @@ def test_topics_are_chosen(tmp_path: Path, robot: Robot) -> None:
             read_bag(file, topic)
     csv = written(tmp_path, ".csv", motion(1), robot)
     with pytest.raises(InvalidFile, match="is no bag"):
-        read_motion(csv, robot, "/joint_trajectory")
+        read_motion(csv, robot.joints, "/joint_trajectory")
     data = file.read_bytes()
     for end in (0, 20, len(data) // 2):
         file.write_bytes(data[:end])
@@ -143,18 +143,18 @@ def test_joints_of_several_degrees_turn_about_z(tmp_path: Path) -> None:
             ],
         },
     }
-    found = read_motion(write(tmp_path, "t.json", json.dumps(message)), robot)
+    found = read_motion(write(tmp_path, "t.json", json.dumps(message)), robot.joints)
     np.testing.assert_allclose(found.q[:, 3], angles)
     np.testing.assert_array_equal(found.q[:, :3], [[0.1, 1, 2], [0.2, 1, 2]])
     bad = json.dumps(message).replace('"x": 0', '"x": 0.5', 1)
     with pytest.raises(InvalidFile, match="rotation has length"):
-        read_motion(write(tmp_path, "t.json", bad), robot)
+        read_motion(write(tmp_path, "t.json", bad), robot.joints)
     tilted = json.dumps(message).replace('"x": 0', '"x": 0.03', 1)
     with pytest.raises(InvalidFile, match="another axis than z"):
-        read_motion(write(tmp_path, "t.json", tilted), robot)
+        read_motion(write(tmp_path, "t.json", tilted), robot.joints)
     high = json.dumps(message).replace('"z": 0}', '"z": 0.2}', 1)
     with pytest.raises(InvalidFile, match="'slide' is planar, expected z 0"):
-        read_motion(write(tmp_path, "t.json", high), robot)
+        read_motion(write(tmp_path, "t.json", high), robot.joints)
 
 
 ODD = {
@@ -247,7 +247,7 @@ def test_trajectories_are_converted(tmp_path: Path, robot: Robot) -> None:
     file, out = written(tmp_path, ".csv", given, robot), tmp_path / "out"
     assert run("convert", cell, "--trajectory", file, "--out", out, *formats) == 0
     for ending in FORMATS:
-        found = read_motion(out / f"trajectory{ending}", robot)
+        found = read_motion(out / f"trajectory{ending}", robot.joints)
         np.testing.assert_array_equal(found.q, given.q)
     assert run("convert", cell, "--cables", file, "--out", out) == 2
     source = read_problem("paper/obs1")

@@ -128,7 +128,7 @@ def convert_robot(cell: Cell, file: Path, folder: Path, also: Sequence[str]) -> 
     names = (TRAJECTORY, *map(message_name, also))
     check_kept([folder / name for name in names], [*cell.files, file])
     robot = cell.robot
-    motion = read_motion(file, robot)
+    motion = read_motion(file, robot.joints)
     with staged(folder) as aside:
         (aside / TRAJECTORY).write_text(csv_text(motion, robot), encoding="utf-8")
         write_messages(aside, motion, also)

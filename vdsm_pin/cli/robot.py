@@ -92,13 +92,8 @@ class RobotOptions(NamedTuple):
         Raises:
             InvalidInput: If both or neither are given, or a file is bad.
         """
-        from vdsm_pin.robots.cell import (
-            RobotFiles,
-            cell_of,
-            locks,
-            read_cell,
-            solids_of,
-        )
+        from vdsm_pin.robots.cell import cell_of, locks, read_cell
+        from vdsm_pin.robots.files import RobotFiles, solids_of
         from vdsm_pin.units import MM_PER_M
 
         if problem is not None:

@@ -1,41 +1,22 @@
 """A robot among its obstacles: from files named one by one, or from a problem file."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from hashlib import sha256
 from math import inf
 from pathlib import Path
-from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, ValidationError
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, frozen, rotation_from_rpy
-from vdsm_pin.io.body_schema import MAX_PARTS
-from vdsm_pin.io.frames import Frame
-from vdsm_pin.io.motion_schema import MovableModel
-from vdsm_pin.io.obstacle_builder import ObstacleBuilder
-from vdsm_pin.io.problem_errors import first_error
-from vdsm_pin.io.problem_file import files_of_obstacles
-from vdsm_pin.io.problem_schema import BasePoseModel, not_bool
-from vdsm_pin.io.schema_types import FileModel, Name, NotNegative, Number
-from vdsm_pin.io.source import read_text
-from vdsm_pin.io.yaml_reader import read_yaml
+from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.bodies import Body, Pair
 from vdsm_pin.proof.terms import WORLD
 from vdsm_pin.robots.coal_pairs import CoalPairs
-from vdsm_pin.robots.link_solids import HULLS, PARTS, MeshCover, Solids
+from vdsm_pin.robots.files import RobotFiles, read_cell_file, source_of
 from vdsm_pin.robots.model import Robot
-from vdsm_pin.robots.scene_files import (
-    MAX_BYTES,
-    SceneModel,
-    check_judged,
-    read_scene_with_files,
-)
+from vdsm_pin.robots.scene_files import read_scene_with_files
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.units import MM_PER_M
 
@@ -114,50 +95,6 @@ class Cell:
         return f"{one.name} and {other.name}"
 
 
-@dataclass(frozen=True)
-class RobotFiles:
-    """A robot, by files and what is said of them; as `read_robot` takes it.
-
-    Args:
-        urdf: The robot.
-        srdf: Pairs that are not held apart; None: neighbours are not.
-        package_dirs: Where `package://` is looked for.
-        lock: Joints that stand still; [rad] or [m].
-        group: Of the SRDF, whose joints alone move.
-        solids: What stands for the meshes of links.
-        joint_limits: A joint_limits.yaml.
-    """
-
-    urdf: Path
-    srdf: Path | None = None
-    package_dirs: tuple[Path, ...] = ()
-    lock: Mapping[str, float] = field(default_factory=dict)
-    group: str | None = None
-    solids: Solids = HULLS
-    joint_limits: Path | None = None
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """Those that it is read from, the URDF first."""
-        return (self.urdf, *filter(None, (self.srdf, self.joint_limits)))
-
-    def read(self) -> Robot:
-        """The robot.
-
-        Raises:
-            InvalidInput: If a file is bad or a value makes no sense.
-        """
-        return read_robot(
-            self.urdf,
-            self.srdf,
-            self.package_dirs,
-            self.lock,
-            self.group,
-            self.solids,
-            self.joint_limits,
-        )
-
-
 def cell_of(
     files: RobotFiles,
     scene: Path | None = None,
@@ -175,95 +112,14 @@ def cell_of(
     Raises:
         InvalidInput: If a file is bad or a value makes no sense.
     """
-    robot = files.read()
+    robot = robot_of(files)
     named = (*files.files, *robot.meshes)
     if scene is None:
-        source = _source(named, ())
+        source = source_of(named, ())
         return Cell(robot, Scene(), required, required_self, source=source)
     solids, of_files = read_scene_with_files(scene, _size(robot))
-    source = _source((*named, scene), of_files)
+    source = source_of((*named, scene), of_files)
     return Cell(robot, solids, required, required_self, source=source)
-
-
-def solids_of(bodies: MeshCover | None, parts: int | None) -> Solids:
-    """What stands for meshes; a number of parts alone asks for parts.
-
-    Raises:
-        InvalidInput: If a number is given beside another cover.
-    """
-    cover = bodies or ("hull" if parts is None else "parts")
-    if parts is not None and cover != "parts":
-        message = f"parts is {parts} beside bodies {cover!r}, expected bodies 'parts'"
-        raise InvalidInput(message)
-    return Solids(cover, parts or PARTS)
-
-
-class RobotModel(FileModel):
-    """A robot by its URDF."""
-
-    urdf: str = Field(description="File, relative to this one.")
-    srdf: str | None = Field(
-        default=None,
-        description="File with the pairs of links that are not held apart. Default: "
-        "links joined by one joint are not.",
-    )
-    package_dirs: list[str] = Field(
-        default=[], description="Folders where package:// is looked for."
-    )
-    lock: dict[str, Number] = Field(
-        default={}, description="Joints that stand still, in the URDF's units [rad, m]."
-    )
-    group: str | None = Field(
-        default=None,
-        description="Group of the SRDF whose joints a trajectory moves; the others "
-        "stand where lock says, or at 0. Default: all move that are not locked.",
-    )
-    bodies: MeshCover | None = Field(
-        default=None,
-        description="What stands for the mesh of a link: its hull, hulls of parts of "
-        "it, or a ball, capsule or box around it (primitives). Default: hull.",
-    )
-    parts: int | None = Field(
-        default=None, ge=1, le=MAX_PARTS, description="Hulls of one mesh, with parts."
-    )
-    joint_limits: str | None = Field(
-        default=None, description="A joint_limits.yaml of MoveIt; the stricter counts."
-    )
-
-    def files(self, folder: Path) -> RobotFiles:
-        """The files that it names in a folder."""
-        optional = (self.srdf, self.joint_limits)
-        srdf, limits = (None if name is None else folder / name for name in optional)
-        return RobotFiles(
-            folder / self.urdf,
-            srdf,
-            tuple(folder / name for name in self.package_dirs),
-            self.lock,
-            self.group,
-            solids_of(self.bodies, self.parts),
-            limits,
-        )
-
-
-class CellModel(SceneModel):
-    """What a motion of a robot is held to."""
-
-    vdsm_problem: Annotated[Literal[1], BeforeValidator(not_bool)] = Field(
-        description="Version of this format."
-    )
-    name: Name | None = Field(default=None, description="Default: the robot's.")
-    robot: RobotModel = Field(description="In place of a manipulator.")
-    base: BasePoseModel = Field(
-        default=BasePoseModel(),
-        description="Where the root link is. Default: at the origin.",
-    )
-    obstacles: list[MovableModel] = Field(default=[], description="Solids to avoid.")
-    required_clearance: NotNegative = Field(
-        description="Between the surfaces of links and obstacles [length_unit]."
-    )
-    required_self_clearance: NotNegative = Field(
-        default=0.0, description="Between links that are held apart [length_unit]."
-    )
 
 
 def read_cell(path: Path) -> Cell:
@@ -272,44 +128,38 @@ def read_cell(path: Path) -> Cell:
     Raises:
         InvalidFile: If the file or one that it names breaks its contract.
     """
-    document = read_yaml(read_text(path, limit=MAX_BYTES), file=path)
-    try:
-        model = CellModel.model_validate(document.data)
-    except ValidationError as error:
-        raise first_error(error, document) from None
-    folder = path.parent
-    robot_files = model.robot.files(folder)
-    robot = robot_files.read()
-    rotation = rotation_from_rpy(np.radians(model.base.rpy_deg))
-    frame = Frame(model.length_unit, rotation, np.array(model.base.position))
-    builder = ObstacleBuilder(document, folder, frame, _size(robot), sha256())
-    scene = Scene(builder.build_all(model.obstacles, ("obstacles",)))
-    check_judged(document, scene)
-    required = float(frame.metres(model.required_clearance))
-    required_self = float(frame.metres(model.required_self_clearance))
-    of_files = files_of_obstacles(model.obstacles, folder)
-    files = (path, *robot_files.files, *robot.meshes)
+    file = read_cell_file(path)
+    robot = robot_of(file.robot)
+    required, required_self = file.required
     pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = rotation, frame.metres(model.base.position)
+    pose[:3, :3] = file.frame.rotation
+    pose[:3, 3] = file.frame.metres(file.model.base.position)
     return Cell(
         robot=robot,
-        scene=scene,
+        scene=file.scene(_size(robot)),
         required_clearance=required,
         required_self_clearance=required_self,
-        stated_name=model.name or "",
+        stated_name=file.model.name or "",
         T_world_base=frozen(pose),
-        source=_source(files, of_files),
+        source=file.source(robot.meshes),
     )
 
 
-def _source(
-    files: tuple[Path, ...], of_obstacles: tuple[tuple[str, Path], ...]
-) -> ProblemSource:
-    """The files that a cell was read from, the robot or the problem first."""
-    read, digest = (*files, *(file for _, file in of_obstacles)), sha256()
-    for file in read:
-        digest.update(file.read_bytes())
-    return ProblemSource(read[0], digest.hexdigest(), read[1:], of_obstacles)
+def robot_of(files: RobotFiles) -> Robot:
+    """The robot of some files.
+
+    Raises:
+        InvalidInput: If a file is bad or a value makes no sense.
+    """
+    return read_robot(
+        files.urdf,
+        files.srdf,
+        files.package_dirs,
+        files.lock,
+        files.group,
+        files.solids,
+        files.joint_limits,
+    )
 
 
 def locks(words: tuple[str, ...]) -> dict[str, float]:

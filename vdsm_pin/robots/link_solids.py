@@ -4,7 +4,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal, TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -14,44 +14,13 @@ from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.geometry.solids import BOX_CORNERS
 from vdsm_pin.io.mesh_file import read_mesh
+from vdsm_pin.robots.files import HULLS, Solids, find_mesh
 from vdsm_pin.robots.hulls import covering_hull, covering_primitive
 
 LARGEST_LINK: Final = 20.0
 """A link's mesh larger than this must be in another unit; [m]."""
 
 LinkPiece: TypeAlias = Hull | FlatCylinder
-MeshCover: TypeAlias = Literal["hull", "parts", "primitives"]
-
-PARTS: Final = 8
-"""Hulls that a mesh is covered by, where `parts` is asked for without a number."""
-
-
-@dataclass(frozen=True)
-class Solids:
-    """What stands for the collision meshes of links; other shapes count as they are.
-
-    Args:
-        cover: `hull`: the convex hull of each mesh; `parts`: hulls of groups of its
-            triangles; `primitives`: a ball, capsule or box that holds it.
-        parts: Hulls of one mesh.
-    """
-
-    cover: MeshCover = "hull"
-    parts: int = PARTS
-
-    @property
-    def words(self) -> str:
-        """For the record."""
-        meshes = {
-            "hull": "hulls of meshes",
-            "parts": f"{self.parts} hulls of groups of triangles for each mesh",
-            "primitives": "a ball, capsule or box around each mesh",
-        }
-        return f"{meshes[self.cover]}; boxes, cylinders, spheres, capsules as they are"
-
-
-HULLS: Final = Solids()
-"""The default."""
 
 
 @dataclass(frozen=True)
@@ -148,22 +117,10 @@ class LinkReader:
 
     def _found(self, link: str, name: str) -> Path:
         """The file of a mesh."""
-        beside = self.path.resolve().parent
-        if not name.startswith(("package://", "model://")):
-            places = [beside / name.removeprefix("file://")]
-        else:
-            inner = Path(name.split("://", 1)[1])
-            rest = Path(*inner.parts[1:])
-            folders = [*self.package_dirs, beside, *beside.parents]
-            places = [folder / part for folder in folders for part in (inner, rest)]
-        for place in places:
-            try:
-                if place.is_file():
-                    return place
-            except (OSError, ValueError):  # a name that no file can have
-                break
-        problem = f"mesh {name!r} is not found; say where with --package-dir"
-        raise self._invalid(link, problem)
+        if (found := find_mesh(name, self.path, self.package_dirs)) is None:
+            problem = f"mesh {name!r} is not found; say where with --package-dir"
+            raise self._invalid(link, problem)
+        return found
 
     def _invalid(self, link: str, problem: str) -> InvalidFile:
         return InvalidFile(file=self.path, problem=f"link {link!r}: {problem}")

@@ -8,7 +8,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.tree import Tree
-from vdsm_pin.robots.link_solids import HULLS, Solids
+from vdsm_pin.robots.files import HULLS, Solids
 from vdsm_pin.robots.srdf import Base
 
 

@@ -5,7 +5,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path as File
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -20,9 +20,11 @@ from vdsm_pin.io.joint_trajectory import (
 )
 from vdsm_pin.io.source import check_is_file
 from vdsm_pin.io.tables import Table, open_text
-from vdsm_pin.proof.paths import Path, cubic_path, quintic_path
 from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.units import MM_PER_M
+
+if TYPE_CHECKING:  # whoever reads waypoints alone needs no pieces
+    from vdsm_pin.proof.paths import Path
 
 UNITS: Final = {"rad": 1.0, "deg": np.pi / 180.0, "m": 1.0, "mm": 1.0 / MM_PER_M}
 MOST_TURNS: Final = 4.0 * np.pi
@@ -36,13 +38,15 @@ _COLUMN: Final = re.compile(r"(.+)_(rad|deg|mm|m)")
 _SMOOTH: Final = re.compile(r"(.+)_(velocity|acceleration)_(rad|deg|mm|m)_(s|s2)")
 
 
-def read_motion(file: File, robot: Robot, topic: str | None = None) -> JointTrajectory:
+def read_motion(
+    file: File, joints: Sequence[RobotJoint], topic: str | None = None
+) -> JointTrajectory:
     """The waypoints of a trajectory, a column for each joint that moves.
 
     Args:
         file: CSV with a column for each joint, `NAME_rad`, `NAME_deg`, `NAME_m` or
             `NAME_mm`; a JointTrajectory or RobotTrajectory as YAML or JSON; or a bag.
-        robot: Whose joints they are.
+        joints: Those that move.
         topic: Of a bag.
 
     Raises:
@@ -53,19 +57,19 @@ def read_motion(file: File, robot: Robot, topic: str | None = None) -> JointTraj
         problem = f"is no bag, so --topic {topic} has no meaning"
         raise InvalidFile(file=file, problem=problem)
     if is_bag(file):
-        found = _of_robot(file, read_bag(file, topic), robot)
+        found = _of_joints(file, read_bag(file, topic), joints)
     else:
         check_is_file(file)
         if file.suffix.lower() in ENDINGS:
-            found = _of_robot(file, read_joint_trajectory(file), robot)
+            found = _of_joints(file, read_joint_trajectory(file), joints)
         else:
-            found = _read_csv(file, robot)
-    _check_units(file, found.q, robot.joints)
+            found = _read_csv(file, joints)
+    _check_units(file, found.q, joints)
     return found
 
 
-def read_path(file: File, robot: Robot, topic: str | None = None) -> Path:
-    """A trajectory as the controller runs it; arguments as of `read_motion`.
+def read_path(file: File, robot: Robot, topic: str | None = None) -> "Path":
+    """A trajectory as the controller runs it, see `read_motion`.
 
     Straight lines between waypoints; cubic pieces where velocities and times are stated
     too, and quintic ones with accelerations.
@@ -73,7 +77,9 @@ def read_path(file: File, robot: Robot, topic: str | None = None) -> Path:
     Raises:
         InvalidFile: As `read_motion`, or if times do not rise.
     """
-    motion = read_motion(file, robot, topic)
+    from vdsm_pin.proof.paths import Path, cubic_path, quintic_path
+
+    motion = read_motion(file, robot.joints, topic)
     try:
         if motion.times is None or motion.rates is None:
             return Path(motion.q, times=motion.times)
@@ -84,13 +90,15 @@ def read_path(file: File, robot: Robot, topic: str | None = None) -> Path:
         raise InvalidFile(file=file, problem=str(error)) from None
 
 
-def _of_robot(file: File, motion: JointTrajectory, robot: Robot) -> JointTrajectory:
-    """The columns of the robot's joints, planar ones by their turn about z.
+def _of_joints(
+    file: File, motion: JointTrajectory, joints: Sequence[RobotJoint]
+) -> JointTrajectory:
+    """The columns of some joints, planar ones by their turn about z.
 
     Raises:
         InvalidFile: If one is missing.
     """
-    named = {joint.name for joint in robot.joints}
+    named = {joint.name for joint in joints}
     names = list(motion.names)
     for k, name in enumerate(names):
         joint, _, part = name.rpartition("/")
@@ -101,20 +109,20 @@ def _of_robot(file: File, motion: JointTrajectory, robot: Robot) -> JointTraject
             raise InvalidFile(file=file, problem=problem)
         if part == "yaw":
             names[k] = f"{joint}/theta"
-    missing = [joint.name for joint in robot.joints if joint.name not in names]
+    missing = [joint.name for joint in joints if joint.name not in names]
     if missing:
         problem = f"has no joint {missing[0]!r}; state its value with --lock"
         raise InvalidFile(file=file, where="joint_names", problem=problem)
-    wanted = [joint.name for joint in robot.joints]
+    wanted = [joint.name for joint in joints]
     return replace(motion, names=tuple(names)).of(wanted)
 
 
-def _read_csv(file: File, robot: Robot) -> JointTrajectory:
+def _read_csv(file: File, joints: Sequence[RobotJoint]) -> JointTrajectory:
     with open_text(file) as text:
         head = text.readline()
     names = [word.strip().strip('"') for word in re.split("[,;\t]", head.strip())]
-    columns, factors = _position_columns(file, names, robot.joints)
-    smooth = [_smooth_columns(file, names, robot.joints, *w) for w in (RATES, CHANGES)]
+    columns, factors = _position_columns(file, names, joints)
+    smooth = [_smooth_columns(file, names, joints, *w) for w in (RATES, CHANGES)]
     if smooth[1] and not smooth[0]:
         problem = "has accelerations, expected velocities too"
         raise InvalidFile(file=file, where="line 1", problem=problem)
@@ -134,7 +142,7 @@ def _read_csv(file: File, robot: Robot) -> JointTrajectory:
         for k, found in enumerate(smooth)
     ]
     return JointTrajectory(
-        tuple(joint.name for joint in robot.joints),
+        tuple(joint.name for joint in joints),
         table[:, :n] * np.array(factors),
         table[:, n] if times else None,
         parts[0],
@@ -245,7 +253,7 @@ def csv_text(motion: JointTrajectory, robot: Robot) -> str:
     return "\n".join([",".join(heads), *rows]) + "\n"
 
 
-def path_text(path: Path, robot: Robot) -> str:
+def path_text(path: "Path", robot: Robot) -> str:
     """The waypoints of straight lines as CSV."""
     names = tuple(joint.name for joint in robot.joints)
     return csv_text(JointTrajectory(names, path.knots, path.times), robot)

@@ -8,9 +8,10 @@ from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.tree import Tree
+from vdsm_pin.robots.files import HULLS, Solids
 from vdsm_pin.robots.joint_limits import read_limits
 from vdsm_pin.robots.joints import JointReader, Moving
-from vdsm_pin.robots.link_solids import HULLS, LinkReader, Solids
+from vdsm_pin.robots.link_solids import LinkReader
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.pairs import held_pairs
 from vdsm_pin.robots.srdf import Srdf

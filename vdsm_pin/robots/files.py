@@ -1,0 +1,273 @@
+"""What a robot and its cell are read from: the problem file, and which files it names.
+
+Nothing of geometry is worked out here; whoever reads a robot by itself begins here.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from hashlib import sha256
+from pathlib import Path
+from typing import Annotated, Final, Literal, TypeAlias
+
+import numpy as np
+from pydantic import BeforeValidator, Field, ValidationError
+
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.geometry.arrays import rotation_from_rpy
+from vdsm_pin.io.body_schema import MAX_PARTS
+from vdsm_pin.io.frames import Frame
+from vdsm_pin.io.motion_schema import MovableModel
+from vdsm_pin.io.obstacle_builder import ObstacleBuilder
+from vdsm_pin.io.problem_errors import first_error
+from vdsm_pin.io.problem_file import files_of_obstacles
+from vdsm_pin.io.problem_schema import BasePoseModel, not_bool
+from vdsm_pin.io.schema_types import FileModel, Name, NotNegative, Number
+from vdsm_pin.io.source import read_text
+from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
+from vdsm_pin.problem.planning_problem import ProblemSource
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.robots.scene_files import MAX_BYTES, SceneModel, check_judged
+
+MeshCover: TypeAlias = Literal["hull", "parts", "primitives"]
+
+PARTS: Final = 8
+"""Hulls that a mesh is covered by, where `parts` is asked for without a number."""
+
+
+@dataclass(frozen=True)
+class Solids:
+    """What stands for the collision meshes of links; other shapes count as they are.
+
+    Args:
+        cover: `hull`: the convex hull of each mesh; `parts`: hulls of groups of its
+            triangles; `primitives`: a ball, capsule or box that holds it.
+        parts: Hulls of one mesh.
+    """
+
+    cover: MeshCover = "hull"
+    parts: int = PARTS
+
+    @property
+    def words(self) -> str:
+        """For the record."""
+        meshes = {
+            "hull": "hulls of meshes",
+            "parts": f"{self.parts} hulls of groups of triangles for each mesh",
+            "primitives": "a ball, capsule or box around each mesh",
+        }
+        return f"{meshes[self.cover]}; boxes, cylinders, spheres, capsules as they are"
+
+
+HULLS: Final = Solids()
+"""The default."""
+
+
+def find_mesh(name: str, urdf: Path, package_dirs: tuple[Path, ...]) -> Path | None:
+    """The file of a mesh that a URDF names; None where there is none.
+
+    Args:
+        name: As the URDF has it: beside it, or `package://NAME/REST`.
+        urdf: The URDF.
+        package_dirs: Where packages are looked for first.
+    """
+    beside = urdf.resolve().parent
+    if not name.startswith(("package://", "model://")):
+        places = [beside / name.removeprefix("file://")]
+    else:
+        inner = Path(name.split("://", 1)[1])
+        rest = Path(*inner.parts[1:])
+        folders = [*package_dirs, beside, *beside.parents]
+        places = [folder / part for folder in folders for part in (inner, rest)]
+    for place in places:
+        try:
+            if place.is_file():
+                return place
+        except (OSError, ValueError):  # a name that no file can have
+            break
+    return None
+
+
+@dataclass(frozen=True)
+class RobotFiles:
+    """A robot, by files and what is said of them; as `read_robot` takes it.
+
+    Args:
+        urdf: The robot.
+        srdf: Pairs that are not held apart; None: neighbours are not.
+        package_dirs: Where `package://` is looked for.
+        lock: Joints that stand still; [rad] or [m].
+        group: Of the SRDF, whose joints alone move.
+        solids: What stands for the meshes of links.
+        joint_limits: A joint_limits.yaml.
+    """
+
+    urdf: Path
+    srdf: Path | None = None
+    package_dirs: tuple[Path, ...] = ()
+    lock: Mapping[str, float] = field(default_factory=dict)
+    group: str | None = None
+    solids: Solids = HULLS
+    joint_limits: Path | None = None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Those that it is read from, the URDF first."""
+        return (self.urdf, *filter(None, (self.srdf, self.joint_limits)))
+
+
+def solids_of(bodies: MeshCover | None, parts: int | None) -> Solids:
+    """What stands for meshes; a number of parts alone asks for parts.
+
+    Raises:
+        InvalidInput: If a number is given beside another cover.
+    """
+    cover = bodies or ("hull" if parts is None else "parts")
+    if parts is not None and cover != "parts":
+        message = f"parts is {parts} beside bodies {cover!r}, expected bodies 'parts'"
+        raise InvalidInput(message)
+    return Solids(cover, parts or PARTS)
+
+
+class RobotModel(FileModel):
+    """A robot by its URDF."""
+
+    urdf: str = Field(description="File, relative to this one.")
+    srdf: str | None = Field(
+        default=None,
+        description="File with the pairs of links that are not held apart. Default: "
+        "links joined by one joint are not.",
+    )
+    package_dirs: list[str] = Field(
+        default=[], description="Folders where package:// is looked for."
+    )
+    lock: dict[str, Number] = Field(
+        default={}, description="Joints that stand still, in the URDF's units [rad, m]."
+    )
+    group: str | None = Field(
+        default=None,
+        description="Group of the SRDF whose joints a trajectory moves; the others "
+        "stand where lock says, or at 0. Default: all move that are not locked.",
+    )
+    bodies: MeshCover | None = Field(
+        default=None,
+        description="What stands for the mesh of a link: its hull, hulls of parts of "
+        "it, or a ball, capsule or box around it (primitives). Default: hull.",
+    )
+    parts: int | None = Field(
+        default=None, ge=1, le=MAX_PARTS, description="Hulls of one mesh, with parts."
+    )
+    joint_limits: str | None = Field(
+        default=None, description="A joint_limits.yaml of MoveIt; the stricter counts."
+    )
+
+    def files(self, folder: Path) -> RobotFiles:
+        """The files that it names in a folder."""
+        optional = (self.srdf, self.joint_limits)
+        srdf, limits = (None if name is None else folder / name for name in optional)
+        return RobotFiles(
+            folder / self.urdf,
+            srdf,
+            tuple(folder / name for name in self.package_dirs),
+            self.lock,
+            self.group,
+            solids_of(self.bodies, self.parts),
+            limits,
+        )
+
+
+class CellModel(SceneModel):
+    """What a motion of a robot is held to."""
+
+    vdsm_problem: Annotated[Literal[1], BeforeValidator(not_bool)] = Field(
+        description="Version of this format."
+    )
+    name: Name | None = Field(default=None, description="Default: the robot's.")
+    robot: RobotModel = Field(description="In place of a manipulator.")
+    base: BasePoseModel = Field(
+        default=BasePoseModel(),
+        description="Where the root link is. Default: at the origin.",
+    )
+    obstacles: list[MovableModel] = Field(default=[], description="Solids to avoid.")
+    required_clearance: NotNegative = Field(
+        description="Between the surfaces of links and obstacles [length_unit]."
+    )
+    required_self_clearance: NotNegative = Field(
+        default=0.0, description="Between links that are held apart [length_unit]."
+    )
+
+
+@dataclass(frozen=True)
+class CellFile:
+    """A problem file with `robot` in place of `manipulator`, as it was read.
+
+    Args:
+        path: The file.
+        document: What it holds, for messages.
+        model: The same, checked.
+    """
+
+    path: Path
+    document: YamlDocument
+    model: CellModel
+
+    @cached_property
+    def robot(self) -> RobotFiles:
+        """The robot, by files."""
+        return self.model.robot.files(self.path.parent)
+
+    @cached_property
+    def frame(self) -> Frame:
+        """Unit of the file and pose of the root link."""
+        base = self.model.base
+        rotation = rotation_from_rpy(np.radians(base.rpy_deg))
+        return Frame(self.model.length_unit, rotation, np.array(base.position))
+
+    @property
+    def required(self) -> tuple[float, float]:
+        """Least clearance from obstacles, and between links; [m]."""
+        asked = self.model.required_clearance, self.model.required_self_clearance
+        return float(self.frame.metres(asked[0])), float(self.frame.metres(asked[1]))
+
+    def scene(self, robot_size: float) -> Scene:
+        """The obstacles in the robot's base frame.
+
+        Args:
+            robot_size: For judging the size of a mesh; [m].
+
+        Raises:
+            InvalidFile: If one breaks its contract, or is of a kind that is not judged.
+        """
+        more = self.path.parent, self.frame, robot_size, sha256()
+        builder = ObstacleBuilder(self.document, *more)
+        scene = Scene(builder.build_all(self.model.obstacles, ("obstacles",)))
+        check_judged(self.document, scene)
+        return scene
+
+    def source(self, meshes: tuple[Path, ...]) -> ProblemSource:
+        """All files that it is read from, those of links' meshes too."""
+        named = files_of_obstacles(self.model.obstacles, self.path.parent)
+        return source_of((self.path, *self.robot.files, *meshes), named)
+
+
+def read_cell_file(path: Path) -> CellFile:
+    """A problem file with `robot` in place of `manipulator`.
+
+    Raises:
+        InvalidFile: If the file breaks its contract.
+    """
+    document = read_yaml(read_text(path, limit=MAX_BYTES), file=path)
+    try:
+        return CellFile(path, document, CellModel.model_validate(document.data))
+    except ValidationError as error:
+        raise first_error(error, document) from None
+
+
+def source_of(
+    files: tuple[Path, ...], of_obstacles: tuple[tuple[str, Path], ...]
+) -> ProblemSource:
+    """The files that a cell was read from, the robot or the problem first."""
+    read, digest = (*files, *(file for _, file in of_obstacles)), sha256()
+    for file in read:
+        digest.update(file.read_bytes())
+    return ProblemSource(read[0], digest.hexdigest(), read[1:], of_obstacles)
