@@ -183,6 +183,13 @@ def test_the_way_onto_the_path_is_hardly_longer_than_the_arc(
     assert arc < length < 1.2 * arc
 
 
+@pytest.mark.parametrize("name", ["obs1", "obs2", "obs2-small"])
+def test_ways_off_the_path_need_no_larger_link_angles_than_the_path(name: str) -> None:
+    plan = plan_of(name)
+    psi, drawn = psi_deg(plan).max(axis=1), plan.trajectory.on_path
+    assert psi[~drawn].max() <= psi[drawn].max()
+
+
 def test_undrawn_stretches_are_told() -> None:
     plan = plan_of("obs2")
     assert any("from 2200.000 mm" in stretch for stretch in plan.undrawn)

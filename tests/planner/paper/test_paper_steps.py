@@ -21,7 +21,7 @@ from vdsm_pin.planner.feasibility import (
 )
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.joint_paths import slide_joints
-from vdsm_pin.planner.paper.lift import lift
+from vdsm_pin.planner.paper.lift import largest_angles, lift
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.scale import scale
 from vdsm_pin.planner.paper.solve import check_limits
@@ -110,6 +110,14 @@ def test_lifted_arms_keep_link_lengths_tip_and_rail(n_links: int, seed: int) -> 
     np.testing.assert_array_equal(centres[:, -1, 0], tip_x)
     np.testing.assert_array_equal(centres[:, 0, 1:], 0.0)
     assert (np.diff(centres[..., 0], axis=1) > 0.0).all()
+    psi = link_angles(*joint_angles(some, centres))
+    np.testing.assert_allclose(
+        largest_angles(planar, lengths), psi.max(axis=1), atol=1e-7
+    )
+    planar[3, -1] += 2.0 * lengths[-1]
+    assert np.isinf(largest_angles(planar, lengths)).tolist() == [
+        row == 3 for row in range(7)
+    ]
 
 
 @pytest.mark.parametrize(("excess", "fits"), [(-1e-12, True), (1e-9, False)])

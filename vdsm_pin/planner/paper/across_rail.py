@@ -21,6 +21,7 @@ from vdsm_pin.errors import PathBlocked
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.paper.bend_kernels import clear_bends, least_moves
 from vdsm_pin.planner.paper.danger_region import DangerRegion
+from vdsm_pin.planner.paper.lift import largest_angles
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.scale import scale
 from vdsm_pin.planner.paper.sections import VIEWS, Section, grown_by, planned_gap
@@ -208,15 +209,8 @@ class AcrossRail:
             planar = self._bent(reference[blocked], tip_x[blocked])
         except PathBlocked:
             return np.inf
-        across = np.diff(planar[:, self._ends], axis=1) / self._pieces[:, None]
-        square = 1.0 - (across**2).sum(axis=2)
-        if not (square > 0.0).all():  # a piece longer than it may be
-            return np.inf
-        along = np.sqrt(square)
-        cosine = along[:, 1:] * along[:, :-1]
-        cosine += (across[:, 1:] * across[:, :-1]).sum(axis=2)
-        angles = np.append(cosine.ravel(), along[:, 0])
-        return float(np.arccos(np.minimum(angles, 1.0)).max(initial=0.0))
+        angles = largest_angles(planar[:, self._ends], self._pieces)
+        return float(angles.max(initial=0.0))
 
 
 def across_rail(

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.errors import PathBlocked
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.detours import detour_route, first_station, path_rows
 from vdsm_pin.planner.paper.project import project
@@ -22,9 +22,9 @@ from vdsm_pin.planner.paper.shadow import Shadow
 from vdsm_pin.planner.paper.side_rules import (
     SideRule,
     anchors,
+    bends,
     choose_rule,
     slid,
-    stands,
 )
 from vdsm_pin.planner.paper.tip_path import Route
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -59,7 +59,7 @@ class AlongRail:
 
     def route(self, missing: float) -> Route:
         """Step 4."""
-        return detour_route(self.problem.path, self.region, self.stands, missing)
+        return detour_route(self.problem.path, self.region, self.bends, missing)
 
     def clearance(self, centres: FloatArray) -> float:
         """From the section, taken as endless along the rail, less the margins."""
@@ -77,9 +77,9 @@ class AlongRail:
                 planar[rows] = slid(manipulator, tip[rows], rule)
         return planar
 
-    def stands(self, points: FloatArray, side: int) -> BoolArray:
-        """Whether the arm can stand with its tip at points, on a side, (n,)."""
-        return stands(self.problem, self.forbidden, self.rules[side], points)
+    def bends(self, points: FloatArray, side: int) -> FloatArray:
+        """Largest link angle with the tip at points; infinite for none, (n,); [rad]."""
+        return bends(self.problem, self.forbidden, self.rules[side], points)
 
 
 def along_rail(

@@ -16,7 +16,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from vdsm_pin.errors import PathBlocked
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.shadow import Shadow, Visit
@@ -38,8 +38,9 @@ WIDER: Final = (0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3)
 """By how much wider than the region ways round it are tried, too, where the arm cannot
 follow the taut one; [m]."""
 
-Judge: TypeAlias = Callable[[FloatArray, int], BoolArray]
-"""(tip positions (n, 3), side) to whether the arm can stand there so, shape (n,)."""
+Judge: TypeAlias = Callable[[FloatArray, int], FloatArray]
+"""(tip positions (n, 3), side) to the largest link angle with the arm on that side,
+infinite where it cannot stand so, shape (n,); [rad]."""
 
 
 def path_rows(path: DesiredPath, start: float, region: DangerRegion) -> Rows:
@@ -145,17 +146,26 @@ def detour_route(
         reason = f"{in_mm(undrawn)} of the path cannot be drawn"
         raise PathBlocked(obstacle=region.name, reason=reason)
     start = _End(path.start, 0, path.start[None, 1:])
+    walk = _Walk(path, shadow, judge, _largest_angle(pieces, judge))
     ways: list[Rows] = []
     here = start
     for piece in pieces:
         left_at = float(ways[-1].stations[-1] if ways else piece.stations[0])
         there = _end(piece, shadow, last=False)
-        ways += [_connect(path, shadow, here, there, left_at, judge), piece]
+        ways += [_connect(walk, here, there, left_at), piece]
         here = _end(piece, shadow, last=True)
     if path.closed:
         left_at = float(ways[-1].stations[-1])
-        ways.append(_connect(path, shadow, here, start, left_at, judge))
+        ways.append(_connect(walk, here, start, left_at))
     return join(path, ways, (note,) if note else ())
+
+
+def _largest_angle(rows: list[Rows], judge: Judge) -> float:
+    """Largest link angle where the arm bends round the region; [rad]."""
+    angles = [
+        judge(some.points[some.side == side], side) for some in rows for side in (1, -1)
+    ]
+    return float(np.concatenate(angles).max(initial=0.0))
 
 
 def _drawable(rows: Rows, shadow: Shadow, judge: Judge) -> list[Rows]:
@@ -200,11 +210,11 @@ def _sides_drawn(
     count = len(points)
     entry, exit_ = visit.entry, visit.exit
     if entry == 0 and exit_ == 0:
-        able = {side: int(judge(points, side).sum()) for side in (-1, 1)}
+        able = {side: int(np.isfinite(judge(points, side)).sum()) for side in (-1, 1)}
         entry = exit_ = max(able, key=lambda side: able[side])
     before, after = np.zeros(count, int), np.zeros(count, int)
     if entry == exit_:
-        kept = np.where(judge(points, entry), entry, 0)
+        kept = np.where(np.isfinite(judge(points, entry)), entry, 0)
         return kept, kept
     n_before = _leading(judge(points, entry)) if entry else 0
     n_after = _leading(judge(points, exit_)[::-1]) if exit_ else 0
@@ -220,8 +230,9 @@ def _sides_drawn(
     return leaving, joining
 
 
-def _leading(able: BoolArray) -> int:
-    """How many entries are true from the beginning on."""
+def _leading(angles: FloatArray) -> int:
+    """How many entries are finite from the beginning on."""
+    able = np.isfinite(angles)
     return len(able) if able.all() else int(np.argmin(able))
 
 
@@ -251,35 +262,53 @@ def _end(rows: Rows, shadow: Shadow, last: bool) -> _End:
     return _End(rows.points[inwards][0], int(side[0]), points[: out + 1])
 
 
-def _connect(
-    path: DesiredPath,
-    shadow: Shadow,
-    begin: _End,
-    end: _End,
-    station: float,
-    judge: Judge,
-) -> Rows:
+@dataclass(frozen=True)
+class _Walk:
+    """What ways off the path have in common.
+
+    Args:
+        path: The desired path.
+        shadow: Of the region that is gone round.
+        judge: Which tip positions the arm can take on a side.
+        gentle: Largest link angle on the path, which ways should not exceed; [rad].
+    """
+
+    path: DesiredPath
+    shadow: Shadow
+    judge: Judge
+    gentle: float
+
+
+def _connect(walk: _Walk, begin: _End, end: _End, station: float) -> Rows:
     """The shortest way off the path that the arm can follow, sides kept in the shadow.
 
     From either end the tip goes round the region at once; where the arm cannot follow,
-    it first goes back along the path it can draw, out of the shadow.
+    it first goes back along the path it can draw, out of the shadow. A way that needs
+    no larger link angles than the path itself is preferred.
     """
+    region, shortest = walk.shadow.region, None
     lines = []
     for k, m in product(*map(_retreats, (begin, end))):
         out, back = begin.retreat[:k], end.retreat[:m][::-1]
         lines += [
             np.concatenate([out, line, back])
-            for line in _ways_round(shadow.region, out[-1], back[0])
+            for line in _ways_round(region, out[-1], back[0])
         ]
     lines.sort(key=lambda line: np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
     from_x, to_x = float(begin.point[0]), float(end.point[0])
     for line in lines:
-        way = off_path_rows(path, line, from_x, to_x, station)
-        side = _sides_on_way(way, shadow, begin.side, end.side, judge)
-        if side is not None:
-            return way.part(0, len(way) - 1, side)
-    reason = "the tip cannot get round it with the arm on the side it needs"
-    raise PathBlocked(obstacle=shadow.region.name, reason=reason)
+        way = off_path_rows(walk.path, line, from_x, to_x, station)
+        side = _sides_on_way(way, walk.shadow, begin.side, end.side, walk.judge)
+        if side is None:
+            continue
+        way = way.part(0, len(way) - 1, side)
+        if _largest_angle([way], walk.judge) <= walk.gentle:
+            return way
+        shortest = shortest or way
+    if shortest is None:
+        reason = "the tip cannot get round it with the arm on the side it needs"
+        raise PathBlocked(obstacle=region.name, reason=reason)
+    return shortest
 
 
 def _retreats(end: _End) -> list[int]:
@@ -319,6 +348,6 @@ def _sides_on_way(
             return None
         span = slice(visit.first, visit.last + 1)
         side[span] = needs.pop() if needs else 1
-        if not judge(way.points[span], int(side[visit.first])).all():
+        if not np.isfinite(judge(way.points[span], int(side[visit.first]))).all():
             return None
     return side

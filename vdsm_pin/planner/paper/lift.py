@@ -35,6 +35,26 @@ def lift(manipulator: Manipulator, planar: FloatArray, tip_x: FloatArray) -> Flo
     return centres
 
 
+def largest_angles(planar: FloatArray, lengths: FloatArray) -> FloatArray:
+    """Largest link angle of arms seen along X; infinite where a link is too short.
+
+    Args:
+        planar: Projected ends of the links, shape (n, k + 1, 2); [m].
+        lengths: Of the links, shape (k,); [m].
+
+    Returns:
+        Shape (n,); [rad].
+    """
+    across = np.diff(planar, axis=1) / lengths[:, None]
+    square = 1.0 - (across**2).sum(axis=2)
+    along = np.sqrt(np.maximum(square, 0.0))
+    cosines = along[:, 1:] * along[:, :-1]
+    cosines += (across[:, 1:] * across[:, :-1]).sum(axis=2)
+    least = np.minimum(cosines.min(axis=1, initial=1.0), along[:, 0])
+    angles = np.arccos(np.clip(least, -1.0, 1.0))
+    return np.where((square > 0.0).all(axis=1), angles, np.inf)
+
+
 def _refuse_gap(manipulator: Manipulator, planar: FloatArray) -> NoReturn:
     """Name the link that falls shortest of the gap it spans.
 

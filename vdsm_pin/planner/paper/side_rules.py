@@ -14,9 +14,10 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.joint_paths import chain_ratios, slide_joints
+from vdsm_pin.planner.paper.lift import largest_angles
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.region_kernels import core_gaps
 from vdsm_pin.planner.paper.sliding_kernels import standing
@@ -155,13 +156,13 @@ def least_cosine(manipulator: Manipulator) -> float:
     return float(np.cos(min(manipulator.max_link_angle, manipulator.max_joint_angle)))
 
 
-def stands(
+def bends(
     problem: PlanningProblem,
     forbidden: DangerRegion,
     rule: SideRule,
     points: FloatArray,
-) -> BoolArray:
-    """Whether links are long enough, limits and clearance kept, and no joint jumps.
+) -> FloatArray:
+    """Largest link angles where links are long enough and clear, and no joint jumps.
 
     Args:
         problem: The arm and its limits.
@@ -170,11 +171,12 @@ def stands(
         points: Tip positions that follow each other as waypoints do, (n, 3); [m].
 
     Returns:
-        Shape (n,).
+        Shape (n,), infinite where the arm cannot stand; [rad].
     """
     manipulator = problem.manipulator
-    return standing(
-        slid(manipulator, project(points), rule),
+    planar = slid(manipulator, project(points), rule)
+    able = standing(
+        planar,
         manipulator.link_lengths,
         least_cosine(manipulator),
         forbidden.corners,
@@ -182,3 +184,4 @@ def stands(
         rule.margins,
         LARGEST_SWING,
     )
+    return np.where(able, largest_angles(planar, manipulator.link_lengths), np.inf)
