@@ -27,8 +27,8 @@ PATIENCE: Final = 3.0
 """A run is ended once it has computed for so many times its usual time, and so many
 seconds: other work on the machine makes no test fail."""
 
-SILENCE: Final = 10.0
-"""It is ended after so many times as long by the clock, too: it may wait for ever."""
+SILENCE: Final = 120.0
+"""It is ended, too, after so long without computing, as it may wait for ever; [s]."""
 
 
 @dataclass(frozen=True)
@@ -97,15 +97,23 @@ def _status(folder: Path, tests: list[str], limit: float, plain: str | None) -> 
         seconds = math.ceil(limit)
         resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
         _run_tests(folder, tests, plain)
-    ends = time.monotonic() + SILENCE * limit
+    computed, ends = "", time.monotonic() + SILENCE
     while time.monotonic() < ends:
         done, status = os.waitpid(child, os.WNOHANG)
         if done:
             return abs(os.waitstatus_to_exitcode(status))
+        if computed != (now := _computed(child)):
+            computed, ends = now, time.monotonic() + SILENCE
         time.sleep(0.02)
     os.killpg(child, signal.SIGKILL)
     os.waitpid(child, 0)
     return signal.SIGKILL
+
+
+def _computed(process: int) -> str:
+    """What the system counts of the time that a process and those before computed."""
+    stat = Path(f"/proc/{process}/stat").read_text(encoding="utf-8")
+    return " ".join(stat.rpartition(")")[2].split()[11:15])
 
 
 def _run_tests(folder: Path, tests: list[str], plain: str | None) -> None:

@@ -1,5 +1,6 @@
 """Scenes of other programs: MoveIt's text, MuJoCo's worlds."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -142,6 +143,22 @@ def test_worlds_stand_where_mujoco_has_them(tmp_path: Path) -> None:
     ):
         with pytest.raises(InvalidFile, match=expected):
             read_scene(write(tmp_path, "world.xml", text), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "expected"),
+    [
+        (b"w\xff.xml", WORLD.encode(), "has a name that is not UTF-8 text"),
+        (b"w.xml", WORLD.encode().replace(b"crate", b"\xff"), "is refused by mujoco"),
+    ],
+)
+def test_names_that_are_no_text_are_refused(
+    tmp_path: Path, name: bytes, content: bytes, expected: str
+) -> None:
+    pytest.importorskip("mujoco")
+    (tmp_path / os.fsdecode(name)).write_bytes(content)
+    with pytest.raises(InvalidFile, match=expected):
+        read_scene(tmp_path / os.fsdecode(name), 1.0)
 
 
 def test_damaged_scenes_never_end_in_a_traceback(tmp_path: Path) -> None:

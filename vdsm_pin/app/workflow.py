@@ -256,9 +256,10 @@ def _judge_arm(
     aside: Path,
 ) -> tuple[str, Verification]:
     """The SHA-256 of the arm's URDF and the judgement; its tables stand aside."""
-    pairs = all_pairs(problem)
     reach = math.inf if order.all_pairs else reach_of(problem)
-    with ClearanceCsv(aside / CLEARANCE, problem, pairs, reach) as clearance:
+    # No name for all pairs: of many obstacles they would take much memory.
+    table = ClearanceCsv(aside / CLEARANCE, problem, all_pairs(problem), reach)
+    with table as clearance:
         verification = verify(
             problem,
             trajectory,

@@ -142,20 +142,24 @@ class Proving:
 
     def _merge_far(self) -> None:
         """Bring what the broad phase settled to the results of the pairs."""
-        far, task = self.broad, self.task
-        body, obstacle = np.nonzero(far.number >= 0)
+        for body in range(len(self.broad.number)):
+            self._merge_far_of(body)
+
+    def _merge_far_of(self, body: int) -> None:
+        """The same of one body; of all at once it would take much memory."""
+        far, task, best = self.broad, self.task, self.results.best
+        obstacle = np.flatnonzero(far.number[body] >= 0)
         pair, at = far.number[body, obstacle], (body, obstacle)
-        best = self.results.best
         self.results.counts[pair, CERTIFIED] += far.settled[at]
         better = far.lower[at] < best[pair, LOW]
         best[pair[better], LOW] = far.lower[at][better]
         best[pair[better], AT_LOWER] = far.at_lower[at][better]
         found = np.flatnonzero(far.upper[at] < best[pair, UP])
-        body, pair, rows = body[found], pair[found], far.at_upper[at][found]
-        corner = task.bodies.corners[task.bodies.first[body]]
-        frames = task.bodies.frame[body]
+        pair, rows = pair[found], far.at_upper[at][found]
+        corner = np.tile(task.bodies.corners[task.bodies.first[body]], (len(rows), 1))
+        frames = np.full(len(rows), task.bodies.frame[body])
         place = place_points(task.tree, self.motion, rows, frames, corner)
-        point = far.point.T[obstacle[found]]
+        point = far.point[:, obstacle[found]].T
         gap = np.linalg.norm(point - place, axis=1)
         best[pair, UP] = gap - task.bodies.radius[body] + task.rules.pad
         best[pair, AT_UPPER], best[pair, TIME] = rows, 0.0

@@ -57,7 +57,9 @@ def new_workspace(
     """
     n_joints, n_ways = task.tree.parent.size, task.ways.rest.size
     corners = int(np.diff(task.bodies.first).max(initial=1))
-    planes = np.zeros((task.pairs.body.size, HELD_AT + 3 * corners))
+    many = np.diff(task.pieces.first_piece).max(initial=0) > 1
+    held = HELD_AT + 3 * corners if many else HELD_AT
+    planes = np.zeros((task.pairs.body.size, held))
     forget(planes)
     return Workspace(
         new_rows(n_joints + 1, n_ways, task.places.way.size, block),

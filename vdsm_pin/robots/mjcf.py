@@ -23,31 +23,47 @@ def read_mjcf(file: Path) -> Scene:
         problem = "MJCF needs mujoco: pip install 'vdsm-pin[mjcf]'"
         raise InvalidFile(file=file, problem=problem)
     check_is_file(file)
-    import mujoco
-
+    if not _is_text(str(file)):
+        problem = "has a name that is not UTF-8 text, which mujoco does not open"
+        raise InvalidFile(file=file, problem=problem)
     try:
-        model = mujoco.MjModel.from_xml_path(str(file))
-    except ValueError as error:
-        problem = f"is refused by mujoco: {' '.join(str(error).split())[:200]}"
-        raise InvalidFile(file=file, problem=problem) from None
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    found = [
-        _solid(file, model, data, k)
-        for k in range(model.ngeom)
-        if model.geom_contype[k] or model.geom_conaffinity[k]
-    ]
-    try:
-        return Scene(tuple(found))
+        return Scene(tuple(_solids(file)))
     except InvalidInput as error:
         raise InvalidFile(file=file, problem=str(error)) from None
 
 
-def _solid(file: Path, model: Any, data: Any, k: int) -> Obstacle:
+def _is_text(name: str) -> bool:
+    return not any("\ud800" <= sign <= "\udfff" for sign in name)
+
+
+def _solids(file: Path) -> list[Obstacle]:
+    """What collides in the world of a file."""
+    import mujoco
+
+    try:
+        model = mujoco.MjModel.from_xml_path(str(file))
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        names = [
+            mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, k)
+            for k in range(model.ngeom)
+        ]
+    # What it cannot hold in memory, and names that are no text, end in other errors.
+    except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
+        problem = f"is refused by mujoco: {' '.join(str(error).split())[:200]}"
+        raise InvalidFile(file=file, problem=problem) from None
+    return [
+        _solid(file, model, data, k, names[k])
+        for k in range(model.ngeom)
+        if model.geom_contype[k] or model.geom_conaffinity[k]
+    ]
+
+
+def _solid(file: Path, model: Any, data: Any, k: int, name: str | None) -> Obstacle:
     import mujoco
 
     kind = mujoco.mjtGeom(model.geom_type[k]).name.removeprefix("mjGEOM_").lower()
-    name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, k) or f"{kind} {k}"
+    name = name or f"{kind} {k}"
     if model.body_weldid[model.geom_bodyid[k]] != 0:
         problem = f"geom {name!r} rides on a joint, expected a world that stands still"
         raise InvalidFile(file=file, problem=problem)

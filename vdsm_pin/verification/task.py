@@ -39,17 +39,20 @@ class ArmPairs:
         self.bodies: tuple[ArmBody, ...] = arm_bodies(arm)
         self.between: SelfPairs = self_pairs(arm, self.bodies)
         names = problem.scene.names
-        self.outer = [
-            (b, o)
-            for o, name in enumerate(names)
+        ignored = [
+            (o, b)
+            for o, name in enumerate(names if arm.ignore_pairs else ())
             for b, body in enumerate(self.bodies)
-            if not arm.ignores(body.name, name)
+            if arm.ignores(body.name, name)
         ]
+        held = np.ones((len(names), len(self.bodies)), np.bool_)
+        held[tuple(np.array(ignored, dtype=np.int64).reshape(-1, 2).T)] = False
+        # Numbers of the body and the obstacle of each pair, obstacle by obstacle.
+        self.outer: IntArray = np.argwhere(held)[:, ::-1]
         self.ignored = tuple(
-            LeftOut(body, name, "left out by the problem file")
-            for name in names
-            for body in dict.fromkeys(body.owner for body in self.bodies)
-            if arm.ignores(body, name)
+            LeftOut(body, names[o], "left out by the problem file")
+            for o, body in dict.fromkeys((o, self.bodies[b].owner) for o, b in ignored)
+            if arm.ignores(body, names[o])
         )
 
     @property
@@ -62,8 +65,7 @@ class ArmPairs:
         """The pair of each body and obstacle, -1 for none, (n_bodies, n_obstacles)."""
         shape = len(self.bodies), len(self.problem.scene.obstacles)
         found = np.full(shape, -1)
-        for pair, at in enumerate(self.outer):
-            found[at] = pair
+        found[tuple(self.outer.T)] = np.arange(len(self.outer))
         return found
 
     @property
@@ -75,9 +77,10 @@ class ArmPairs:
     def pairs(self) -> tuple[Pair, ...]:
         """Every pair as the reports name it."""
         names = self.problem.scene.names
+        own = [(body.link, self._named(b)) for b, body in enumerate(self.bodies)]
         rows = [
-            Pair(self.bodies[b].link, names[o], body=self._named(b))
-            for b, o in self.outer
+            Pair(own[b][0], names[o], body=own[b][1])
+            for b, o in zip(*self.outer.T.tolist(), strict=True)
         ]
         rows += [
             Pair(
@@ -96,8 +99,7 @@ class ArmPairs:
     def numbers(self) -> PairTable:
         """The same by numbers of bodies: the obstacles, then those of the arm."""
         problem, between = self.problem, self.between.held
-        outer = np.array(self.outer, dtype=np.int64).reshape(-1, 2)
-        n = len(problem.scene.obstacles)
+        outer, n = self.outer, len(problem.scene.obstacles)
         needed = problem.required_clearance, problem.required_self_clearance
         return PairTable(
             one=n + np.concatenate([outer[:, 0], between[:, 1]]),
