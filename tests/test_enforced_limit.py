@@ -89,4 +89,5 @@ def test_a_command_that_hangs_in_reading_ends_with_one_word(
     found = CliRunner().invoke(app, [*words, *rows, "--time-limit", "0.1"])
     assert isinstance(found.exception, OutOfTime)
     assert "the time limit of 0.1 s came first" in str(found.exception)
+    assert "no_plan.html" not in str(found.exception), "there was no time for it"
     assert not (tmp_path / "out").exists()

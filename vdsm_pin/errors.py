@@ -25,13 +25,20 @@ Messages say what, where, how much and against what; the same facts are attribut
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from vdsm_pin.text import printable
 from vdsm_pin.units import MM_PER_M, in_mm
 
 
 class VdsmError(Exception):
-    """Base of all errors raised on purpose; as text one line that can be shown."""
+    """Base of all errors raised on purpose; as text one line that can be shown.
+
+    Attributes:
+        page: A page that was written and tells more.
+    """
+
+    page: Path | None = None
 
     def __str__(self) -> str:
         """The message, which may quote a file: every sign of it can be seen."""

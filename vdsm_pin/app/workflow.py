@@ -171,6 +171,7 @@ def plan_to_folder(
         with staged(folder) as aside:
             run = PlanRun(strategy, record)
             write_no_plan(aside / NO_PLAN, source.problem, error, run)
+        error.page = folder / NO_PLAN
         raise
     plan, problem = refinement.plan, source.problem
     with staged(folder) as aside:

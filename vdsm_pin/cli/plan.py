@@ -24,7 +24,7 @@ from vdsm_pin.cli.options import (
     examples,
     family,
 )
-from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
+from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime, VdsmError
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
 from vdsm_pin.time_limit import Deadline, enforced
 
@@ -62,7 +62,7 @@ def plan(
     required is written, is called incomplete, and ends with status 1. Errors are added
     to those of the problem file; the plan keeps its clearances under them.
     """
-    from vdsm_pin.app.workflow import NO_PLAN, plan_to_folder
+    from vdsm_pin.app.workflow import plan_to_folder
     from vdsm_pin.io.problem_file import read_problem
     from vdsm_pin.kept import is_cold, note_planned
     from vdsm_pin.progress import shown
@@ -80,7 +80,6 @@ def plan(
     if limit is None:
         limit = COLD_LIMIT if is_cold() else LIMIT
     deadline, begin = Deadline.after(limit), time.monotonic()
-    page = f"see {out / NO_PLAN}"
     try:
         with enforced(deadline):
             source = read_problem(problem).under(errors)
@@ -90,18 +89,24 @@ def plan(
     except OutOfTime as error:  # which tells its time itself
         if limit == COLD_LIMIT:
             note_planned()
-        error.args = (f"no plan found: {error}; {page}",)
+        error.args = (f"no plan found: {error}{_see(error)}",)
         raise
     except NoPlanFound as error:
         note_planned()
         spent = time.monotonic() - begin
-        error.args = (f"no plan found: {error}; searched for {spent:.1f} s; {page}",)
+        said = f"no plan found: {error}; searched for {spent:.1f} s{_see(error)}"
+        error.args = (said,)
         raise
     except Infeasible as error:
-        error.args = (f"{error}; {page}",)
+        error.args = (f"{error}{_see(error)}",)
         raise
     if as_json:
         typer.echo(file.text(), nl=False)
     elif not quiet:
         show_plan(file, out)
     raise typer.Exit(PASSED if outcome(file.verdict).passed else NOT_PASSED)
+
+
+def _see(error: VdsmError) -> str:
+    """Names the page that tells of an error, where there was time to write it."""
+    return f"; see {error.page}" if error.page else ""
