@@ -9,6 +9,7 @@ from paper_figures.views import oblique
 
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.report.palette import AXES, PATH
 from vdsm_pin.simulation.closed_loop import Simulation
 from vdsm_pin.simulation.folder import BAND
 
@@ -103,4 +104,4 @@ def _labels(figure: Figure, what: str) -> None:
 
 
 def _colour(k: int) -> str:
-    return "#1463b8" if k % 2 == 0 else "#b8541a"
+    return AXES["z"] if k % 2 == 0 else PATH

@@ -15,10 +15,11 @@ from matplotlib.axes import Axes
 
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.report.palette import PATH
 
 TARGET: Final = Path(__file__).parents[1] / "docs" / "conventions.svg"
 ANGLE: Final = np.deg2rad(25.0)
-INK, LINK, TURNED = "#1f2733", "#b6bfcb", "#d9480f"
+INK, LINK, TURNED = "#1f2733", "#b6bfcb", PATH
 
 
 def _bent(alpha: float, theta: float) -> np.ndarray:

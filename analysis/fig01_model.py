@@ -13,10 +13,10 @@ from paper_figures.style import save_all
 
 from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.report.palette import AXES
 from vdsm_pin.units import MM_PER_M
 
 NAME: Final = "fig01"
-AXES: Final = {"x": "#c0392b", "y": "#2e8b57", "z": "#1f5fbf"}
 ARROW: Final = 105.0
 """Length of a drawn axis; [mm]."""
 

@@ -10,6 +10,7 @@ from paper_figures.style import save_all
 
 from vdsm_pin.arm.kinematics import link_angles, link_frames, position_angles
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.report.palette import AXES, OBSTACLE_EDGE, PATH
 
 NAME: Final = "fig02"
 ALPHA, THETA = np.deg2rad(38.0), np.deg2rad(-30.0)
@@ -32,7 +33,7 @@ def draw(runs: Runs) -> dict[str, Figure]:
     flat = np.array([tip[0], tip[1], 0.0])
     wall = np.array([0.0, tip[1], tip[2]])
     for start, end, colour, width in (
-        ((-0.6, 0.0, 0.0), (0.0, 0.0, 0.0), "#7d8aa0", 6.0),
+        ((-0.6, 0.0, 0.0), (0.0, 0.0, 0.0), OBSTACLE_EDGE, 6.0),
         ((0.0, 0.0, 0.0), tip, style.STRATEGY_COLOURS["fewest"], 6.0),
         ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), style.FAINT, 0.8),
         ((0.0, 0.0, 0.0), (0.0, 0.62, 0.0), style.FAINT, 0.8),
@@ -42,10 +43,10 @@ def draw(runs: Runs) -> dict[str, Figure]:
     for ends in ([(0.0, 0.0, 0.0), flat], [flat, tip], [tip, wall],
                  [(0.0, 0.0, 0.0), wall], [wall, (0.0, tip[1], 0.0)]):  # fmt: skip
         _line(axes, ends, style.INK, 0.6, (0, (3, 2)))
-    _arc(axes, 0.42, [1.0, 0.0, 0.0], flat, "α", "#c0392b")
-    _arc(axes, 0.62, flat, tip, "θ", "#2e8b57")
+    _arc(axes, 0.42, [1.0, 0.0, 0.0], flat, "α", AXES["x"])
+    _arc(axes, 0.62, flat, tip, "θ", AXES["y"])
     _arc(axes, 0.28, [1.0, 0.0, 0.0], tip, "ψ", "#8e44ad")
-    _arc(axes, 0.20, [0.0, 1.0, 0.0], wall, "γ", "#d9480f")
+    _arc(axes, 0.20, [0.0, 1.0, 0.0], wall, "γ", PATH)
     for word, place in (("x", (1.04, 0.0, 0.0)), ("y", (0.0, 0.66, -0.09)),
                         ("z", (0.0, 0.0, 0.67)),
                         ("link i − 1", (-0.55, -0.02, 0.08)),

@@ -14,9 +14,10 @@ from matplotlib.axes import Axes
 
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import Manipulator, built_in
+from vdsm_pin.report.palette import AXES, PATH
 
 FOLDER: Final = Path(__file__).parents[1] / "docs"
-INK, PALE, ARM, PLANE = "#1f2733", "#b6bfcb", "#d9480f", "#1c7ed6"
+INK, PALE, ARM, PLANE = "#1f2733", "#b6bfcb", PATH, AXES["z"]
 KNEE: Final = 4
 """The joint at which the arm of the chart bends."""
 

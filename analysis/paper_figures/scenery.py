@@ -19,6 +19,7 @@ from vdsm_pin.geometry.solids import HalfSpace
 from vdsm_pin.planner.paper.sections import VIEWS, section_along
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle
+from vdsm_pin.report.palette import OBSTACLE, OBSTACLE_EDGE
 from vdsm_pin.report.solids import surface
 from vdsm_pin.units import MM_PER_M
 
@@ -67,8 +68,8 @@ def draw_obstacles(
         outline(
             axes,
             silhouette,
-            facecolor=style.OBSTACLE,
-            edgecolor=style.OBSTACLE_EDGE,
+            facecolor=OBSTACLE,
+            edgecolor=OBSTACLE_EDGE,
             linewidth=0.6,
             alpha=0.55,
             zorder=zorder,
@@ -77,8 +78,8 @@ def draw_obstacles(
             outline(
                 axes,
                 ends,
-                facecolor=style.OBSTACLE,
-                edgecolor=style.OBSTACLE_EDGE,
+                facecolor=OBSTACLE,
+                edgecolor=OBSTACLE_EDGE,
                 linewidth=0.6,
                 alpha=0.6,
                 zorder=zorder,
@@ -151,8 +152,8 @@ def draw_section(axes: Axes, problem: PlanningProblem, axis: str) -> None:
     outline(
         axes,
         body.shape,
-        facecolor=style.OBSTACLE,
-        edgecolor=style.OBSTACLE_EDGE,
+        facecolor=OBSTACLE,
+        edgecolor=OBSTACLE_EDGE,
         linewidth=0.8,
         zorder=1.5,
     )

@@ -1,8 +1,7 @@
-"""One look for all figures: typography, the paper's colours, files that stay small.
+"""One look for all figures: typography, colours, files that stay small.
 
-Joint O_i, its link i and its link angle psi_i share a colour, as in the paper's
-figures: orange for the first, pink for the long links, blue for the short ones, black
-for the tip. Pink and blue run from light to dark so that neighbours can be told apart.
+Joint O_i, its link i and its link angle psi_i share a colour, that of the link in
+reports and in 3D; the tip is black.
 """
 
 from collections.abc import Mapping
@@ -18,9 +17,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 from result_files import REPORTS
+from scipy.spatial import KDTree
 
 from vdsm_pin.arm.manipulator import Manipulator
-from vdsm_pin.report.palette import oklch
+from vdsm_pin.report.palette import (
+    AXES,
+    link_colours,
+)
 
 WIDTH: Final = 7.2
 """Width of a printed figure; [inch]."""
@@ -28,24 +31,18 @@ WIDTH: Final = 7.2
 DPI: Final = 150
 """Resolution of the PNG pictures; [dots per inch]."""
 
-PNG_COLOURS: Final = 256
+PNG_COLOURS: Final = 128
 """Palette size of the PNG pictures, enough for line drawings; [-]."""
-
-NEAR_TINT: Final = 24
-"""A palette's colour this near to a shared tint stands for it, red, green and blue
-together; [-]."""
 
 INK: Final = "#1d2129"
 FAINT: Final = "#9aa1ab"
 GRID: Final = "#e4e7eb"
-OBSTACLE: Final = "#8fd3cf"
-OBSTACLE_EDGE: Final = "#3d8f8a"
 DANGER: Final = "#dff3e2"
 DANGER_EDGE: Final = "#3f9a52"
-AUXILIARY: Final = "#d62828"
-LIMIT: Final = "#d62828"
+AUXILIARY: Final = AXES["x"]
+LIMIT: Final = AXES["x"]
 TIP: Final = "#111111"
-STRATEGY_COLOURS: Final = {"paper": "#6a6f7a", "fewest": "#1463b8"}
+STRATEGY_COLOURS: Final = {"paper": "#6a6f7a", "fewest": AXES["z"]}
 
 _SETTINGS: Final[dict[str, Any]] = {
     "font.family": "sans-serif",
@@ -109,15 +106,8 @@ def place(
 
 
 def key_colours(manipulator: Manipulator) -> tuple[str, ...]:
-    """Colours of O_1..O_{N+1}: orange, pink, two blues, black."""
-    n_pink = max(manipulator.n_links - 3, 0)
-    pink = [
-        oklch(0.80 - 0.36 * k / max(n_pink - 1, 1), 0.125 + 0.02 * (k % 2), 350 - 5 * k)
-        for k in range(n_pink)
-    ]
-    blue = [oklch(0.68, 0.12, 245.0), oklch(0.45, 0.16, 258.0)]
-    colours = [oklch(0.72, 0.17, 58.0), *pink, *blue]
-    return (*colours[: manipulator.n_links], TIP)
+    """Colours of O_1..O_{N+1}: those of the links, and black for the tip."""
+    return (*link_colours(manipulator.n_links), TIP)
 
 
 def subscript(number: int) -> str:
@@ -150,20 +140,21 @@ def save(figure: Figure, name: str, folder: Path = REPORTS) -> None:
 
 
 def save_png(figure: Figure, file: Path) -> None:
-    """Write a PNG picture with a palette, at print resolution.
+    """Write a PNG picture with a palette of its commonest colours, at print resolution.
 
-    The tints that many figures share are the same in all of them.
+    So areas keep their exact tint, the same in all figures.
     """
     figure.savefig(file, dpi=DPI, metadata={"Software": None})
     with Image.open(file) as picture:
-        few = picture.convert("RGB").quantize(
-            PNG_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE
-        )
-    palette = np.array(few.getpalette()).reshape(-1, 3)
-    for tint in (OBSTACLE, OBSTACLE_EDGE, DANGER, DANGER_EDGE, GRID, FAINT):
-        exact = np.array([int(tint[k : k + 2], 16) for k in (1, 3, 5)])
-        off = np.abs(palette - exact).sum(axis=1)
-        if off.min() <= NEAR_TINT:
-            palette[np.argmin(off)] = exact
-    few.putpalette(palette.ravel().tolist())
+        pixels = np.asarray(picture.convert("RGB"))
+    colours, which, counts = np.unique(
+        pixels.reshape(-1, 3) @ [1 << 16, 1 << 8, 1],
+        return_inverse=True,
+        return_counts=True,
+    )
+    channels = colours[:, None] >> np.array([16, 8, 0]) & 255
+    palette = channels[np.argsort(-counts, kind="stable")[:PNG_COLOURS]]
+    nearest = KDTree(palette).query(channels)[1].astype(np.uint8)
+    few = Image.fromarray(nearest[which].reshape(pixels.shape[:2]), "P")
+    few.putpalette(palette.astype(np.uint8).ravel().tolist())
     few.save(file, optimize=True)

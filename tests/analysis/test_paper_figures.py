@@ -40,21 +40,20 @@ PANELS = {
     "fig01_model": {"fig01": 3},
     "fig02_angles": {"fig02": 1},
     "fig03_flow": {"fig03": 1},
-    "fig04_paths_free": {"fig04": 4},
+    "fig04_fig11_paths": {
+        "fig04": 4,
+        **{
+            f"{name}-{strategy}": 4 if name == "fig13" else 11
+            for name in ("fig11", "fig12", "fig12-small", "fig13")
+            for strategy in ("paper", "fewest")
+        },
+    },
     "fig05_collision": {"fig05": 6},
     "fig06_tip_path": {"fig06": 6},
     "fig07_projected_arm": {"fig07": 4},
     "fig08_step5": {"fig08": 6},
     "fig09_moving_on": {"fig09": 6},
     "fig10_holes": {"fig10": 2},
-    "fig11_paths_obs1": {"fig11-paper": 11, "fig11-fewest": 11},
-    "fig12_paths_obs2": {
-        "fig12-paper": 11,
-        "fig12-fewest": 11,
-        "fig12-small-paper": 11,
-        "fig12-small-fewest": 11,
-    },
-    "fig13_paths_obs3": {"fig13-paper": 4, "fig13-fewest": 4},
     "fig14_link_angles": {"fig14": 10},
     "fig15_local": {"fig15": 8},
     "fig16_ranges": {"fig16": 5},
@@ -87,7 +86,7 @@ def test_a_figure_has_its_panels(script: str, drawn: Drawn) -> None:
 
 
 def test_views_along_axes_are_drawn_to_scale(drawn: Drawn) -> None:
-    figure = drawn("fig11_paths_obs1")["fig11-paper"]
+    figure = drawn("fig04_fig11_paths")["fig11-paper"]
     front, side, top = figure.axes[:3]
     for axes in (front, side, top):
         axes.apply_aspect()
@@ -100,7 +99,7 @@ def test_views_along_axes_are_drawn_to_scale(drawn: Drawn) -> None:
 
 def test_side_view_draws_every_key_point_where_it_is(runs: Runs, drawn: Drawn) -> None:
     run = runs("obs1", "paper")
-    figure = drawn("fig11_paths_obs1")["fig11-paper"]
+    figure = drawn("fig04_fig11_paths")["fig11-paper"]
     colours = key_colours(run.problem.manipulator)
     lines = {line.get_color(): line for line in figure.axes[1].lines}
     for i, colour in enumerate(colours):

@@ -17,7 +17,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Moving, solid_of
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.moves import quaternion, told_moments
-from vdsm_pin.report.palette import link_colours
+from vdsm_pin.report.palette import OBSTACLE_EDGE, PATH, link_colours
 from vdsm_pin.report.solids import FINE, Surface, detail, surface
 from vdsm_pin.report.thinning import thinned
 
@@ -27,7 +27,7 @@ _POINTS, _INDICES = 34962, 34963
 _LINE: Final = 3
 _KINDS: Final = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 _Y_UP: Final = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
-_GLASS, _GREY, _DARK, _PATH = 0.42, "#8a94a6", "#3b4048", "#d9480f"
+_GLASS, _DARK = 0.42, "#3b4048"
 
 
 def glb(problem: PlanningProblem, trajectory: Trajectory, seconds: float) -> bytes:
@@ -43,7 +43,7 @@ def glb(problem: PlanningProblem, trajectory: Trajectory, seconds: float) -> byt
     clock = file.times(play_times(problem, rows, seconds))
     parts = [*_arm(file, problem, rows, clock), *_scene(file, problem, rows, clock)]
     if problem.tip_path is not None:
-        parts.append(file.line("desired path", problem.tip_path.corners, _PATH))
+        parts.append(file.line("desired path", problem.tip_path.corners, PATH))
     matrix = problem.T_world_base.T.ravel().tolist()
     base = file.node(name="base", matrix=matrix, children=parts)
     root = file.node(name=problem.name, rotation=_Y_UP, children=[base])
@@ -119,7 +119,7 @@ def _scene(
     fine, nodes = detail(len(obstacles)), []
     for one in obstacles:
         skin = surface(solid_of(one), extent, fine)
-        mesh = file.mesh(one.name, skin, _GREY, _GLASS)
+        mesh = file.mesh(one.name, skin, OBSTACLE_EDGE, _GLASS)
         nodes.append(file.node(name=one.name, mesh=mesh))
         if isinstance(one, Moving):
             own = one.carrier.path.own_times[:1].repeat(rows.n_samples)

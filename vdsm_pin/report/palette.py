@@ -1,6 +1,6 @@
-"""Colours of links, the same in plots and in 3D, and of obstacles.
+"""Colours of pages, plots, 3D and printed figures: one place for all.
 
-Each is legible on white and on the dark page.
+Those of links and of obstacles in plots are legible on white and on the dark page.
 """
 
 import math
@@ -9,6 +9,13 @@ from typing import Final
 _CHROMA: Final = 0.135
 _LIGHTNESS: Final = (0.55, 0.64)  # alternating, so that neighbours differ without hue
 _OBSTACLES: Final = (0.62, 0.57)
+OBSTACLE: Final = "#c9d0da"
+OBSTACLE_EDGE: Final = "#8791a0"
+PATH: Final = "#d9480f"
+"""The desired path, and what is pointed out."""
+AXES: Final = {"x": "#c92a2a", "y": "#2b8a3e", "z": "#1864ab"}
+"""Of frames; those of `templates/overlay.js`."""
+
 _FIRST_HUE, _LAST_HUE = 262.0, -20.0  # blue at the base, over green, to magenta
 
 

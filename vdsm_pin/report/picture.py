@@ -10,7 +10,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import HalfSpace
 from vdsm_pin.problem.scene import solid_of
 from vdsm_pin.report.moves import start_pose
-from vdsm_pin.report.palette import link_colours
+from vdsm_pin.report.palette import OBSTACLE, OBSTACLE_EDGE, PATH, link_colours
 from vdsm_pin.report.solids import surface
 from vdsm_pin.report.thinning import MOST_DRAWN, nearest_obstacles
 from vdsm_pin.verification.records import ArmVerification, Verification
@@ -59,8 +59,8 @@ def _scene(verification: Verification, scale: float, shift: FloatArray) -> list[
     return [
         f'<svg xmlns="http://www.w3.org/2000/svg" {head}',
         *(
-            f'<polygon points="{_text(scale * outline + shift)}" fill="#c9d0da" '
-            'fill-opacity=".7" stroke="#8791a0"/>'
+            f'<polygon points="{_text(scale * outline + shift)}" fill="{OBSTACLE}" '
+            f'fill-opacity=".7" stroke="{OBSTACLE_EDGE}"/>'
             for outline in _outlines(verification)
         ),
     ]
@@ -78,7 +78,7 @@ def _of_arm(verification: ArmVerification) -> str:
     parts = _scene(verification, scale, shift)
     if len(path):
         line = _text(scale * path + shift)
-        ink = 'fill="none" stroke="#d9480f" stroke-width="1.5"'
+        ink = f'fill="none" stroke="{PATH}" stroke-width="1.5"'
         parts.append(f'<polyline points="{line}" {ink}/>')
     width = max(3.0, 2.0 * arm.link_radius * scale)
     body = scale * seen + shift

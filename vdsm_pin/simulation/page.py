@@ -6,7 +6,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.report.html import rendered
-from vdsm_pin.report.palette import link_colours
+from vdsm_pin.report.palette import AXES, link_colours
 from vdsm_pin.simulation.closed_loop import SLACK, Simulation
 from vdsm_pin.simulation.plots import Curve, Plot
 from vdsm_pin.simulation.settings import Part, Settings
@@ -100,9 +100,9 @@ def _angles(found: Simulation, kind: str, offset: int) -> Plot:
 def _tensions(found: Simulation, least: float, largest: float) -> Plot:
     """Largest and least tension of any cable."""
     curves = (
-        Curve("largest", found.times, found.tensions.max(axis=1), "#c0392b"),
+        Curve("largest", found.times, found.tensions.max(axis=1), AXES["x"]),
         Curve("mean", found.times, found.tensions.mean(axis=1), "var(--accent)"),
-        Curve("least", found.times, found.tensions.min(axis=1), "#2e8b57"),
+        Curve("least", found.times, found.tensions.min(axis=1), AXES["y"]),
     )
     limits = ("largest allowed", largest), ("least held", least)
     return Plot("Tensions of the cables", "N", curves, limits)
