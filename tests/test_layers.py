@@ -37,6 +37,7 @@ LAYERS = {
     "app": 13,
     "batch": 13,
     "robots": 11,
+    "repair": 12,
     "certificate_checker": 13,
     "api": 14,
     "cli": 14,

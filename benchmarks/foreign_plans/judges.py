@@ -14,6 +14,7 @@ from vdsm_pin.errors import Infeasible
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
+from vdsm_pin.repair.robot import repair_robot
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import (
     LINKS,
@@ -22,7 +23,6 @@ from vdsm_pin.robots.judgement import (
     verify_robot,
 )
 from vdsm_pin.robots.model import Robot
-from vdsm_pin.robots.repair import repair_robot
 from vdsm_pin.verification.records import Verdict, combine
 
 DENSITIES: Final = ("0.01", "0.005", "1 deg", "1 mm")

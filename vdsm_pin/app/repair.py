@@ -1,26 +1,38 @@
-"""A robot's trajectory repaired, in a folder."""
+"""A trajectory repaired, in a folder."""
 
 import json
 from dataclasses import replace
-from typing import Final
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 from vdsm_pin import __version__
 from vdsm_pin.app.workflow import JUDGED, TRAJECTORY, VerifyOrder, verify_to_folder
+from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
+from vdsm_pin.repair.arm import RepairedArm, repair_arm
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
-from vdsm_pin.robots.cell import Cell
-from vdsm_pin.robots.repair import Repaired, repair_robot
-from vdsm_pin.robots.trajectory_files import path_text, read_path
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from vdsm_pin.repair.robot import Repaired
+    from vdsm_pin.robots.cell import Cell
 
 REPAIR: Final = "repair.json"
 
+Found: TypeAlias = "RepairedArm | Repaired"
 
-def repair_to_folder(
-    order: VerifyOrder, cell: Cell, pinned: tuple[int, ...] = ()
-) -> Repaired:
-    """Repair a robot's trajectory; trajectory.csv, repair.json and its verification.
+
+def repair_to_folder(order: VerifyOrder, pinned: tuple[int, ...] = ()) -> Found:
+    """Repair a trajectory; trajectory.csv, repair.json and its verification.
 
     The verification is of trajectory.csv as it was written.
+
+    Args:
+        order: What to repair and where to.
+        pinned: Numbers of waypoints, from 0, that stay.
 
     Raises:
         InvalidInput: If a file is bad or the folder cannot be written.
@@ -29,8 +41,10 @@ def repair_to_folder(
     inputs = [*order.read.files, order.trajectory]
     check_output_folder(order.folder)
     check_kept([order.folder / n for n in (TRAJECTORY, REPAIR, *JUDGED)], inputs)
-    path = read_path(order.trajectory, cell.robot, order.topic)
-    found = repair_robot(cell, path, pinned, order.deadline)
+    if isinstance(order.source, ProblemFile):
+        found, write = _of_arm(order, order.source, pinned)
+    else:
+        found, write = _of_robot(order, order.source, pinned)
     rows = zip(found.given.tolist(), found.moved.tolist(), strict=True)
     content = {
         "vdsm_repair": 1,
@@ -43,9 +57,38 @@ def repair_to_folder(
         ],
     }
     with staged(order.folder) as aside:
-        text = path_text(found.verification.trajectory, cell.robot)
-        (aside / TRAJECTORY).write_text(text, encoding="utf-8")
+        write(aside / TRAJECTORY)
         (aside / REPAIR).write_text(json.dumps(content, indent=1) + "\n", "utf-8")
     written = order.folder / TRAJECTORY
-    verify_to_folder(replace(order, trajectory=written, topic=None))
+    verify_to_folder(
+        replace(order, trajectory=written, topic=None, interpolation="auto")
+    )
     return found
+
+
+def _of_arm(
+    order: VerifyOrder, source: ProblemFile, pinned: tuple[int, ...]
+) -> "tuple[Found, Callable[[Path], None]]":
+    """The repaired motion of a snake arm, and what writes it."""
+    problem, read = source.problem, (order.trajectory, source.problem.manipulator)
+    trajectory = read_trajectory(*read, order.interpolation)
+    found = repair_arm(problem, trajectory, pinned, order.deadline)
+    motion = found.verification.trajectory
+    return found, partial(write_trajectory, trajectory=motion)
+
+
+def _of_robot(
+    order: VerifyOrder, cell: "Cell", pinned: tuple[int, ...]
+) -> "tuple[Found, Callable[[Path], None]]":
+    """The same of any other robot."""
+    from vdsm_pin.repair.robot import repair_robot
+    from vdsm_pin.robots.trajectory_files import path_text, read_path
+
+    path = read_path(order.trajectory, cell.robot, order.topic)
+    found = repair_robot(cell, path, pinned, order.deadline)
+    text = path_text(found.verification.trajectory, cell.robot)
+
+    def write(file: Path) -> None:
+        file.write_text(text, encoding="utf-8")
+
+    return found, write

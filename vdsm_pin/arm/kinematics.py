@@ -56,6 +56,31 @@ def link_frames(alpha: FloatArray, theta: FloatArray) -> FloatArray:
     return frames
 
 
+def tip_jacobian(
+    manipulator: Manipulator, alpha: FloatArray, theta: FloatArray
+) -> FloatArray:
+    """How the tip moves with x0, alpha1, theta1, ..
+
+    Args:
+        manipulator: The arm.
+        alpha: Yaw angles, shape (n_samples, N); [rad].
+        theta: Pitch angles, shape (n_samples, N); [rad].
+
+    Returns:
+        Shape (n_samples, 3, 1 + 2N); [-], [m/rad].
+    """
+    n, n_links = alpha.shape
+    frames = link_frames(alpha, theta)
+    centres = joint_centres(manipulator, np.zeros(n), alpha, theta)
+    arms = centres[:, -1:] - centres[:, :-1]
+    jacobian = np.zeros((n, 3, 1 + 2 * n_links))
+    jacobian[:, 0, 0] = 1.0
+    before = np.concatenate([np.tile(np.eye(3), (n, 1, 1, 1)), frames[:, :-1]], axis=1)
+    for first, axes in ((1, before[..., 2]), (2, frames[..., 1])):
+        jacobian[:, :, first::2] = np.swapaxes(np.cross(axes, arms), 1, 2)
+    return jacobian
+
+
 def joint_angles(
     manipulator: Manipulator, centres: FloatArray
 ) -> tuple[FloatArray, FloatArray]:

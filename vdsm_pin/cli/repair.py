@@ -1,6 +1,5 @@
 """`vdsm repair`."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -21,7 +20,7 @@ from vdsm_pin.cli.robot import (
     Topic,
     Urdf,
 )
-from vdsm_pin.errors import InvalidInput
+from vdsm_pin.cli.verify import read_source
 from vdsm_pin.time_limit import Deadline, enforced
 
 commands = family()
@@ -29,6 +28,7 @@ commands = family()
 
 @commands.command(
     epilog=examples(
+        "vdsm repair paper/obs1 --trajectory mine.csv --out out/mine",
         "vdsm repair cell.yaml --trajectory plan.csv --out out/cell",
         "vdsm repair --urdf ur5.urdf --srdf ur5.srdf --scene scene.yaml "
         "--trajectory plan.csv --out out/ur5",
@@ -41,7 +41,8 @@ def repair(
     problem: Annotated[
         str | None,
         typer.Argument(
-            metavar="PROBLEM", help="A problem file with robot; none with --urdf."
+            metavar="PROBLEM",
+            help="A built-in name or a problem file; none with --urdf.",
         ),
     ] = None,
     urdf: Urdf = None,
@@ -62,13 +63,15 @@ def repair(
     ] = None,
     time_limit: TimeLimit = None,
 ) -> None:
-    """Move a robot's waypoints until they are certified.
+    """Move the waypoints of a trajectory until it is certified.
 
-    Writes trajectory.csv, repair.json (how far each waypoint moved) and
-    verification.json; where no such trajectory is found, nothing, and says why.
+    Of a snake arm the tip stays on its path. Writes trajectory.csv, repair.json (how
+    far each waypoint moved) and what verify writes; where no such trajectory is found,
+    nothing, and says why.
     """
     from vdsm_pin.app.repair import repair_to_folder
     from vdsm_pin.app.workflow import VerifyOrder
+    from vdsm_pin.problem.error_boxes import ErrorBox
 
     deadline = Deadline.after(time_limit)
     options = RobotOptions(
@@ -85,32 +88,13 @@ def repair(
         joint_limits,
     )
     with enforced(deadline):
-        cell = options.cell(None if problem is None else _of_robot(problem))
+        source = read_source(problem, ErrorBox(), options, {}, topic)
         order = VerifyOrder(
-            cell, trajectory, out, context.obj, deadline=deadline, topic=topic
+            source, trajectory, out, context.obj, deadline=deadline, topic=topic
         )
-        found = repair_to_folder(order, cell, tuple(pin or ()))
+        found = repair_to_folder(order, tuple(pin or ()))
     new = int((found.given < 0).sum())
     typer.echo(
         f"certified with {len(found.moved)} waypoints, {new} of them new; moved by "
         f"{found.moved.max():.6f} rad (m) at most; wrote {out}"
     )
-
-
-def _of_robot(problem: str) -> Path:
-    """The problem file of a robot.
-
-    Raises:
-        InvalidInput: If the problem is about a snake arm.
-    """
-    from vdsm_pin.io.problem_file import ProblemOfRobot, read_problem
-
-    try:
-        read_problem(problem)
-    except ProblemOfRobot as error:
-        return Path(error.file)
-    message = (
-        f"{problem} is about a snake arm, whose motions are not repaired; "
-        "vdsm plan makes a certified one"
-    )
-    raise InvalidInput(message)

@@ -174,7 +174,7 @@ def verify(
 
     with enforced(deadline):
         order = VerifyOrder(
-            source=_read(problem, errors, of_robot, of_arm, topic),
+            source=read_source(problem, errors, of_robot, of_arm, topic),
             trajectory=trajectory,
             folder=out,
             command=context.obj,
@@ -189,7 +189,7 @@ def verify(
     raise typer.Exit(PASSED if _passes(order, said) else NOT_PASSED)
 
 
-def _read(
+def read_source(
     problem: str | None,
     errors: "ErrorBox",
     of_robot: RobotOptions,

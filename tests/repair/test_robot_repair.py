@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from vdsm_pin.cli import app, main
+from vdsm_pin.cli import app
 from vdsm_pin.errors import Infeasible, InvalidInput
 from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
+from vdsm_pin.repair.robot import repair_robot
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import verify_robot
-from vdsm_pin.robots.repair import repair_robot
 from vdsm_pin.robots.trajectory_files import path_text, read_path
 from vdsm_pin.robots.urdf import read_robot
 
@@ -127,13 +127,3 @@ def test_command_writes_what_verify_certifies(tmp_path: Path) -> None:
     again = ["verify", *common, str(out / "trajectory.csv"), "--out"]
     ended = CliRunner().invoke(app, [*again, str(tmp_path / "v")], obj="vdsm verify")
     assert ended.exit_code == 0, ended.output
-
-
-def test_motions_of_a_snake_arm_are_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = ["repair", "paper/obs1", "--trajectory", "t.csv", "--out", str(tmp_path)]
-    with pytest.raises(SystemExit) as ended:
-        main(words)
-    assert ended.value.code == 2
-    assert "about a snake arm" in capsys.readouterr().err

@@ -1,0 +1,143 @@
+"""Motions of a snake arm that come too near: repaired, or refused with the reason."""
+
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from vdsm_pin.arm.kinematics import joint_centres, tip_jacobian
+from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.cli import app
+from vdsm_pin.errors import Infeasible, InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.solids import Sphere
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.refinement import plan_and_verify
+from vdsm_pin.repair.arm import repair_arm
+from vdsm_pin.verification.coal_distances import coal_distances
+from vdsm_pin.verification.robot_model import load_robot
+
+ROBOT = load_robot(built_in("hrm8"))
+
+
+@cache
+def planned(name: str) -> tuple[PlanningProblem, Trajectory]:
+    problem = read_problem(name).problem
+    return problem, plan_and_verify(problem, "fewest", ROBOT).plan.trajectory
+
+
+def beside(name: str, row: int, link: int, gap: float) -> PlanningProblem:
+    """The problem with a ball above a link at a row, so far from it; [m]."""
+    problem, motion = planned(name)
+    joints = (values[row : row + 1] for values in (motion.x0, motion.alpha))
+    x0, alpha = joints
+    centres = joint_centres(problem.manipulator, x0, alpha, motion.theta[row : row + 1])
+    middle = centres[0, link : link + 2].mean(axis=0)
+    away = problem.manipulator.least_radius + 0.1 + gap
+    ball = Sphere("ball", middle + away * np.eye(3)[2], 0.1)
+    return replace(problem, scene=Scene((*problem.scene.obstacles, ball)))
+
+
+def finely(motion: Trajectory) -> Trajectory:
+    """The motion with nine moments between any two waypoints."""
+    return motion.at(np.linspace(0.0, motion.n_samples - 1.0, 9 * motion.n_samples))
+
+
+@pytest.mark.parametrize("name", ["paper/obs1", "paper/obs2", "paper/obs3"])
+def test_larger_clearance_is_reached(name: str) -> None:
+    """Samples between waypoints keep it by Coal; tip and start stay."""
+    problem, motion = planned(name)
+    asked = replace(problem, required_clearance=problem.required_clearance + 0.03)
+    found = repair_arm(asked, motion)
+    assert found.verification.verdict == "certified"
+    rows = found.verification.trajectory
+    assert rows.joints[0].tolist() == motion.joints[0].tolist()
+    assert found.given[0] == 0
+    assert 0.0 < found.moved.max() < 0.2
+    near = coal_distances(ROBOT, asked, finely(rows), 0.05)
+    least = min(chunk.distance.min() for chunk in near)
+    assert least >= asked.required_clearance - 5e-6
+
+
+def test_clear_motion_stays() -> None:
+    problem, motion = planned("paper/obs1")
+    found = repair_arm(problem, motion)
+    assert found.verification.trajectory is motion
+    assert found.given.tolist() == list(range(motion.n_samples))
+    assert not found.moved.any()
+
+
+def test_ball_that_is_grazed_is_passed() -> None:
+    problem = beside("paper/obs2", 700, 3, -0.002)
+    found = repair_arm(problem, planned("paper/obs2")[1])
+    assert found.verification.verdict == "certified"
+    assert found.verification.coverage == pytest.approx(1.0, abs=1e-12)
+
+
+def test_start_and_pinned_waypoints_in_the_way_are_named() -> None:
+    motion = planned("paper/obs2")[1]
+    for row, pinned in ((0, ()), (700, (700,))):
+        words = f"waypoint {row} stays, and there the arm is .* mm nearer than required"
+        with pytest.raises(Infeasible, match=words):
+            repair_arm(beside("paper/obs2", row, 3, -0.002), motion, pinned)
+    with pytest.raises(InvalidInput, match="pinned waypoint is 9999, expected 0 to"):
+        repair_arm(planned("paper/obs2")[0], motion, (9999,))
+
+
+def test_ball_on_the_desired_path_is_refused() -> None:
+    """The tip has to go there."""
+    problem, motion = planned("paper/obs1")
+    row = int(np.flatnonzero(motion.on_path)[len(motion.x0) // 2])
+    ball = Sphere("ball", problem.path.at(motion.path_m[row : row + 1])[0], 0.05)
+    asked = replace(problem, scene=Scene((ball,)))
+    with pytest.raises(Infeasible):
+        repair_arm(asked, motion)
+
+
+def test_smooth_motion_is_refused() -> None:
+    problem, motion = planned("paper/obs1")
+    times = np.arange(float(motion.n_samples))
+    smooth = replace(motion, times=times, rates=np.zeros_like(motion.joints))
+    with pytest.raises(InvalidInput, match="straight lines"):
+        repair_arm(problem, smooth)
+
+
+def test_jacobian_agrees_with_differences() -> None:
+    arm, h = built_in("hrm8"), 1e-6
+    q = np.random.default_rng(3).uniform(-0.6, 0.6, (5, 17))
+
+    def tips(q: FloatArray) -> FloatArray:
+        return joint_centres(arm, q[:, 0], q[:, 1::2], q[:, 2::2])[:, -1]
+
+    J = tip_jacobian(arm, q[:, 1::2], q[:, 2::2])
+    for k, step in enumerate(h * np.eye(17)):
+        expected = (tips(q + step) - tips(q - step)) / (2.0 * h)
+        np.testing.assert_allclose(J[:, :, k], expected, atol=1e-8)
+
+
+def test_command_repairs_what_it_is_given(tmp_path: Path) -> None:
+    """A file with a larger clearance; how far each waypoint moved is told."""
+    problem, motion = planned("paper/obs3")
+    text = read_problem("paper/obs3").path.read_text(encoding="utf-8")
+    assert "required_clearance: 3.5" in text
+    file, given, out = tmp_path / "p.yaml", tmp_path / "t.csv", tmp_path / "out"
+    file.write_text(text.replace("required_clearance: 3.5", "required_clearance: 33.5"))
+    write_trajectory(given, motion)
+    words = ["repair", str(file), "--trajectory", str(given), "--out", str(out)]
+    ended = CliRunner().invoke(app, words, obj="vdsm repair")
+    assert ended.exit_code == 0, ended.output
+    assert "certified with" in ended.output
+    rows = read_trajectory(out / "trajectory.csv", problem.manipulator)
+    waypoints = json.loads((out / "repair.json").read_text())["waypoints"]
+    moved = np.abs(rows.joints - motion.joints).max(axis=1)
+    np.testing.assert_allclose([one["moved"] for one in waypoints], moved, atol=1e-9)
+    verdict = json.loads((out / "verification.json").read_text())["verdict"]
+    assert verdict == "certified"

@@ -1,0 +1,1 @@
+"""A certified motion near one that is not."""
