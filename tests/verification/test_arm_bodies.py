@@ -33,7 +33,8 @@ from vdsm_pin.problem import scene
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
+from vdsm_pin.verification.certificate_lines import Hashes
+from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_bodies import coal_bodies, distance_request, measure
 from vdsm_pin.verification.records import ClearanceChunk, Pair, Verdict

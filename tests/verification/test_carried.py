@@ -18,7 +18,8 @@ from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.io.problem_file import ProblemFile, read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
+from vdsm_pin.verification.certificate_lines import Hashes
+from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify

@@ -24,7 +24,8 @@ from vdsm_pin.report.facts import verification_file
 from vdsm_pin.report.html import write_report
 from vdsm_pin.report.run_record import RunRecord
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.verification.certificate_writer import Hashes, write_certificate
+from vdsm_pin.verification.certificate_lines import Hashes
+from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.records import ClearanceChunk, Verdict, Verification
 from vdsm_pin.verification.robot_model import load_robot

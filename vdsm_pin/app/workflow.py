@@ -21,6 +21,7 @@ from vdsm_pin.io.trajectory_file import (
     read_trajectory,
     write_trajectory,
 )
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem, ProblemSource
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import step
@@ -52,6 +53,7 @@ from vdsm_pin.verification.verify import verify
 
 if TYPE_CHECKING:  # whoever verifies an arm needs no robots
     from vdsm_pin.robots.cell import Cell
+    from vdsm_pin.verification.certificate_lines import Hashes
 
 TRAJECTORY: Final = "trajectory.csv"
 PLAN: Final = "plan.json"
@@ -321,22 +323,40 @@ def _certify(order: VerifyOrder, verification: Verification, record: RunRecord) 
         return "not asked for"
     if verification.verdict is not Verdict.CERTIFIED:
         return "no proof"
-    assert isinstance(verification, ArmVerification)
+    if not isinstance(verification, ArmVerification):
+        from vdsm_pin.robots.certificate import NO_ERRORS
+
+        if verification.errors != ErrorBox():
+            return NO_ERRORS
     # Imported by those who ask for one: its schema takes a while to build.
-    from vdsm_pin.verification.certificate_writer import (
-        Hashes,
-        write_certificate,
-    )
+    from vdsm_pin.verification.certificate_lines import Hashes
 
     hashes = Hashes(
         problem=record.problem_sha256,
         trajectory=record.trajectory_sha256,
     )
     try:
-        write_certificate(order.certificate, verification, hashes, order.deadline)
+        _write_certificate(order, order.certificate, verification, hashes)
     except OutOfTime as error:
         return str(error)
     return ""
+
+
+def _write_certificate(
+    order: VerifyOrder, path: Path, verification: Verification, hashes: "Hashes"
+) -> None:
+    """The certificate of an arm's motion, or of a robot's."""
+    if isinstance(verification, ArmVerification):
+        from vdsm_pin.verification.certificate_writer import write_certificate
+
+        write_certificate(path, verification, hashes, order.deadline)
+        return
+    from vdsm_pin.robots.certificate import write_robot_certificate
+    from vdsm_pin.robots.judgement import RobotVerification
+
+    assert isinstance(verification, RobotVerification)
+    topic = order.topic
+    write_robot_certificate(path, verification, hashes, topic, order.deadline)
 
 
 def _record(order: VerifyOrder, urdf_sha256: str) -> RunRecord:

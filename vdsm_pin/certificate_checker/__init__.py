@@ -1,8 +1,9 @@
-"""Rechecks certificates in ball arithmetic: a program of its own, below 860 lines.
+"""Rechecks certificates in ball arithmetic: a program of its own.
 
-Read `claims.py` first: it recomputes every claim. `motion.py` bounds how far the arm
-reaches, `solids.py` how near the obstacles come, `path.py` what the tip draws;
-`program.py` reads the files and says the verdict, `balls.py` has vectors of balls.
+Read `claims.py` first: it recomputes every claim. `motion.py` bounds how far bodies
+reach, `solids.py` how near the obstacles come. `arm.py` says what the files of a snake
+arm ask about, with `rows.py` and `path.py` for what its tip draws; `robot.py` those of
+any robot. `program.py` says the verdict, `balls.py` has vectors of balls.
 """
 
 from vdsm_pin.certificate_checker.program import Outcome, check_certificate, main

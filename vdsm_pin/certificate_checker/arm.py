@@ -6,17 +6,27 @@ that carry obstacles.
 
 from collections.abc import Iterator, Mapping
 from itertools import combinations
+from pathlib import Path as File
 from typing import Any, Final
 
 import numpy as np
 
-from vdsm_pin.certificate_checker.balls import claim, column, number
+from vdsm_pin.certificate_checker.balls import belongs, claim, column, number
 from vdsm_pin.certificate_checker.motion import Branch, Path
+from vdsm_pin.certificate_checker.rows import Rows
 from vdsm_pin.certificate_checker.solids import Body, Mesh, Pair, Solid, solid
-from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Tree, hung
+from vdsm_pin.certificate_checker.tree import (
+    SLIDES,
+    TURNS,
+    Joint,
+    Tree,
+    frame_of,
+    hung,
+)
+from vdsm_pin.io.problem_file import ProblemFile
+from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.problem import scene
-from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.trajectory import Trajectory
 
 ERRORS: Final = {"joints_rad", "base", "obstacles"}
 
@@ -31,11 +41,6 @@ def arm_joints(lengths: list[float], angles: list[float], base: Any) -> list[Joi
         axis = (0, 0, 1) if k % 2 else (0, 1, 0)
         joints.append(Joint(k, TURNS, axis, place, (k, 1.0, 0.0), (error, 0.0, 0.0)))
     return joints
-
-
-def frame_of(link: int) -> int:
-    """The frame of a link from 1, or of the feed (0), which never turns."""
-    return 2 * link + 1
 
 
 def own_bodies(arm: Any) -> Iterator[Body]:
@@ -58,15 +63,26 @@ class Arm:
     """What the two files ask about, under the errors that a certificate states.
 
     Args:
-        problem: As it was read.
-        rows: As they were read.
+        file: The problem as it was read.
         header: Of the certificate.
+        trajectory: The file.
     """
 
+    judged = (
+        "clearance and pointing hold as the problem asks under the errors stated, "
+        "limits, start, goal and path without them; cables are not judged"
+    )
+
     def __init__(
-        self, problem: PlanningProblem, rows: Trajectory, header: Mapping[str, Any]
+        self, file: ProblemFile, header: Mapping[str, Any], trajectory: File
     ) -> None:
+        problem = file.problem
         self.problem, self.arm = problem, problem.manipulator
+        belongs(header, "errors joined", file.sha256, sha256_of_file(trajectory))
+        joined = header["interpolation"]
+        known = joined in ("linear", "cubic", "quintic")
+        claim(known, f"interpolation is {joined}, expected linear, cubic or quintic")
+        rows = read_trajectory(trajectory, self.arm, joined)
         self.lengths = self.arm.link_lengths.tolist()
         self.solids = [solid(one) for one in problem.scene.obstacles]
         self.meshes = {s.name: s for s in self.solids if isinstance(s, Mesh)}
@@ -91,8 +107,9 @@ class Arm:
         ]
         self._cover(dict(header["pieces"]), header["joined"])
         self.pairs = [*self._pairs()]
-        expected = [pair.names for pair in self.pairs]
-        claim(header["pairs"] == expected, "the pairs are not those of the problem")
+        self.rows = Rows(self, rows)
+        self.notes = [note for mesh in self.meshes.values() for note in mesh.notes()]
+        self.notes.append(f"{joined} pieces join the rows")
 
     def _errors(self, stated: dict[str, Any]) -> tuple[list[float], Any, Any]:
         """Errors of angles and base, and how far obstacles may be off.
@@ -103,10 +120,8 @@ class Arm:
         asked, names = self.problem.errors, [one.name for one in self.solids]
         known = set(stated["obstacles"]) == set(names)
         claim(known, "errors: the obstacles are not those of the problem")
-        angles, base = (
-            [*map(number, stated["joints_rad"])],
-            [*map(number, stated["base"])],
-        )
+        angles = [*map(number, stated["joints_rad"])]
+        base = [*map(number, stated["base"])]
         off = [[*map(number, stated["obstacles"][name])] for name in names]
         single = {one.name: (one.shift, one.turn) for one in asked.obstacles}
         least = [[asked.base, asked.base_turn]]

@@ -13,6 +13,7 @@ from vdsm_pin.certificate_checker.tree import Pose, Tree
 
 PER_METRE: Final = 10**10  # a clearance that is whole counts these parts of a metre
 AT_ONCE: Final = 4_096  # planes
+FALSE: Final = "claims {} mm, proves {} mm, required are {} mm"
 ROOM: Final = 2**20  # heights worked out at once
 
 
@@ -81,14 +82,9 @@ class Clearances:
                 some = planes[i : i + few]
                 proved = clearances(pair, some, slices).tolist()
                 for plane, found in zip(some, proved, strict=True):
-                    self.place, holds = (
-                        plane.place,
-                        pair.required <= plane.lower <= found,
-                    )
-                    told = [MM * x for x in (plane.lower, found, pair.required)]
-                    claim(
-                        holds, "claims {} mm, proves {} mm, required are {} mm", *told
-                    )
+                    self.place, least = plane.place, pair.required
+                    told = [MM * x for x in (plane.lower, found, least)]
+                    claim(least <= plane.lower <= found, FALSE, *told)
         self.waiting, self.n_settled = defaultdict(list), self.n_claims
 
 

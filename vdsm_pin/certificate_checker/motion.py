@@ -41,6 +41,11 @@ def raised(points: Points, degree: int) -> Points:
     return points
 
 
+def derivative(points: Points) -> Points:
+    """Control points of how fast a column changes."""
+    return [(b - a) * (len(points) - 1) for a, b in pairwise(points)]
+
+
 class Branch:
     """Rows of some columns of q, joined by straight lines or smooth pieces.
 
@@ -217,10 +222,9 @@ class Interval:
         bounds = []
         for points in self.controls:
             sizes, cut = [0.0] * 3, (low, high) != (0.0, 1.0)
-            orders, n = [points], len(points) - 1
-            for k in range(n, max(n - 2, 0), -1):
-                orders.append([(b - a) * k for a, b in pairwise(orders[-1])])
-            for order, values in enumerate(orders):
+            values = points
+            for order in range(min(3, len(points))):
+                values = derivative(values) if order else points
                 here = part(values, arb(low), arb(high)) if cut else values
                 sizes[order] = UP * float(reduce(arb.max, map(abs, here)))
             bounds.append(sizes)

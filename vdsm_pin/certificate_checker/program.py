@@ -9,8 +9,9 @@ with planner or verifier. The certificate itself is read here, line by line.
 import hashlib
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,20 +21,14 @@ from flint import ctx
 from vdsm_pin.certificate_checker.arm import Arm
 from vdsm_pin.certificate_checker.balls import Rejected, claim
 from vdsm_pin.certificate_checker.claims import Clearances
-from vdsm_pin.certificate_checker.rows import Rows
+from vdsm_pin.certificate_checker.robot import Robot
 from vdsm_pin.errors import InvalidFile, InvalidInput
-from vdsm_pin.io.problem_file import ProblemFile, read_problem
-from vdsm_pin.io.source import bounded_lines, check_is_file, sha256_of_file
-from vdsm_pin.io.trajectory_file import read_trajectory
-from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.io.problem_file import ProblemOfRobot, read_problem
+from vdsm_pin.io.source import bounded_lines, check_is_file
+from vdsm_pin.robots.files import read_cell_file
 from vdsm_pin.text import printable, show_everything
 
 VERSION: Final = 6
-KEYS: Final = set(
-    "vdsm_certificate problem_sha256 trajectory_sha256 versions interpolation errors "
-    "pairs pieces joined".split()
-)
 PRECISION: Final = 128
 """Bits of a ball: lengths are known to about 1e-35 m."""
 
@@ -44,30 +39,28 @@ DAMAGE: Final = (
 """What a file of another make raises where it is taken for a certificate."""
 
 
-JUDGED: Final = (
-    "clearance and pointing hold as the problem asks under the errors stated, limits, "
-    "start, goal and path without them; cables are not judged"
-)
-"""What an accepted certificate says, and what it does not."""
-
-
 @dataclass(frozen=True)
 class Outcome:
     """What a check found.
 
     Args:
-        accepted: Whether every claim holds.
+        judged: What an accepted certificate says; empty if it is not.
         reason: Empty, or the claim that fails with its interval and pair.
         n_intervals: Intervals found good.
         n_claims: Clearances recomputed and found good.
         notes: What was assumed of the meshes.
     """
 
-    accepted: bool
+    judged: str
     reason: str
     n_intervals: int
     n_claims: int
     notes: tuple[str, ...]
+
+    @property
+    def accepted(self) -> bool:
+        """Whether every claim holds."""
+        return not self.reason
 
 
 def _lines(path: Path) -> Iterator[dict[str, Any]]:
@@ -99,22 +92,16 @@ def _unique(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
     return dict(pairs)
 
 
-def _joined(header: dict[str, Any], file: Path, problem: PlanningProblem) -> Trajectory:
-    """The trajectory, its rows joined as the certificate says."""
-    version, kinds = header.get("vdsm_certificate"), ("linear", "cubic", "quintic")
-    by = f"as vdsm-pin {header.get('versions', {}).get('vdsm_pin')} writes and reads it"
-    claim(version == VERSION, f"is of version {version}, {by}; expected {VERSION}")
-    claim(set(header) == KEYS, f"has other keys than {sorted(KEYS)}")
-    joined = header["interpolation"]
-    claim(joined in kinds, f"interpolation is {joined}, expected one of {kinds}")
-    return read_trajectory(file, problem.manipulator, joined)
-
-
 class _Run:
-    """One run of the checker on an arm's certificate; `place` says where it is."""
+    """One run of the checker; `place` says where it is."""
 
-    def __init__(self, problem: ProblemFile, trajectory: Path) -> None:
-        self.problem, self.trajectory = problem, trajectory
+    def __init__(self, problem: Path, trajectory: Path) -> None:
+        self.asked: Callable[..., Arm | Robot]
+        try:
+            self.asked = partial(Arm, read_problem(problem))
+        except ProblemOfRobot:
+            self.asked = partial(Robot, read_cell_file(problem))
+        self.trajectory, self.judged = trajectory, ""
         self.parts = list[Any]()  # those that are checked, and where they are
         self.notes = list[str]()
 
@@ -123,23 +110,18 @@ class _Run:
         return self.parts[-1].place if self.parts else "header"
 
     def check(self, lines: Iterator[dict[str, Any]]) -> None:
-        header, problem = next(lines, {}), self.problem.problem
-        rows = _joined(header, self.trajectory, problem)
-        hashes = {
-            "problem": self.problem.sha256,
-            "trajectory": sha256_of_file(self.trajectory),
-        }
-        for kind, sha256 in hashes.items():
-            known = header[f"{kind}_sha256"] == sha256
-            claim(known, f"the certificate is of another {kind} file")
-        arm = Arm(problem, rows, header)
-        self.parts.append(Clearances(arm.tree, arm.path, arm.pairs))
+        header = next(lines, {})
+        version, by = header.get("vdsm_certificate"), header.get("versions", {})
+        told = f"is of version {version}, as vdsm-pin {by.get('vdsm_pin')} writes and "
+        claim(version == VERSION, told + f"reads it; expected {VERSION}")
+        asked = self.asked(header, self.trajectory)
+        expected = [pair.names for pair in asked.pairs]
+        claim(header["pairs"] == expected, "the pairs are not those of the problem")
+        self.parts.append(Clearances(asked.tree, asked.path, asked.pairs))
         self.parts[0].check(lines)
-        self.parts.append(Rows(arm, rows))
-        arm.check_outside(self.parts[0].first)
-        self.parts[1].check()
-        self.notes = [note for mesh in arm.meshes.values() for note in mesh.notes()]
-        self.notes.append(f"{rows.interpolation} pieces join the rows")
+        self.parts.append(asked.rows)
+        asked.rows.check(self.parts[0].first)
+        self.notes, self.judged = asked.notes, asked.judged
 
 
 def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Outcome:
@@ -158,7 +140,7 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
     """
     check_is_file(certificate)
     check_is_file(trajectory)
-    run, reason = _Run(read_problem(problem), trajectory), ""
+    run, reason = _Run(problem, trajectory), ""
     with ctx.workprec(PRECISION), np.errstate(all="ignore"):
         try:
             run.check(_lines(certificate))
@@ -169,7 +151,7 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
             raise InvalidFile(file=certificate, where=run.place, problem=text) from None
     first = run.parts[0] if run.parts else None
     counts = (first.n_intervals, first.n_claims) if first else (0, 0)
-    return Outcome(not reason, reason, counts[0], counts[1], tuple(run.notes))
+    return Outcome(run.judged, reason, counts[0], counts[1], tuple(run.notes))
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -189,7 +171,7 @@ def main(arguments: Sequence[str]) -> int:
         return 2
     found = f"{outcome.n_intervals} intervals, {outcome.n_claims} clearances"
     verdict = "accepted" if outcome.accepted else "rejected"
-    told = JUDGED if outcome.accepted else outcome.reason
+    told = outcome.judged if outcome.accepted else outcome.reason
     notes = "; ".join([f"{found} recomputed", *outcome.notes])
     sys.stdout.write(f"{verdict}: {told} ({notes})\n")
     return 0 if outcome.accepted else 1

@@ -5,7 +5,6 @@ from typing import Any, Final
 import numpy as np
 from flint import arb
 
-from vdsm_pin.certificate_checker.arm import Arm, frame_of
 from vdsm_pin.certificate_checker.balls import (
     MM,
     SLACK,
@@ -19,6 +18,7 @@ from vdsm_pin.certificate_checker.balls import (
 )
 from vdsm_pin.certificate_checker.motion import Interval, Slices, Sweep, part
 from vdsm_pin.certificate_checker.path import Drawing
+from vdsm_pin.certificate_checker.tree import Pose, frame_of
 from vdsm_pin.problem.planning_problem import Order, Posture
 from vdsm_pin.problem.trajectory import Trajectory
 
@@ -34,20 +34,24 @@ class Rows:
         rows: The trajectory.
     """
 
-    def __init__(self, arm: Arm, rows: Trajectory) -> None:
+    def __init__(self, arm: Any, rows: Trajectory) -> None:
         self.arm, self.rows, self.problem = arm, rows, arm.problem
         self.place, path = "header", self.problem.tip_path
         self.drawing = None if path is None else Drawing(path)
         self.ordered = path is not None and path.order is Order.AS_GIVEN
         self.link, self.last = frame_of(len(arm.lengths)), arm.lengths[-1]
 
-    def check(self) -> None:
+    def check(self, first: Pose) -> None:
         """Check them all.
+
+        Args:
+            first: The pose as the motion begins.
 
         Raises:
             Rejected: At the first thing that is not as asked; `place` says where.
         """
         (tree, path), before = self.arm.own, None
+        self.arm.check_outside(first)
         for k in range(path.size):
             self.place = f"interval {k}"
             motion = Interval(tree, path.controls(k), before)

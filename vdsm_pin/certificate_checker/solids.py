@@ -68,25 +68,15 @@ class Solid:
             pieces: As for `cut`; of a mesh the triangles under each hull. None where
                 the whole is one piece.
         """
-        groups = [[k] for k in range(len(self.points))]
         if isinstance(self, Mesh):
-            groups = [[k for one in groups for k in one]] if pieces is None else pieces
-            missing = set(range(len(self.points))) - {k for one in groups for k in one}
-            claim(not missing, f"pieces of {self.name} do not make up the whole")
-        elif pieces is not None:
-            self.cut(pieces)
-            groups = [[k] for k in range(len(self.points))]
-        several = len(groups) > 1
-        return [
-            Solid(
-                f"{self.name} part {k}" if several else self.name,
-                [self.points[np.array(group)].reshape(-1, 3)],
-                self.extent,
-                self.radius,
-                (self.disc_axis, self.disc_radius),
-            )
-            for k, group in enumerate(groups, start=1)
-        ]
+            parts = hulls(self.name, self.points, pieces)
+        else:
+            if pieces is not None:
+                self.cut(pieces)
+            parts = [*self.points]
+        disc = self.disc_axis, self.disc_radius
+        more = self.extent, self.radius, disc
+        return named_parts([Solid(self.name, [part], *more) for part in parts])
 
     def cut(self, pieces: list[Any]) -> None:
         """Take the certificate's pieces: parts of a prism, or the mesh's in its order.
@@ -117,6 +107,45 @@ def boundary(loops: Iterable[Sequence[int]]) -> dict[tuple[int, int], int]:
         for i, j in pairwise([*loop, loop[0]]):
             chain[min(i, j), max(i, j)] += (i < j) - (j < i)
     return {edge: times for edge, times in chain.items() if times}
+
+
+def hulls(name: str, corners: Any, groups: Any) -> list[Any]:
+    """Corners of hulls of groups of triangles (n, 3, 3), which are all of them."""
+    every = range(len(corners))
+    groups = [every] if groups is None else groups
+    missing = {*every} - {k for group in groups for k in group}
+    claim(not missing, f"pieces of {name} do not make up the whole")
+    found = (corners[np.array(group, dtype=int)] for group in groups)
+    return [np.unique(one.reshape(-1, 3), axis=0) for one in found]
+
+
+def named_parts(parts: "list[Solid]") -> "list[Solid]":
+    """Solids of one piece that together are one, by its name if it is one alone."""
+    for k, part in enumerate(parts if len(parts) > 1 else [], start=1):
+        part.name += f" part {k}"
+    return parts
+
+
+class Compound:
+    """Solids of one piece each, at rest on one frame, as planes count them.
+
+    Args:
+        name: Name in the certificate.
+        points: The solids.
+        order: A permutation of their numbers, or none at all for 0, 1 and so on.
+    """
+
+    def __init__(self, name: str, points: Sequence[Solid], order: Any = ()) -> None:
+        every = [*range(len(points))]
+        told = f"pieces of {name} do not make up the whole"
+        claim(sorted(order or every) == every, told)
+        self.name, self.whole = name, True
+        self.points: list[Solid] = [points[k] for k in [*order] or every]
+        self.normal, self.extent = None, max(one.extent for one in points)
+
+    def support(self, n: Any, first: int, last: int) -> float:
+        """Least n.x over the pieces first..last-1, for a unit n."""
+        return min([one.support(n, 0, 1) for one in self.points[first:last]])
 
 
 class Mesh(Solid):
@@ -203,7 +232,7 @@ class Pair(NamedTuple):
     """
 
     body: Body
-    solid: Solid
+    solid: Solid | Compound
     rest: int
     required: float
     lost: float

@@ -24,7 +24,7 @@ class Joint:
         parent: The frame that it hangs on.
         kind: FIXED, TURNS or SLIDES.
         axis: In its own frame, of any length.
-        placement: T_parent_joint, shape (4, 4); [m].
+        placement: T_parent_joint, shape (4, 4), doubles or balls; [m].
         moves: Column of q that moves it, None for none, ratio and offset: its value is
             ratio q + offset; [rad] or [m].
         errors: Of its value, and a shift and a turn of its placement; [rad] or [m].
@@ -41,7 +41,7 @@ class Joint:
     ) -> None:
         self.parent, self.kind = parent, kind
         self.column, self.ratio, self.offset = moves[0], *map(arb, moves[1:])
-        rows = [[float(x) for x in row] for row in placement]
+        rows = [[*row] for row in placement]
         self.shift = column(*(row[3] for row in rows[:3]))
         turned = [row[:3] for row in rows[:3]]
         self.rotation = None if turned == np.eye(3).tolist() else arb_mat(turned)
@@ -57,6 +57,11 @@ class Joint:
         value, moved, self.tilt = (UP * error for error in errors)
         self.turn_error = value if kind == TURNS else 0.0
         self.slip = moved + (value if kind == SLIDES else 0.0)
+
+
+def frame_of(link: int) -> int:
+    """The frame of an arm's link from 1, or of its feed (0), which never turns."""
+    return 2 * link + 1
 
 
 def hung(given: Iterable[Any], base: int, columns: int) -> list[Joint]:

@@ -22,7 +22,7 @@ def check_certificate(
     problem: Problem,
     trajectory: Annotated[
         Path,
-        typer.Argument(metavar="TRAJECTORY", help="The motion that it is about (CSV)."),
+        typer.Argument(metavar="TRAJECTORY", help="The motion that it is about."),
     ],
 ) -> None:
     """Recheck a certificate.

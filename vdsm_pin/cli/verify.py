@@ -217,7 +217,7 @@ def read_source(
     else:
         refuse_beside("an arm", {"--topic": topic})
         return arm
-    refuse_beside("a robot", of_arm)
+    refuse_beside("a robot", {k: v for k, v in of_arm.items() if k != "--certificate"})
     return of_robot.cell(path)
 
 

@@ -2,7 +2,7 @@
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, TypeAlias
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from vdsm_pin.arm.bodies import grouped
 from vdsm_pin.errors import InvalidFile
-from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, rotation_from_rpy
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.geometry.solids import BOX_CORNERS
 from vdsm_pin.io.mesh_file import read_mesh
@@ -21,6 +21,7 @@ LARGEST_LINK: Final = 20.0
 """A link's mesh larger than this must be in another unit; [m]."""
 
 LinkPiece: TypeAlias = Hull | FlatCylinder
+MeshPieces: TypeAlias = tuple[IntArray, ...] | Hull
 
 
 @dataclass(frozen=True)
@@ -31,11 +32,14 @@ class LinkReader:
         path: The URDF.
         package_dirs: Where `package://NAME/REST` is looked for.
         solids: What stands for meshes.
+        covers: By link, of each of its meshes that was read the triangles under each
+            hull, or the primitive around it.
     """
 
     path: Path
     package_dirs: tuple[Path, ...] = ()
     solids: Solids = HULLS
+    covers: dict[str, list[MeshPieces]] = field(default_factory=dict)
 
     def pieces(self, link: ET.Element) -> tuple[LinkPiece, ...]:
         """The convex pieces of a link, in its frame, which hold all of it.
@@ -81,15 +85,20 @@ class LinkReader:
                     yield Hull(ends, float(shape.get("radius", "")))
                 case "mesh":
                     corners = shift + self._triangles(link, shape) @ turn.T
-                    yield from self._cover(corners)
+                    yield from self._cover(link, corners)
 
-    def _cover(self, corners: FloatArray) -> Iterator[LinkPiece]:
+    def _cover(self, link: str, corners: FloatArray) -> Iterator[LinkPiece]:
         """Pieces that hold all triangles, shape (n, 3, 3)."""
+        covers = self.covers.setdefault(link, [])
         if self.solids.cover == "primitives":
-            yield covering_primitive(corners.reshape(-1, 3))
+            around = covering_primitive(corners.reshape(-1, 3))
+            covers.append(around)
+            yield around
             return
         count = self.solids.parts if self.solids.cover == "parts" else 1
-        for group in grouped(corners, count):
+        groups = grouped(corners, count)
+        covers.append(groups)
+        for group in groups:
             yield covering_hull(np.unique(corners[group].reshape(-1, 3), axis=0))
 
     def _triangles(self, link: str, shape: ET.Element) -> FloatArray:

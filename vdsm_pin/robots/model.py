@@ -1,11 +1,13 @@
 """A robot of any kind: a tree of joints and the solids of its links."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.files import HULLS, Solids
@@ -70,6 +72,8 @@ class Robot:
         solids: What stands for the meshes of links.
         notes: What else a reader should know, a sentence each.
         meshes: The files of its links' meshes.
+        covers: By link, of each of its meshes the triangles under each hull, or the
+            primitive around it.
     """
 
     name: str
@@ -84,6 +88,9 @@ class Robot:
     solids: Solids = HULLS
     notes: tuple[str, ...] = ()
     meshes: tuple[Path, ...] = ()
+    covers: Mapping[str, Sequence[tuple[IntArray, ...] | Hull]] = field(
+        default_factory=dict
+    )
 
     def poses(self, q: FloatArray) -> dict[str, FloatArray]:
         """T_world_link of every link at rows of q, shape (n_rows, 4, 4); [m]."""

@@ -79,6 +79,7 @@ def read_robot(
         solids=solids,
         notes=tuple(reader.notes),
         meshes=links.meshes(document),
+        covers=links.covers,
     )
 
 

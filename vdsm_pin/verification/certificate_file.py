@@ -10,7 +10,9 @@ Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Error = Annotated[FiniteFloat, Field(ge=0.0)]
 ShiftAndTurn = tuple[Error, Error]
 Pair = tuple[str, str]
+Joined = Literal["linear", "cubic", "quintic"]
 Normal = FiniteFloat
+Point = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 Plane = tuple[Number, Number, Normal, Normal, Normal, int | FiniteFloat]
 Slice = tuple[Share, Share, Annotated[list[Plane], Field(min_length=1)]]
 
@@ -37,27 +39,32 @@ class ErrorLimits(LineModel):
     )
 
 
-class HeaderLine(LineModel):
-    """Line 1."""
+class AnyHeader(LineModel):
+    """Line 1, of whatever moves."""
 
     vdsm_certificate: Literal[6] = Field(default=6, description="version of the format")
-    problem_sha256: Sha256 = Field(description="problem file and the meshes it names")
-    trajectory_sha256: Sha256 = Field(description="trajectory.csv")
+    problem_sha256: Sha256 = Field(description="problem file and all that it names")
+    trajectory_sha256: Sha256 = Field(description="the trajectory file")
     versions: dict[str, str] = Field(description="of the writer; told, not proved")
-    errors: ErrorLimits
-    interpolation: Literal["linear", "cubic", "quintic"] = Field(
+    interpolation: Joined = Field(
         description="what joins the rows: straight lines or smooth pieces"
     )
     pairs: list[Pair] = Field(
-        description="moving body, `link 1` and so on, `tool`, `feed` or the name of "
-        "what a link carries, and what it is proved clear of: an obstacle's name, or "
-        "another body at rest"
+        description="moving body, `link 1` and so on, `tool`, `feed`, the name of what "
+        "a link carries or of a robot's link, and what it is proved clear of: an "
+        "obstacle's name, or another body at rest"
     )
     pieces: dict[str, list[Number] | list[list[Number]]] = Field(
         description="numbers of a mesh's triangles, or corner numbers of a prism's, in "
         "the order in which planes count them; of a mesh on a link the triangles "
         "under each of its hulls"
     )
+
+
+class HeaderLine(AnyHeader):
+    """Line 1, of an arm."""
+
+    errors: ErrorLimits
     joined: dict[
         str,
         tuple[list[tuple[Number, Number]], list[tuple[Number, Number, Number, Number]]],
@@ -66,6 +73,34 @@ class HeaderLine(LineModel):
         "joined with], and seams, [three corners, where the edge beside them begins]; "
         "corner 3 k + i is corner i of triangle k, both from 0"
     )
+
+
+class Primitive(LineModel):
+    """A ball, capsule or box that holds a mesh: no, one or three edges."""
+
+    origin_m: Point = Field(description="a corner, in the link's frame [m]")
+    edges_m: list[Point] = Field(description="from there [m]")
+    radius_m: Error = Field(description="by which that is grown [m]")
+
+
+class LinkPieces(LineModel):
+    """What a robot's link is made of, beyond what its URDF says."""
+
+    order: list[Number] = Field(
+        description="its pieces in the order in which planes count them; empty for "
+        "that of the file"
+    )
+    meshes: list[list[Number] | Primitive] = Field(
+        description="of each of its meshes the hull over each triangle, by numbers "
+        "from 0, or what holds it; empty where each is one hull"
+    )
+
+
+class RobotHeaderLine(AnyHeader):
+    """Line 1, of any robot."""
+
+    links: dict[str, LinkPieces] = Field(description="by name, where there is any")
+    topic: str | None = Field(description="of a bag, where the trajectory is one")
 
 
 class IntervalLine(LineModel):
@@ -86,7 +121,9 @@ class LastLine(LineModel):
     sha256: Sha256 = Field(description="of all lines before")
 
 
-class CertificateLine(RootModel[HeaderLine | IntervalLine | LastLine]):
+class CertificateLine(
+    RootModel[HeaderLine | RobotHeaderLine | IntervalLine | LastLine]
+):
     """Every line of a certificate fits this."""
 
 

@@ -1,0 +1,436 @@
+"""Certificates of robots: accepted as written, refused where anything is untrue.
+
+The oracle of acceptance is the prover, that of refusal the forgery: every hash and the
+seal are made to fit again, so that only what is claimed can be wrong.
+"""
+
+import copy
+import json
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from flint import arb, ctx
+from oracles.certificate_cases import certificate_lines, write_cube
+from oracles.certificate_mutations import change_number, changes
+from oracles.certificate_oracle import sealed
+from oracles.random_robots import MESH, random_urdf
+
+from vdsm_pin.certificate_checker import Outcome, check_certificate
+from vdsm_pin.certificate_checker.robot import Joints
+from vdsm_pin.cli import main
+from vdsm_pin.errors import VerificationFailed
+from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.robots.cell import read_cell, robot_of
+from vdsm_pin.robots.certificate import write_robot_certificate
+from vdsm_pin.robots.files import RobotFiles
+from vdsm_pin.robots.judgement import RobotVerification, verify_robot
+from vdsm_pin.robots.srdf import Srdf
+from vdsm_pin.robots.trajectory_files import read_path
+from vdsm_pin.robots.urdf import read_robot
+from vdsm_pin.verification.certificate_lines import Hashes
+from vdsm_pin.verification.records import Verdict
+
+Rng = np.random.Generator
+
+URDF = """<robot name="all">
+  <link name="foot"><collision><geometry><box size="0.4 0.3 0.1"/></geometry>
+    </collision></link>
+  <link name="mast"><collision><origin xyz="0 0 0.3" rpy="0.1 0.2 0.3"/>
+    <geometry><cylinder radius="0.05" length="0.3"/></geometry></collision>
+    <collision><origin xyz="0 0.2 0.3"/><geometry><sphere radius="0.04"/></geometry>
+    </collision></link>
+  <link name="boom"><collision><origin xyz="0.4 0 0" rpy="0 1.5 0.2"/>
+    <geometry><capsule radius="0.04" length="0.5"/></geometry></collision></link>
+  <link name="tool"><collision><origin xyz="0.1 0 0" rpy="0.3 0 0.1"/>
+    <geometry><mesh filename="tool.stl" scale="0.02 0.01 0.01"/></geometry>
+    </collision></link>
+  <link name="finger"><collision><origin xyz="0.1 0 0"/>
+    <geometry><mesh filename="finger.obj" scale="0.01 0.01 -0.01"/></geometry>
+    </collision></link>
+  <joint name="turn" type="continuous"><parent link="foot"/><child link="mast"/>
+    <origin xyz="0 0 0.1"/><axis xyz="0 0 2"/></joint>
+  <joint name="lift" type="prismatic"><parent link="mast"/><child link="boom"/>
+    <origin xyz="0.2 0 0.5" rpy="0.1 0.2 0.3"/><axis xyz="0 0.1 1"/>
+    <limit lower="-0.1" upper="0.4" effort="1" velocity="0.5"/></joint>
+  <joint name="bend" type="revolute"><parent link="boom"/><child link="tool"/>
+    <origin xyz="0.8 0 0"/><axis xyz="0 1 0.2"/>
+    <limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+  <joint name="follow" type="revolute"><parent link="tool"/><child link="finger"/>
+    <origin xyz="0.3 0 0"/><axis xyz="1 1 0"/>
+    <mimic joint="bend" multiplier="-0.5" offset="0.1"/>
+    <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+</robot>
+"""
+SRDF = """<robot name="all"><virtual_joint name="roll" type="{base}"
+    parent_frame="world" child_link="foot"/>
+  <group name="arm"><chain base_link="foot" tip_link="tool"/></group>
+  <disable_collisions link1="mast" link2="boom" reason="near"/>
+  <disable_collisions link1="tool" link2="finger" reason="near"/>
+  <disable_collisions link1="boom" link2="tool" reason="near"/>
+  <disable_collisions link1="foot" link2="mast" reason="near"/></robot>
+"""
+VIRTUAL = """<robot name="random"><virtual_joint name="roll" type="{base}"
+    parent_frame="world" child_link="l0"/></robot>
+"""
+CELL: dict[str, Any] = {
+    "vdsm_problem": 1,
+    "length_unit": "mm",
+    "robot": {"urdf": "all.urdf", "srdf": "all.srdf"},
+    "base": {"position": [10, 20, 30], "rpy_deg": [0, 0, 20]},
+    "required_clearance": 5,
+    "required_self_clearance": 1,
+    "obstacles": [
+        {"name": "ball", "shape": "sphere", "center": [900, 1500, 900], "radius": 90},
+        {
+            "name": "floor",
+            "shape": "half_space",
+            "point": [0, 0, -600],
+            "normal": [0, 0.1, 1],
+        },
+        {
+            "name": "notch",
+            "shape": "prism",
+            "axis": "z",
+            "from": 1500,
+            "to": 1700,
+            "polygon": [[0, 0], [300, 0], [300, 300], [100, 100], [0, 300]],
+        },
+    ],
+}
+SINGLE = "turn", "lift", "bend"
+BASES = {
+    "fixed": (),
+    "planar": ("roll/x", "roll/y", "roll/theta"),
+    "floating": ("roll/x", "roll/y", "roll/z", "roll/yaw", "roll/pitch", "roll/roll"),
+}
+
+
+class Made:
+    """A robot's files in a folder, and a certificate of a motion."""
+
+    def __init__(self, folder: Path, base: str = "fixed", smooth: int = 0) -> None:
+        self.folder, self.cell = folder, copy.deepcopy(CELL)
+        names = (*BASES[base], *SINGLE)
+        rng = np.random.default_rng(len(names) + smooth)
+        q = np.cumsum(rng.uniform(-0.03, 0.05, (3, len(names))), axis=0)
+        parts, heads = [q], [f"{n}_{unit(n)}" for n in names]
+        if smooth:
+            heads.append("time_s")
+            parts.append(np.arange(3.0)[:, None])
+        for kind, per in (("velocity", "s"), ("acceleration", "s2"))[:smooth]:
+            heads += [f"{n}_{kind}_{unit(n)}_{per}" for n in names]
+            parts.append(rng.uniform(-0.1, 0.1, q.shape))
+        self.rows = [heads, *np.hstack(parts).tolist()]
+        self.texts = {"all.urdf": URDF, "all.srdf": SRDF.format(base=base)}
+        for mesh in ("tool.stl", "finger.obj"):
+            write_cube(folder / mesh, 5.0)
+        self.write()
+
+    def write(self) -> None:
+        for name, text in self.texts.items():
+            (self.folder / name).write_text(text)
+        (self.folder / "c.yaml").write_text(json.dumps(self.cell))
+        lines = [",".join(map(str, row)) for row in self.rows]
+        (self.folder / "t.csv").write_text("\n".join(lines) + "\n")
+
+    @property
+    def files(self) -> tuple[Path, Path]:
+        return self.folder / "c.yaml", self.folder / "t.csv"
+
+    def hashes(self) -> Hashes:
+        source = read_cell(self.files[0]).source
+        assert source is not None
+        return Hashes(source.sha256, sha256_of_file(self.files[1]))
+
+    def verified(self) -> RobotVerification:
+        self.write()
+        cell = read_cell(self.files[0])
+        return verify_robot(cell, read_path(self.files[1], cell.robot))
+
+    def is_certified(self) -> bool:
+        return self.verified().verdict is Verdict.CERTIFIED
+
+    def certified(self) -> list[Any]:
+        """The lines of the certificate, which is accepted."""
+        found = self.verified()
+        wrong = [row for row in found.checks if row.verdict is not Verdict.CERTIFIED]
+        assert not wrong, wrong
+        proof = self.folder / "good"
+        write_robot_certificate(proof, found, self.hashes())
+        outcome = check_certificate(proof, *self.files)
+        assert outcome.accepted, outcome.reason
+        return certificate_lines(proof)[:-1]
+
+    def check(self, lines: list[Any], fits: bool = True) -> Outcome:
+        """Of other lines beside the files as they are; hashes fit unless told."""
+        self.write()
+        if fits:
+            now = self.hashes()
+            lines[0] |= {
+                "problem_sha256": now.problem,
+                "trajectory_sha256": now.trajectory,
+            }
+        (self.folder / "forged").write_bytes(sealed(lines))
+        return check_certificate(self.folder / "forged", *self.files)
+
+
+def unit(joint: str) -> str:
+    return "m" if joint == "lift" or joint[-2:] in ("/x", "/y", "/z") else "rad"
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("smooth", range(3))
+def test_what_is_certified_is_accepted(tmp_path: Path, base: str, smooth: int) -> None:
+    made = Made(tmp_path, base, smooth)
+    for more in (
+        {},
+        {"bodies": "parts", "parts": 10},
+        {"bodies": "primitives"},
+        {"group": "arm", "lock": {"lift": 0.2}},
+    ):
+        if "group" in more and base != "fixed":
+            continue
+        if "group" in more:
+            heads = made.rows[0]
+            keep = [k for k, head in enumerate(heads) if not head.startswith("lift")]
+            made.rows = [[row[k] for k in keep] for row in made.rows]
+        made.cell["robot"] = CELL["robot"] | more
+        lines = made.certified()
+        joined = ("linear", "cubic", "quintic")[smooth]
+        assert lines[0]["interpolation"] == joined
+
+
+def text(old: str, new: str, file: str = "all.urdf") -> Callable[[Made], None]:
+    def change(made: Made) -> None:
+        assert old in made.texts[file]
+        made.texts[file] = made.texts[file].replace(old, new)
+
+    return change
+
+
+def cell(**more: Any) -> Callable[[Made], None]:
+    return lambda made: made.cell.update(more)
+
+
+def moved(made: Made) -> None:
+    made.rows[2][1] += 1.0
+
+
+def swollen(made: Made) -> None:
+    write_cube(made.folder / "tool.stl", 50.0)
+
+
+WRONG: dict[str, tuple[Callable[[Made], None], str]] = {
+    "origin": (text('xyz="0.8 0 0"', 'xyz="2.5 0 0"'), "claims"),
+    "axis": (text('xyz="0 1 0.2"', 'xyz="1 0 0"'), "claims"),
+    "mimic": (text('multiplier="-0.5"', 'multiplier="9"'), "claims"),
+    "offset": (text('offset="0.1"', 'offset="2"'), "claims"),
+    "shape": (text('radius="0.04" length', 'radius="0.2" length'), "claims"),
+    "cylinder": (text('radius="0.05"', 'radius="0.45"'), "claims"),
+    "scale": (text('scale="0.02', 'scale="0.2'), "claims"),
+    "turned": (text('rpy="0.1 0.2 0.3"/><axis', 'rpy="2 0.2 0.3"/><axis'), "claims"),
+    "mesh": (swollen, "claims"),
+    "limits": (text('lower="-0.1" upper="0.4"', 'lower="-0.001" upper="0"'), "limits"),
+    "rates": (text('velocity="0.5"', 'velocity="0.01"'), "the limit of its rates"),
+    "pair": (text('link1="mast" link2="boom"', 'link1="mast" link2="foot"', "all.srdf"),
+             "pairs are not those"),
+    "required": (cell(required_clearance=700), "claims"),
+    "self": (cell(required_self_clearance=700), "claims"),
+    "base": (cell(base={"position": [0, 0, -700]}), "claims|half-space"),
+    "obstacle": (
+        lambda made: made.cell["obstacles"][0].update(radius=900),
+        "claims",
+    ),
+    "other": (lambda made: made.cell["obstacles"].pop(0), "pairs are not those"),
+    "primitives": (
+        lambda made: made.cell["robot"].update(bodies="primitives"),
+        "what holds its mesh is missing",
+    ),
+    "motion": (moved, "claims|limits"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_forged_certificate_of_other_files_is_refused(
+    tmp_path: Path, what: str
+) -> None:
+    made = Made(tmp_path, "fixed", 1)
+    lines = made.certified()
+    change, reason = WRONG[what]
+    change(made)
+    made.write()
+    assert not made.check(copy.deepcopy(lines), fits=False).accepted
+    outcome = made.check(lines)
+    assert not outcome.accepted
+    assert any(word in outcome.reason for word in reason.split("|")), outcome.reason
+
+
+def lines_of(what: str, lines: list[Any]) -> None:
+    """Change one thing that is claimed."""
+    header, proofs = lines[0], lines[1]["proofs"]
+    tool = header["links"].get("tool", {})
+    match what:
+        case "a pair less":
+            header["pairs"].pop()
+            for line in lines[1:]:
+                line["proofs"].pop()
+        case "a part less":
+            tool["meshes"][0] = [max(k, 1) for k in tool["meshes"][0]]
+        case "a triangle less":
+            tool["meshes"][0].pop()
+        case "more parts":
+            tool["meshes"][0][0] = 10
+        case "no part":
+            tool["meshes"][0][0] = -1
+        case "another order":
+            tool["order"][0] = tool["order"][1]
+        case "a smaller primitive":
+            tool["meshes"][0]["radius_m"] *= 0.0
+        case "a shifted primitive":
+            tool["meshes"][0]["origin_m"][0] += 1e-3
+        case "a link more":
+            header["links"]["nobody"] = {"order": [], "meshes": []}
+        case "a mesh more":
+            header["links"]["foot"] = {"order": [], "meshes": [[[0]]]}
+        case "an interval less":
+            lines.pop()
+        case "another interpolation":
+            header["interpolation"] = "linear"
+        case "errors":
+            header["errors"] = {"joints_rad": []}
+        case "more clearance":
+            proofs[0][0][2][0][-1] += 10**9
+
+
+@pytest.mark.parametrize(
+    ("bodies", "what"),
+    [
+        *[("hull", "a pair less"), ("hull", "a link more"), ("hull", "a mesh more")],
+        *[("hull", "an interval less"), ("hull", "another interpolation")],
+        *[("hull", "errors"), ("hull", "more clearance"), ("parts", "a part less")],
+        *[
+            ("parts", "no part"),
+            ("parts", "a triangle less"),
+            ("parts", "another order"),
+        ],
+        *[("parts", "more parts"), ("primitives", "a smaller primitive")],
+        ("primitives", "a shifted primitive"),
+    ],
+)
+def test_a_forged_claim_is_refused(tmp_path: Path, bodies: str, what: str) -> None:
+    made = Made(tmp_path, "planar", 1)
+    more = {"parts": 10} if bodies == "parts" else {}
+    made.cell["robot"] = CELL["robot"] | {"bodies": bodies} | more
+    lines = made.certified()
+    lines_of(what, lines)
+    outcome = made.check(lines)
+    assert not outcome.accepted
+    assert outcome.reason
+
+
+def test_numbers_changed_at_random_are_refused_or_true(tmp_path: Path) -> None:
+    made, rng = Made(tmp_path, "floating", 2), np.random.default_rng(0)
+    lines, refused = made.certified(), 0
+    for _ in range(60):
+        forged = copy.deepcopy(lines)
+        change_number(forged, rng)
+        outcome = made.check(forged)
+        refused += not outcome.accepted
+        if outcome.accepted:  # a claim that says less, or a plane that holds as well
+            (place,) = changes(lines, forged) or [()]
+            assert place[:2] not in [(0, "links"), (0, "pieces"), (0, "pairs")]
+    assert refused > 25
+
+
+def assert_read_alike(files: RobotFiles, rng: Rng) -> None:
+    """The checker's tree stands as the package's, which Pinocchio's agrees with."""
+    robot = robot_of(files)
+    document = ET.fromstring(robot.text)
+    srdf = None if files.srdf is None else Srdf(files.srdf, document)
+    joints = Joints(files, document, srdf)
+    assert joints.moved == list(robot.joints)
+    rows = rng.uniform(-2.0, 2.0, (3, len(robot.joints)))
+    with ctx.workprec(128):
+        mine = [joints.tree.pose([arb(x) for x in row]) for row in rows.tolist()]
+    for name, poses in robot.poses(rows).items():
+        for pose, frames in zip(poses, mine, strict=True):
+            origin, turned = frames[joints.frames[name]]
+            found = np.array([[*map(float, row)] for row in turned.tolist()])
+            place = [*map(float, origin.entries())]
+            np.testing.assert_allclose(pose[:3, :3], found, rtol=0, atol=1e-13)
+            np.testing.assert_allclose(pose[:3, 3], place, rtol=0, atol=1e-13)
+
+
+def judged_at_random(folder: Path, seed: int) -> bool:
+    """Read a random robot twice; whether a motion was certified, and accepted then."""
+    rng, made = np.random.default_rng(seed), Made(folder)
+    (folder / "r.urdf").write_text(random_urdf(rng, int(rng.integers(1, 8))))
+    write_cube(folder / MESH, 5.0)
+    made.texts["all.srdf"] = VIRTUAL.format(base=rng.choice([*BASES]))
+    made.write()
+    asked = {"urdf": "r.urdf"} | ({"srdf": "all.srdf"} if rng.random() < 0.5 else {})
+    asked |= {"bodies": str(rng.choice(["hull", "parts", "primitives"]))}
+    srdf = folder / "all.srdf" if "srdf" in asked else None
+    robot = read_robot(folder / "r.urdf", srdf)
+    locked = [joint.name for joint in robot.joints if rng.random() < 0.15]
+    lock = {name: float(rng.uniform(-0.5, 0.5)) for name in locked}
+    assert_read_alike(RobotFiles(folder / "r.urdf", srdf, (), lock), rng)
+    moves = [joint for joint in robot.joints if joint.name not in lock]
+    if not moves:
+        return False
+    made.cell["robot"] = asked | {"lock": lock}
+    for _ in range(4):
+        q = rng.uniform(-0.5, 0.5, (int(rng.integers(1, 4)), len(moves)))
+        made.rows = [[f"{j.name}_{j.unit}" for j in moves], *q.tolist()]
+        if made.is_certified():
+            made.certified()
+            return True
+    return False
+
+
+def test_random_robots_are_read_alike_and_their_proofs_accepted(tmp_path: Path) -> None:
+    assert sum(judged_at_random(tmp_path, seed) for seed in range(12)) > 4
+
+
+@pytest.mark.slow
+def test_hundreds_of_random_robots(tmp_path: Path) -> None:
+    assert sum(judged_at_random(tmp_path, seed) for seed in range(300)) > 100
+
+
+def test_under_errors_nothing_is_written(tmp_path: Path) -> None:
+    made = Made(tmp_path)
+    found = replace(made.verified(), errors=ErrorBox(joint=1e-3))
+    with pytest.raises(VerificationFailed, match="errors of robots"):
+        write_robot_certificate(tmp_path / "proof", found, made.hashes())
+    assert not (tmp_path / "proof").exists()
+
+
+def test_the_commands_write_and_check_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = Made(tmp_path)
+    problem, rows = map(str, made.files)
+    proof, out = str(tmp_path / "proof"), str(tmp_path / "out")
+
+    def ends(*words: str) -> object:
+        with pytest.raises(SystemExit) as ended:
+            main(list(words))
+        return ended.value.code
+
+    verify = "verify", problem, "--trajectory", rows, "--out", out
+    assert ends(*verify, "--certificate", proof) == 0
+    assert f"certificate  {proof}" in " ".join(capsys.readouterr().out.split("\n"))
+    assert ends("check-certificate", proof, problem, rows) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("accepted: clearances, limits of joints")
+    assert "4 of 10 pairs of links left out" in said
+    moved(made)
+    made.write()
+    assert ends("check-certificate", proof, problem, rows) == 1
+    assert "of another trajectory file" in capsys.readouterr().out

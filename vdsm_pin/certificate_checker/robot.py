@@ -1,0 +1,335 @@
+"""Any robot among obstacles at rest as the checker takes it, from its own files.
+
+The URDF is read here once more; joint 0 is fixed and holds the root link.
+"""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping
+from itertools import combinations, pairwise, product
+from pathlib import Path as File
+from typing import Any, Final
+
+import numpy as np
+from flint import arb, arb_mat
+
+from vdsm_pin.arm.urdf_validator import validate_urdf
+from vdsm_pin.certificate_checker.balls import SLACK, Ball, belongs, claim
+from vdsm_pin.certificate_checker.motion import Branch, Path, Points, derivative, part
+from vdsm_pin.certificate_checker.solids import (
+    Body,
+    Compound,
+    Mesh,
+    Pair,
+    Solid,
+    hulls,
+    named_parts,
+    solid,
+)
+from vdsm_pin.certificate_checker.tree import FIXED, SLIDES, TURNS, Joint, Pose, Tree
+from vdsm_pin.io.mesh_file import read_mesh
+from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.robots.files import CellFile, RobotFiles, find_mesh
+from vdsm_pin.robots.joint_limits import Limits, read_limits, stated_limits
+from vdsm_pin.robots.model import RobotJoint
+from vdsm_pin.robots.srdf import Srdf, end
+from vdsm_pin.robots.trajectory_files import read_motion
+from vdsm_pin.robots.xacro import urdf_text
+
+X, Y, Z = np.eye(3)
+PLANE: Final = (("/x", SLIDES, X), ("/y", SLIDES, Y))
+TURN: Final = (("/yaw", TURNS, Z), ("/pitch", TURNS, Y), ("/roll", TURNS, X))
+MOVES: Final = {
+    "fixed": (("", FIXED, X),),
+    "revolute": (("", TURNS, None),),
+    "continuous": (("", TURNS, None),),
+    "prismatic": (("", SLIDES, None),),
+    "planar": (*PLANE, ("/theta", TURNS, Z)),
+    "floating": (*PLANE, ("/z", SLIDES, Z), *TURN),
+}
+"""What each type of joint is made of: suffix, movement and axis, None for its own."""
+
+CORNERS: Final = np.array([*product((-1.0, 1.0), repeat=3)])
+HALVINGS: Final = 20  # of a piece whose control points do not decide
+
+
+def numbers(words: str) -> list[float]:
+    """Those of an attribute of a URDF."""
+    return [*map(float, words.split())]
+
+
+def placed(element: ET.Element) -> list[list[Ball]]:
+    """Three rows of T_parent_element."""
+    origin = element.find("origin")
+    words = {} if origin is None else origin.attrib
+    turned = arb_mat(3, 3, 1)
+    for k, angle in enumerate(numbers(words.get("rpy", "0 0 0"))):
+        (sine, cosine), one = arb(angle).sin_cos(), arb_mat(3, 3, 1)
+        i, j = (k + 1) % 3, (k + 2) % 3
+        one[i, i] = one[j, j] = cosine
+        one[i, j], one[j, i] = -sine, sine
+        turned = one * turned
+    rows = zip(turned.tolist(), numbers(words.get("xyz", "0 0 0")), strict=True)
+    return [[*row, arb(shift)] for row, shift in rows]
+
+
+class Joints:
+    """The joints of a URDF as a tree, and which of them a trajectory moves.
+
+    Args:
+        files: Of the robot.
+        document: Its URDF.
+        srdf: Its SRDF, or None.
+    """
+
+    def __init__(self, files: RobotFiles, document: ET.Element, srdf: Any) -> None:
+        self.lock, self.moved = files.lock, list[RobotJoint]()
+        self.group = srdf.group(files.group) if files.group is not None else None
+        self.values = dict[str, tuple[int | None, float, float]]()
+        self.elements = {j.attrib["name"]: j for j in document.findall("joint")}
+        given = read_limits(files.joint_limits) if files.joint_limits else {}
+        base, still = srdf.base() if srdf else None, np.eye(4)
+        if base:
+            self._own(base.name, base.kind, Limits())
+        for name, joint in self.elements.items():
+            kind = joint.attrib["type"]
+            if kind == "fixed":
+                self.values[name] = (None, 1.0, 0.0)
+            elif len(MOVES[kind]) > 1 or joint.find("mimic") is None:
+                limits = stated_limits(joint, given.get(name, Limits()))
+                self._own(name, kind, limits)
+        self.joints = [Joint(0, FIXED, X, still, (None, 1.0, 0.0))]
+        waiting, links = [*self.elements.values()], document.findall("link")
+        (root,) = {x.get("name") for x in links} - {end(j, "child") for j in waiting}
+        self.frames = {root: self._hang(1, base.name, base.kind, still) if base else 1}
+        while waiting:
+            joint = next(j for j in waiting if end(j, "parent") in self.frames)
+            waiting.remove(joint)
+            name, kind = joint.attrib["name"], joint.attrib["type"]
+            parent, axis = self.frames[end(joint, "parent")], joint.find("axis")
+            own = numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"))
+            frame = self._hang(parent, name, kind, placed(joint), own)
+            self.frames[end(joint, "child")] = frame
+        self.tree = Tree(self.joints)
+
+    def _own(self, name: str, kind: str, limits: Limits) -> None:
+        """Of a joint that follows none: columns of its own, or values that stay."""
+        away = self.group is not None and name not in self.group
+        for suffix, movement, _ in MOVES[kind]:
+            one = name + suffix
+            if away or one in self.lock or name in self.lock:
+                value = self.lock.get(one, 0.0)
+                within = limits.lower <= value <= limits.upper
+                claim(within, f"joint {one!r} stands outside of its limits")
+                self.values[one] = (None, 1.0, value)
+                continue
+            self.values[one] = (len(self.moved), 1.0, 0.0)
+            both = limits.lower, limits.upper
+            rates = limits.velocity, limits.acceleration
+            self.moved.append(RobotJoint(one, *both, movement == TURNS, *rates))
+
+    def _value(self, name: str, followers: tuple[str, ...] = ()) -> Any:
+        """Column, ratio and offset of a joint's value."""
+        if name not in self.values:
+            known = name in self.elements and name not in followers
+            mimic: Any = self.elements[name].find("mimic") if known else None
+            told = f"joint {name!r} has no value that another could follow"
+            claim(mimic is not None, told)
+            column, ratio, more = self._value(mimic.get("joint"), (*followers, name))
+            factor = float(mimic.get("multiplier", "1"))
+            more = factor * more + float(mimic.get("offset", "0"))
+            self.values[name] = column, factor * ratio, more
+        return self.values[name]
+
+    def _hang(self, parent: int, name: str, kind: str, place: Any, own: Any = X) -> int:
+        """The frame that a joint carries."""
+        for suffix, movement, axis in MOVES[kind]:
+            along, value = own if axis is None else axis, self._value(name + suffix)
+            self.joints.append(Joint(parent, movement, along, place, value))
+            parent, place = len(self.joints), np.eye(4)
+        return parent
+
+
+class Robot:
+    """What the files ask about.
+
+    Args:
+        file: The problem as it was read.
+        header: Of the certificate.
+        trajectory: The file.
+    """
+
+    judged = (
+        "clearances, limits of joints and of their rates hold as the problem asks; "
+        "errors are not judged"
+    )
+
+    def __init__(
+        self, file: CellFile, header: Mapping[str, Any], trajectory: File
+    ) -> None:
+        self.files, self.rows = file.robot, self
+        text = urdf_text(self.files.urdf, self.files.package_dirs)
+        validate_urdf(text, geometry_only=True)
+        document = ET.fromstring(text)
+        named = document.findall("link/collision/geometry/mesh")
+        meshes = tuple(dict.fromkeys(map(self._mesh, named)))
+        hashes = file.source(meshes).sha256, sha256_of_file(trajectory)
+        belongs(header, "links topic", *hashes)
+        srdf = Srdf(self.files.srdf, document) if self.files.srdf else None
+        self.joints = Joints(self.files, document, srdf)
+        self.tree, self.place = self.joints.tree, "header"
+        self._path(header, trajectory)
+        self.notes = [self.files.solids.words, f"{header['interpolation']} pieces"]
+        self.pairs = [*self._pairs(file, header, document, srdf)]
+
+    def _mesh(self, mesh: ET.Element) -> Any:
+        name = mesh.attrib["filename"]
+        found = find_mesh(name, self.files.urdf, self.files.package_dirs)
+        claim(found, f"mesh {name!r} is not found")
+        return found
+
+    def _path(self, header: Mapping[str, Any], trajectory: File) -> None:
+        motion = read_motion(trajectory, self.joints.moved, header["topic"])
+        times, rates = motion.times, [motion.rates, motion.changes]
+        rates = [x for x in rates if x is not None and times is not None]
+        branch = Branch(motion.q, times, rates=rates)
+        claim((np.diff(branch.times) > 0.0).all(), "times do not rise")
+        self.timed = times is not None and len(motion.q) > 1
+        joined = {1: "linear", 3: "cubic", 5: "quintic"}[branch.degree]
+        told = f"interpolation is {header['interpolation']}, the file's is {joined}"
+        claim(header["interpolation"] == joined, told)
+        self.path = Path(branch)
+
+    def _pairs(
+        self, file: CellFile, header: Any, document: ET.Element, srdf: Srdf | None
+    ) -> Iterator[Pair]:
+        """What the problem holds apart, in order."""
+        size = float(sum(joint.lever for joint in self.tree.joints)) or 1.0
+        things = [solid(one) for one in file.scene(size).obstacles]
+        named, stated = {one.name: one for one in things}, header["links"]
+        for name, order in header["pieces"].items():
+            named[name].cut(order)
+        links, as_read = dict[str, list[Solid]](), {"order": [], "meshes": list[Any]()}
+        for link in document.findall("link"):
+            covers = stated.get(link.attrib["name"], as_read)["meshes"]
+            if parts := named_parts([*self._solids(link, [*covers])]):
+                links[link.attrib["name"]] = parts
+        claim(set(stated) <= set(links), "links without solids are told of")
+        required, own = file.required
+        frames = self.joints.frames
+        for thing, (name, parts) in product(things, links.items()):
+            for each in parts:
+                yield Pair(Body(frames[name], each), thing, 0, required, 0.0)
+        left = srdf.disabled() if srdf else {}
+        every = [*combinations(links, 2)]
+        apart = [both for both in every if self._held(*both, left, srdf)]
+        for one, other in apart:
+            swapped = len(links[other]) < len(links[one])  # the one of fewer moves
+            moves, rests = (other, one) if swapped else (one, other)
+            order = stated.get(rests, as_read)["order"]
+            rest = Compound(rests, links[rests], order)
+            for each in links[moves]:
+                yield Pair(Body(frames[moves], each), rest, frames[rests], own, 0.0)
+        few = f"{len(every) - len(apart)} of {len(every)}"
+        self.notes.append(f"{few} pairs of links left out")
+        for mesh in (one for one in things if isinstance(one, Mesh)):
+            self.notes += mesh.notes()
+
+    def _held(self, one: str, other: str, left: Any, srdf: Any) -> bool:
+        """Whether two links are held apart."""
+        way = self.tree.way(self.joints.frames[one], self.joints.frames[other])
+        moving = sum(self.tree.joints[k].column is not None for k, _ in way)
+        near = moving == 1 and srdf is None
+        return moving > 0 and not near and frozenset((one, other)) not in left
+
+    def _solids(self, link: ET.Element, covers: list[Any]) -> Iterator[Solid]:
+        """The convex pieces of a link; of each mesh as the certificate has it."""
+        name = link.attrib["name"]
+        for collision in link.findall("collision"):
+            place = np.array([[*map(float, row)] for row in placed(collision)])
+            turn, shift = place[:, :3], place[:, 3]
+            for shape in collision.findall("geometry/*"):
+                if shape.tag == "mesh":
+                    corners = self._triangles(shape) @ turn.T + shift
+                    cover = covers.pop(0) if covers else None
+                    yield from self._covered(name, corners, cover)
+                    continue
+                size, radius, length = (
+                    np.array(numbers(shape.get(word, "0")))
+                    for word in ("size", "radius", "length")
+                )
+                points = {"box": CORNERS * size / 2, "sphere": np.zeros((1, 3))}
+                points = points.get(shape.tag, np.array([-Z, Z]) * length / 2)
+                far = np.abs(points).max() + np.abs(shift).max()
+                round_ = radius[0] if shape.tag == "cylinder" else 0.0
+                grown, disc = radius[0] - round_, (turn[:, 2], round_)
+                yield Solid(name, [points @ turn.T + shift], far, grown, disc)
+        claim(not covers, f"{name} has fewer meshes than are told of")
+
+    def _triangles(self, shape: ET.Element) -> Any:
+        """Corners of a mesh in the frame of its place, shape (n, 3, 3); [m]."""
+        mesh = read_mesh(self._mesh(shape))
+        scale = np.array(numbers(shape.get("scale", "1 1 1"))) * (mesh.unit or 1.0)
+        return (mesh.vertices * scale)[mesh.triangles]
+
+    def _covered(self, name: str, corners: Any, cover: Any) -> Iterator[Solid]:
+        """Convex solids that hold a mesh in the way that the problem asks for."""
+        asked, far = self.files.solids, np.abs(corners).max()
+        if asked.cover == "primitives":
+            yield primitive(name, corners.reshape(-1, 3), cover)
+            return
+        most = asked.parts if asked.cover == "parts" else 1
+        over = np.array([0] * len(corners) if cover is None else cover)
+        good = over.shape == corners.shape[:1] and {*over.tolist()} <= {*range(most)}
+        claim(good, f"{name}: expected a hull of at most {most} over each triangle")
+        groups = [np.flatnonzero(over == k) for k in np.unique(over)]
+        for points in hulls(name, corners, groups):
+            yield Solid(name, [points], far)
+
+    def check(self, _: Pose) -> None:
+        """Check that joints and their rates keep their limits.
+
+        Raises:
+            Rejected: If one does not; `place` says where.
+        """
+        for k in range(self.path.size):
+            self.place, step = f"interval {k}", arb(0)
+            if self.timed:
+                step = arb(self.path.times[k + 1]) - arb(self.path.times[k])
+            columns = self.path.controls(k)
+            for joint, points in zip(self.joints.moved, columns, strict=True):
+                told = f"joint {joint.name!r} leaves its limits"
+                claim(within(points, joint.lower, joint.upper), told)
+                limits = joint.velocity, joint.acceleration
+                for order, most in enumerate(limits if self.timed else (), start=1):
+                    told = f"joint {joint.name!r} leaves the limit of its rates"
+                    smooth = order < len(columns[0])  # else they change at once
+                    points = [q / step for q in derivative(points)]  # noqa: PLW2901
+                    kept = smooth and within(points, -most, most)
+                    claim(kept or most == np.inf, told)
+
+
+def primitive(name: str, points: Any, cover: Any) -> Solid:
+    """A ball, capsule or box that holds all points, shape (n, 3)."""
+    claim(cover, f"{name}: what holds its mesh is missing")
+    origin, edges = (np.array(cover[key]) for key in ("origin_m", "edges_m"))
+    edges = edges.reshape(-1, 3)
+    radius = float(cover["radius_m"])
+    shares = np.linalg.lstsq(edges.T, (points - origin).T, rcond=None)[0].T.clip(0, 1)
+    corners = origin + np.array([*product((0, 1), repeat=len(edges))]) @ edges
+    far = float(max(np.abs(x).max() for x in (corners, points))) + radius
+    off = np.linalg.norm(origin + shares @ edges - points, axis=1)
+    holds = radius > 0.0 and (off <= radius - 2.0**-46 * far).all()
+    claim(holds, f"{name}: a corner of its mesh is not proved inside of what holds it")
+    return Solid(name, [corners], far, radius)
+
+
+def within(points: Points, low: float, high: float, halvings: int = HALVINGS) -> bool:
+    """Whether a polynomial keeps within limits."""
+    slack = SLACK * max(1.0, min(abs(low), abs(high)))
+    good = [low - slack <= q <= high + slack for q in points]
+    if all(good) or not (halvings and good[0] and good[-1]) or len(points) < 3:
+        return all(good)
+    ends = arb(0), arb(0.5), arb(1)
+    return all(
+        within(part(points, a, b), low, high, halvings - 1) for a, b in pairwise(ends)
+    )

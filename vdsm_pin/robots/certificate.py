@@ -1,0 +1,126 @@
+"""The certificate of a robot's motion: what stands above the lines of its proof."""
+
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.errors import VerificationFailed
+from vdsm_pin.geometry.arrays import IntArray
+from vdsm_pin.geometry.convex import Hull
+from vdsm_pin.geometry.pieces import PackedPieces
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.proof.bodies import Body, PairTable
+from vdsm_pin.proof.budget import Budget
+from vdsm_pin.proof.prover import start_proof
+from vdsm_pin.robots.cell import Cell
+from vdsm_pin.robots.files import HULLS
+from vdsm_pin.robots.judgement import RobotVerification
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.verification.certificate_file import (
+    Joined,
+    LinkPieces,
+    Pair,
+    Primitive,
+    RobotHeaderLine,
+)
+from vdsm_pin.verification.certificate_lines import (
+    Hashes,
+    Recorded,
+    check_certified,
+    write_lines,
+)
+from vdsm_pin.verification.certificate_writer import pieces_of_obstacles
+
+DEGREES: Final[Mapping[int, Joined]] = {1: "linear", 3: "cubic", 5: "quintic"}
+NO_ERRORS: Final = "no certificate is written: errors of robots are not certified yet"
+EDGES: Final[Mapping[int, tuple[int, ...]]] = {1: (), 2: (1,), 8: (1, 2, 4)}
+"""By the number of a primitive's corners those at the ends of the first one's edges."""
+
+
+def write_robot_certificate(
+    path: Path,
+    verification: RobotVerification,
+    hashes: Hashes,
+    topic: str | None = None,
+    deadline: Deadline = NO_LIMIT,
+) -> None:
+    """Write the proof of a certified motion of a robot.
+
+    Args:
+        path: The file; it appears whole or not at all.
+        verification: Of the same problem and trajectory files.
+        hashes: Of the files.
+        topic: Of the trajectory file, where it is a bag.
+        deadline: When to give up; there is no file then.
+
+    Raises:
+        OutOfTime: If the time is over.
+        VerificationFailed: If the motion is not certified, or under errors: there is
+            nothing to write.
+        InvalidFile: If the file cannot be written.
+    """
+    check_certified(verification)
+    if verification.errors != ErrorBox():
+        raise VerificationFailed(NO_ERRORS)
+    cell, motion = verification.problem, verification.trajectory
+    table, budget = PairTable.of(cell.pairs), Budget(until=deadline.end)
+    tree, bodies = cell.robot.tree, cell.bodies
+    proving, plan = start_proof(tree, bodies, motion, table, budget=budget)
+    pieces = proving.task.pieces
+    header = RobotHeaderLine(
+        **hashes.told(),
+        interpolation=DEGREES[motion.degree],
+        pairs=_pairs(plan.bodies[len(bodies) :], plan.bodies, plan.pairs),
+        pieces=pieces_of_obstacles(cell.scene.obstacles, pieces),
+        links=_links(cell, pieces),
+        topic=topic,
+    )
+    whole = np.zeros(len(pieces.root), np.int64)
+    proof = Recorded(proving.task, proving.motion, whole)
+    write_lines(path, header, proof, deadline)
+
+
+def _pairs(parts: list[Body], bodies: list[Body], pairs: PairTable) -> list[Pair]:
+    """The convex part of a link that moves, and what it is proved clear of."""
+    count, seen = Counter(part.name for part in parts), Counter[str]()
+    names = [body.name for body in bodies]
+    for k, part in enumerate(parts, start=len(bodies) - len(parts)):
+        seen[part.name] += 1
+        if count[part.name] > 1:
+            names[k] = f"{part.name} part {seen[part.name]}"
+    both = zip(pairs.one.tolist(), pairs.other.tolist(), strict=True)
+    return [(names[one], names[other]) for one, other in both]
+
+
+def _links(cell: Cell, pieces: PackedPieces) -> dict[str, LinkPieces]:
+    """Of each link that is not as its URDF says what it is made of."""
+    found = {}
+    for k, body in enumerate(cell.robot.bodies, start=len(cell.scene.obstacles)):
+        order = pieces.order[pieces.first_piece[k] : pieces.first_piece[k + 1]]
+        sorted_ = bool((np.diff(order) != 1).any())
+        covers = () if cell.robot.solids == HULLS else cell.robot.covers.get(body.name)
+        if sorted_ or covers:
+            found[body.name] = LinkPieces(
+                order=order.tolist() if sorted_ else [],
+                meshes=[_cover(cover) for cover in covers or ()],
+            )
+    return found
+
+
+def _cover(cover: tuple[IntArray, ...] | Hull) -> list[int] | Primitive:
+    """What holds a mesh: the hull over each of its triangles, or a primitive."""
+    if not isinstance(cover, Hull):
+        hulls = np.zeros(sum(map(len, cover)), np.int64)
+        for k, group in enumerate(cover):
+            hulls[group] = k
+        return [int(k) for k in hulls]
+    origin = cover.points[0]
+    edges = [cover.points[k] - origin for k in EDGES[len(cover.points)]]
+    return Primitive(
+        origin_m=origin.tolist(),
+        edges_m=[edge.tolist() for edge in edges],
+        radius_m=cover.radius,
+    )

@@ -1,0 +1,183 @@
+"""The lines of a certificate: planes, interval by interval, and the seal.
+
+The format is docs/certificate.md. Planes are found again and go to the file as they
+come, so that memory stays bounded.
+"""
+
+import gzip
+import hashlib
+import json
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import chain
+from pathlib import Path
+from typing import IO, Any, Final, cast
+
+import numpy as np
+
+from vdsm_pin import __version__
+from vdsm_pin.errors import VerificationFailed
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.io.atomic import atomic_path
+from vdsm_pin.proof.budget import Budget
+from vdsm_pin.proof.layouts import CLAIM, FIRST, LAST, PLANE_NORMAL, RECORD
+from vdsm_pin.proof.packed_tree import Motion
+from vdsm_pin.proof.recording import record
+from vdsm_pin.proof.terms import Task
+from vdsm_pin.proof.workspace import new_workspace
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.verification.certificate_file import AnyHeader, LastLine
+from vdsm_pin.verification.records import Verdict, Verification
+
+LEVEL: Final = 9
+"""Of gzip; it takes a small part of the time that finding the planes does."""
+
+PER_METRE: Final = 10**10
+"""A clearance that is whole counts these parts of a metre."""
+
+CHUNK: Final = 512
+"""Intervals recorded at once."""
+
+ROOM: Final = 65_536
+"""Planes there is room for at first; doubled where one interval needs more."""
+
+
+@dataclass(frozen=True)
+class Hashes:
+    """SHA-256 of the files that a certificate is about, as hexadecimal digits.
+
+    Args:
+        problem: Of the problem file and its mesh files.
+        trajectory: Of the trajectory file.
+    """
+
+    problem: str
+    trajectory: str
+
+    def told(self) -> dict[str, Any]:
+        """What every header says of them and of the writer."""
+        return {
+            "problem_sha256": self.problem,
+            "trajectory_sha256": self.trajectory,
+            "versions": {"vdsm_pin": __version__, "numpy": np.__version__},
+        }
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """The proof that is written down.
+
+    Args:
+        task: What was proved.
+        motion: Of what.
+        whole: Pieces of each partner that one plane serves, 0 for no such rule.
+    """
+
+    task: Task
+    motion: Motion
+    whole: IntArray
+
+
+def check_certified(verification: Verification) -> None:
+    """Refuse a motion of which there is no proof to write.
+
+    Raises:
+        VerificationFailed: If it is not certified.
+    """
+    if verification.verdict is not Verdict.CERTIFIED:
+        verdict = verification.verdict.value
+        message = f"no certificate is written: the verdict is {verdict}"
+        raise VerificationFailed(message)
+
+
+def write_lines(
+    path: Path, header: AnyHeader, proof: Recorded, deadline: Deadline = NO_LIMIT
+) -> None:
+    """Write a certificate; it appears whole or not at all.
+
+    Raises:
+        OutOfTime: If the time is over.
+        VerificationFailed: If a proof is not found again.
+        InvalidFile: If the file cannot be written.
+    """
+    digest = hashlib.sha256()
+    with atomic_path(path) as temporary, _packed(temporary) as file:
+        for text in chain([header.model_dump_json()], _lines(proof, deadline)):
+            line = text.encode() + b"\n"
+            digest.update(line)
+            file.write(line)
+        last = LastLine(end=True, sha256=digest.hexdigest())
+        file.write(last.model_dump_json().encode() + b"\n")
+
+
+@contextmanager
+def _packed(path: Path) -> Iterator[IO[bytes]]:
+    """A file whose bytes are gzipped; equal content makes equal files."""
+    with (
+        path.open("wb") as file,
+        gzip.GzipFile("", "wb", LEVEL, fileobj=file, mtime=0) as packed,
+    ):
+        yield cast("IO[bytes]", packed)
+
+
+def _lines(proof: Recorded, deadline: Deadline) -> Iterator[str]:
+    """One line per interval."""
+    motion, task = proof.motion, proof.task
+    n_intervals = max(1, len(motion.knots) - 1)
+    work = new_workspace(task, motion.knots.shape[1], Budget().slices)
+    records, first = np.zeros((ROOM, RECORD)), 0
+    while first < n_intervals:
+        last = min(first + CHUNK, n_intervals)
+        count, reached, pair = record(task, motion, work, first, last, records)
+        deadline.check()
+        if pair >= 0:
+            message = (
+                f"interval {reached}: the proof of pair {pair} was not found again"
+            )
+            raise VerificationFailed(message)
+        partner = task.pairs.obstacle[records[:count, 1].astype(np.int64)]
+        records[:count, LAST] = np.maximum(records[:count, LAST], proof.whole[partner])
+        if reached == first:
+            records = np.zeros((2 * len(records), RECORD))
+        yield from _interval_lines(task, records[:count], first, reached)
+        first = reached
+
+
+def _interval_lines(
+    task: Task, records: FloatArray, first: int, last: int
+) -> Iterator[str]:
+    """The lines of the intervals [first, last)."""
+    order = np.lexsort((records[:, FIRST], records[:, 2], records[:, 1], records[:, 0]))
+    rows = records[order]
+    for k in range(first, last):
+        low, high = np.searchsorted(rows[:, 0], [k, k + 1])
+        line = {"k": k, "proofs": _proofs(task, rows[low:high].tolist())}
+        yield json.dumps(line, separators=(",", ":"))
+
+
+def _proofs(task: Task, rows: list[list[float]]) -> list[list[list[Any]]]:
+    """The proofs of one interval: per pair its slices, per slice its planes."""
+    proofs: list[list[list[Any]]] = [[] for _ in range(task.pairs.body.size)]
+    for row in rows:
+        slices = proofs[int(row[1])]
+        if not slices or slices[-1][0] != row[2]:
+            slices.append([_short(row[2]), _short(row[3]), []])
+        n = [_short(x) for x in row[PLANE_NORMAL:CLAIM]]
+        lower = _counted(row[CLAIM], float(task.pairs.required[int(row[1])]))
+        slices[-1][2].append([int(row[FIRST]), int(row[LAST]), *n, lower])
+    return proofs
+
+
+def _short(value: float) -> float:
+    """A whole number as such; others as they are."""
+    return int(value) if value == int(value) else value
+
+
+def _counted(lower: float, required: float) -> float:
+    """A clearance in parts of a metre, rounded down; as it is where that fails."""
+    parts = math.floor(lower * PER_METRE)
+    enough = Fraction(parts, PER_METRE) >= Fraction(required)
+    return parts if enough and parts <= lower * PER_METRE else lower
