@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from vdsm_pin.errors import UnknownName
-from vdsm_pin.planner.records import Plan, TipPath
+from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import Adjustment, Refinement, Round
@@ -51,9 +51,8 @@ def test_verification_json_fits_its_schema(
 def test_plan_and_manifest_fit_their_schemas() -> None:
     judged = made_up.verification()
     rows = judged.trajectory
-    tip = TipPath(np.zeros((rows.n_samples, 3)), rows.on_path, rows.path_m)
     zero = np.zeros((rows.n_samples, 8, 3))
-    plan = Plan(judged.problem, "paper", tip, zero, rows, zero, ("a note",))
+    plan = Plan(judged.problem, "paper", zero, rows, ("a note",))
     raised = Adjustment(3.0, 7, "pillar", "Coal", 0.001, 0.0032)
     first = Round(0.0, None, 0.001, "too near", (raised,))
     rounds = (first, Round(0.0032, judged.verdict, 0.0035, "every check passed"))

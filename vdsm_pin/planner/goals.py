@@ -12,12 +12,11 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.arm.kinematics import joint_centres, straight_joints
 from vdsm_pin.errors import Infeasible, NoPlanFound
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.joint_lines import clear_line
-from vdsm_pin.planner.records import LinkClearance, Margin, Plan, TipPath
+from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.planner.strategies import Strategy
 from vdsm_pin.problem.planning_problem import (
     Blocked,
@@ -74,7 +73,7 @@ def with_return(plan: Plan) -> Plan:
     on = np.concatenate([told.on_path, np.zeros(len(back), np.bool_)])
     stations = np.concatenate([told.path_m, np.full(len(back), told.path_m[-1])])
     rows = np.concatenate([told.joints, back])
-    whole = _of_rows(plan, rows, on, stations)
+    whole = _of_rows(plan, Trajectory.of_joints(rows, on, stations))
     note = f"behind the path the arm goes home the way it came, in {len(back)} rows"
     return replace(
         whole,
@@ -94,24 +93,14 @@ def _off_path(plan: Plan, rows: FloatArray) -> Plan:
     """A plan of other rows, none of which draws."""
     nothing = np.zeros(len(rows), dtype=np.bool_)
     plan = replace(plan, notes=(), undrawn=(), rivals=())
-    return _of_rows(plan, rows, nothing, np.zeros(len(rows)))
+    return _of_rows(plan, Trajectory.of_joints(rows, nothing, np.zeros(len(rows))))
 
 
-def _of_rows(
-    plan: Plan, rows: FloatArray, on_path: BoolArray, stations: FloatArray
-) -> Plan:
-    """A plan with these joint values, shape (r, 1 + 2N); [m], [rad]."""
+def _of_rows(plan: Plan, rows: Trajectory) -> Plan:
+    """A plan with other rows."""
     arm = plan.problem.manipulator
-    x0, alpha, theta = rows[:, 0], rows[:, 1::2], rows[:, 2::2]
-    centres = joint_centres(arm, x0, alpha, theta)
-    return replace(
-        plan,
-        tip_path=TipPath(centres[:, -1], on_path, stations),
-        centres=centres,
-        trajectory=Trajectory(on_path, stations, x0, alpha, theta),
-        cable_lengths=cable_lengths(arm, alpha, theta),
-        steps=None,
-    )
+    centres = joint_centres(arm, rows.x0, rows.alpha, rows.theta)
+    return replace(plan, centres=centres, trajectory=rows, steps=None)
 
 
 def _to_joints(

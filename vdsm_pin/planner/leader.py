@@ -11,15 +11,12 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.arm.kinematics import joint_angles, link_angles
-from vdsm_pin.arm.manipulator import Manipulator
-from vdsm_pin.compiled import compiled
 from vdsm_pin.errors import NoPlanFound
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.follow_the_leader import beyond
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.planner.fewest.follow_the_leader import led_along
 from vdsm_pin.planner.fewest.route import path_rows
-from vdsm_pin.planner.records import LinkClearance, Margin, Plan, TipPath
+from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.planner.start import check_start, start_centres
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
@@ -27,40 +24,6 @@ from vdsm_pin.tolerances import TOLERANCES
 
 FINEST: Final = 64
 """Parts into which a step is cut at most so that no joint turns too far in one."""
-
-
-@compiled
-def laid(
-    curve: FloatArray, first: IntArray, tips: FloatArray, lengths: FloatArray
-) -> FloatArray:
-    """Arms whose joints lie on a curve behind their tips.
-
-    Args:
-        curve: Its corners from the far end back, shape (k, 3); [m].
-        first: The corner that comes next behind each tip, shape (n,).
-        tips: Places on the curve, shape (n, 3); [m].
-        lengths: Of the links, shape (N,); [m].
-
-    Returns:
-        Joint centres, shape (n, N + 1, 3), NaN where the curve has no place for a
-        joint, or the base cannot be on the rail; [m].
-    """
-    count = lengths.size
-    result = np.full((tips.shape[0], count + 1, 3), np.nan)
-    for r in range(tips.shape[0]):
-        row, at, place = result[r], first[r], tips[r].copy()
-        row[count] = place
-        for joint in range(count - 1, 0, -1):
-            found = np.zeros(3)
-            at = beyond(curve, at, place, lengths[joint], found)
-            if at == curve.shape[0]:
-                break
-            row[joint], place = found, found
-        square = lengths[0] ** 2 - place[1] ** 2 - place[2] ** 2
-        if at < curve.shape[0] and square >= 0.0:
-            row[0, 0] = place[0] - np.sqrt(square)
-            row[0, 1] = row[0, 2] = 0.0
-    return result
 
 
 def plan_follow_the_leader(
@@ -90,7 +53,8 @@ def plan_follow_the_leader(
         tips = np.concatenate([approach[:-1], inner])
         on_path = np.arange(len(tips)) >= len(approach) - 1
         along = np.append(np.full(len(approach) - 1, stations[0]), stations)
-        centres = _following(arm, start, tips)
+        centres = led_along(tips, start, arm.link_lengths)
+        centres[0] = start
         _check(problem, centres, tips)
         alpha, theta = joint_angles(arm, centres)
         turn = np.abs(np.diff(np.stack([alpha, theta]), axis=1)).max(initial=0.0)
@@ -102,10 +66,8 @@ def plan_follow_the_leader(
     return Plan(
         problem,
         "follow-the-leader",
-        TipPath(tips, on_path, along),
         centres,
         trajectory,
-        cable_lengths(arm, alpha, theta),
         notes=(note,),
     )
 
@@ -122,23 +84,6 @@ def _stepped(corners: FloatArray, step: float) -> FloatArray:
         side[-1] = b
         made.append(side)
     return np.concatenate(made)
-
-
-def _following(arm: Manipulator, start: FloatArray, tips: FloatArray) -> FloatArray:
-    """Joint centres of the arm behind each tip, shape (n, N + 1, 3); [m].
-
-    Args:
-        arm: The arm.
-        start: Its joint centres at the start, shape (N + 1, 3); [m].
-        tips: Places of the tip in order, the first one at the start, shape (n, 3); [m].
-    """
-    behind = start[:1] - np.array([2.0 * arm.total_length, 0.0, 0.0])
-    curve = np.concatenate([tips[::-1], start[-2::-1], behind])
-    # The tip of row r is corner n - 1 - r of the curve.
-    first = np.arange(len(tips))[::-1] + 1
-    centres = laid(np.ascontiguousarray(curve), first, tips, arm.link_lengths)
-    centres[0] = start
-    return np.asarray(centres)
 
 
 def _check(problem: PlanningProblem, centres: FloatArray, tips: FloatArray) -> None:

@@ -2,8 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
 
+from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -40,10 +42,8 @@ class Plan(Summarised):
     Args:
         problem: What was asked.
         strategy: Name of the strategy.
-        tip_path: The route of the tip.
         centres: Joint centres O_1..O_{N+1}, shape (n_samples, N + 1, 3); [m].
         trajectory: Joint values, the plan proper.
-        cable_lengths: l_ja, l_jb, l_jc, shape (n_samples, N, 3); [m].
         undrawn: Stretches of the desired path that are not drawn, each with the reason:
             "from 0.5000 m to 1.0000 m along the path (why)".
         notes: What else the user should know, one sentence each: rounds of refinement
@@ -56,14 +56,24 @@ class Plan(Summarised):
 
     problem: PlanningProblem
     strategy: str
-    tip_path: TipPath
     centres: FloatArray
     trajectory: Trajectory
-    cable_lengths: FloatArray
     undrawn: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     rivals: tuple["Plan", ...] = ()
     steps: "PaperSteps | None" = None
+
+    @cached_property
+    def tip_path(self) -> TipPath:
+        """The route of the tip."""
+        rows = self.trajectory
+        return TipPath(self.centres[:, -1], rows.on_path, rows.path_m)
+
+    @cached_property
+    def cable_lengths(self) -> FloatArray:
+        """l_ja, l_jb, l_jc, shape (n_samples, N, 3); [m]."""
+        rows = self.trajectory
+        return cable_lengths(self.problem.manipulator, rows.alpha, rows.theta)
 
     def summary(self) -> tuple[tuple[str, str], ...]:
         """How it was planned, its size, and the notes."""

@@ -1,12 +1,11 @@
 """Plans beside obstacles that move: the arm waits until all of them rest."""
 
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from vdsm_pin.planner.records import Plan, TipPath
+from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.units import in_mm
@@ -33,14 +32,9 @@ def waited(plan: Plan, problem: PlanningProblem) -> Plan:
     turns = steps[:, 1:].max(axis=1, initial=0.0) / TURNING
     durations = np.maximum(np.maximum(turns, steps[:, 0] / SLIDING), SHORTEST)
     times = scene.rest_time + np.append(0.0, np.cumsum(durations))
-    extra = int(scene.start_time < scene.rest_time)
-    if extra:
-        times = np.append(scene.start_time, times)
-
-    def from_start(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        return np.concatenate([values[:extra], values])
-
-    tips = plan.tip_path
+    order = np.arange(rows.n_samples)
+    if scene.start_time < scene.rest_time:
+        times, order = np.append(scene.start_time, times), np.append(0, order)
     note = (
         f"waits at the start until {scene.rest_time:g} s, when all obstacles have come "
         f"to rest; then goes at {np.rad2deg(TURNING):.0f} deg/s and {in_mm(SLIDING)}/s "
@@ -49,19 +43,10 @@ def waited(plan: Plan, problem: PlanningProblem) -> Plan:
     return replace(
         plan,
         problem=problem,
-        tip_path=TipPath(
-            from_start(tips.points), from_start(tips.on_path), from_start(tips.path_m)
+        centres=plan.centres[order],
+        trajectory=Trajectory.of_joints(
+            rows.joints[order], rows.on_path[order], rows.path_m[order], times
         ),
-        centres=from_start(plan.centres),
-        trajectory=Trajectory(
-            from_start(rows.on_path),
-            from_start(rows.path_m),
-            from_start(rows.x0),
-            from_start(rows.alpha),
-            from_start(rows.theta),
-            times=times,
-        ),
-        cable_lengths=from_start(plan.cable_lengths),
         notes=(*plan.notes, note),
         steps=None,
     )

@@ -106,6 +106,18 @@ class Trajectory(Summarised):
             message = "trajectory has accelerations but no velocities"
             raise InvalidInput(message)
 
+    @classmethod
+    def of_joints(
+        cls,
+        joints: FloatArray,
+        on_path: BoolArray,
+        path_m: FloatArray,
+        times: FloatArray | None = None,
+    ) -> "Trajectory":
+        """A trajectory from its rows of joint values, shape (n_samples, 1 + 2N)."""
+        x0, alpha, theta = joints[:, 0], joints[:, 1::2], joints[:, 2::2]
+        return cls(on_path, path_m, x0, alpha, theta, times=times)
+
     @property
     def n_samples(self) -> int:
         """Number of rows."""
@@ -211,7 +223,9 @@ class Trajectory(Summarised):
         joints, times = self.joints_at(moments), self.times_at(moments)
         if times is not None and not (np.diff(times) > 0.0).all():
             times = None
-        return _of_joints(joints, self.on_path[before], self.path_m[before], times)
+        return Trajectory.of_joints(
+            joints, self.on_path[before], self.path_m[before], times
+        )
 
     def within(self, interval: int, low: float, high: float) -> "Trajectory":
         """A part of one interval as a motion of two rows; its tip draws nothing.
@@ -241,7 +255,7 @@ class Trajectory(Summarised):
         """The same motion with rows at rising moments in waypoints."""
         joints, times = self.joints_at(moments), self.times_at(moments)
         if not self.is_smooth or self.times is None:
-            return _of_joints(joints, on_path, path_m, times)
+            return Trajectory.of_joints(joints, on_path, path_m, times)
         k = np.minimum(moments.astype(np.int64), self.n_samples - 2)
         step, share = np.diff(self.times)[k, None], moments - k
         once = bernstein.derivative(self.pieces(k))
@@ -250,16 +264,7 @@ class Trajectory(Summarised):
             twice = bernstein.derivative(once)
             changes = bernstein.value(twice, share) / step**2
         return replace(
-            _of_joints(joints, on_path, path_m, times), rates=rates, changes=changes
+            Trajectory.of_joints(joints, on_path, path_m, times),
+            rates=rates,
+            changes=changes,
         )
-
-
-def _of_joints(
-    joints: FloatArray,
-    on_path: BoolArray,
-    path_m: FloatArray,
-    times: FloatArray | None = None,
-) -> Trajectory:
-    """A trajectory from its rows of joint values, shape (n, 1 + 2N)."""
-    x0, alpha, theta = joints[:, 0], joints[:, 1::2], joints[:, 2::2]
-    return Trajectory(on_path, path_m, x0, alpha, theta, times=times)

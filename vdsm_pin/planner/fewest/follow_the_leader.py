@@ -7,7 +7,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 
 
 @compiled
-def beyond(
+def _beyond(
     curve: FloatArray, at: int, place: FloatArray, length: float, found: FloatArray
 ) -> int:
     """The next place on a polyline at a distance from a place on it.
@@ -57,7 +57,7 @@ def _lay(
     count, at = lengths.size, begin
     place, found = centres[count].copy(), np.zeros(3)
     for joint in range(count - 1, 0, -1):
-        at = beyond(curve, at, place, lengths[joint], found)
+        at = _beyond(curve, at, place, lengths[joint], found)
         if at == curve.shape[0]:
             break
         centres[joint], place = found, found.copy()

@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.arm.kinematics import joint_angles
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
@@ -36,7 +35,7 @@ from vdsm_pin.planner.fewest.unbend import (
     unbend,
     with_unbending,
 )
-from vdsm_pin.planner.records import LinkClearance, Margin, Plan, TipPath
+from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.planner.start import check_start
 from vdsm_pin.planner.time_limit import deadline_of
 from vdsm_pin.problem.planning_problem import Blocked, PlanningProblem
@@ -260,10 +259,8 @@ def _written(
     return Plan(
         problem,
         name,
-        TipPath(rows.centres[:, -1], on_path, stations),
         rows.centres,
         trajectory,
-        cable_lengths(arm, alpha, theta),
         undrawn(problem, outcome),
         notes_of(problem, enough, outcome, trajectory, rows.centres),
     )

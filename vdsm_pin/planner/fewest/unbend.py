@@ -12,13 +12,12 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.arm.kinematics import joint_centres, link_angles
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.joint_lines import clear_line
-from vdsm_pin.planner.records import LinkClearance, Plan, TipPath
+from vdsm_pin.planner.records import LinkClearance, Plan
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
@@ -136,30 +135,20 @@ def with_unbending(problem: PlanningProblem, rows: FloatArray, plan: Plan) -> Pl
         rows: As `unbend` returns them, shape (r, 1 + 2N); [m], [rad].
         plan: From the last of these rows on.
     """
-    first, arm = rows[:-1], problem.manipulator
-    centres, told, count = _centres(arm, first), plan.trajectory, len(first)
-    alpha, theta = first[:, 1::2], first[:, 2::2]
-    on_path = np.concatenate([np.zeros(count, dtype=np.bool_), told.on_path])
-    path_m = np.concatenate([np.full(count, told.path_m[0]), told.path_m])
-    every = np.concatenate([centres, plan.centres])
-    trajectory = Trajectory(
-        on_path,
-        path_m,
-        np.concatenate([first[:, 0], told.x0]),
-        np.concatenate([alpha, told.alpha]),
-        np.concatenate([theta, told.theta]),
+    first, told, count = rows[:-1], plan.trajectory, len(rows) - 1
+    trajectory = Trajectory.of_joints(
+        np.concatenate([first, told.joints]),
+        np.concatenate([np.zeros(count, dtype=np.bool_), told.on_path]),
+        np.concatenate([np.full(count, told.path_m[0]), told.path_m]),
     )
+    before = _centres(problem.manipulator, first)
     note = (
         f"a link leans backwards at the start: the arm unbends first, in {count} rows"
     )
     return replace(
         plan,
         problem=problem,
-        tip_path=TipPath(every[:, -1], on_path, path_m),
-        centres=every,
+        centres=np.concatenate([before, plan.centres]),
         trajectory=trajectory,
-        cable_lengths=np.concatenate(
-            [cable_lengths(arm, alpha, theta), plan.cable_lengths]
-        ),
         notes=(*plan.notes, note),
     )

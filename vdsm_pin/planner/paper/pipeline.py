@@ -4,7 +4,6 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.errors import Infeasible, NoPlanFound, PathBlocked
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.feasibility import check_feasibility
@@ -49,15 +48,11 @@ def plan_paper(
     check_feasibility(problem.manipulator, problem.path)
     check_start(problem, clearance)
     motion = _best_motion(problem, clearance, _by_link(problem, margin))
-    trajectory = motion.trajectory
-    cables = cable_lengths(problem.manipulator, trajectory.alpha, trajectory.theta)
     return Plan(
         problem,
         "paper",
-        motion.route.tip_path,
         motion.centres,
-        trajectory,
-        cables,
+        motion.trajectory,
         tuple(
             f"from {in_mm(a)} to {in_mm(b)} along the path (left out by the paper's "
             f"rule on its way round {motion.avoidance.passed!r}; nothing is proved)"
