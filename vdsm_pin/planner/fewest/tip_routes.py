@@ -9,7 +9,6 @@ motion: nothing is proved here.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import islice
 from typing import Final
 
@@ -19,18 +18,16 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.feasibility import curled_reach
 from vdsm_pin.planner.impossible.octree import (
     DEPTH,
+    Octree,
     adjoining,
     doubt_to,
     holders,
-    places,
 )
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.pointing import angles_between
 from vdsm_pin.tolerances import TOLERANCES
 
-FIRST_LEVEL: Final = 4
-"""Level of the cells begun with."""
 LEAST: Final = 0.05
 """Cells smaller than this part of the body's radius are not halved; [-]."""
 NARROW: Final = 0.3
@@ -57,43 +54,23 @@ BOW: Final = 0.2
 """Part of the room of a narrow place that the way between two points may bow; [-]."""
 
 
-@dataclass
-class _Cells:
-    """Cells over all places a tip can be, halved on demand.
+class _Cells(Octree):
+    """Cells over all places a tip can be.
 
     Args:
-        clearance: The clearance function.
-        required: Clearance that the tip must keep; [m].
-        radius: Of the body; [m].
+        space: Clearance function and limits.
         corner: Lowest corner of the whole, shape (3,); [m].
         side: Side of the whole; [m].
-        reach: Largest distance of a tip from the rail; [m].
-        most: Cells at which a search ends.
     """
 
-    clearance: LinkClearance
-    required: float
-    radius: float
-    corner: FloatArray
-    side: float
-    reach: float
-    most: int
-
-    def __post_init__(self) -> None:
-        """Begin with cells of one size."""
-        count = 8**FIRST_LEVEL
-        self.codes = np.arange(count) << (3 * (DEPTH - FIRST_LEVEL))
-        self.levels = np.full(count, FIRST_LEVEL)
-        self.clearances = self._clearances(self.codes, self.levels)
+    def __init__(self, space: "TipSpace", corner: FloatArray, side: float) -> None:
+        self.clearance, self.required = space.clearance, space.required
+        self.radius, self.most = space.arm.most_radius, space.most
+        self.reach = curled_reach(space.arm)
         self.avoided: list[FloatArray] = []
+        super().__init__(corner, side)
 
-    def boxes(self, codes: IntArray, levels: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Centres, shape (n, 3), and half sides, shape (n,), of cells; [m]."""
-        half = self.side / 2.0 ** (levels + 1.0)
-        low = self.corner + self.side / 2.0**DEPTH * places(codes)
-        return np.asarray(low + half[:, None]), np.asarray(half)
-
-    def _clearances(self, codes: IntArray, levels: IntArray) -> FloatArray:
+    def look(self, codes: IntArray, levels: IntArray) -> tuple[FloatArray]:
         """What the tip has to spare at the centre of each cell, shape (n,); [m]."""
         centre, half = self.boxes(codes, levels)
         clearances = (
@@ -103,17 +80,17 @@ class _Cells:
         clearances = np.maximum(clearances, -self.radius - self.required)
         out = np.hypot(centre[:, 1], centre[:, 2]) - self.reach
         clearances[out > np.sqrt(2.0) * half] = -np.inf
-        return np.asarray(clearances)
+        return (np.asarray(clearances),)
 
     def costs(self) -> tuple[FloatArray, BoolArray]:
         """Cost of passing each cell, inf where it is shut; whether it is in doubt."""
         centre, half = self.boxes(self.codes, self.levels)
-        radius = np.sqrt(3.0) * half
-        shut = self.clearances + radius < 0.0
-        doubt = ~shut & (self.clearances < half) & (half > LEAST * self.radius)
-        shut |= ~doubt & (self.clearances < 0.0)
+        (clearances,), radius = self.known, np.sqrt(3.0) * half
+        shut = clearances + radius < 0.0
+        doubt = ~shut & (clearances < half) & (half > LEAST * self.radius)
+        shut |= ~doubt & (clearances < 0.0)
         # A cell in doubt is taken for as wide as it may be.
-        clearances = np.where(doubt, self.clearances + radius, self.clearances)
+        clearances = np.where(doubt, clearances + radius, clearances)
         narrow = NARROW * self.radius
         cost = 2.0 * half * (1.0 + (narrow / np.maximum(clearances, CAP * narrow)) ** 2)
         around = AROUND * self.radius
@@ -126,23 +103,6 @@ class _Cells:
         """Cells that hold points within the whole, shape (n,)."""
         place = (points - self.corner) / self.side * 2.0**DEPTH
         return holders(self.codes, np.clip(place, 0, 2**DEPTH - 1).astype(np.int64))
-
-    def split(self, chosen: IntArray) -> None:
-        """Put the eight children of cells in their place."""
-        count = np.ones(self.codes.size, dtype=np.int64)
-        count[chosen] = 8
-        begin = np.cumsum(count) - count
-        kids = (begin[chosen, None] + np.arange(8)).ravel()
-        codes, levels, clearances = (
-            np.repeat(values, count)
-            for values in (self.codes, self.levels, self.clearances)
-        )
-        levels[kids] += 1
-        codes[kids] += np.tile(np.arange(8), len(chosen)) << (
-            3 * (DEPTH - levels[kids])
-        )
-        clearances[kids] = self._clearances(codes[kids], levels[kids])
-        self.codes, self.levels, self.clearances = codes, levels, clearances
 
     def cheapest(self, start: FloatArray, goal: FloatArray) -> FloatArray | None:
         """Points on the cheapest way that is clear, shape (k, 3); None without one."""
@@ -291,10 +251,7 @@ class TipSpace:
         high = min(high + length, float(ends[:, 0].max()) + length)
         side = max(high - low, 2.0 * reach)
         corner = np.array([low, -side / 2.0, -side / 2.0])
-        return _Cells(
-            self.clearance, self.required, self.arm.most_radius, corner, side, reach,
-            self.most,
-        )  # fmt: skip
+        return _Cells(self, corner, side)
 
     def _spare(self, points: FloatArray, ends: FloatArray | None = None) -> FloatArray:
         """What the tip has to spare at points, or on lines to ends, shape (n,); [m]."""

@@ -20,10 +20,10 @@ from vdsm_pin.planner.impossible.octree import (
     DOUBTFUL,
     OPEN,
     SHUT,
+    Octree,
     adjoining,
     doubt_to,
     holders,
-    places,
 )
 from vdsm_pin.planner.upper_clearance import upper_bounds
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -36,8 +36,6 @@ FINE: Final = 0.0032
 """Size to which the narrowest place is told, over the arm's length; [-]."""
 CLOSER: Final = 60
 """Rounds of coming closer to it."""
-FIRST_LEVEL: Final = 4
-"""Level of the cells begun with."""
 LIGHT: Final = 0.02
 """Doubt of a cell whose centre is clear over that of another; [-]."""
 LIKELY: Final = 0.5
@@ -47,7 +45,7 @@ DETOUR: Final = 1.001
 """Ways with so much of the best one's doubt are looked at with it; [-]."""
 
 
-class _Cells:
+class _Cells(Octree):
     """The octree over all places a tip can be."""
 
     def __init__(self, problem: PlanningProblem, deadline: Deadline) -> None:
@@ -65,20 +63,18 @@ class _Cells:
         ahead = arm.total_length + beside
         self.x_low, self.x_high = low - ahead, high + ahead
         self.fine = FINE * arm.total_length
-        self.side = max(self.x_high - self.x_low, 2.0 * self.reach)
-        self.corner = np.array([self.x_low, -self.side / 2.0, -self.side / 2.0])
-        count = 8**FIRST_LEVEL
-        self.codes = np.arange(count) << (3 * (DEPTH - FIRST_LEVEL))
-        self.levels = np.full(count, FIRST_LEVEL)
-        self.state, self.middle = self._states(self.codes, self.levels)
+        side = max(self.x_high - self.x_low, 2.0 * self.reach)
+        super().__init__(np.array([self.x_low, -side / 2.0, -side / 2.0]), side)
 
-    def _boxes(
-        self, codes: IntArray, levels: IntArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Centres, shape (n, 3), and half sides, shape (n,), of cells; [m]."""
-        half = self.side / 2.0 ** (levels + 1.0)
-        low = self.corner + self.side / 2.0**DEPTH * places(codes)
-        return np.asarray(low + half[:, None]), np.asarray(half)
+    @property
+    def state(self) -> IntArray:
+        """What is proved of each cell, shape (n,)."""
+        return np.asarray(self.known[0])
+
+    @property
+    def middle(self) -> FloatArray:
+        """What its centre has to spare, shape (n,); [m]."""
+        return np.asarray(self.known[1])
 
     def _excess(self, points: FloatArray, obstacle: int = -1) -> FloatArray:
         """Distances less what a tip must keep, from above; 0 counts inside; [m].
@@ -96,9 +92,9 @@ class _Cells:
         self.deadline.check()
         return np.asarray(np.maximum(upper, 0.0) + self.inside)
 
-    def _states(self, codes: IntArray, levels: IntArray) -> tuple[IntArray, FloatArray]:
+    def look(self, codes: IntArray, levels: IntArray) -> tuple[FloatArray, ...]:
         """What is known of cells, and what their centres have to spare, shape (n,)."""
-        centre, half = self._boxes(codes, levels)
+        centre, half = self.boxes(codes, levels)
         out, inside = self._extent(centre, half)
         radius = np.sqrt(3.0) * half
         excess = np.full((len(codes), len(self.convex)), np.inf)
@@ -162,24 +158,7 @@ class _Cells:
     def centre(self, number: int) -> FloatArray:
         """Centre of a cell, shape (3,); [m]."""
         one = slice(number, number + 1)
-        return np.asarray(self._boxes(self.codes[one], self.levels[one])[0][0])
-
-    def split(self, chosen: IntArray) -> None:
-        """Put the eight children of cells in their place."""
-        count = np.ones(self.codes.size, dtype=np.int64)
-        count[chosen] = 8
-        begin = np.cumsum(count) - count
-        kids = (begin[chosen, None] + np.arange(8)).ravel()
-        codes, levels, state, middle = (
-            np.repeat(values, count)
-            for values in (self.codes, self.levels, self.state, self.middle)
-        )
-        levels[kids] += 1
-        codes[kids] += np.tile(np.arange(8), len(chosen)) << (
-            3 * (DEPTH - levels[kids])
-        )
-        state[kids], middle[kids] = self._states(codes[kids], levels[kids])
-        self.codes, self.levels, self.state, self.middle = codes, levels, state, middle
+        return np.asarray(self.boxes(self.codes[one], self.levels[one])[0][0])
 
 
 def cut_off(

@@ -1,4 +1,4 @@
-"""Compiled loops over the cells of an octree: what a cell holds, what it leads to.
+"""Octrees: cells halved on demand, what they hold and what they lead to.
 
 A cell is the code of its lowest corner (bits of the three coordinates in turn, counted
 in cells of the finest level) and its level. Sorted codes are in depth-first order, so
@@ -16,6 +16,8 @@ DEPTH = 18
 """Level of the finest cells; three coordinates of so many bits fit an integer."""
 COORDINATE = sum(1 << (3 * bit) for bit in range(DEPTH))
 """Bits of the first coordinate in a code; those of the others stand beside them."""
+FIRST_LEVEL = 4
+"""Level of the cells begun with."""
 SHUT = 0
 """Proved: a tip anywhere in the cell is too close to an obstacle or out of reach."""
 DOUBTFUL = 1
@@ -172,3 +174,46 @@ def doubt_to(
                 result[m] = value + doubt[m]
                 heapq.heappush(heap, (result[m], m))
     return result
+
+
+class Octree:
+    """Cells that fill a cube, halved on demand.
+
+    Args:
+        corner: Lowest corner of the cube, shape (3,); [m].
+        side: Of the cube; [m].
+    """
+
+    def __init__(self, corner: FloatArray, side: float) -> None:
+        self.corner, self.side = corner, side
+        count = 8**FIRST_LEVEL
+        self.codes = np.arange(count) << (3 * (DEPTH - FIRST_LEVEL))
+        self.levels = np.full(count, FIRST_LEVEL)
+        self.known = self.look(self.codes, self.levels)
+
+    def look(self, codes: IntArray, levels: IntArray) -> tuple[FloatArray, ...]:
+        """What is kept of cells, shape (n,) each."""
+        raise NotImplementedError
+
+    def boxes(self, codes: IntArray, levels: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Centres, shape (n, 3), and half sides, shape (n,), of cells; [m]."""
+        half = self.side / 2.0 ** (levels + 1.0)
+        low = self.corner + self.side / 2.0**DEPTH * places(codes)
+        return np.asarray(low + half[:, None]), np.asarray(half)
+
+    def split(self, chosen: IntArray) -> None:
+        """Put the eight children of cells in their place."""
+        count = np.ones(self.codes.size, dtype=np.int64)
+        count[chosen] = 8
+        begin = np.cumsum(count) - count
+        kids = (begin[chosen, None] + np.arange(8)).ravel()
+        codes, levels = np.repeat(self.codes, count), np.repeat(self.levels, count)
+        levels[kids] += 1
+        shift = 3 * (DEPTH - levels[kids])
+        codes[kids] += np.tile(np.arange(8), len(chosen)) << shift
+        known = tuple(np.repeat(values, count) for values in self.known)
+        for values, fresh in zip(
+            known, self.look(codes[kids], levels[kids]), strict=True
+        ):
+            values[kids] = fresh
+        self.codes, self.levels, self.known = codes, levels, known
