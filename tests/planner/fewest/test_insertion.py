@@ -20,7 +20,7 @@ from vdsm_pin.arm.manipulator import (
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
-from vdsm_pin.planner.fewest.charts import Directions, Projections
+from vdsm_pin.planner.fewest.charts import coordinates
 from vdsm_pin.planner.fewest.follow_the_leader import followed, led_along
 from vdsm_pin.planner.fewest.insertion import insert
 from vdsm_pin.planner.fewest.insertion_population import Insertion, Layers
@@ -244,9 +244,7 @@ def test_a_leader_is_followed_through_a_tube_where_chance_is_lost() -> None:
     task = problem(tube, points=curve.at(marks[-1:]), start=(-0.2, 0, 0), closed=False)
     layers = Layers(curve.at(marks), np.zeros(len(marks)))
     for exactly in (True, False):
-        grown = Insertion(
-            judge_of(task), layers, np.random.default_rng(0), 2, Projections()
-        )
+        grown = Insertion(judge_of(task), layers, np.random.default_rng(0), 2)
         if not exactly:
             grown._leader = lambda _, start: start  # type: ignore[method-assign]
         chain = grown.grow(np.zeros((ARM.n_links + 1, 2)), 0)
@@ -261,7 +259,7 @@ def test_what_is_inserted_keeps_clearance_limits_and_layers() -> None:
     play[[0, -1]] = 0.0
     rng = np.random.default_rng(0)
     root = np.zeros((ARM.n_links + 1, 2))
-    chain = Insertion(judge, Layers(route, play), rng, 24, Projections()).grow(root, 3)
+    chain = Insertion(judge, Layers(route, play), rng, 24).grow(root, 3)
     assert chain.layer[-1] == len(route) - 1
     assert (np.diff(chain.layer) >= 0).all()
     np.testing.assert_array_equal(chain.tips[[0, -1]], route[[0, -1]])
@@ -278,7 +276,7 @@ def test_nothing_is_inserted_through_a_wall() -> None:
     layers = Layers(tips, np.zeros(30))
     root = np.zeros((ARM.n_links + 1, 2))
     rng = np.random.default_rng(0)
-    chain = Insertion(judge, layers, rng, 24, Projections()).grow(root, 3)
+    chain = Insertion(judge, layers, rng, 24).grow(root, 3)
     assert chain.tips[-1, 0] < 0.65
 
 
@@ -321,8 +319,8 @@ def test_between_directions_the_arm_moves_steadily(
     here = joint_centres(arm, x0[0], alpha, theta)
     there = joint_centres(arm, x0[1], alpha + turns[0], theta + turns[1])
     tips = here[:, -1].copy(), there[:, -1].copy()
-    chart, steps = Directions(), []
-    lines = Intervals(*tips, chart.of_centres(arm, here), chart.of_centres(arm, there))
+    ends, steps = (coordinates(arm, one, directed=True) for one in (here, there)), []
+    lines = Intervals(*tips, *ends)
     for parts in (200, 400):
         share = np.tile(np.linspace(0.0, 1.0, parts + 1), 200)
         places = lines.centres(arm, np.repeat(np.arange(200), parts + 1), share)
@@ -381,8 +379,8 @@ def test_directions_and_projections_place_the_same_arms() -> None:
     centres = bent_arms(rng, 100)
     centres[:, :, 1:] -= centres[:, :1, 1:]
     tips, number, still = centres[:, -1].copy(), np.arange(100), np.zeros(100)
-    for chart in (Projections(), Directions()):
-        shapes = chart.of_centres(ARM, centres)
+    for directed in (False, True):
+        shapes = coordinates(ARM, centres, directed)
         placed = Intervals(tips, tips, shapes, shapes).centres(ARM, number, still)
         np.testing.assert_allclose(placed, centres, atol=1e-12)
 
@@ -397,7 +395,7 @@ def test_between_directions_tip_links_and_rail_are_exact(
     here = joint_centres(ARM, np.full(200, rail[0]), alpha, theta)
     turns = rng.uniform(-0.1, 0.1, (2, 200, ARM.n_links))
     there = joint_centres(ARM, np.full(200, rail[1]), alpha + turns[0], theta)
-    ends = [Directions().of_centres(ARM, centres) for centres in (here, there)]
+    ends = [coordinates(ARM, one, directed=True) for one in (here, there)]
     tips = here[:, -1].copy(), there[:, -1].copy()
     lines = Intervals(*tips, *ends)
     for share in (0.0, 0.3, 1.0):

@@ -1,47 +1,77 @@
-"""The two charts of configurations: how children vary, how centres become numbers."""
+"""The two charts of configurations: how children vary, how centres become numbers.
 
-from typing import Final, Protocol
+Offsets of the joints' projections hold arms whose links lean ahead, directions of the
+links hold all.
+"""
+
+from typing import Final
 
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.fewest.direction_kernels import vary_directions
-from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.planner.fewest.motion import is_directed, standing
 from vdsm_pin.planner.fewest.vary import COPIED, SCALES, vary
 
 TURNS: Final = (0.02, 0.08, 0.25)
 """Sizes of a turn of links; [rad]."""
 
 
-class Chart(Protocol):
-    """What the growth of arms needs of a chart."""
+def coordinates(arm: Manipulator, centres: FloatArray, directed: bool) -> FloatArray:
+    """The shape coordinates of arms.
 
-    def of_centres(self, arm: Manipulator, centres: FloatArray) -> FloatArray:
-        """The shape coordinates of arms, from joint centres (n, N + 1, 3) [m]."""
+    Args:
+        arm: The arm.
+        centres: Joint centres, shape (n, N + 1, 3); [m].
+        directed: Whether in directions of links, which may lean any way.
 
-    def varied(
-        self,
-        arm: Manipulator,
-        shapes: FloatArray,
-        moved: FloatArray,
-        kept: BoolArray,
-        rng: np.random.Generator,
-    ) -> FloatArray:
-        """Children of arms, one each.
+    Returns:
+        Directions, shape (n, N, 3) [-], or offsets D_1..D_{N+1} of the joints'
+        projections, shape (n, N + 1, 2) [m].
+    """
+    if directed:
+        return np.asarray(np.diff(centres, axis=1) / arm.link_lengths[:, None])
+    offsets = centres[:, :, 1:] - arm.ratios[:, None] * centres[:, -1:, 1:]
+    offsets[:, [0, -1]] = 0.0
+    return np.asarray(offsets)
 
-        Args:
-            arm: The arm.
-            shapes: Their shape coordinates.
-            moved: How far the tip has moved across the rail since, shape (n, 2); [m].
-            kept: Which of them stay as they are, shape (n,).
-            rng: Source of chance.
-        """
 
-    def settled(
-        self, arm: Manipulator, tips: FloatArray, shapes: FloatArray
-    ) -> FloatArray:
-        """The shape coordinates with the base brought onto its rail, if it can be."""
+def varied(
+    arm: Manipulator,
+    shapes: FloatArray,
+    moved: FloatArray,
+    kept: BoolArray,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """Children of arms, one each; see `vary` and `vary_directions`.
+
+    Args:
+        arm: The arm.
+        shapes: Their shape coordinates.
+        moved: How far the tip has moved across the rail since, shape (n, 2); [m].
+        kept: Which of them stay as they are, shape (n,).
+        rng: Source of chance.
+    """
+    n = len(shapes)
+    if is_directed(shapes):
+        scale = rng.choice(np.array(TURNS), n)
+        turn = rng.normal(size=(n, 3)) * scale[:, None]
+        kind = np.where(kept, 0.0, rng.random(n))
+        return vary_directions(shapes, rng.random(n), rng.random(n), kind, turn)
+    scale = rng.choice(np.array(SCALES), n) * arm.total_length
+    kind = np.where(kept, 0.5 * COPIED, rng.random(n))
+    shift = rng.normal(size=(n, 2)) * scale[:, None]
+    return vary(shapes, arm.stations, moved, rng.random(n), kind, shift)
+
+
+def settled(arm: Manipulator, tips: FloatArray, shapes: FloatArray) -> FloatArray:
+    """The shape coordinates with the base brought onto its rail, if it can be."""
+    if not is_directed(shapes):
+        return shapes
+    centres = standing(arm, tips, shapes)
+    found = np.asarray(np.isfinite(centres).all(axis=(1, 2)))[:, None, None]
+    return np.where(found, coordinates(arm, centres, directed=True), shapes)
 
 
 def turned_towards(
@@ -65,66 +95,3 @@ def turned_towards(
     part = np.maximum(0.0, 1.0 - back / sharing[:, None]) * turned[:, None]
     mixed = (1.0 - part[..., None]) * shapes + part[..., None] * goal[:, None]
     return np.asarray(mixed / np.linalg.norm(mixed, axis=2, keepdims=True))
-
-
-class Projections:
-    """Offsets of the joints' projections; links lean ahead."""
-
-    def of_centres(self, arm: Manipulator, centres: FloatArray) -> FloatArray:
-        """Offsets D_1..D_{N+1}, shape (n, N + 1, 2); [m]."""
-        offsets = centres[:, :, 1:] - arm.ratios[:, None] * centres[:, -1:, 1:]
-        offsets[:, [0, -1]] = 0.0
-        return np.asarray(offsets)
-
-    def varied(
-        self,
-        arm: Manipulator,
-        shapes: FloatArray,
-        moved: FloatArray,
-        kept: BoolArray,
-        rng: np.random.Generator,
-    ) -> FloatArray:
-        """See `growth.vary`; shape (n, N + 1, 2); [m]."""
-        n = len(shapes)
-        scale = rng.choice(np.array(SCALES), n) * arm.total_length
-        kind = np.where(kept, 0.5 * COPIED, rng.random(n))
-        shift = rng.normal(size=(n, 2)) * scale[:, None]
-        return vary(shapes, arm.stations, moved, rng.random(n), kind, shift)
-
-    def settled(
-        self, arm: Manipulator, tips: FloatArray, shapes: FloatArray
-    ) -> FloatArray:
-        """The same: the chart knows no other base."""
-        return shapes
-
-
-class Directions:
-    """Directions of the links, whichever way they lean."""
-
-    def of_centres(self, arm: Manipulator, centres: FloatArray) -> FloatArray:
-        """Directions, shape (n, N, 3); [-]."""
-        return np.asarray(np.diff(centres, axis=1) / arm.link_lengths[:, None])
-
-    def varied(
-        self,
-        arm: Manipulator,
-        shapes: FloatArray,
-        moved: FloatArray,
-        kept: BoolArray,
-        rng: np.random.Generator,
-    ) -> FloatArray:
-        """See `vary_directions`; shape (n, N, 3); [-]."""
-        n = len(shapes)
-        scale = rng.choice(np.array(TURNS), n)
-        turn = rng.normal(size=(n, 3)) * scale[:, None]
-        kind = np.where(kept, 0.0, rng.random(n))
-        return vary_directions(shapes, rng.random(n), rng.random(n), kind, turn)
-
-    def settled(
-        self, arm: Manipulator, tips: FloatArray, shapes: FloatArray
-    ) -> FloatArray:
-        """Directions turned until the base is on its rail, where that can be."""
-        still = Intervals(tips, tips, shapes, shapes)
-        centres = still.centres(arm, np.arange(len(tips)), np.zeros(len(tips)))
-        found = np.asarray(np.isfinite(centres).all(axis=(1, 2)))[:, None, None]
-        return np.where(found, self.of_centres(arm, centres), shapes)

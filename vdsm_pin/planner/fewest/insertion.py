@@ -14,11 +14,10 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.fewest.broad_phase import BroadPhase
-from vdsm_pin.planner.fewest.charts import Chart, Directions, Projections
 from vdsm_pin.planner.fewest.insertion_population import Chain, Insertion, Layers
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
-from vdsm_pin.planner.fewest.motion import Corners, Intervals
+from vdsm_pin.planner.fewest.motion import Corners, standing
 from vdsm_pin.planner.fewest.route import PathRows, TipRoute, tip_route
 from vdsm_pin.planner.fewest.search import Found
 from vdsm_pin.planner.fewest.start_node import checked_start
@@ -126,8 +125,7 @@ class _Search:
         self.judge, self.space = judge, space
         self.route, self.effort = route, effort
         self.tips = route.tips[route.layers]
-        self.chart: Chart = Directions() if effort.directed else Projections()
-        self.root = checked_start(judge, route.tips[:1], self.chart)
+        self.root = checked_start(judge, route.tips[:1], effort.directed)
         self.rng = np.random.default_rng(effort.seed)
         self.farthest: _Visit | None = None
 
@@ -160,10 +158,8 @@ class _Search:
         visit = self.farthest
         if visit is None:
             return None
-        tip, shape = visit.chain.tips[-1:], visit.chain.offsets[-1:]
-        still = Intervals(tip, tip, shape, shape)
-        arm, place = self.judge.problem.manipulator, np.zeros(1, np.int64)
-        centres = still.centres(arm, place, np.zeros(1))[0]
+        arm, last = self.judge.problem.manipulator, visit.chain
+        centres = standing(arm, last.tips[-1:], last.offsets[-1:])[0]
         come = 1 + min(int(visit.chain.layer[-1]), visit.before)
         return Stuck(visit.route, come, centres)
 
@@ -179,9 +175,7 @@ class _Search:
             play[1:before] = PLAY * self.judge.problem.manipulator.most_radius
             tips = np.vstack([route, path[1:]])
             layers = Layers(tips, play, *self._pull(k, before, tips))
-            grown = Insertion(
-                self.judge, layers, self.rng, self.effort.population, self.chart
-            )
+            grown = Insertion(self.judge, layers, self.rng, self.effort.population)
             chain = grown.grow(self.root, self.effort.returns)
             visit = _Visit(k, before, chain, route)
             if self.farthest is None or visit.come > self.farthest.come:

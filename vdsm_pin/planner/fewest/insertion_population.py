@@ -14,11 +14,11 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.charts import Chart, turned_towards
+from vdsm_pin.planner.fewest.charts import coordinates, settled, turned_towards, varied
 from vdsm_pin.planner.fewest.follow_the_leader import followed, led_along
 from vdsm_pin.planner.fewest.growth import FAMILY, lacking
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.planner.fewest.motion import Intervals, is_directed, standing
 from vdsm_pin.problem.pointing import angles_between
 
 LED: Final = 0.4
@@ -96,7 +96,6 @@ class Insertion:
         layers: Where the tip goes.
         rng: Source of chance.
         population: Arms that live on at a layer.
-        chart: How they are described.
     """
 
     def __init__(
@@ -105,12 +104,9 @@ class Insertion:
         layers: Layers,
         rng: np.random.Generator,
         population: int,
-        chart: Chart,
     ) -> None:
         self.judge, self.layers, self.rng = judge, layers, rng
-        self.population, self.chart = population, chart
-        arm = judge.problem.manipulator
-        self.arm, self.radius = arm, arm.most_radius
+        self.population, self.arm = population, judge.problem.manipulator
 
     def _forget(self, root: FloatArray) -> None:
         """Begin with empty records; `root` tells how arms are described."""
@@ -178,12 +174,11 @@ class Insertion:
             start: The same arm, on record.
         """
         tips, judge = self.layers.tips, self.judge
-        still = Intervals(tips[:1], tips[:1], root[None], root[None])
-        centres = still.centres(self.arm, np.zeros(1, np.int64), np.zeros(1))[0]
+        centres = standing(self.arm, tips[:1], root[None])[0]
         laid = led_along(np.ascontiguousarray(tips), centres, self.arm.link_lengths)
         fits = np.isfinite(laid).all(axis=(1, 2))
         count = len(tips) if fits.all() else int(np.argmin(fits))
-        tips, offsets = tips[:count], self.chart.of_centres(self.arm, laid[:count])
+        tips, offsets = tips[:count], self._coordinates(laid[:count])
         offsets[:1] = root
         aims = self._asked(count)
         clearances, _, _ = judge.look(tips, offsets, aims)
@@ -200,6 +195,10 @@ class Insertion:
             parent = number[k - 1 : k]
             self._recorded(k, tips[one], offsets[one], clearances[one], parent)
         return _Crowd(number, tips[:count], offsets[:count])
+
+    def _coordinates(self, centres: FloatArray) -> FloatArray:
+        """Shape coordinates as those on record, from (n, N + 1, 3); [m]."""
+        return coordinates(self.arm, centres, is_directed(self.offsets))
 
     def _asked(self, count: int) -> FloatArray | None:
         """Where last links must look at the first layers, NaN for anywhere."""
@@ -282,7 +281,7 @@ class Insertion:
     def _born(self, to: int, crowd: _Crowd) -> tuple[IntArray, FloatArray, FloatArray]:
         """Children at a layer: row of the parent, tip, offsets."""
         rows = np.repeat(np.arange(len(crowd.number)), self._family(crowd))
-        n, arm, rng = len(rows), self.arm, self.rng
+        n, rng = len(rows), self.rng
         shift = rng.normal(size=(n, 3)) * self.layers.play[to] / 2.0
         tips = self.layers.tips[to] + shift
         offsets = crowd.offsets[rows]
@@ -293,11 +292,11 @@ class Insertion:
         moved[led] = 0.0
         kept = np.zeros(n, dtype=np.bool_)
         kept[led[rng.random(len(led)) < UNCHANGED]] = True
-        born = self.chart.varied(arm, offsets, moved, kept, rng)
+        born = varied(self.arm, offsets, moved, kept, rng)
         aims = self._aims(to, tips)
         if aims is not None:
             born = turned_towards(born, aims, rng.random(n) < AIMED, rng)
-        return rows, tips, self.chart.settled(arm, tips, born)
+        return rows, tips, settled(self.arm, tips, born)
 
     def _family(self, crowd: _Crowd) -> int:
         """Children of each arm: a small population has more."""
@@ -307,12 +306,11 @@ class Insertion:
         self, crowd: _Crowd, rows: IntArray, tips: FloatArray
     ) -> tuple[FloatArray, BoolArray]:
         """Shapes of arms that follow the leader, and which of them can."""
-        arm = self.arm
-        still = Intervals(crowd.tips, crowd.tips, crowd.offsets, crowd.offsets)
-        number = np.arange(len(crowd.number))
-        centres = still.centres(arm, number, np.zeros(len(number)))
-        after = followed(centres[rows], np.ascontiguousarray(tips), arm.link_lengths)
-        offsets = self.chart.of_centres(arm, after)
+        centres = standing(self.arm, crowd.tips, crowd.offsets)
+        after = followed(
+            centres[rows], np.ascontiguousarray(tips), self.arm.link_lengths
+        )
+        offsets = self._coordinates(after)
         fits = np.asarray(np.isfinite(after).all(axis=(1, 2)))
         return np.where(fits[:, None, None], offsets, crowd.offsets[rows]), fits
 

@@ -14,7 +14,7 @@ import numpy as np
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.interval_parts import Parts
-from vdsm_pin.planner.fewest.motion import Corners, Intervals
+from vdsm_pin.planner.fewest.motion import Corners, Intervals, standing
 from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along, pieces_of
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Pricing, link_limit
 from vdsm_pin.planner.records import LinkClearance
@@ -160,9 +160,7 @@ class Judge:
 
     def bends(self, tips: FloatArray, offsets: FloatArray) -> FloatArray:
         """Link angles of configurations, shape (n, N); [rad]."""
-        still = Intervals(tips, tips, offsets, offsets)
-        number, share = np.arange(len(tips)), np.zeros(len(tips))
-        return bends_of(still.centres(self.problem.manipulator, number, share))
+        return bends_of(standing(self.problem.manipulator, tips, offsets))
 
     def _cuts(self, intervals: Intervals) -> BoolArray:
         """Joints at which arms are cut into straight pieces, shape (n, N + 1).

@@ -70,7 +70,7 @@ class Corners:
 
     def unit(self, manipulator: Manipulator) -> float:
         """Way of the tip that one of the offsets counts for; [-], of directions [m]."""
-        directed = self.offsets.shape[2] == 3
+        directed = is_directed(self.offsets)
         return manipulator.total_length / 3.0 if directed else 1.0
 
     def pick(self, intervals: IntArray) -> "Intervals":
@@ -125,7 +125,7 @@ class Intervals:
     @property
     def directed(self) -> bool:
         """Whether links are given by their directions."""
-        return bool(self.offsets.shape[2] == 3)
+        return is_directed(self.offsets)
 
     def continued(self) -> BoolArray:
         """Whether each interval ends where the next begins, shape (n,)."""
@@ -157,6 +157,20 @@ class Intervals:
             self.tips, self.next_tips, self.offsets, self.next_offsets,
             interval, share, manipulator.ratios, manipulator.link_lengths,
         )  # fmt: skip
+
+
+def is_directed(offsets: FloatArray) -> bool:
+    """Whether shape coordinates are directions of links."""
+    return bool(offsets.shape[2] == 3)
+
+
+def standing(
+    manipulator: Manipulator, tips: FloatArray, offsets: FloatArray
+) -> FloatArray:
+    """Joint centres of configurations, shape (n, N + 1, 3); see `Intervals.centres`."""
+    number = np.arange(len(tips))
+    still = Intervals(tips, tips, offsets, offsets)
+    return still.centres(manipulator, number, np.zeros(len(tips)))
 
 
 def motion_corners(

@@ -11,9 +11,9 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
-from vdsm_pin.planner.fewest.charts import Projections
+from vdsm_pin.planner.fewest.charts import coordinates
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.motion import Corners, Intervals
+from vdsm_pin.planner.fewest.motion import Corners, is_directed, standing
 from vdsm_pin.planner.fewest.vary import lined_up
 
 ROUNDS: Final = 3
@@ -30,7 +30,7 @@ def sparser(judge: Judge, corners: Corners) -> Corners:
     """
     corners = projected(judge, corners)
     arm = judge.problem.manipulator
-    if corners.offsets.shape[2] == 3:
+    if is_directed(corners.offsets):
         return corners
     on = np.append(corners.drawn, False) | np.append(False, corners.drawn)
     for _ in range(ROUNDS):
@@ -44,15 +44,13 @@ def sparser(judge: Judge, corners: Corners) -> Corners:
 
 def projected(judge: Judge, corners: Corners) -> Corners:
     """Corners given by projections if all links lean ahead and all ways stay clear."""
-    every = corners.pick(np.arange(len(corners.drawn)))
-    if not every.directed:
+    if not is_directed(corners.offsets):
         return corners
-    arm, count = judge.problem.manipulator, len(corners.tips)
-    still = Intervals(corners.tips, corners.tips, corners.offsets, corners.offsets)
-    centres = still.centres(arm, np.arange(count), np.zeros(count))
+    arm = judge.problem.manipulator
+    centres = standing(arm, corners.tips, corners.offsets)
     if not (np.diff(centres[:, :, 0], axis=1) > 0.0).all():
         return corners
-    offsets = Projections().of_centres(arm, centres)
+    offsets = coordinates(arm, centres, directed=False)
     trial = replace(corners, offsets=offsets)
     clear = judge.clear(judge.lines(trial, np.arange(len(corners.drawn))))
     return trial if clear.all() else corners

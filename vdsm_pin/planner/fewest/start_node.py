@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from vdsm_pin.arm.kinematics import joint_centres, link_angles
+from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.errors import LimitExceeded, NoPlanFound, NoWayOut
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.planner.fewest.charts import Chart, Projections
+from vdsm_pin.planner.fewest.charts import coordinates
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap, extended
@@ -18,47 +18,31 @@ EXITS = 24
 """Nodes tried as the first step away from the start."""
 
 
-def start_offsets(problem: PlanningProblem) -> FloatArray:
-    """Offsets D_1..D_{N+1} of the arm at the start, shape (N + 1, 2); [m].
-
-    Raises:
-        NoPlanFound: If a link leans backwards, where the chart ends.
-    """
-    arm, path = problem.manipulator, problem.path
-    if path.start_joints is None:
-        return np.zeros((arm.n_links + 1, 2))
-    joints = path.start_joints[None]
-    centres = joint_centres(arm, joints[:, 0], joints[:, 1::2], joints[:, 2::2])[0]
-    if not (np.diff(centres[:, 0]) > 0.0).all():
-        link = int(np.argmin(np.diff(centres[:, 0]))) + 1
-        message = f"link {link} leans backwards at the start; the chart ends there"
-        raise NoPlanFound(message)
-    line = centres[-1, 1:] * arm.ratios[:, None]
-    offsets = centres[:, 1:] - line
-    offsets[[0, -1]] = 0.0
-    return np.asarray(offsets)
-
-
-def checked_start(judge: Judge, tip: FloatArray, chart: Chart) -> FloatArray:
+def checked_start(judge: Judge, tip: FloatArray, directed: bool) -> FloatArray:
     """Shape coordinates of the arm at the start.
 
     Args:
         judge: Knows the limits.
         tip: Of the arm at the start, shape (1, 3); [m].
-        chart: How arms are described.
+        directed: Whether in directions of links.
 
     Raises:
         LimitExceeded: If it breaks a limit.
         NoPlanFound: If it bends more than may be used, or the chart does not hold it.
     """
-    if isinstance(chart, Projections):
-        shape = start_offsets(judge.problem)
+    problem = judge.problem
+    arm, centres = problem.manipulator, start_centres(problem)
+    if directed or problem.path.start_joints is not None:
+        ahead = np.diff(centres[:, 0])
+        if not (directed or (ahead > 0.0).all()):
+            link = int(np.argmin(ahead)) + 1
+            message = f"link {link} leans backwards at the start; the chart ends there"
+            raise NoPlanFound(message)
+        shape = coordinates(arm, centres[None], directed)[0]
     else:
-        shape = chart.of_centres(
-            judge.problem.manipulator, start_centres(judge.problem)[None]
-        )[0]
+        shape = np.zeros((arm.n_links + 1, 2))
     _check_limits(judge, tip, shape[None])
-    return shape
+    return np.asarray(shape)
 
 
 def with_start(
@@ -73,7 +57,7 @@ def with_start(
     if judge.problem.path.start_joints is None and roadmap.index[0] >= 0:
         return roadmap, int(roadmap.index[0])
     tip = roadmap.route.tips[:1]
-    offsets = checked_start(judge, tip, Projections())[None]
+    offsets = checked_start(judge, tip, directed=False)[None]
     clearances, _, _ = judge.look(tip, offsets)
     shapes = roadmap.shapes
     nodes = roadmap.nodes_at(0)
