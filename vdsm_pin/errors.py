@@ -291,10 +291,15 @@ class NoPlanFound(Infeasible):
 
 
 class NoWayOut(NoPlanFound):
-    """No way out of the start was found."""
+    """No way out of the start was found.
 
-    def __init__(self) -> None:
-        super().__init__("no way out of the start was found")
+    Args:
+        why: What keeps the arm there; empty if nobody knows.
+    """
+
+    def __init__(self, why: str = "") -> None:
+        words = "no way out of the start was found"
+        super().__init__(f"{words}: {why}" if why else words)
 
 
 class OutOfTime(VdsmError):

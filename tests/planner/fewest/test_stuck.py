@@ -16,7 +16,13 @@ from vdsm_pin.planner.fewest.explore import explore
 from vdsm_pin.planner.fewest.levels import Effort, Insert
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.strategy import plan_fewest
-from vdsm_pin.planner.fewest.stuck import Stuck, where_stuck
+from vdsm_pin.planner.fewest.stuck import (
+    Stuck,
+    at_reach,
+    no_way_in,
+    on_the_path,
+    where_stuck,
+)
 from vdsm_pin.problem.planning_problem import Blocked, PlanningProblem
 from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.progress import shown
@@ -67,6 +73,30 @@ def test_the_passage_the_stop_and_the_advice_are_named() -> None:
     room = np.hypot(0.08, 0.08) - task.manipulator.most_radius
     assert f"where link 8 has {room * 1e3:.3f} mm to 'wall" in words
     assert "wider opening" not in words
+
+
+def test_what_the_path_itself_lacks_is_named() -> None:
+    """The path runs 70 mm below the upper edge of a window 160 mm high."""
+    task = behind(HALF)
+    tips = np.array([[0.5, 0.0, 0.01], [0.7, 0.0, 0.01]])
+    room = 0.07 - task.manipulator.most_radius
+    told = on_the_path(task, tips, room + 1e-4, "", 0.2)
+    assert told is not None
+    assert f"leaves the tip itself {room * 1e3:.3f} mm to 'wall3'" in told.words
+    assert (told.link, told.obstacle, told.station) == (8, "wall3", 0.2)
+    assert on_the_path(task, tips, room - 1e-4, "", 0.2) is None
+    assert at_reach(task, tips, "", 0.0) is None
+    short = replace(task.manipulator, base_range=(-5.0, 0.7 - 3.126))
+    told = at_reach(replace(task, manipulator=short), tips, "", 0.0)
+    assert told is not None
+    assert "longer rail" in told.words
+
+
+def test_an_opening_too_narrow_for_the_tip_is_named() -> None:
+    task = behind(0.06)
+    told = no_way_in(task, np.array([0.6, 0.0, 0.0]), "", 0.0)
+    assert "120.000 mm wide, for a body of 123.000 mm with 3.500 mm" in told.words
+    assert told.obstacle.startswith("wall")
 
 
 def test_limits_that_are_met_are_named_first() -> None:

@@ -17,10 +17,10 @@ from vdsm_pin.errors import (
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.feasibility import curled_reach, rail_distance
 from vdsm_pin.planner.fewest.explore import Outcome
-from vdsm_pin.planner.fewest.motion import Corners, Intervals
+from vdsm_pin.planner.fewest.motion import Corners, standing
 from vdsm_pin.planner.fewest.pose_kernels import bends_of
 from vdsm_pin.planner.fewest.route import PathRows
-from vdsm_pin.planner.fewest.stuck import where_stuck
+from vdsm_pin.planner.fewest.stuck import at_reach, no_way_in, on_the_path, where_stuck
 from vdsm_pin.planner.impossible.bounds import (
     TipProof,
     least_changed,
@@ -67,7 +67,7 @@ def refuse(problem: PlanningProblem, outcome: Outcome) -> None:
     allowed = TOLERANCES.coverage * problem.path.length
     whole = problem.path.blocked is Blocked.FAIL
     if outcome.found is None or (whole and missing > allowed):
-        reached = how_far(problem, outcome)
+        reached = how_far(problem, outcome, deadline_of(outcome.judge.clearance))
         raise NoPlanFound(str(reached), reached)
 
 
@@ -135,10 +135,7 @@ def _cut_off(
     problem: PlanningProblem, rows: PathRows, proof: TipProof, deadline: Deadline
 ) -> Infeasible:
     first = int(np.flatnonzero(proof.cut_off)[0])
-    try:
-        place = narrowest(problem, rows.tips[first], deadline)
-    except OutOfTime:  # the proof stands without it
-        place = None
+    place = _shut(problem, rows.tips[first], deadline)
     words = ""
     if place is not None:
         clearances = upper_clearance(problem, np.stack([place, place])[None])[0]
@@ -151,6 +148,18 @@ def _cut_off(
             f"{in_mm(required)}"
         )
     return CutOff(station=float(rows.stations[first]), narrowest=words)
+
+
+def _shut(
+    problem: PlanningProblem, tip: FloatArray, deadline: Deadline | None
+) -> FloatArray | None:
+    """Where the widest way to a tip is shut, shape (3,); None where nobody knows."""
+    if deadline is None or not problem.scene.obstacles:
+        return None
+    try:
+        return narrowest(problem, tip, deadline)
+    except OutOfTime:  # what is told stands without it
+        return None
 
 
 def say_drawn(problem: PlanningProblem, outcome: Outcome) -> None:
@@ -171,34 +180,54 @@ def say_drawn(problem: PlanningProblem, outcome: Outcome) -> None:
     )  # fmt: skip
 
 
-def how_far(problem: PlanningProblem, outcome: Outcome) -> Reached:
-    """Where the search came to an end; not a proof."""
+def how_far(
+    problem: PlanningProblem, outcome: Outcome, deadline: Deadline | None = None
+) -> Reached:
+    """Where the search came to an end, what stopped it, what to try; not a proof.
+
+    Args:
+        problem: What was asked.
+        outcome: What the search came to.
+        deadline: Until when the narrowest passage may be looked for; None: not at all.
+    """
     drawn = _drawn(problem, outcome)
     route = None if outcome.found is None else outcome.found.route
     if outcome.found is not None and drawn >= problem.path.length:
         whole = "a motion that draws the whole path was found, but not finished"
         return Reached(whole, problem.path.length)
-    station, tip = 0.0, outcome.rows.tips[0]
+    stations = outcome.rows.stations
+    station, stop, tip = float(stations[0]), float(stations[-1]), outcome.rows.tips[0]
     if outcome.found is not None and route is not None:
         skipped = [k for k in outcome.found.skipped if not route.closed[k]]
         if skipped:
-            station = float(route.stations[skipped[0] - 1])
+            station, stop = route.stations[skipped[0] - 1 : skipped[0] + 1].tolist()
             tip = route.tips[route.layers[skipped[0]]]
     words = (
         f"drew {in_mm(drawn)} of {in_mm(problem.path.length)}; the first stretch not "
         f"drawn begins at {in_mm(station)} along the path, tip "
         f"{problem.in_file(tip)}"
     )
+    rows = outcome.rows.tips[(stations >= station) & (stations <= stop)]
+    cause = on_the_path(problem, rows, outcome.judge.required, words, station)
+    if cause is not None:
+        return cause
     if outcome.stuck is not None:
         return where_stuck(problem, outcome.stuck, words, station)
+    cause = at_reach(problem, rows, words, station)
+    if cause is not None:
+        return cause
+    place = _shut(problem, tip, deadline)
+    if place is not None:
+        return no_way_in(problem, place, words, station)
     zero = np.zeros((1, problem.manipulator.n_links + 1, 2))
-    straight = Intervals(tip[None], tip[None], zero, zero)
-    place = np.zeros(1, dtype=np.int64)
-    centres = straight.centres(problem.manipulator, place, np.zeros(1))[0]
+    centres = standing(problem.manipulator, tip[None], zero)[0]
     if not problem.scene.obstacles or not np.isfinite(centres).all():
         return Reached(words, station)
     link, name, least = culprit(problem, centres)
-    words += f"; link {link} of the straight arm there has {in_mm(least)} to {name!r}"
+    words += (
+        f"; link {link} of the straight arm there has {in_mm(least)} to {name!r}; try "
+        "another start or a longer time limit"
+    )
     return Reached(words, station, link, name)
 
 

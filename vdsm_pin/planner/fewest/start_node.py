@@ -11,8 +11,10 @@ from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap, extended
 from vdsm_pin.planner.fewest.sequence import TURN
 from vdsm_pin.planner.start import start_centres
+from vdsm_pin.planner.upper_clearance import culprit
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.units import in_mm
 
 EXITS = 24
 """Nodes tried as the first step away from the start."""
@@ -72,7 +74,7 @@ def with_start(
     need = np.minimum(judge.required, float(clearances[0])) * np.ones(len(near))
     good = judge.clear(lines, need) if len(near) else np.zeros(0, bool)
     if not good.any():
-        raise NoWayOut
+        raise NoWayOut(_kept_there(judge, float(clearances[0]), len(near)))
     ids = np.full(int(good.sum()), shapes.size)
     there = roadmap.shapes_of(nodes[near[good]])
     turn = gap[near[good]] / (TURN * judge.problem.manipulator.total_length)
@@ -82,6 +84,32 @@ def with_start(
         judge.bends(tip, offsets), clearances, shapes.with_grown(offsets, links),
     )  # fmt: skip
     return more, int(more.index[shapes.size])
+
+
+def _kept_there(judge: Judge, clearance: float, tried: int) -> str:
+    """Why no node can be reached from the start, in words.
+
+    Args:
+        judge: Knows what is kept.
+        clearance: Of the arm at the start, beyond what links keep besides; [m].
+        tried: Number of nodes at the tip of the start.
+    """
+    kept = in_mm(judge.required)
+    if clearance < judge.required:
+        _, name, least = culprit(judge.problem, start_centres(judge.problem))
+        return (
+            f"the arm starts with {in_mm(least)} to {name!r}, and the search keeps "
+            f"{kept}; try a smaller margin or `required_clearance`, or another start"
+        )
+    if not tried:
+        return (
+            f"with the tip where it starts no arm bent at one joint keeps {kept}; try "
+            "another start"
+        )
+    return (
+        f"the way to each of the {tried} nearest postures bent at one joint is "
+        "blocked; try another start"
+    )
 
 
 def largest_start_angle(problem: PlanningProblem) -> float:

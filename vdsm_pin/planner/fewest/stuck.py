@@ -1,4 +1,4 @@
-"""Where an insertion came to an end, what stopped it, and what might help."""
+"""Where a search came to an end, what stopped it, and what might help."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -7,6 +7,7 @@ import numpy as np
 
 from vdsm_pin.errors import Reached
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.feasibility import rail_distance
 from vdsm_pin.planner.fewest.pose_kernels import bends_of
 from vdsm_pin.planner.upper_clearance import culprit, upper_clearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -19,6 +20,11 @@ AT_END: Final = 1e-3
 counts as there; [-]."""
 SNUG: Final = 1.15
 """An opening up to this many times what the body needs counts as the reason; [-]."""
+
+FINER: Final = 8
+"""Places looked at for each row of the path."""
+AT_REACH: Final = 0.9995
+"""Part of the arm's length from which on a path is too far from the rail; [-]."""
 
 
 @dataclass(frozen=True)
@@ -51,9 +57,10 @@ def where_stuck(
     parts, link, obstacle = [words], 0, ""
     narrowest: list[float] = []
     if problem.scene.obstacles:
-        parts.append(_passage(problem, stuck))
+        narrow = stuck.route[_opening(problem, stuck)[0]]
+        parts.append(_passage(problem, narrow))
         link, obstacle, _ = culprit(problem, stuck.centres)
-        narrowest = stuck.route[_opening(problem, stuck)[0]].tolist()
+        narrowest = narrow.tolist()
     parts.append(_stop(problem, stuck))
     parts.append(f"try {' or '.join(_advice(problem, stuck))}")
     centres = stuck.centres.tolist()
@@ -74,14 +81,90 @@ def _needed(problem: PlanningProblem) -> float:
     return 2.0 * (problem.manipulator.most_radius + problem.required_clearance)
 
 
-def _passage(problem: PlanningProblem, stuck: Stuck) -> str:
-    narrow, width = _opening(problem, stuck)
-    arm = problem.manipulator
+def _passage(problem: PlanningProblem, place: FloatArray) -> str:
+    """The narrowest place of the best way, its width and that of the body."""
+    _, name, least = culprit(problem, np.stack([place, place]))
+    radius = problem.manipulator.most_radius
     return (
-        f"the best way in is narrowest at {problem.in_file(stuck.route[narrow])}: "
-        f"{in_mm(width)} wide, for a body of {in_mm(2.0 * arm.most_radius)} with "
-        f"{in_mm(problem.required_clearance)} on either side"
+        f"the best way in is narrowest at {problem.in_file(place)}, beside {name!r}: "
+        f"{in_mm(max(0.0, 2.0 * (least + radius)))} wide, for a body of "
+        f"{in_mm(2.0 * radius)} with {in_mm(problem.required_clearance)} on either side"
     )
+
+
+def no_way_in(
+    problem: PlanningProblem, place: FloatArray, words: str, station: float
+) -> Reached:
+    """No way for the tip was found: where the widest is too narrow, what to try.
+
+    Args:
+        problem: Arm and scene.
+        place: There, shape (3,); [m].
+        words: What is known besides, told first.
+        station: Where along the path the first stretch begins that is not drawn; [m].
+    """
+    _, name, _ = culprit(problem, np.stack([place, place]))
+    told = (
+        f"{words}; no way for the tip was found: {_passage(problem, place)}; try a "
+        "smaller `required_clearance` or a wider opening"
+    )
+    last = problem.manipulator.n_links
+    return Reached(told, station, last, name, (), place.tolist())
+
+
+def at_reach(
+    problem: PlanningProblem, tips: FloatArray, words: str, station: float
+) -> Reached | None:
+    """Where a stretch of the path is at the end of the arm's reach; else None.
+
+    Arguments are those of `on_the_path`.
+    """
+    length = problem.manipulator.total_length
+    away = rail_distance(problem.manipulator, tips)
+    far = int(np.argmax(away))
+    if not away[far] > AT_REACH * length:
+        return None
+    told = (
+        f"{words}; at {problem.in_file(tips[far])} the path is {in_mm(away[far])} from "
+        f"where the base can be, and the straight arm is {in_mm(length)} long; try a "
+        "longer rail (`base_range`) or another path"
+    )
+    return Reached(told, station)
+
+
+def on_the_path(
+    problem: PlanningProblem,
+    tips: FloatArray,
+    kept: float,
+    words: str,
+    station: float,
+) -> Reached | None:
+    """What keeps every arm from a stretch of the path; None where nothing is seen to.
+
+    Args:
+        problem: Arm and scene.
+        tips: Along the stretch, at most a row apart, shape (r, 3); [m].
+        kept: Clearance that plans keep; [m].
+        words: What is known besides, told first.
+        station: Where along the path the stretch begins; [m].
+    """
+    arm, share = problem.manipulator, np.arange(FINER)[:, None, None] / FINER
+    between = (1.0 - share) * tips[:-1] + share * tips[1:]
+    places = np.concatenate([between.reshape(-1, 3), tips[-1:]])
+    clearances = upper_clearance(problem, np.stack([places, places], axis=1))
+    least = clearances.min(axis=1, initial=np.inf)
+    near = int(np.argmin(least))
+    if not least[near] < kept:
+        return None
+    name = problem.scene.obstacles[int(np.argmin(clearances[near]))].name
+    told = (
+        f"{words}; at {problem.in_file(places[near])} the path leaves the tip itself "
+        f"{in_mm(least[near])} to {name!r}, required are "
+        f"{in_mm(problem.required_clearance)}, and the search keeps {in_mm(kept)}; try "
+        f"a smaller `required_clearance`, a path farther from {name!r}, or "
+        "`blocked: detour` to draw the rest"
+    )
+    return Reached(told, station, arm.n_links, name, (), places[near].tolist())
 
 
 def _stop(problem: PlanningProblem, stuck: Stuck) -> str:
