@@ -5,21 +5,7 @@ from typing import Annotated
 import typer
 
 from vdsm_pin.cli.options import OutFolder, TimeLimit, Trajectory, examples, family
-from vdsm_pin.cli.robot import (
-    Bodies,
-    Group,
-    JointLimits,
-    Locks,
-    PackageDirs,
-    Parts,
-    RequiredClearance,
-    RequiredSelfClearance,
-    RobotOptions,
-    SceneFile,
-    Srdf,
-    Topic,
-    Urdf,
-)
+from vdsm_pin.cli.robot import RobotOptions, Topic, of_robots
 from vdsm_pin.cli.verify import read_source
 from vdsm_pin.time_limit import Deadline, enforced
 
@@ -34,10 +20,12 @@ commands = family()
         "--trajectory plan.csv --out out/ur5",
     )
 )
+@of_robots
 def repair(
     context: typer.Context,
     trajectory: Trajectory,
     out: OutFolder,
+    *,
     problem: Annotated[
         str | None,
         typer.Argument(
@@ -45,17 +33,7 @@ def repair(
             help="A built-in name or a problem file; none with --urdf.",
         ),
     ] = None,
-    urdf: Urdf = None,
-    srdf: Srdf = None,
-    scene: SceneFile = None,
-    package_dir: PackageDirs = None,
-    lock: Locks = None,
-    required_clearance_mm: RequiredClearance = None,
-    required_self_clearance_mm: RequiredSelfClearance = None,
-    group: Group = None,
-    bodies: Bodies = None,
-    parts: Parts = None,
-    joint_limits: JointLimits = None,
+    robot: RobotOptions,
     topic: Topic = None,
     pin: Annotated[
         list[int] | None,
@@ -74,21 +52,8 @@ def repair(
     from vdsm_pin.problem.error_boxes import ErrorBox
 
     deadline = Deadline.after(time_limit)
-    options = RobotOptions(
-        urdf,
-        srdf,
-        scene,
-        tuple(package_dir or ()),
-        tuple(lock or ()),
-        required_clearance_mm,
-        required_self_clearance_mm,
-        group,
-        bodies,
-        parts,
-        joint_limits,
-    )
     with enforced(deadline):
-        source = read_source(problem, ErrorBox(), options, {}, topic)
+        source = read_source(problem, ErrorBox(), robot, {}, topic)
         order = VerifyOrder(
             source, trajectory, out, context.obj, deadline=deadline, topic=topic
         )

@@ -1,8 +1,10 @@
 """What commands ask about a robot of a URDF: by options, or in a problem file."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import wraps
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import typer
 
@@ -69,19 +71,19 @@ RequiredSelfClearance = Annotated[
 
 
 class RobotOptions(NamedTuple):
-    """Options as they were given; None or empty where they were not."""
+    """Options as they were given; None where they were not."""
 
-    urdf: Path | None
-    srdf: Path | None
-    scene: Path | None
-    package_dirs: tuple[Path, ...]
-    lock: tuple[str, ...]
-    required_mm: float | None
-    required_self_mm: float | None
-    group: str | None
-    bodies: Literal["hull", "parts", "primitives"] | None
-    parts: int | None
-    joint_limits: Path | None
+    urdf: Urdf = None
+    srdf: Srdf = None
+    scene: SceneFile = None
+    package_dir: PackageDirs = None
+    lock: Locks = None
+    required_clearance_mm: RequiredClearance = None
+    required_self_clearance_mm: RequiredSelfClearance = None
+    group: Group = None
+    bodies: Bodies = None
+    parts: Parts = None
+    joint_limits: JointLimits = None
 
     def cell(self, problem: Path | None) -> "Cell":
         """The robot and what it is held to.
@@ -105,8 +107,8 @@ class RobotOptions(NamedTuple):
         files = RobotFiles(
             self.urdf,
             self.srdf,
-            self.package_dirs,
-            locks(self.lock),
+            tuple(self.package_dir or ()),
+            locks(tuple(self.lock or ())),
             self.group,
             solids_of(self.bodies, self.parts),
             self.joint_limits,
@@ -114,25 +116,42 @@ class RobotOptions(NamedTuple):
         return cell_of(
             files,
             self.scene,
-            (self.required_mm or 0.0) / MM_PER_M,
-            (self.required_self_mm or 0.0) / MM_PER_M,
+            (self.required_clearance_mm or 0.0) / MM_PER_M,
+            (self.required_self_clearance_mm or 0.0) / MM_PER_M,
         )
 
     def named(self) -> dict[str, object]:
         """By the names of the command line."""
-        return {
-            "--urdf": self.urdf,
-            "--srdf": self.srdf,
-            "--scene": self.scene,
-            "--package-dir": self.package_dirs,
-            "--lock": self.lock,
-            "--group": self.group,
-            "--bodies": self.bodies,
-            "--parts": self.parts,
-            "--joint-limits": self.joint_limits,
-            "--required-clearance-mm": self.required_mm,
-            "--required-self-clearance-mm": self.required_self_mm,
-        }
+        given = self._asdict().items()
+        return {f"--{name.replace('_', '-')}": value for name, value in given}
+
+
+def of_robots(command: Callable[..., None]) -> Callable[..., None]:
+    """A command whose parameter `robot` becomes the options about a robot."""
+
+    @wraps(command)
+    def asked(**given: Any) -> None:
+        robot = RobotOptions(*(given.pop(name) for name in RobotOptions._fields))
+        command(robot=robot, **given)
+
+    options = [
+        Parameter(
+            name,
+            Parameter.KEYWORD_ONLY,
+            default=RobotOptions._field_defaults[name],
+            annotation=kind,
+        )
+        for name, kind in RobotOptions.__annotations__.items()
+    ]
+    own = [
+        one.replace(kind=Parameter.KEYWORD_ONLY)
+        for one in signature(command).parameters.values()
+    ]
+    place = [one.name for one in own].index("robot")
+    parameters = [*own[:place], *options, *own[place + 1 :]]
+    asked.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    asked.__annotations__ = {one.name: one.annotation for one in parameters}
+    return asked
 
 
 def refuse_beside(what: str, options: Mapping[str, object]) -> None:

@@ -23,22 +23,7 @@ from vdsm_pin.cli.options import (
     examples,
     family,
 )
-from vdsm_pin.cli.robot import (
-    Bodies,
-    Group,
-    JointLimits,
-    Locks,
-    PackageDirs,
-    Parts,
-    RequiredClearance,
-    RequiredSelfClearance,
-    RobotOptions,
-    SceneFile,
-    Srdf,
-    Topic,
-    Urdf,
-    refuse_beside,
-)
+from vdsm_pin.cli.robot import RobotOptions, Topic, of_robots, refuse_beside
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.time_limit import Deadline, enforced
 
@@ -75,10 +60,12 @@ class Said(NamedTuple):
         "--trajectory plan.csv --required-clearance-mm 5 --out out/ur5",
     )
 )
+@of_robots
 def verify(
     context: typer.Context,
     trajectory: Trajectory,
     out: OutFolder,
+    *,
     problem: Annotated[
         str | None,
         typer.Argument(
@@ -117,17 +104,7 @@ def verify(
     ] = "auto",
     quiet: Quiet = False,
     as_json: AsJson = False,
-    urdf: Urdf = None,
-    srdf: Srdf = None,
-    scene: SceneFile = None,
-    package_dir: PackageDirs = None,
-    lock: Locks = None,
-    required_clearance_mm: RequiredClearance = None,
-    required_self_clearance_mm: RequiredSelfClearance = None,
-    group: Group = None,
-    bodies: Bodies = None,
-    parts: Parts = None,
-    joint_limits: JointLimits = None,
+    robot: RobotOptions,
     topic: Topic = None,
 ) -> None:
     """Prove a trajectory clear, or say where it is not.
@@ -136,19 +113,6 @@ def verify(
     clearance.csv, link_angles.csv, centres.csv and cables.csv; of a robot (problem with
     robot, or --urdf) the first three.
     """
-    of_robot = RobotOptions(
-        urdf,
-        srdf,
-        scene,
-        tuple(package_dir or ()),
-        tuple(lock or ()),
-        required_clearance_mm,
-        required_self_clearance_mm,
-        group,
-        bodies,
-        parts,
-        joint_limits,
-    )
     of_arm: dict[str, object] = {
         "--joint-error-deg": joint_error_deg != "0",
         "--base-error-mm": base_error_mm,
@@ -174,7 +138,7 @@ def verify(
 
     with enforced(deadline):
         order = VerifyOrder(
-            source=read_source(problem, errors, of_robot, of_arm, topic),
+            source=read_source(problem, errors, robot, of_arm, topic),
             trajectory=trajectory,
             folder=out,
             command=context.obj,
