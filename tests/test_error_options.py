@@ -37,6 +37,7 @@ def test_options_and_python_say_the_same() -> None:
         obstacles_deg={"crate": 0.5},
     )
     assert typed.widened(error_boxes.ErrorBox()) == box.widened(error_boxes.ErrorBox())
+    assert box.with_joint(0.5) == typed.with_joint(0.5)
     assert typed.angles(3)[2].tolist() == [radians(0.3)] * 2
     crate = typed.of_obstacle("crate")
     assert crate.shift == 0.0025 and crate.turn == radians(0.5)

@@ -75,6 +75,16 @@ def test_each_motion_gets_a_row_a_page_and_a_test_case(folder: Path) -> None:
     assert "cell-clear/report.html" in page
 
 
+def test_the_problem_beside_the_motions_is_no_motion(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "plans" / "clear.csv").rename(folder / "clear.csv")
+    (row,) = run_batch(asked(folder, trajectories=(str(folder),), quiet=False))
+    assert (row.folder, row.outcome) == ("cell-clear", "certified")
+    said = capsys.readouterr().out
+    assert "smallest proved clearance" in said and "not available" not in said
+
+
 def test_what_changed_is_done_again(folder: Path) -> None:
     """A motion that is another one now is not taken from the earlier batch."""
     before = {row.folder: row for row in run_batch(asked(folder))}

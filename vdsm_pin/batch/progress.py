@@ -58,7 +58,9 @@ class Progress:
         if known.passed:
             near = _said(row, "min_clearance_lower_m", "m")
             near = near if row.closest_link else "no obstacle"
-            tail = f"{near}, {_said(row, 'max_link_angle_rad', 'rad')}"
+            tail = near
+            if row.max_link_angle_rad is not None:
+                tail += f", {_said(row, 'max_link_angle_rad', 'rad')}"
             if row.coverage is not None and row.coverage < 1.0 - TOLERANCES.coverage:
                 tail += f", {percent(row.coverage)} drawn"
         place = printable(row.folder) + (" (kept)" if done.kept else "")

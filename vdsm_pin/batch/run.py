@@ -5,7 +5,7 @@ import json
 import shutil
 import signal
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -178,7 +178,11 @@ def _tasks(batch: Batch) -> list[Task]:
         InvalidFile: If a folder to be written holds something else.
     """
     problems = expanded(batch.problems)
-    given = _motions(batch.trajectories) if batch.trajectories else (None,)
+    given: tuple[str | None, ...] = (None,)
+    if batch.trajectories:
+        given = _motions(
+            batch.trajectories, {Path(name).resolve() for name in problems}
+        )
     jobs = _jobs(problems, given)
     names = folder_names(tuple(jobs), OWN)
     _check_own(batch.folder)
@@ -239,8 +243,8 @@ def _stems(job: tuple[str, str | None]) -> str:
     return "-".join(Path(name).stem for name in job if name is not None)
 
 
-def _motions(names: tuple[str, ...]) -> tuple[str, ...]:
-    """Every trajectory once, in one order.
+def _motions(names: tuple[str, ...], problems: Set[Path]) -> tuple[str, ...]:
+    """Every trajectory once, in one order; `problems` beside them are none.
 
     Raises:
         InvalidFile: If a folder holds none.
@@ -250,7 +254,8 @@ def _motions(names: tuple[str, ...]) -> tuple[str, ...]:
         if not Path(name).is_dir():
             found.add(name)
             continue
-        inside = [p for p in Path(name).iterdir() if p.suffix in MOTIONS]
+        beside = [p for p in Path(name).iterdir() if p.resolve() not in problems]
+        inside = [p for p in beside if p.suffix in MOTIONS]
         if not inside:
             problem = f"holds no trajectory; expected {', '.join(MOTIONS)}"
             raise InvalidFile(file=name, problem=problem)

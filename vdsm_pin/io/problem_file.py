@@ -90,7 +90,8 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
     if isinstance(document.data, dict) and "robot" in document.data:
         line = document.line(("robot",))
         where = "robot" if line is None else f"robot (line {line})"
-        what = "is for verify and repair only; expected manipulator"
+        others = "verify, repair, convert and batch --trajectories"
+        what = f"is for {others} only; expected manipulator"
         raise ProblemOfRobot(file=path, where=where, problem=what)
     try:
         model = ProblemModel.model_validate(document.data)

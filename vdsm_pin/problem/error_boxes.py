@@ -113,7 +113,7 @@ class ErrorBox:
 
     def with_joint(self, joint: float) -> "ErrorBox":
         """The same with one error of all joint angles; [rad]."""
-        return replace(self, joint=joint, joints=())
+        return replace(self.widened(ErrorBox()), joint=joint, joints=())
 
     def angles(self, n_links: int) -> FloatArray:
         """Largest errors of alpha_i and theta_i, shape (N, 2); [rad]."""
