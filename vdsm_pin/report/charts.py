@@ -39,26 +39,28 @@ def charts(verification: Verification, shown: Thinned) -> list[dict[str, Any]]:
         names = [body.name for body in verification.problem.robot.bodies]
         clearances = _clearance_charts(verification, shown, names)
         return [*clearances, *joint_charts(verification, shown)]
-    links = verification.problem.manipulator.n_links
-    names = [f"link {i + 1}" for i in range(links)]
+    names = [f"link {i + 1}" for i in range(verification.problem.manipulator.n_links)]
+    rows = verification.trajectory
+    psi = link_angles(rows.alpha[shown.rows], rows.theta[shown.rows])
     return [
-        _link_angle_chart(verification, shown),
+        _link_angle_chart(verification, psi),
         _base_chart(verification, shown),
         *_clearance_charts(verification, shown, names),
-        _changed_chart(verification, shown),
+        _changed_chart(psi),
         *_joint_charts(verification, shown),
         _cable_chart(verification, shown),
     ]
 
 
-def _series(name: str, colour: str, values: FloatArray, **more: Any) -> dict[str, Any]:
+def series(name: str, colour: str, values: FloatArray, **more: Any) -> dict[str, Any]:
+    """One line of a plot; `values` against the row number."""
     return {"name": name, "colour": colour, "values": packed(values), **more}
 
 
 def _per_joint(symbol: str, values: FloatArray) -> list[dict[str, Any]]:
     colours = link_colours(values.shape[1])
     return [
-        _series(f"{symbol}{i + 1}", colours[i], np.degrees(values[:, i]))
+        series(f"{symbol}{i + 1}", colours[i], np.degrees(values[:, i]))
         for i in range(values.shape[1])
     ]
 
@@ -67,9 +69,7 @@ def _limit(label: str, value: float) -> dict[str, Any]:
     return {"label": label, "value": value}
 
 
-def _link_angle_chart(verification: ArmVerification, shown: Thinned) -> dict[str, Any]:
-    rows = verification.trajectory
-    psi = link_angles(rows.alpha[shown.rows], rows.theta[shown.rows])
+def _link_angle_chart(verification: ArmVerification, psi: FloatArray) -> dict[str, Any]:
     cone = math.degrees(verification.problem.manipulator.max_link_angle)
     return {
         "id": "psi",
@@ -94,7 +94,7 @@ def _base_chart(verification: ArmVerification, shown: Thinned) -> dict[str, Any]
         "axis": "x₀ [mm]",
         "limits": [_limit("rail end", low), _limit("rail end", high)],
         "far_limits": True,
-        "series": [_series("x₀", _INK, x0)],
+        "series": [series("x₀", _INK, x0)],
     }
 
 
@@ -152,7 +152,7 @@ def _brackets(
     names: list[str], colours: tuple[str, ...], lower: FloatArray, upper: FloatArray
 ) -> list[dict[str, Any]]:
     return [
-        _series(
+        series(
             name,
             colours[i],
             lower[:, i] * MM_PER_M,
@@ -163,10 +163,7 @@ def _brackets(
     ]
 
 
-def _changed_chart(verification: ArmVerification, shown: Thinned) -> dict[str, Any]:
-    rows = verification.trajectory
-    psi = link_angles(rows.alpha[shown.rows], rows.theta[shown.rows])
-    count = changed_angles(psi)
+def _changed_chart(psi: FloatArray) -> dict[str, Any]:
     return {
         "id": "changed",
         "title": "Changed link angles",
@@ -176,7 +173,9 @@ def _changed_chart(verification: ArmVerification, shown: Thinned) -> dict[str, A
         "floor": 0.0,
         "whole": True,
         "limits": [],
-        "series": [_series("changed", _INK, count.astype(np.float64), step=True)],
+        "series": [
+            series("changed", _INK, changed_angles(psi).astype(np.float64), step=True)
+        ],
     }
 
 
@@ -216,7 +215,7 @@ def _cable_chart(verification: ArmVerification, shown: Thinned) -> dict[str, Any
         "axis": "change [mm]",
         "limits": [],
         "series": [
-            _series(f"l{i + 1}{hole}", colours[i], change[:, i, j], dash=_DASHES[j])
+            series(f"l{i + 1}{hole}", colours[i], change[:, i, j], dash=_DASHES[j])
             for i in range(change.shape[1])
             for j, hole in enumerate("abc")
         ],

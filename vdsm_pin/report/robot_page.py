@@ -13,7 +13,7 @@ from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
 from vdsm_pin.geometry.solids import Capsule, Cylinder, Sphere
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.report.charts import packed
+from vdsm_pin.report.charts import packed, series
 from vdsm_pin.report.moves import quaternion
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import FINE, Surface, joined, surface
@@ -161,12 +161,7 @@ def joint_charts(
                 "axis": f"value [{unit.strip()}]",
                 "limits": [],
                 "series": [
-                    {
-                        "name": joints[k].name,
-                        "colour": colours[k],
-                        "values": packed(factor * q[:, k]),
-                    }
-                    for k in mine
+                    series(joints[k].name, colours[k], factor * q[:, k]) for k in mine
                 ],
             }
         )
