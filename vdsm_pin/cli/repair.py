@@ -58,8 +58,7 @@ def repair(
             source, trajectory, out, context.obj, deadline=deadline, topic=topic
         )
         found = repair_to_folder(order, tuple(pin or ()))
-    new = int((found.given < 0).sum())
-    typer.echo(
-        f"certified with {len(found.moved)} waypoints, {new} of them new; moved by "
-        f"{found.moved.max():.6f} rad (m) at most; wrote {out}"
-    )
+    new, most = int((found.given < 0).sum()), found.moved.max()
+    changed = f"{new} of them new; moved by {most:.6f} rad (m) at most"
+    how = changed if new or most else "none of them moved: it was clear as given"
+    typer.echo(f"certified with {len(found.moved)} waypoints, {how}; wrote {out}")
