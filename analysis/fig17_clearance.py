@@ -83,6 +83,7 @@ def _surface_panel(axes: Axes, run: Run) -> None:
         line = thin(np.column_stack([first, DECADE * np.log10(shown)]))
         axes.plot(line[:, 0], 10.0 ** (line[:, 1] / DECADE), color=colour, **look)
     axes.set_yscale("log")
+    axes.set_yticks([1, 10, 100], ["1", "10", "100"])
     axes.set_xlim(0, run.trajectory.n_samples - 1)
     axes.set_ylim(*SURFACE)
     draw_limit(axes, run.problem.required_clearance * MM_PER_M)

@@ -3,6 +3,7 @@
 import importlib
 import itertools
 import json
+import re
 import sys
 from collections.abc import Callable
 from functools import cache
@@ -244,3 +245,12 @@ def _close(kept: Any, again: Any) -> None:
         assert again == pytest.approx(kept, abs=2e-3)
     else:
         assert kept == again
+
+
+@pytest.mark.parametrize("file", sorted(REPORTS.glob("*.svg")), ids=lambda f: f.stem)
+def test_no_letter_is_smaller_than_6_pt_in_print(file: Path) -> None:
+    sizes = re.findall(
+        r"font(?:-size)?: [^;]*?([0-9.]+)px", file.read_text(encoding="utf-8")
+    )
+    assert sizes
+    assert min(map(float, sizes)) >= 6.0
