@@ -174,6 +174,8 @@ class Robot:
         meshes = tuple(dict.fromkeys(map(self._mesh, named)))
         hashes = file.source(meshes).sha256, sha256_of_file(trajectory)
         belongs(header, "links topic", *hashes)
+        asked = "errors" in file.model.model_fields_set
+        claim(not asked, "errors of robots are not checked yet")
         srdf = Srdf(self.files.srdf, document) if self.files.srdf else None
         self.joints = Joints(self.files, document, srdf)
         self.tree, self.place = self.joints.tree, "header"
