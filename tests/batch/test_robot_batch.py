@@ -94,11 +94,20 @@ def test_what_changed_is_done_again(folder: Path) -> None:
     assert after["cell-through"] == before["cell-through"]
 
 
+@pytest.mark.parametrize(("degrees", "passes"), [(10.0, True), (20.0, False)])
+def test_errors_are_asked_about(folder: Path, degrees: float, passes: bool) -> None:
+    """By 18.5 deg more the arm, 30 deg from the ball, comes nearer than 10 mm."""
+    rows = run_batch(asked(folder, proving=Proving(joint_error_deg=degrees)))
+    outcomes = {row.folder: row.outcome for row in rows}
+    assert (outcomes["cell-clear"] == "certified") is passes
+
+
 def test_what_is_not_judged_of_robots_is_refused(folder: Path) -> None:
     """Nothing green that covers less than was asked; and what is missing is named."""
-    rows = run_batch(asked(folder, proving=Proving(joint_error_deg=1.0)))
-    assert {row.outcome for row in rows} == {"error"}
-    assert "no errors are judged" in rows[0].reason
+    both = Proving(joint_error_deg=1.0, certificate=True)
+    rows = run_batch(asked(folder, proving=both))
+    why = {row.folder: row.reason for row in rows if row.outcome == "error"}
+    assert "errors of robots are not certified" in why["cell-clear"]
     (row,) = run_batch(asked(folder, trajectories=()))
     assert row.outcome == "error"
     assert "expected manipulator" in row.reason

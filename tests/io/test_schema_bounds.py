@@ -24,7 +24,7 @@ CONTRACT = """\
 <= 1e12, >= -1e12, items <= 3, items >= 3: rpy_deg[] to
 <= 1e12, >= 0.0: joint_deg[] required_clearance
 <= 1e12, >= 0.0, default 0.0: base base_deg joint_deg obstacle required_self_clearance
-    retreat shift
+    retreat shift slide
 <= 256, >= 1, default 1: parts
 <= 40, >= 1: link
 >= 2, default None: joint

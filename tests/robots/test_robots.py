@@ -372,14 +372,14 @@ def test_a_problem_file_names_a_robot(
     capsys.readouterr()
     for words in (
         ("plan", problem),
-        ("verify", problem, "--trajectory", rows, "--joint-error-deg", 1),
+        ("verify", problem, "--trajectory", rows, "--all-pairs"),
         ("verify", problem, "--trajectory", rows, "--lock", "a=1"),
     ):
         assert run(*words, "--out", out) == 2
     said = capsys.readouterr().err.splitlines()
     assert "robot (line" in said[0]
     assert "expected manipulator" in said[0]
-    assert "--joint-error-deg has no meaning with a robot" in said[1]
+    assert "--all-pairs has no meaning with a robot" in said[1]
     assert "--lock has no meaning with a problem" in said[2]
 
 
@@ -397,16 +397,3 @@ def test_a_base_moves_the_robot_in_the_scene(tmp_path: Path) -> None:
         (ball,) = read_cell(write(tmp_path, "cell.yaml", text)).scene.obstacles
         assert isinstance(ball, Sphere)
         np.testing.assert_allclose(ball.centre, center, atol=1e-12)
-
-
-OF_ARM = ("joint-error-deg", "base-error-mm", "base-error-deg", "obstacle-error-mm")
-
-
-@pytest.mark.parametrize("option", OF_ARM)
-def test_an_error_that_is_not_covered_is_refused(
-    tmp_path: Path, option: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    urdf, rows = write(tmp_path, "two.urdf", URDF), write(tmp_path, "t.csv", ROWS)
-    asked = ("verify", "--urdf", urdf, "--trajectory", rows, "--out", tmp_path / "out")
-    assert run(*asked, f"--{option}", 5) == 2
-    assert f"--{option} has no meaning with --urdf" in capsys.readouterr().err

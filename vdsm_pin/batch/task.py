@@ -228,12 +228,9 @@ def _read(task: Task) -> "ProblemFile | Cell":
         refusal = error
     if task.trajectory is None:
         raise refusal
-    if task.proving.errors != ErrorBox():
-        problem = "is about a robot, of which no errors are judged"
-        raise InvalidFile(file=task.problem, problem=problem)
     from vdsm_pin.robots.cell import read_cell
 
-    return read_cell(Path(refusal.file))
+    return read_cell(Path(refusal.file)).under(task.proving.errors)
 
 
 def _check_apart(task: Task, source: "ProblemFile | Cell") -> None:

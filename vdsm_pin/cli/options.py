@@ -64,7 +64,15 @@ JointErrors = Annotated[
     typer.Option(
         metavar="DEG[,DEG..]",
         help="Largest error of every joint angle, or one for each joint from the base "
-        "[deg].",
+        "[deg]; of some joints of a robot: JOINT=DEG[,JOINT=DEG..].",
+    ),
+]
+SlideErrors = Annotated[
+    str,
+    typer.Option(
+        metavar="MM",
+        help="Largest error of a robot's joints that slide, or JOINT=MM[,JOINT=MM..] "
+        "[mm].",
     ),
 ]
 ObstacleErrors = Annotated[
@@ -123,6 +131,7 @@ def errors_of(
     base_deg: float,
     obstacles_mm: Sequence[str] | None,
     obstacles_deg: Sequence[str] | None,
+    slide_mm: str = "0",
 ) -> "ErrorBox":
     """The error box that a user types.
 
@@ -131,20 +140,37 @@ def errors_of(
     """
     from vdsm_pin.problem.error_boxes import ErrorBox
 
-    joints = [_number("--joint-error-deg", word) for word in joint_deg.split(",")]
     shifts = _by_name("--obstacle-error-mm", obstacles_mm or ())
     turns = _by_name("--obstacle-error-deg", obstacles_deg or ())
     if "" in turns:
         message = "--obstacle-error-deg needs the obstacle's name, NAME=DEG"
         raise InvalidInput(message)
+    slide = _of_joints("--slide-error-mm", slide_mm)
+    if isinstance(slide, list):
+        message = f"--slide-error-mm is {slide_mm!r}, expected a number or JOINT=MM"
+        raise InvalidInput(message)
     return ErrorBox.typed(
-        joints if len(joints) > 1 else joints[0],
+        _of_joints("--joint-error-deg", joint_deg),
         base_mm,
         shifts.pop("", 0.0),
         base_deg,
         shifts,
         turns,
+        slide,
     )
+
+
+def _of_joints(option: str, text: str) -> float | list[float] | dict[str, float]:
+    """One number, one for each joint, or some by name."""
+    words = text.split(",")
+    if "=" in text:
+        named = _by_name(option, words)
+        if "" in named:
+            message = f"{option} is {text!r}, expected a name before each number"
+            raise InvalidInput(message)
+        return named
+    each = [_number(option, word) for word in words]
+    return each if len(each) > 1 else each[0]
 
 
 def _by_name(option: str, words: Sequence[str]) -> dict[str, float]:

@@ -17,6 +17,7 @@ from vdsm_pin.cli.options import (
     ObstacleTurns,
     OutFolder,
     Quiet,
+    SlideErrors,
     TimeLimit,
     Trajectory,
     errors_of,
@@ -74,6 +75,7 @@ def verify(
         ),
     ] = None,
     joint_error_deg: JointErrors = "0",
+    slide_error_mm: SlideErrors = "0",
     base_error_mm: BaseError = 0.0,
     base_error_deg: BaseTurn = 0.0,
     obstacle_error_mm: ObstacleErrors = None,
@@ -114,11 +116,6 @@ def verify(
     robot, or --urdf) the first three.
     """
     of_arm: dict[str, object] = {
-        "--joint-error-deg": joint_error_deg != "0",
-        "--base-error-mm": base_error_mm,
-        "--base-error-deg": base_error_deg,
-        "--obstacle-error-mm": obstacle_error_mm,
-        "--obstacle-error-deg": obstacle_error_deg,
         "--certificate": certificate,
         "--pdf": pdf,
         "--all-pairs": all_pairs,
@@ -132,6 +129,7 @@ def verify(
         base_error_deg,
         obstacle_error_mm,
         obstacle_error_deg,
+        slide_error_mm,
     )
     from vdsm_pin.app.workflow import VerifyOrder
     from vdsm_pin.report.run_record import now
@@ -167,7 +165,7 @@ def read_source(
     """
     if of_robot.urdf is not None:
         refuse_beside("--urdf", {"PROBLEM": problem, **of_arm})
-        return of_robot.cell(None)
+        return of_robot.cell(None).under(errors)
     refuse_beside("a problem", of_robot.named())
     if problem is None:
         message = "expected a PROBLEM, or --urdf for any other robot"
@@ -182,7 +180,7 @@ def read_source(
         refuse_beside("an arm", {"--topic": topic})
         return arm
     refuse_beside("a robot", {k: v for k, v in of_arm.items() if k != "--certificate"})
-    return of_robot.cell(path)
+    return of_robot.cell(path).under(errors)
 
 
 def _passes(order: "VerifyOrder", said: Said) -> bool:

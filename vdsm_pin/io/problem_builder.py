@@ -7,9 +7,9 @@ import numpy as np
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
-from vdsm_pin.geometry.solids import HalfSpace
 from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.arm_builder import ArmBuilder
+from vdsm_pin.io.errors_builder import build_errors
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.other_arms import OtherArms
@@ -17,7 +17,7 @@ from vdsm_pin.io.path_builder import PathBuilder, spacing_of
 from vdsm_pin.io.posture_builder import PostureBuilder
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import YamlDocument
-from vdsm_pin.problem.error_boxes import ErrorBox, JointErrors, ObstacleError
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scaling import (
     OtherRatios,
@@ -25,7 +25,7 @@ from vdsm_pin.problem.scaling import (
     Scaling,
     ScalingCentre,
 )
-from vdsm_pin.problem.scene import Moving, Scene, solid_of
+from vdsm_pin.problem.scene import Moving, Scene
 from vdsm_pin.tolerances import TOLERANCES
 
 
@@ -109,37 +109,15 @@ def _errors(
     """The errors under which every clearance is asked for."""
     n_links, scene = known
     joint = model.joint_deg
-    joints: JointErrors = ()
-    if isinstance(joint, list):
-        if len(joint) != n_links:
-            problem = f"has {len(joint)} values, expected {n_links}: one per joint"
-            raise document.invalid(("errors", "joint_deg"), problem)
-        joints = tuple((float(e), float(e)) for e in np.deg2rad(joint))
-        joint = 0.0
-    kinds = {one.name: solid_of(one) for one in scene.obstacles}
-    for i, one in enumerate(model.obstacles):
-        at = ("errors", "obstacles", i)
-        if one.name not in kinds:
-            problem = f"is {one.name!r}, expected one of {', '.join(kinds) or 'none'}"
-            raise document.invalid((*at, "name"), problem)
-        if one.turn_deg and isinstance(kinds[one.name], HalfSpace):
-            problem = "is of a half_space, which has no middle to turn about"
-            raise document.invalid((*at, "turn_deg"), problem)
-    return ErrorBox(
-        joint=float(np.deg2rad(joint)),
-        base=float(frame.metres(model.base)),
-        obstacle=float(frame.metres(model.obstacle)),
-        base_turn=float(np.deg2rad(model.base_deg)),
-        joints=joints,
-        obstacles=tuple(
-            ObstacleError(
-                one.name,
-                float(frame.metres(one.shift)),
-                float(np.deg2rad(one.turn_deg)),
-            )
-            for one in model.obstacles
-        ),
-    )
+    if isinstance(joint, list) and len(joint) != n_links:
+        problem = f"has {len(joint)} values, expected {n_links}: one per joint"
+        raise document.invalid(("errors", "joint_deg"), problem)
+    errors = build_errors(model, frame, scene, document)
+    try:
+        errors.angles(n_links)
+    except InvalidInput as error:
+        raise document.invalid(("errors",), str(error)) from None
+    return errors
 
 
 def _scaling(

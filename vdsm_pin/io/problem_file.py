@@ -48,12 +48,14 @@ class ProblemFile:
 
         Raises:
             UnknownName: If they name an obstacle that there is not.
+            InvalidInput: If they are of joints that only other robots have.
         """
         known = self.problem.scene.names
         for one in errors.obstacles:
             if one.name not in known:
                 raise UnknownName(kind="obstacle", name=one.name, known=known)
         widened = self.problem.errors.widened(errors)
+        widened.angles(self.problem.manipulator.n_links)
         return replace(self, problem=replace(self.problem, errors=widened))
 
     @property

@@ -359,10 +359,16 @@ class ObstacleErrorModel(FileModel):
 class ErrorsModel(FileModel):
     """How far the real motion, its base and the obstacles may be off."""
 
-    joint_deg: NotNegative | list[NotNegative] = Field(
+    joint_deg: NotNegative | list[NotNegative] | dict[str, NotNegative] = Field(
         default=0.0,
         description="Of every alpha and theta, either way [deg]; a list has a value "
-        "per joint, from the base.",
+        "per joint, from the base. Of a robot: of every joint that turns, or of some "
+        "by name.",
+    )
+    slide: NotNegative | dict[str, NotNegative] = Field(
+        default=0.0,
+        description="Of a robot: of every joint that slides, or of some by name "
+        "[length_unit].",
     )
     base: NotNegative = Field(
         default=0.0, description="Shift of the base, in any direction [length_unit]."

@@ -34,17 +34,35 @@ class ObstacleError:
 
 
 @dataclass(frozen=True)
+class JointError:
+    """How far one joint of a robot may be off.
+
+    Args:
+        name: The joint's.
+        turn: Of one that turns; [rad].
+        shift: Of one that slides; [m].
+    """
+
+    name: str
+    turn: float = 0.0
+    shift: float = 0.0
+
+
+@dataclass(frozen=True)
 class ErrorBox:
     """How far the real motion may stray from the nominal one.
 
     Args:
-        joint: Error of every theta_i and alpha_i, at most; [rad].
+        joint: Error of every theta_i and alpha_i, or of every joint of a robot that
+            turns, at most; [rad].
         base: Largest displacement of the base in any direction, and so of x0; [m].
         obstacle: Largest displacement of an obstacle surface; [m].
         base_turn: Largest rotation of the base about its origin; [rad].
         joints: Errors of alpha_i and theta_i by joint, of the first joints at least;
             where they are larger than `joint` they count; [rad].
         obstacles: Errors of single obstacles; the larger shift counts.
+        slide: Error of every joint of a robot that slides; [m].
+        named: Errors of single joints of a robot; the larger one counts.
 
     Raises:
         InvalidInput: If a value is negative or not finite.
@@ -56,11 +74,14 @@ class ErrorBox:
     base_turn: float = 0.0
     joints: JointErrors = ()
     obstacles: tuple[ObstacleError, ...] = ()
+    slide: float = 0.0
+    named: tuple[JointError, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse what is no error."""
         values = [("joint", e) for pair in self.joints for e in pair]
         values += [("obstacle", e) for o in self.obstacles for e in (o.shift, o.turn)]
+        values += [(repr(j.name), e) for j in self.named for e in (j.turn, j.shift)]
         values += [(name, getattr(self, name)) for name in PLAIN]
         for name, value in values:
             if not 0.0 <= value < np.inf:
@@ -72,35 +93,41 @@ class ErrorBox:
     @classmethod
     def typed(
         cls,
-        joint_deg: float | Sequence[float] = 0.0,
+        joint_deg: float | Sequence[float] | Mapping[str, float] = 0.0,
         base_mm: float = 0.0,
         obstacle_mm: float = 0.0,
         base_deg: float = 0.0,
         obstacles_mm: Mapping[str, float] = NOTHING,
         obstacles_deg: Mapping[str, float] = NOTHING,
+        slide_mm: float | Mapping[str, float] = 0.0,
     ) -> "ErrorBox":
         """The box from degrees and millimetres, as people state them.
 
         Args:
-            joint_deg: Of every angle, or one for each joint from the base; [deg].
+            joint_deg: Of every angle, or one for each joint from the base, or of a
+                robot's joints by name; [deg].
             base_mm: As `base`; [mm].
             obstacle_mm: As `obstacle`; [mm].
             base_deg: As `base_turn`; [deg].
             obstacles_mm: Shifts of single obstacles by their names; [mm].
             obstacles_deg: Their turns; [deg].
+            slide_mm: Of every joint of a robot that slides, or of some by name; [mm].
 
         Raises:
             InvalidInput: If a value is negative or not finite.
         """
-        one = isinstance(joint_deg, (int, float))
-        each = () if one else np.deg2rad(np.asarray(joint_deg)).tolist()
+        turns = joint_deg if isinstance(joint_deg, Mapping) else {}
+        shifts = slide_mm if isinstance(slide_mm, Mapping) else {}
+        plain = 0.0 if isinstance(joint_deg, Mapping) else joint_deg
+        one = plain if isinstance(plain, (int, float)) else 0.0
+        each = () if isinstance(plain, (int, float)) else plain
         names = dict.fromkeys((*obstacles_mm, *obstacles_deg))
         return ErrorBox(
-            joint=float(np.deg2rad(joint_deg)) if one else 0.0,
+            joint=float(np.deg2rad(one)),
             base=base_mm / MM_PER_M,
             obstacle=obstacle_mm / MM_PER_M,
             base_turn=float(np.deg2rad(base_deg)),
-            joints=tuple((error, error) for error in each),
+            joints=tuple((error, error) for error in np.deg2rad(each).tolist()),
             obstacles=tuple(
                 ObstacleError(
                     name,
@@ -109,6 +136,15 @@ class ErrorBox:
                 )
                 for name in names
             ),
+            slide=0.0 if isinstance(slide_mm, Mapping) else slide_mm / MM_PER_M,
+            named=tuple(
+                JointError(
+                    name,
+                    float(np.deg2rad(turns.get(name, 0.0))),
+                    shifts.get(name, 0.0) / MM_PER_M,
+                )
+                for name in dict.fromkeys((*turns, *shifts))
+            ),
         )
 
     def with_joint(self, joint: float) -> "ErrorBox":
@@ -116,7 +152,17 @@ class ErrorBox:
         return replace(self.widened(ErrorBox()), joint=joint, joints=())
 
     def angles(self, n_links: int) -> FloatArray:
-        """Largest errors of alpha_i and theta_i, shape (N, 2); [rad]."""
+        """Largest errors of alpha_i and theta_i, shape (N, 2); [rad].
+
+        Raises:
+            InvalidInput: If the box has what only other robots have.
+        """
+        if self.slide or self.named:
+            message = (
+                "joints of a snake arm are numbered and slide by the base alone: "
+                "expected one joint error, or one for each joint from the base"
+            )
+            raise InvalidInput(message)
         errors = np.full((n_links, 2), self.joint)
         given = np.array(self.joints[:n_links]).reshape(-1, 2)
         errors[: len(given)] = np.maximum(errors[: len(given)], given)
@@ -152,8 +198,9 @@ class ErrorBox:
             **plain,
             joints=tuple((max(a[0], b[0]), max(a[1], b[1])) for a, b in both),
             obstacles=tuple(dict.fromkeys((*self.obstacles, *other.obstacles))),
+            named=tuple(dict.fromkeys((*self.named, *other.named))),
         )
 
 
-PLAIN = ("joint", "base", "obstacle", "base_turn")
+PLAIN = ("joint", "base", "obstacle", "base_turn", "slide")
 """The errors that are one number."""

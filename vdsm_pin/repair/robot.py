@@ -13,6 +13,7 @@ import numpy as np
 
 from vdsm_pin.errors import Infeasible, InvalidInput
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.proof.bodies import Pair
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.terms import CERTIFIED
@@ -139,21 +140,29 @@ def repair_robot(
     fixed = np.isin(np.arange(n), [0, n - 1, *pinned])
     rows = _Rows(path.knots, path.knots, np.arange(n), fixed)
     near: dict[int, float] = {}
+    lost: dict[int, float] = {}
     found = verify_robot(cell, path, deadline)
     for _ in range(ROUNDS):
         bad = np.flatnonzero(found.least.verdict != CERTIFIED).tolist()
         if not bad or deadline.passed:
             break
         near |= {k: min(2.0 * near.get(k, 0.5 * FIRST), WIDEST) for k in bad}
-        slopes = _Slopes(
-            cell, [cell.pairs[k] for k in near], np.array([*near.values()])
-        )
+        if cell.errors != ErrorBox():
+            lost |= {k: _lost(found, k) for k in bad}
+        margins = np.array([room + lost.get(k, 0.0) for k, room in near.items()])
+        slopes = _Slopes(cell, [cell.pairs[k] for k in near], margins)
         moments = found.least.interval[bad] + found.least.time[bad]
         rows = _pushed(rows.sampled(moments[moments >= 0.0]), slopes)
         found = verify_robot(cell, Path(rows.q), deadline)
     if found.verdict is not Verdict.CERTIFIED:
         raise Infeasible(_why(found))
     return Repaired(found, rows.given, np.abs(rows.q - rows.base).max(axis=1))
+
+
+def _lost(found: RobotVerification, pair: int) -> float:
+    """What errors take of the clearance of a pair, about; [m]."""
+    bracket = found.least.upper[pair] - found.least.lower[pair]
+    return float(bracket) if np.isfinite(bracket) else 0.0
 
 
 def _pushed(rows: _Rows, slopes: "_Slopes") -> _Rows:

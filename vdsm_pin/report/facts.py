@@ -22,6 +22,7 @@ from vdsm_pin.report.files import (
     CounterexampleRow,
     ErrorBoxRow,
     Hashes,
+    JointErrorRow,
     LeftOutRow,
     MinClearance,
     MotionFacts,
@@ -212,9 +213,9 @@ def nearest_to_obstacle(verification: Verification) -> int | None:
     return next(near, None)
 
 
-def _error_box(errors: ErrorBox, n_links: int) -> ErrorBoxRow:
-    """The errors in words of the JSON file."""
-    angles = errors.angles(n_links)
+def error_box(errors: ErrorBox, n_links: int | None = None) -> ErrorBoxRow:
+    """The errors in words of the JSON file; of a robot without a number of links."""
+    angles = np.array([[errors.joint]]) if n_links is None else errors.angles(n_links)
     alike = bool((angles == angles.flat[0]).all())
     single = (errors.of_obstacle(one.name) for one in errors.obstacles)
     return ErrorBoxRow(
@@ -226,6 +227,11 @@ def _error_box(errors: ErrorBox, n_links: int) -> ErrorBoxRow:
         obstacles=tuple(
             ObstacleErrorRow(name=one.name, shift_m=one.shift, turn_rad=one.turn)
             for one in single
+        ),
+        slide_error_m=errors.slide,
+        named=tuple(
+            JointErrorRow(name=one.name, turn_rad=one.turn, shift_m=one.shift)
+            for one in errors.named
         ),
     )
 
@@ -376,7 +382,7 @@ def _own_facts(verification: Verification) -> dict[str, Any]:
         "coverage": finite(verification.coverage),
         "path_length_m": None if path is None else path.length,
         "undrawn_m": tuple((float(a), float(b)) for a, b in verification.undrawn),
-        "error_box": _error_box(verification.errors, rows.n_links),
+        "error_box": error_box(verification.errors, rows.n_links),
         "left_out": left_out(problem),
         "counterexamples": tuple(
             counterexample_row(verification, found)
@@ -456,7 +462,7 @@ def plan_file(refinement: "Refinement", record: RunRecord) -> PlanFile:
         centres_error_m=next(
             (finite(c.worst) for c in verification.checks if c.name == PLANNED), None
         ),
-        error_box=_error_box(verification.errors, plan.trajectory.n_links),
+        error_box=error_box(verification.errors, plan.trajectory.n_links),
         coverage=finite(verification.coverage),
         motion=motion_facts(plan.problem, plan.trajectory),
         hashes=hashes(record),

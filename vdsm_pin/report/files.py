@@ -159,8 +159,16 @@ class ObstacleErrorRow(FileModel):
     )
 
 
+class JointErrorRow(FileModel):
+    """How far one joint of a robot may be off."""
+
+    name: str = Field(description="its name")
+    turn_rad: FiniteFloat = Field(description="of one that turns")
+    shift_m: FiniteFloat = Field(description="of one that slides")
+
+
 class ErrorBoxRow(FileModel):
-    """The errors of the real arm that the clearance proof was asked to cover."""
+    """The errors of the real motion that the clearance proof was asked to cover."""
 
     joint_error_rad: FiniteFloat = Field(
         default=0.0,
@@ -178,6 +186,12 @@ class ErrorBoxRow(FileModel):
     )
     obstacles: tuple[ObstacleErrorRow, ...] = Field(
         default=(), description="of single obstacles, where they are off by more"
+    )
+    slide_error_m: FiniteFloat = Field(
+        default=0.0, description="of a robot's joints that slide"
+    )
+    named: tuple[JointErrorRow, ...] = Field(
+        default=(), description="of single joints of a robot, where they err by more"
     )
 
 

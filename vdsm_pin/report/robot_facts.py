@@ -4,8 +4,8 @@ from typing import Any, Final
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.report.facts import finite
-from vdsm_pin.report.files import ErrorBoxRow, JointRow, LeftOutRow, RobotFacts
+from vdsm_pin.report.facts import error_box, finite
+from vdsm_pin.report.files import JointRow, LeftOutRow, RobotFacts
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification
 from vdsm_pin.robots.model import RobotJoint
@@ -21,7 +21,7 @@ def robot_facts(verification: RobotVerification) -> dict[str, Any]:
         "coverage": None,
         "path_length_m": None,
         "undrawn_m": (),
-        "error_box": ErrorBoxRow(),
+        "error_box": error_box(cell.errors),
         "left_out": tuple(
             LeftOutRow(body=pair.one, other=pair.other, reason=pair.reason)
             for pair in cell.robot.left_out

@@ -175,11 +175,16 @@ def errors(box: "ErrorBoxRow") -> str:
     elif box.joint_error_rad:
         parts.append(f"±{quantity(box.joint_error_rad, 'rad')} of every joint angle")
     for value, unit, what in (
+        (box.slide_error_m, "m", "of every joint that slides"),
         (box.base_error_m, "m", f"({BASE_ERROR})"),
         (box.base_error_rad, "rad", "(turn of the base)"),
         (box.obstacle_error_m, "m", "of every obstacle"),
     ):
         parts += [f"{quantity(value, unit)} {what}"] if value else []
+    for joint in box.named:
+        size = joint.turn_rad or joint.shift_m
+        unit = "rad" if joint.turn_rad else "m"
+        parts += [f"±{quantity(size, unit)} of {joint.name}"] if size else []
     for one in box.obstacles:
         parts.append(
             f"{quantity(one.shift_m, 'm')} and {quantity(one.turn_rad, 'rad')} "

@@ -1,19 +1,21 @@
 """A robot among its obstacles: from files named one by one, or from a problem file."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 from pathlib import Path
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidInput
+from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.bodies import Body, Pair
 from vdsm_pin.proof.terms import WORLD
 from vdsm_pin.robots.coal_pairs import CoalPairs
+from vdsm_pin.robots.errors import check_errors
 from vdsm_pin.robots.files import RobotFiles, read_cell_file, source_of
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.scene_files import read_scene_with_files
@@ -33,9 +35,11 @@ class Cell:
         stated_name: Of the problem; empty for the robot's.
         T_world_base: The robot's root link in the frame of the files, (4, 4); [m].
         source: The files it was read from; None for none.
+        errors: What every clearance is asked for under.
 
     Raises:
-        InvalidInput: If a clearance is negative or not finite.
+        InvalidInput: If a clearance is negative or not finite, or errors are of what
+            there is not.
     """
 
     robot: Robot
@@ -45,9 +49,11 @@ class Cell:
     stated_name: str = ""
     T_world_base: FloatArray = field(default_factory=lambda: np.eye(4))
     source: ProblemSource | None = None
+    errors: ErrorBox = field(default_factory=ErrorBox)
 
     def __post_init__(self) -> None:
-        """Check the clearances."""
+        """Check clearances and errors."""
+        check_errors(self.robot, self.scene, self.errors)
         for value in (self.required_clearance, self.required_self_clearance):
             if not 0.0 <= value < inf:
                 millimetres = value * MM_PER_M
@@ -86,6 +92,14 @@ class Cell:
     def coal(self) -> CoalPairs:
         """Coal's distances of them."""
         return CoalPairs(self.robot, self.scene)
+
+    def under(self, errors: ErrorBox) -> "Cell":
+        """The same, its clearances asked for under more errors.
+
+        Raises:
+            InvalidInput: If they are of what there is not.
+        """
+        return replace(self, errors=self.errors.widened(errors))
 
     def names(self, pair: Pair) -> str:
         """Both bodies of a pair in words, a link first."""
@@ -134,15 +148,22 @@ def read_cell(path: Path) -> Cell:
     pose = np.eye(4)
     pose[:3, :3] = file.frame.rotation
     pose[:3, 3] = file.frame.metres(file.model.base.position)
-    return Cell(
+    scene = file.scene(_size(robot))
+    cell = Cell(
         robot=robot,
-        scene=file.scene(_size(robot)),
+        scene=scene,
         required_clearance=required,
         required_self_clearance=required_self,
         stated_name=file.model.name or "",
         T_world_base=frozen(pose),
         source=file.source(robot.meshes),
     )
+    try:
+        return cell.under(file.errors(scene))
+    except InvalidFile:
+        raise
+    except InvalidInput as error:
+        raise file.document.invalid(("errors",), str(error)) from None
 
 
 def robot_of(files: RobotFiles) -> Robot:

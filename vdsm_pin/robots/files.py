@@ -16,15 +16,17 @@ from pydantic import BeforeValidator, Field, ValidationError
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.io.body_schema import MAX_PARTS
+from vdsm_pin.io.errors_builder import build_errors
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.motion_schema import MovableModel
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.problem_errors import first_error
 from vdsm_pin.io.problem_file import files_of_obstacles
-from vdsm_pin.io.problem_schema import BasePoseModel, not_bool
+from vdsm_pin.io.problem_schema import BasePoseModel, ErrorsModel, not_bool
 from vdsm_pin.io.schema_types import FileModel, Name, NotNegative, Number
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.robots.scene_files import MAX_BYTES, SceneModel, check_judged
@@ -195,6 +197,11 @@ class CellModel(SceneModel):
     required_self_clearance: NotNegative = Field(
         default=0.0, description="Between links that are held apart [length_unit]."
     )
+    errors: ErrorsModel = Field(
+        default=ErrorsModel(),
+        description="How far joints, base and obstacles may be off. Default: not at "
+        "all.",
+    )
 
 
 @dataclass(frozen=True)
@@ -243,6 +250,14 @@ class CellFile:
         scene = Scene(builder.build_all(self.model.obstacles, ("obstacles",)))
         check_judged(self.document, scene)
         return scene
+
+    def errors(self, scene: Scene) -> ErrorBox:
+        """The errors under which every clearance is asked for.
+
+        Raises:
+            InvalidFile: If they name an obstacle that there is not.
+        """
+        return build_errors(self.model.errors, self.frame, scene, self.document)
 
     def source(self, meshes: tuple[Path, ...]) -> ProblemSource:
         """All files that it is read from, those of links' meshes too."""

@@ -8,13 +8,13 @@ import numpy as np
 
 from vdsm_pin.errors import OutOfTime, VdsmError
 from vdsm_pin.geometry.arrays import FloatArray, frozen
-from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import Proof, prove
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.contacts import common_ball
+from vdsm_pin.robots.errors import proof_box
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.rates import rate_checks
 from vdsm_pin.robots.second_opinion import pose_difference
@@ -75,7 +75,8 @@ def verify_robot(
     robot = cell.robot
     columns, budget = np.arange(len(cell.bodies)), Budget(until=deadline.end)
     tree, pairs = robot.tree, cell.pairs
-    proof = prove(tree, cell.bodies, path, pairs, budget=budget, columns=columns)
+    box = proof_box(robot, cell.scene, cell.errors)
+    proof = prove(tree, cell.bodies, path, pairs, box, budget, columns)
     named, least = _named(cell), _met(cell, path, _least(cell, proof))
     coal, measured = _coal(cell, path, proof)
     late = "" if proof.in_time else f": {OutOfTime(deadline.limit)}"
@@ -89,7 +90,7 @@ def verify_robot(
     return RobotVerification(
         problem=cell,
         trajectory=path,
-        errors=ErrorBox(),
+        errors=cell.errors,
         pairs=named,
         checks=tuple(checks),
         approaches=_closest(named, least, measured),

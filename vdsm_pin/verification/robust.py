@@ -110,7 +110,11 @@ def within_reach(
     arm, lengths = problem.manipulator, problem.manipulator.link_lengths
     lever = 2.0 * float(np.arange(1, lengths.size + 1) @ lengths)
     lever += 2.0 * lengths.size * arm.most_radius  # of what sticks out of the axis
-    moved = errors.joint * lever + errors.base + max(obstacle_growth(problem, errors))
+    moved = (
+        errors.joint * lever
+        + errors.base
+        + max(obstacle_growth(problem.scene.obstacles, errors))
+    )
     far = float(np.abs(arm.base_range).max()) + arm.total_length + arm.most_radius
     moved += errors.base_turn * (far + moved)
     return _without_far(problem, clearances, problem.required_clearance + moved + SPARE)

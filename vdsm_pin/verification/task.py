@@ -13,7 +13,7 @@ from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.geometry.solids import HalfSpace
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import solid_of
+from vdsm_pin.problem.scene import Obstacle, solid_of
 from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.error_box import ErrorBox as ProofBox
@@ -124,7 +124,7 @@ def pack_scene(problem: PlanningProblem) -> PackedPieces:
     return problem.packed
 
 
-def obstacle_growth(problem: PlanningProblem, errors: ErrorBox) -> list[float]:
+def obstacle_growth(obstacles: Sequence[Obstacle], errors: ErrorBox) -> list[float]:
     """How far the surface of each obstacle may be off; [m].
 
     A turn moves a point by its angle times the distance from the obstacle's middle at
@@ -134,7 +134,7 @@ def obstacle_growth(problem: PlanningProblem, errors: ErrorBox) -> list[float]:
         InvalidInput: If a half-space may be turned.
     """
     found = []
-    for obstacle in problem.scene.obstacles:
+    for obstacle in obstacles:
         error, reach = errors.of_obstacle(obstacle.name), 0.0
         if error.turn > 0.0:
             solid = solid_of(obstacle)
@@ -192,7 +192,7 @@ def with_errors(task: Task, problem: PlanningProblem, errors: ErrorBox) -> Task:
         task,
         errors,
         problem.manipulator.n_links,
-        obstacle_growth(problem, errors),
+        obstacle_growth(problem.scene.obstacles, errors),
     )
 
 
