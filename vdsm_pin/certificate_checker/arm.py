@@ -69,7 +69,7 @@ class Arm:
     """
 
     judged = (
-        "clearance and pointing hold as the problem asks under the errors stated, "
+        "clearance, and pointing where it is asked, hold under the errors stated; "
         "limits, start, goal and path without them; cables are not judged"
     )
 
