@@ -16,7 +16,10 @@ from vdsm_pin.geometry.arrays import FloatArray
 FOLDER: Final = "VDSM_MOTION_BENCH_MAKER"
 """Environment variable: folder of ROBOT/{ROBOT.urdf, ROBOT.srdf, problems.tar.bz2}."""
 
-ROBOTS: Final = ("panda", "ur5")
+ARMS: Final = {"panda": "panda_arm", "ur5": "manipulator"}
+"""Of each robot the group of joints that is planned for; its base stands."""
+
+ROBOTS: Final = tuple(ARMS)
 
 
 @dataclass(frozen=True)

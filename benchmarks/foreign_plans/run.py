@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from benchmarks.foreign_plans.judges import Judged, Plan, judge
-from benchmarks.foreign_plans.problems import ROBOTS, Problem, problems, source
+from benchmarks.foreign_plans.problems import ARMS, ROBOTS, Problem, problems, source
 from benchmarks.foreign_plans.sampled import Sampled
 from benchmarks.foreign_plans.summary import document
 from vdsm_pin.errors import InvalidInput
@@ -36,7 +36,8 @@ def outcomes(
         stored: Plans by robot, set and number; empty to plan.
     """
     folder = source(name)
-    robot = read_robot(folder / f"{name}.urdf", folder / f"{name}.srdf")
+    urdf, srdf = folder / f"{name}.urdf", folder / f"{name}.srdf"
+    robot = read_robot(urdf, srdf, group=ARMS[name])
     with tempfile.TemporaryDirectory() as aside:
         for problem in problems(name, per_set, Path(aside)):
             sampled = Sampled(name, problem.scene)

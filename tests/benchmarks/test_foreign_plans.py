@@ -29,7 +29,9 @@ URDF = """<robot name="two"><link name="foot"/>
 <joint name="b" type="revolute"><parent link="upper"/><child link="fore"/>
 <origin xyz="0.4 0 0.1"/><axis xyz="0 0 1"/>
 <limit lower="-3" upper="3" velocity="1" effort="1"/></joint></robot>"""
-SRDF = """<robot name="two">
+SRDF = """<robot name="two"><virtual_joint name="stand" type="floating"
+parent_frame="world" child_link="foot"/>
+<group name="panda_arm"><joint name="a"/><joint name="b"/></group>
 <disable_collisions link1="upper" link2="fore" reason="Adjacent"/></robot>"""
 SCENE = {
     "world": {
@@ -101,7 +103,8 @@ def test_false_verdicts_are_faults(folder: Path, tmp_path: Path) -> None:
         sampled, through, Verdict.CERTIFIED, hit=False, near=0.1
     )
     assert "0.1" in _fault(sampled, through, Verdict.REFUTED, hit=False, near=1e-4)
-    robot = read_robot(folder / "panda/panda.urdf", folder / "panda/panda.srdf")
+    files = folder / "panda/panda.urdf", folder / "panda/panda.srdf"
+    robot = read_robot(*files, group="panda_arm")
     plan = Plan("panda", "post", 1, 0.01, through.tolist())
     found = judge(plan, sampled, robot, read_scene(problem.scene, 1.0))
     assert not found.fault
