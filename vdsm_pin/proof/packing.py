@@ -164,7 +164,9 @@ class _PlaceTable:
     def packed(self) -> Places:
         """All places, those in the world first."""
         n = len(self._frames)
-        ways = [self.ways.number(WORLD, frame) for frame in self._frames]
+        frames = dict.fromkeys(self._frames)
+        way_of = {frame: self.ways.number(WORLD, frame) for frame in frames}
+        ways = [way_of[frame] for frame in self._frames]
         points = np.array([*range(n), *self._points], dtype=np.int64)
         return Places(
             n_points=n,
