@@ -163,6 +163,11 @@ def read_source(
     Raises:
         InvalidInput: If a file is bad, or an option has no meaning for it.
     """
+    if of_robot.urdf is not None and of_arm.get("--certificate"):
+        message = (
+            "--certificate needs a problem file with `robot` beside it, not --urdf"
+        )
+        raise InvalidInput(message)
     if of_robot.urdf is not None:
         refuse_beside("--urdf", {"PROBLEM": problem, **of_arm})
         return of_robot.cell(None).under(errors)
