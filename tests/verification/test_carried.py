@@ -227,6 +227,45 @@ def test_errors_of_the_file_are_asked_for(tmp_path: Path) -> None:
             assert outcome.accepted, outcome.reason
 
 
+@pytest.mark.parametrize(
+    ("x", "surface"),
+    [
+        (-0.2, 0.045), (0.25, 0.06), (0.55, 0.05), (0.7, 0.065), (1.0, 0.04),
+        (1.39, 0.02),
+    ],
+    ids=["feed", "link 1", "link 2", "camera", "link 3", "tool"],
+)  # fmt: skip
+def test_checker_knows_how_thick_each_body_is(
+    x: float, surface: float, tmp_path: Path
+) -> None:
+    """A ball 20 mm above it: 19.9 mm are accepted, 20.1 mm are not."""
+    rows = motion_in(tmp_path, STILL)
+    camera = CAMERA | {"link": 2, "center": [0.2, 0, 0], "size": [0.06, 0.05, 0.13]}
+    arm = {"link_radius": [0.06, 0.05, 0.04], "feed": {"length": 0.3, "radius": 0.045}}
+    arm |= {"bodies": [camera], "tool": {"length": 0.1, "radius": 0.02}}
+    arm |= {"ignore_pairs": [["camera", "link 3"]]}
+    post = [BALL | {"center": [x, 0.0, surface + 0.02 + 0.05]}]
+    problem = problem_in(tmp_path, arm, post, required_clearance=0.0199)
+    path = certified(problem, rows)
+    outcome = check_certificate(path, problem, rows)
+    assert outcome.accepted, outcome.reason
+    lines = certificate_lines(path)[:-1]
+    more = problem_in(tmp_path, arm, post, required_clearance=0.0201)
+    lines[0]["problem_sha256"] = read_problem(more).sha256
+    assert "post" in rejected(path, lines, more, rows)
+
+
+def test_joint_errors_of_the_file_are_asked_for_alone(tmp_path: Path) -> None:
+    """One number for all joints; the certificate states none."""
+    rows = motion_in(tmp_path, STILL)
+    problem = problem_in(tmp_path, {}, [])
+    path = certified(problem, rows)
+    lines = certificate_lines(path)[:-1]
+    asked = problem_in(tmp_path, {}, [], errors={"joint_deg": 0.01})
+    lines[0]["problem_sha256"] = read_problem(asked).sha256
+    assert "less than the problem asks" in rejected(path, lines, asked, rows)
+
+
 # ---- many, against samples -----------------------------------------------------------
 
 

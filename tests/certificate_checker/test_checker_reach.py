@@ -1,0 +1,55 @@
+"""How far the checker takes a point to reach in a slice, by the formula of the docs."""
+
+from math import cos, sin
+
+import numpy as np
+import pytest
+from flint import arb
+
+from vdsm_pin.certificate_checker.motion import Interval, Slices
+from vdsm_pin.certificate_checker.solids import Body, Solid
+from vdsm_pin.certificate_checker.tree import TURNS, Joint, Tree
+
+LEVER = 0.7
+"""Of the point about the joint; [m]."""
+
+
+def reached(
+    width: float, errors: tuple[float, float, float], disc: float = 0.0
+) -> float:
+    """Largest y of a point on the x axis that turns about z, errors included; [m]."""
+    joint = Joint(0, TURNS, (0, 0, 1), np.eye(4), (0, 1.0, 0.0), errors)
+    tree = Tree([joint])
+    interval = Interval(tree, [[arb(0), arb(width)]])
+    slices = Slices(tree, [(interval, 0.0, 1.0)])
+    point = Solid("point", [[[LEVER, 0.0, 0.0]]], disc=((1.0, 0.0, 0.0), disc))
+    body, at = Body(1, point), np.zeros(1, np.int64)
+    found, _ = slices.reach(body, 0, at, np.array([[0.0, 1.0, 0.0]]))
+    return float(found[0])
+
+
+@pytest.mark.parametrize("width", [0.0, 0.1, 0.8])
+@pytest.mark.parametrize("error", [0.0, 1e-3, 0.1])
+@pytest.mark.parametrize("tilt", [0.0, 2e-3, 0.05])
+@pytest.mark.parametrize("disc", [0.0, 0.2])
+def test_reach_is_that_of_the_docs(
+    width: float, error: float, tilt: float, disc: float
+) -> None:
+    """Height at an end, M h^2 / 8, h D / 2, Q, and what errors move at the ends."""
+    far, turned = LEVER + disc, error + tilt
+    end = LEVER * sin(width) + disc * cos(width)
+    bend = far * width**2 * (1.0 + tilt) / 8.0
+    drift, second = far * error * width / 2.0, far * turned**2 / 2.0
+    moved = error * LEVER * (1.0 + cos(width)) / 2.0 + tilt * LEVER
+    heights = max(disc, end)
+    expected = heights + bend + drift + second + disc * turned + moved
+    found = reached(width, (error, 0.0, tilt), disc)
+    assert found == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("width", [0.1, 0.8])
+@pytest.mark.parametrize("error", [0.0, 0.05])
+def test_reach_is_an_upper_bound(width: float, error: float) -> None:
+    """Of the exact motion within the errors, at many moments."""
+    angles = np.linspace(0.0, width, 101)[:, None] + np.linspace(-error, error, 21)
+    assert (LEVER * np.sin(angles)).max() <= reached(width, (error, 0.0, 0.0))
