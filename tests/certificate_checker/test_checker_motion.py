@@ -80,16 +80,22 @@ def test_an_angle_at_the_goal_counts_by_how_far_it_moves_the_tip(
     assert (found == "") is good
 
 
-@pytest.mark.parametrize(("more", "good"), [(0.0, True), (0.01, False)])
+@pytest.mark.parametrize(
+    ("more", "order", "good"),
+    [(0.0, "as_given", True), (0.01, "as_given", False), (0.01, "free", True)],
+)
 def test_a_closed_path_left_in_between_is_drawn_once(
-    more: float, good: bool, tmp_path: Path
+    more: float, order: str, good: bool, tmp_path: Path
 ) -> None:
-    """There and back along 0.4 m, one row off the path: a lap, or a little more."""
+    """There and back along 0.4 m, one row off the path: a lap, or a little more.
+
+    Only where the order is given has it to be once.
+    """
     points = [[1.0, 0, 0], [1.2, 0, 0], [1.4, 0, 0]]
     x0 = [0.3, 0.4, 0.4, 0.4, 0.3, 0.1, 0.0, 0.1, 0.3 + more]
     station = [0.3, 0.4, 0.4, 0.4, 0.5, 0.7, 0.8, 0.9, 1.1 + more]
     path = {"start": [1.3, 0, 0], "points": points, "closed": True}
-    path |= {"required_coverage": 0.5}
+    path |= {"required_coverage": 0.5, "order": order}
     on = [1, 1, 0, 1, 1, 1, 1, 1, 1]
     case = along(tmp_path, x0, tip_path=path, on_path=on, path_m=station)
     assert ("begun again" in refusal(case)) is not good

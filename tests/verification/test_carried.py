@@ -228,31 +228,36 @@ def test_errors_of_the_file_are_asked_for(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("x", "surface"),
+    ("x", "z"),
     [
-        (-0.2, 0.045), (0.25, 0.06), (0.55, 0.05), (0.7, 0.065), (1.0, 0.04),
-        (1.39, 0.02),
+        (-0.2, 0.045 + 0.07), (0.25, 0.06 + 0.07), (0.55, 0.05 + 0.07),
+        (0.7, 0.065 + 0.07), (0.98, 0.04 + 0.07),
+        (1.1, np.sqrt((0.2 + 0.07) ** 2 - 0.15**2)),
     ],
-    ids=["feed", "link 1", "link 2", "camera", "link 3", "tool"],
+    ids=["feed", "link 1", "link 2", "camera", "link 3", "start of the tool"],
 )  # fmt: skip
 def test_checker_knows_how_thick_each_body_is(
-    x: float, surface: float, tmp_path: Path
+    x: float, z: float, tmp_path: Path
 ) -> None:
-    """A ball 20 mm above it: 19.9 mm are accepted, 20.1 mm are not."""
+    """A ball 20.2 mm off it, then 20 mm; 20.1 mm are asked for and claimed."""
     rows = motion_in(tmp_path, STILL)
     camera = CAMERA | {"link": 2, "center": [0.2, 0, 0], "size": [0.06, 0.05, 0.13]}
     arm = {"link_radius": [0.06, 0.05, 0.04], "feed": {"length": 0.3, "radius": 0.045}}
-    arm |= {"bodies": [camera], "tool": {"length": 0.1, "radius": 0.02}}
-    arm |= {"ignore_pairs": [["camera", "link 3"]]}
-    post = [BALL | {"center": [x, 0.0, surface + 0.02 + 0.05]}]
-    problem = problem_in(tmp_path, arm, post, required_clearance=0.0199)
+    arm |= {"bodies": [camera], "tool": {"length": 0.1, "radius": 0.2}}
+    arm |= {"link_lengths": [0.5, 0.4, 0.35], "ignore_pairs": [["camera", "link 3"]]}
+
+    def asked(more: float) -> Path:
+        post = [BALL | {"center": [x, 0.0, float(z) + more]}]
+        return problem_in(tmp_path, arm, post, required_clearance=0.0201)
+
+    problem = asked(3e-4)
     path = certified(problem, rows)
     outcome = check_certificate(path, problem, rows)
     assert outcome.accepted, outcome.reason
     lines = certificate_lines(path)[:-1]
-    more = problem_in(tmp_path, arm, post, required_clearance=0.0201)
-    lines[0]["problem_sha256"] = read_problem(more).sha256
-    assert "post" in rejected(path, lines, more, rows)
+    problem = asked(0.0)
+    lines[0]["problem_sha256"] = read_problem(problem).sha256
+    assert "post" in rejected(path, lines, problem, rows)
 
 
 def test_joint_errors_of_the_file_are_asked_for_alone(tmp_path: Path) -> None:
