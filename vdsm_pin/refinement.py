@@ -191,7 +191,8 @@ def _plan_at_rest(
                 raise OutOfTime(deadline.limit, "a motion was found, but not proved")
             adjustments = _by_proof(verification, margins)
             rounds.append(_proved(margins, verification, adjustments))
-        say("margin %s: %s", in_mm(rounds[-1].margin), rounds[-1].reason)
+        kept = in_mm(rounds[-1].margin)
+        say("planned with a margin of %s; %s", kept, rounds[-1].reason)
         if rounds[-1].verdict in HANDED_OUT:
             story = (_story(rounds),) if len(rounds) > 1 else ()
             added = (*_unread_scheme(plan), *known.notes, *story)
