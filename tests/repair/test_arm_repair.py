@@ -85,7 +85,7 @@ def test_ball_that_is_grazed_is_passed() -> None:
 def test_start_and_pinned_waypoints_in_the_way_are_named() -> None:
     motion = planned("paper/obs2")[1]
     for row, pinned in ((0, ()), (700, (700,))):
-        words = f"waypoint {row} stays, and there the arm is .* mm nearer than required"
+        words = f"waypoint {row} stays, and there link 4 and ball are .* mm nearer"
         with pytest.raises(Infeasible, match=words):
             repair_arm(beside("paper/obs2", row, 3, -0.002), motion, pinned)
     with pytest.raises(InvalidInput, match="pinned waypoint is 9999, expected 0 to"):

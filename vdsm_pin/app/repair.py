@@ -11,18 +11,20 @@ from vdsm_pin.app.workflow import JUDGED, TRAJECTORY, VerifyOrder, verify_to_fol
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
-from vdsm_pin.repair.arm import RepairedArm, repair_arm
+from vdsm_pin.repair.arm import repair_arm
+from vdsm_pin.repair.rounds import Repaired
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from vdsm_pin.repair.robot import Repaired
     from vdsm_pin.robots.cell import Cell
+    from vdsm_pin.robots.judgement import RobotVerification
+    from vdsm_pin.verification.records import ArmVerification
 
 REPAIR: Final = "repair.json"
 
-Found: TypeAlias = "RepairedArm | Repaired"
+Found: TypeAlias = "Repaired[ArmVerification] | Repaired[RobotVerification]"
 
 
 def repair_to_folder(order: VerifyOrder, pinned: tuple[int, ...] = ()) -> Found:

@@ -1,9 +1,4 @@
-"""A certified motion of a robot near one that is not.
-
-Where the proof finds bodies too near, samples of the motion are pushed up the slopes of
-the clearance until they keep it with a margin; they become waypoints, and the proof
-judges the whole again. Start, goal and pinned waypoints stay, and limits are kept.
-"""
+"""A certified motion of a robot near one that is not."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,32 +6,18 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.errors import Infeasible, InvalidInput
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.proof.bodies import Pair
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.terms import CERTIFIED
+from vdsm_pin.repair.rounds import APART, Origins, Places, Repaired, repaired
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.units import MM_PER_M
-from vdsm_pin.verification.records import Verdict
 
-FIRST: Final = 1e-3
-"""Room beyond the required clearance that a pair gets first; [m]."""
-
-WIDEST: Final = 8e-3
-"""The most, after it was doubled whenever the pair was still too near; [m]."""
-
-ROUNDS: Final = 12
-"""Of pushing and judging."""
-
-APART: Final = float(np.radians(1.0))
-"""How far samples lie apart in the joint that moves most; [rad], [m]."""
-
-MOST: Final = 200
-"""Samples that a round may push: more are pushed to different sides and lead apart."""
+MARGINS: Final = 1e-3, 8e-3
+"""Room beyond the required clearance that a pair gets first, and the most; [m]."""
 
 PUSHES: Final = 25
 """Most steps of one sample up the slopes."""
@@ -49,66 +30,34 @@ STEP: Final = 1e-6
 
 
 @dataclass(frozen=True)
-class Repaired:
-    """A motion that is certified, and how far it is from the one that was given.
+class _Motion:
+    """Waypoints on their way to be certified.
 
     Args:
-        verification: Of the motion.
-        given: Number of the given waypoint that each waypoint was, -1 for a new one,
-            shape (n_rows,).
-        moved: How far each waypoint lies off its place in the given motion, in the
-            joint that differs most, shape (n_rows,); [rad], [m].
-    """
-
-    verification: RobotVerification
-    given: IntArray
-    moved: FloatArray
-
-
-@dataclass(frozen=True)
-class _Rows:
-    """Waypoints, and where each was in the given motion.
-
-    Args:
+        cell: Robot and scene.
         q: Shape (n_rows, n_columns); [rad], [m].
-        base: Their places in the given motion, the same shape.
-        given: As in `Repaired`.
-        fixed: Which stay, shape (n_rows,).
+        origins: Where they were.
     """
 
+    cell: Cell
     q: FloatArray
-    base: FloatArray
-    given: IntArray
-    fixed: BoolArray
+    origins: Origins
 
-    def sampled(self, moments: FloatArray) -> "_Rows":
-        """The same motion with samples between the waypoints, and at some moments."""
-        parts = []
-        for k, way in enumerate(np.diff(self.q, axis=0)):
-            count = max(1, int(np.ceil(np.abs(way).max() / APART)))
-            parts.append(k + np.arange(count) / count)
-        last = len(self.q) - 1.0
-        places = np.unique(
-            np.concatenate([*parts, [last], np.clip(moments, 0.0, last)])
-        )
-        first = np.minimum(places.astype(np.int64), max(len(self.q) - 2, 0))
-        share = (places - first)[:, None]
-        after = np.minimum(first + 1, len(self.q) - 1)
-        old = places == np.floor(places)
-        row = places.astype(np.int64)
-        q = np.where(
-            old[:, None],
-            self.q[row],
-            (1.0 - share) * self.q[first] + share * self.q[after],
-        )
-        base = (1.0 - share) * self.base[first] + share * self.base[after]
-        base = np.where(old[:, None], self.base[row], base)
-        given = np.where(old, self.given[row], -1)
-        return _Rows(q, base, given, np.where(old, self.fixed[row], False))
-
-    def only(self, keep: BoolArray) -> "_Rows":
-        """Some of them."""
-        return _Rows(self.q[keep], self.base[keep], self.given[keep], self.fixed[keep])
+    def pushed(self, margins: dict[int, float], moments: FloatArray) -> "_Motion":
+        """The motion sampled closely, its pairs pushed apart by margins; [m]."""
+        steps = np.abs(np.diff(self.q, axis=0)).max(axis=1, initial=0.0)
+        parts = np.maximum(1.0, np.ceil(steps / APART)).astype(np.int64)
+        places = Places.within(parts, moments)
+        q, origins = places.through(self.q), self.origins.at(places)
+        pairs = [self.cell.pairs[k] for k in margins]
+        more = np.array([*margins.values()])
+        slopes = _Slopes(self.cell, pairs, more)
+        names = [self.cell.names(pair) for pair in pairs]
+        bad = origins.too_near(slopes.gaps(q), more, names)
+        kept, q = origins.kept(q, bad), q.copy()
+        for k in np.flatnonzero(bad):
+            q[k] = slopes.up(q[k])
+        return _Motion(self.cell, q[kept], origins.only(kept))
 
 
 def repair_robot(
@@ -116,8 +65,8 @@ def repair_robot(
     path: Path,
     pinned: Sequence[int] = (),
     deadline: Deadline = NO_LIMIT,
-) -> Repaired:
-    """A certified motion near a given one.
+) -> Repaired[RobotVerification]:
+    """A certified motion near a given one; start, goal and pinned waypoints stay.
 
     Args:
         cell: Robot, scene and required clearances.
@@ -129,76 +78,17 @@ def repair_robot(
         InvalidInput: If the motion is not of straight lines or has no such waypoint.
         Infeasible: If none was found; the message says why and where.
     """
-    n = len(path.knots)
     if path.degree != 1:
         message = "repair takes straight lines between waypoints, without velocities"
         raise InvalidInput(message)
-    for k in pinned:
-        if not 0 <= k < n:
-            message = f"pinned waypoint is {k}, expected 0 to {n - 1}"
-            raise InvalidInput(message)
-    fixed = np.isin(np.arange(n), [0, n - 1, *pinned])
-    rows = _Rows(path.knots, path.knots, np.arange(n), fixed)
-    near: dict[int, float] = {}
-    lost: dict[int, float] = {}
-    found = verify_robot(cell, path, deadline)
-    for _ in range(ROUNDS):
-        bad = np.flatnonzero(found.least.verdict != CERTIFIED).tolist()
-        if not bad or deadline.passed:
-            break
-        near |= {k: min(2.0 * near.get(k, 0.5 * FIRST), WIDEST) for k in bad}
-        if cell.errors != ErrorBox():
-            lost |= {k: _lost(found, k) for k in bad}
-        margins = np.array([room + lost.get(k, 0.0) for k, room in near.items()])
-        slopes = _Slopes(cell, [cell.pairs[k] for k in near], margins)
-        moments = found.least.interval[bad] + found.least.time[bad]
-        rows = _pushed(rows.sampled(moments[moments >= 0.0]), slopes)
-        found = verify_robot(cell, Path(rows.q), deadline)
-    if found.verdict is not Verdict.CERTIFIED:
-        raise Infeasible(_why(found))
-    return Repaired(found, rows.given, np.abs(rows.q - rows.base).max(axis=1))
-
-
-def _lost(found: RobotVerification, pair: int) -> float:
-    """What errors take of the clearance of a pair, about; [m]."""
-    bracket = found.least.upper[pair] - found.least.lower[pair]
-    return float(bracket) if np.isfinite(bracket) else 0.0
-
-
-def _pushed(rows: _Rows, slopes: "_Slopes") -> _Rows:
-    """The motion with waypoints where pairs come too near, pushed apart.
-
-    Raises:
-        Infeasible: If a waypoint that stays is too near.
-    """
-    gaps = slopes.gaps(rows.q)
-    room = gaps + slopes.margins
-    for k in np.flatnonzero(rows.fixed & (room.min(axis=1) < 0.0)):
-        words = slopes.words(int(np.argmin(room[k])))
-        short = -MM_PER_M * room[k].min()
-        message = (
-            f"waypoint {rows.given[k]} stays, and there {words} are "
-            f"{short:.3f} mm nearer than required"
-        )
-        raise Infeasible(message)
-    bad = (gaps.min(axis=1) < 0.0) & ~rows.fixed
-    if bad.sum() > MOST:
-        words = slopes.words(int(np.argmin(gaps.min(axis=0))))
-        message = (
-            f"{int(bad.sum())} samples are too near, {words} most: small "
-            "changes do not lead round; expected a new plan"
-        )
-        raise Infeasible(message)
-    q = rows.q.copy()
-    for k in np.flatnonzero(bad):
-        q[k] = slopes.up(q[k])
-    beside = bad.copy()
-    beside[1:] |= bad[:-1]
-    beside[:-1] |= bad[1:]
-    moved = _Rows(q, rows.base, rows.given, rows.fixed)
-    old = np.isin(np.arange(len(q)), np.flatnonzero(rows.given >= 0))
-    new = (rows.q != rows.base).any(axis=1)
-    return moved.only(old | beside | new)
+    origins = Origins.of(path.knots, [0, len(path.knots) - 1], pinned)
+    return repaired(
+        _Motion(cell, path.knots, origins),
+        lambda motion: verify_robot(cell, Path(motion.q), deadline),
+        MARGINS,
+        deadline,
+        under_errors=cell.errors != ErrorBox(),
+    )
 
 
 class _Slopes:
@@ -206,14 +96,9 @@ class _Slopes:
 
     def __init__(self, cell: Cell, pairs: Sequence[Pair], margins: FloatArray) -> None:
         self._tree, self._coal, self._pairs = cell.robot.tree, cell.coal, pairs
-        self._cell, self.margins = cell, margins
         self._target = np.array([pair.required for pair in pairs]) + margins
         joints = cell.robot.joints
         self._limits = [j.lower for j in joints], [j.upper for j in joints]
-
-    def words(self, k: int) -> str:
-        """Both bodies of a pair."""
-        return self._cell.names(self._pairs[k])
 
     def gaps(self, q: FloatArray) -> FloatArray:
         """Room of every pair at rows of q, shape (n_rows, n_pairs); [m]."""
@@ -244,13 +129,3 @@ class _Slopes:
         pair, poses = self._pairs[k], self._tree.poses(q)
         found = [self._coal.measured(pair, row).distance for row in poses]
         return np.asarray(np.array(found) - self._target[k])
-
-
-def _why(found: RobotVerification) -> str:
-    """What is still wrong and where."""
-    check = next(c for c in found.checks if c.verdict is not Verdict.CERTIFIED)
-    where = f" ({check.where})" if check.where else ""
-    return (
-        f"no certified motion was found: {check.name}{where} is {check.verdict.value} "
-        f"at waypoint {check.moment:.3f} of the last attempt"
-    )

@@ -10,7 +10,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.verification.pair_slopes import pair_slopes
-from vdsm_pin.verification.task import make_task
+from vdsm_pin.verification.task import all_pairs, make_task
 
 PUSHES: Final = 40
 """Most steps of one row up the slopes."""
@@ -42,7 +42,8 @@ class Slopes:
     """How much room pairs have beyond what is required, and where it grows."""
 
     def __init__(self, problem: PlanningProblem) -> None:
-        self._arm = problem.manipulator
+        self.problem, self._arm = problem, problem.manipulator
+        self.names = [str(pair) for pair in all_pairs(problem)]
         self._task = make_task(problem, ErrorBox())
         self._required = self._task.pairs.required
         self._scale = joint_scale(self._arm)

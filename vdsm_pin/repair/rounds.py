@@ -1,0 +1,255 @@
+"""What the repair of any motion shares: rounds of judging and pushing rows apart.
+
+Where the proof finds bodies too near, rows are pushed up the slopes of the clearance
+until they keep it with a margin; they become waypoints, and the whole is judged again.
+How rows are pushed is told by who knows the robot.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final, Generic, Protocol, Self, TypeVar
+
+import numpy as np
+
+from vdsm_pin.errors import Infeasible, InvalidInput
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.proof.terms import CERTIFIED
+from vdsm_pin.time_limit import Deadline
+from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.records import LeastClearances, Verdict, Verification
+
+V = TypeVar("V", bound=Verification)
+
+ROUNDS: Final = 12
+"""Of pushing and judging."""
+
+APART: Final = float(np.radians(1.0))
+"""How far samples lie apart in the joint that moves most; [rad], [m]."""
+
+MOST: Final = 300
+"""New rows that a round may push: more are pushed to different sides and lead apart."""
+
+
+@dataclass(frozen=True)
+class Repaired(Generic[V]):
+    """A motion that is certified, and how far it is from the one that was given.
+
+    Args:
+        verification: Of the motion.
+        given: Number of the given waypoint that each waypoint was, -1 for a new one,
+            shape (n_rows,).
+        moved: How far each waypoint lies off its place in the given motion, in the
+            joint that differs most, shape (n_rows,); [rad], [m].
+    """
+
+    verification: V
+    given: IntArray
+    moved: FloatArray
+
+
+@dataclass(frozen=True)
+class Places:
+    """Rows of a motion and moments between them, in waypoints and rising.
+
+    Args:
+        moments: Shape (m,).
+        n_rows: Of the motion.
+    """
+
+    moments: FloatArray
+    n_rows: int
+
+    @classmethod
+    def within(cls, parts: IntArray, moments: FloatArray) -> "Places":
+        """Every interval in so many parts, shape (n_rows - 1,), and some moments."""
+        first, last = np.cumsum(parts) - parts, float(len(parts))
+        k = np.repeat(np.arange(len(parts)), parts)
+        even = k + (np.arange(parts.sum()) - first[k]) / parts[k]
+        inside = np.clip(moments, 0.0, last)
+        return cls(np.unique(np.concatenate([even, [last], inside])), len(parts) + 1)
+
+    @property
+    def row(self) -> IntArray:
+        """The row at or before each."""
+        return self.moments.astype(np.int64)
+
+    @property
+    def old(self) -> BoolArray:
+        """Which of them are rows."""
+        return np.asarray(self.moments == np.floor(self.moments))
+
+    def through(self, rows: FloatArray) -> FloatArray:
+        """Rows (n_rows, ..) and what lies evenly between, rows to the last bit."""
+        k, after = self.row, np.minimum(self.row + 1, self.n_rows - 1)
+        share = (self.moments - k).reshape(-1, *[1] * (rows.ndim - 1))
+        between = (1.0 - share) * rows[k] + share * rows[after]
+        return np.where(share == 0.0, rows[k], between)
+
+
+@dataclass(frozen=True)
+class Origins:
+    """Where the rows of a motion were in the one that was given.
+
+    Args:
+        base: Joint values there, shape (n_rows, n_columns); [rad], [m].
+        given: As in `Repaired`.
+        fixed: Which rows stay, shape (n_rows,).
+    """
+
+    base: FloatArray
+    given: IntArray
+    fixed: BoolArray
+
+    @classmethod
+    def of(cls, q: FloatArray, ends: Sequence[int], pinned: Sequence[int]) -> "Origins":
+        """Of the given motion.
+
+        Raises:
+            InvalidInput: If there is no such waypoint.
+        """
+        for k in pinned:
+            if not 0 <= k < len(q):
+                message = f"pinned waypoint is {k}, expected 0 to {len(q) - 1}"
+                raise InvalidInput(message)
+        numbers = np.arange(len(q))
+        return cls(q, numbers, np.isin(numbers, [*ends, *pinned]))
+
+    def at(self, places: Places) -> "Origins":
+        """Of rows and moments between them; none of these is given."""
+        given = np.where(places.old, self.given[places.row], -1)
+        fixed = places.old & self.fixed[places.row]
+        return Origins(places.through(self.base), given, fixed)
+
+    def only(self, keep: BoolArray) -> "Origins":
+        """Of some rows."""
+        return Origins(self.base[keep], self.given[keep], self.fixed[keep])
+
+    def too_near(
+        self, room: FloatArray, margins: FloatArray, names: Sequence[str]
+    ) -> BoolArray:
+        """Which rows to push apart, shape (n_rows,).
+
+        Args:
+            room: Of pairs beyond what they are to get, shape (n_rows, n_pairs); [m].
+            margins: What of that is more than required, shape (n_pairs,); [m].
+            names: Of the pairs.
+
+        Raises:
+            Infeasible: If a row that stays is nearer than required, or too many new
+                ones are too near.
+        """
+        short = room + margins
+        for k in np.flatnonzero(self.fixed & (short.min(axis=1) < 0.0)):
+            message = (
+                f"waypoint {self.given[k]} stays, and there "
+                f"{names[int(np.argmin(short[k]))]} are "
+                f"{-MM_PER_M * short[k].min():.3f} mm nearer than required"
+            )
+            raise Infeasible(message)
+        bad = (room.min(axis=1) < 0.0) & ~self.fixed
+        if (new := int((bad & (self.given < 0)).sum())) > MOST:
+            message = (
+                f"{new} rows between waypoints are too near, "
+                f"{names[int(np.argmin(room.min(axis=0)))]} most: small changes do not "
+                "lead round; expected a new plan"
+            )
+            raise Infeasible(message)
+        return np.asarray(bad)
+
+    def kept(self, q: FloatArray, bad: BoolArray) -> BoolArray:
+        """Rows that become waypoints: given, moved, and beside those to be pushed.
+
+        Args:
+            q: Before they are pushed, shape (n_rows, n_columns).
+            bad: Which are pushed, shape (n_rows,).
+        """
+        beside = bad.copy()
+        beside[1:] |= bad[:-1]
+        beside[:-1] |= bad[1:]
+        return np.asarray((self.given >= 0) | beside | (q != self.base).any(axis=1))
+
+
+class Pushed(Protocol):
+    """A motion on its way to be certified."""
+
+    @property
+    def q(self) -> FloatArray:
+        """Its joint values, shape (n_rows, n_columns)."""
+        ...
+
+    @property
+    def origins(self) -> Origins:
+        """Where its rows were."""
+        ...
+
+    def pushed(self, margins: dict[int, float], moments: FloatArray) -> Self:
+        """The motion with pairs pushed apart by margins beyond what is required [m].
+
+        Raises:
+            Infeasible: If that cannot be.
+        """
+        ...
+
+
+M = TypeVar("M", bound=Pushed)
+
+
+def repaired(
+    motion: M,
+    judge: Callable[[M], V],
+    margins: tuple[float, float],
+    deadline: Deadline,
+    under_errors: bool,
+) -> Repaired[V]:
+    """A certified motion near a given one.
+
+    Args:
+        motion: The given one.
+        judge: Verifies one.
+        margins: Room beyond the required clearance that a pair gets first, and the most
+            after it was doubled whenever the pair was still too near; [m].
+        deadline: When to give up.
+        under_errors: Whether what errors take of a clearance is kept in reserve.
+
+    Raises:
+        Infeasible: If none was found; the message says why and where.
+    """
+    first, widest = margins
+    near, lost = dict[int, float](), dict[int, float]()
+    found, settled = judge(motion), False
+    for _ in range(ROUNDS):
+        least = found.least
+        assert least is not None
+        bad = np.flatnonzero(least.verdict != CERTIFIED).tolist()
+        if found.verdict is Verdict.CERTIFIED or deadline.passed:
+            break
+        if not bad and (settled or not near):
+            break  # what is wrong is no clearance
+        settled = not bad
+        near |= {k: min(2.0 * near.get(k, 0.5 * first), widest) for k in bad}
+        if under_errors:
+            lost |= {k: _lost(least, k) for k in bad}
+        wanted = {k: room + lost.get(k, 0.0) for k, room in near.items()}
+        moments = least.interval[bad] + least.time[bad]
+        motion = motion.pushed(wanted, moments[moments >= 0.0])
+        found = judge(motion)
+    if found.verdict is not Verdict.CERTIFIED:
+        raise Infeasible(_why(found))
+    moved = np.abs(motion.q - motion.origins.base).max(axis=1)
+    return Repaired(found, motion.origins.given, moved)
+
+
+def _lost(least: LeastClearances, pair: int) -> float:
+    """What errors take of the clearance of a pair, about; [m]."""
+    bracket = float(least.upper[pair] - least.lower[pair])
+    return bracket if np.isfinite(bracket) else 0.0
+
+
+def _why(found: Verification) -> str:
+    """What is still wrong and where."""
+    check = next(c for c in found.checks if c.verdict is not Verdict.CERTIFIED)
+    where = f" ({check.where})" if check.where else ""
+    return (
+        f"no certified motion was found: {check.name}{where} is {check.verdict.value} "
+        f"at waypoint {check.moment:.3f} of the last attempt"
+    )
