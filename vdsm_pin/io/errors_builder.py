@@ -40,13 +40,8 @@ def build_errors(
             for one in model.obstacles
         ),
         slide=float(frame.metres(slide)) if isinstance(slide, float) else 0.0,
-        named=tuple(
-            JointError(
-                name,
-                float(np.deg2rad(turns.get(name, 0.0))),
-                float(frame.metres(shifts.get(name, 0.0))),
-            )
-            for name in dict.fromkeys((*turns, *shifts))
+        named=JointError.of(
+            turns, {name: float(frame.metres(value)) for name, value in shifts.items()}
         ),
     )
 

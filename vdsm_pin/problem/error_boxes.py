@@ -47,6 +47,20 @@ class JointError:
     turn: float = 0.0
     shift: float = 0.0
 
+    @classmethod
+    def of(
+        cls, turns_deg: Mapping[str, float], shifts: Mapping[str, float]
+    ) -> tuple["JointError", ...]:
+        """Those of joints by name: of those that turn [deg], that slide [m]."""
+        return tuple(
+            cls(
+                name,
+                float(np.deg2rad(turns_deg.get(name, 0.0))),
+                float(shifts.get(name, 0.0)),
+            )
+            for name in dict.fromkeys((*turns_deg, *shifts))
+        )
+
 
 @dataclass(frozen=True)
 class ErrorBox:
@@ -137,13 +151,8 @@ class ErrorBox:
                 for name in names
             ),
             slide=0.0 if isinstance(slide_mm, Mapping) else slide_mm / MM_PER_M,
-            named=tuple(
-                JointError(
-                    name,
-                    float(np.deg2rad(turns.get(name, 0.0))),
-                    shifts.get(name, 0.0) / MM_PER_M,
-                )
-                for name in dict.fromkeys((*turns, *shifts))
+            named=JointError.of(
+                turns, {name: value / MM_PER_M for name, value in shifts.items()}
             ),
         )
 

@@ -49,14 +49,11 @@ def check_errors(robot: Robot, scene: Scene, errors: ErrorBox) -> None:
 
 def joint_errors(joints: Sequence[RobotJoint], errors: ErrorBox) -> FloatArray:
     """Largest error of each joint that a trajectory moves, (n_joints,); [rad], [m]."""
-    largest = {}
-    for joint in joints:
-        mine = [one for one in errors.named if one.name == joint.name]
-        if joint.turns:
-            largest[joint.name] = max([errors.joint, *(one.turn for one in mine)])
-        else:
-            largest[joint.name] = max([errors.slide, *(one.shift for one in mine)])
-    return np.array([largest[joint.name] for joint in joints])
+    plain = [errors.joint if joint.turns else errors.slide for joint in joints]
+    largest = dict(zip((joint.name for joint in joints), plain, strict=True))
+    for one in errors.named:  # of one that turns the shift is 0, and the reverse
+        largest[one.name] = max(largest[one.name], one.turn, one.shift)
+    return np.array([*largest.values()])
 
 
 def proof_box(robot: Robot, scene: Scene, errors: ErrorBox) -> ProofBox | None:
