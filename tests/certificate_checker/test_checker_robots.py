@@ -21,7 +21,8 @@ from oracles.certificate_oracle import sealed
 from oracles.random_robots import MESH, random_urdf
 
 from vdsm_pin.certificate_checker import Outcome, check_certificate
-from vdsm_pin.certificate_checker.robot import Joints
+from vdsm_pin.certificate_checker.balls import SLACK
+from vdsm_pin.certificate_checker.robot import Joints, within
 from vdsm_pin.cli import main
 from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.io.source import sha256_of_file
@@ -434,3 +435,23 @@ def test_the_commands_write_and_check_it(
     made.write()
     assert ends("check-certificate", proof, problem, rows) == 1
     assert "of another trajectory file" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("points", "low", "high", "good"),
+    [
+        ([0.0, 2.0 + 1.9 * SLACK], -np.inf, 2.0, True),
+        ([0.0, 2.0 + 2.1 * SLACK], -np.inf, 2.0, False),
+        ([0.0, 1.0 + 0.9 * SLACK], -1.0, 1.0, True),
+        ([0.0, 1.0 + 1.1 * SLACK], -1.0, 1.0, False),
+        ([-1.0 - 1.1 * SLACK, 0.0], -1.0, 1e9, False),
+        ([0.0, 5.0], -np.inf, 2.0, False),
+        ([0.0, 1.5, 0.0], -1.0, 1.0, True),
+        ([0.0, 2.5, 0.0], -1.0, 1.0, False),
+    ],
+)
+def test_limits_are_kept_to_the_tolerance(
+    points: list[float], low: float, high: float, good: bool
+) -> None:
+    """A parabola from 0 over h to 0 rises to h / 2; its control points say h."""
+    assert within([arb(x) for x in points], low, high) is good
