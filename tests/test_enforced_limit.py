@@ -79,6 +79,14 @@ def test_work_that_heard_has_its_grace() -> None:
         assert 0.0 < signal.getitimer(signal.ITIMER_REAL)[0] <= 0.5 * GRACE
 
 
+def test_work_that_has_nothing_to_write_has_no_grace() -> None:
+    ends = time.monotonic() + 60.0
+    with enforced(Deadline(60.0, ends), grace=0.0):
+        assert signal.getitimer(signal.ITIMER_REAL)[0] <= 60.0
+    with pytest.raises(OutOfTime), enforced(OVER, grace=0.0):
+        for_ever()
+
+
 @pytest.mark.parametrize("command", ["plan", "verify"])
 def test_a_command_that_hangs_in_reading_ends_with_one_word(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

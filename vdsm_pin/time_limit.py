@@ -56,7 +56,7 @@ class Deadline:
 NO_LIMIT: Final = Deadline()
 """Work may take as long as it takes."""
 
-GRACE: Final = 0.7
+GRACE: Final = 0.5
 """Work that has heard of the end has so long to write down what it found; [s]."""
 
 AGAIN: Final = 1.0
@@ -64,12 +64,16 @@ AGAIN: Final = 1.0
 
 
 @contextmanager
-def enforced(deadline: Deadline) -> Iterator[None]:
-    """Interrupt whatever still runs `GRACE` after a deadline.
+def enforced(deadline: Deadline, grace: float = GRACE) -> Iterator[None]:
+    """Interrupt whatever still runs a little after a deadline.
 
     Python code is interrupted between two of its steps; one call of a library is not.
     Only the main thread of a process can be, and only where there are such signals:
     elsewhere nothing is enforced.
+
+    Args:
+        deadline: When work must have ended.
+        grace: How long after it; none for work that has nothing to write; [s].
 
     Raises:
         OutOfTime: Out of the block.
@@ -83,7 +87,7 @@ def enforced(deadline: Deadline) -> Iterator[None]:
         raise OutOfTime(deadline.limit)
 
     before = signal.signal(signal.SIGALRM, ring)
-    left = deadline.end + GRACE - time.monotonic()
+    left = deadline.end + grace - time.monotonic()
     try:
         signal.setitimer(signal.ITIMER_REAL, max(left, 1e-6), AGAIN)
         yield

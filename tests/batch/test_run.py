@@ -19,9 +19,10 @@ import pytest
 from batch_folders import tree
 from problem_files import BEHIND_A_WALL, NEAR, OUT_OF_REACH, write_problem
 
+import vdsm_pin.batch.task as task_module
 from vdsm_pin.batch.progress import Progress
 from vdsm_pin.batch.run import Batch, Interrupted, expanded, run_batch
-from vdsm_pin.batch.task import Done, folder_names
+from vdsm_pin.batch.task import MANIFEST, TIMING, Done, Task, folder_names, perform
 from vdsm_pin.errors import InvalidFile, InvalidInput, UnknownName
 from vdsm_pin.report.tables import read_summary
 
@@ -238,6 +239,25 @@ def test_a_time_limit_makes_a_row(problems: Path, tmp_path: Path) -> None:
     assert (row.outcome, row.folder) == ("time-limit", "good")
     assert "0.01 s came first" in row.reason
     assert (tmp_path / "good" / "manifest.json").is_file()
+
+
+def test_a_worker_that_never_asks_the_clock_ends_by_itself(
+    problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def for_ever(*_: object) -> None:
+        while True:
+            pass
+
+    for slow in ("read_problem", "plan_to_folder"):
+        with monkeypatch.context() as changed:
+            changed.setattr(task_module, slow, for_ever)
+            file, place = str(problems / "good.yaml"), tmp_path / slow
+            aside = place.with_suffix(".part")
+            task = Task(file, "paper", slow, place, aside, False, time_limit=0.05)
+            row = perform(task).row
+        assert row.outcome == "time-limit"
+        assert "0.05 s came first" in row.reason
+        assert sorted(p.name for p in aside.iterdir()) == [MANIFEST, TIMING]
 
 
 def test_what_is_not_a_result_is_never_overwritten(

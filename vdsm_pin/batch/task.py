@@ -39,7 +39,7 @@ from vdsm_pin.report.picture import picture
 from vdsm_pin.report.run_record import versions
 from vdsm_pin.report.words import TIME_LIMIT, outcome
 from vdsm_pin.text import printable
-from vdsm_pin.time_limit import Deadline
+from vdsm_pin.time_limit import Deadline, enforced
 from vdsm_pin.verification.records import Verdict
 
 if TYPE_CHECKING:  # whoever plans for an arm needs no robots
@@ -183,14 +183,16 @@ def perform(task: Task) -> Done:
     shutil.rmtree(task.aside, ignore_errors=True)
     digest = ""
     try:
-        source = _read(task)
-        digest = source.source.sha256 if source.source else ""
-        _check_apart(task, source)
-        if task.resume:
-            kept = finished(task, digest)
-            if kept is not None:
-                return Done(kept, kept=True)
-        row = _done(task, source, deadline)
+        with enforced(deadline, grace=0.0):
+            source = _read(task)
+            digest = source.source.sha256 if source.source else ""
+            _check_apart(task, source)
+            if task.resume:
+                kept = finished(task, digest)
+                if kept is not None:
+                    return Done(kept, kept=True)
+        with enforced(deadline):
+            row = _done(task, source, deadline)
     except Infeasible as error:
         row = failed_row(task, "infeasible", str(error))
     except OutOfTime as error:

@@ -81,10 +81,11 @@ def plan(
         limit = COLD_LIMIT if is_cold() else LIMIT
     deadline, begin = Deadline.after(limit), time.monotonic()
     try:
-        with enforced(deadline):
+        with enforced(deadline, grace=0.0):
             source = read_problem(problem).under(errors)
-            with nullcontext() if quiet or as_json else shown(limit=limit):
-                file = plan_to_folder(source, strategy, out, context.obj, deadline)
+        told = nullcontext() if quiet or as_json else shown(limit=limit)
+        with enforced(deadline), told:
+            file = plan_to_folder(source, strategy, out, context.obj, deadline)
         note_planned()
     except OutOfTime as error:  # which tells its time itself
         if limit == COLD_LIMIT:

@@ -52,8 +52,9 @@ def repair(
     from vdsm_pin.problem.error_boxes import ErrorBox
 
     deadline = Deadline.after(time_limit)
-    with enforced(deadline):
+    with enforced(deadline, grace=0.0):
         source = read_source(problem, ErrorBox(), robot, {}, topic)
+    with enforced(deadline):
         order = VerifyOrder(
             source, trajectory, out, context.obj, deadline=deadline, topic=topic
         )

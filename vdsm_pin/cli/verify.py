@@ -134,7 +134,7 @@ def verify(
     from vdsm_pin.app.workflow import VerifyOrder
     from vdsm_pin.report.run_record import now
 
-    with enforced(deadline):
+    with enforced(deadline, grace=0.0):
         order = VerifyOrder(
             source=read_source(problem, errors, robot, of_arm, topic),
             trajectory=trajectory,
