@@ -152,6 +152,21 @@ ONE_VALUE: list[tuple[tuple[Any, ...], Any, str]] = [
     (("tip_path", "start"), 3126, "is 3126, expected 3 numbers or a mapping with joi"),
     (
         ("tip_path", "start"),
+        {"joints": STRAIGHT, "tip": [0, 0, 0]},
+        "tip_path.start.tip (line 37): is not a known key; known: joints",
+    ),
+    (
+        ("manipulator",),
+        {"urdf": "a.urdf"},
+        "manipulator.max_link_angle_deg (line 4): is missing; expected: Largest link",
+    ),
+    (
+        ("manipulator",),
+        {"urdf": "a.urdf", "max_link_angle_deg": 40, "tool": {}},
+        "manipulator.tool (line 7): is not a known key; known: urdf, max_link_angle_",
+    ),
+    (
+        ("tip_path", "start"),
         [3126, 4000, 0],
         "lies 4000 mm from the rail, the arm is 3",
     ),

@@ -78,6 +78,10 @@ def test_the_hash_of_a_problem_counts_its_path_files(tmp_path: Path) -> None:
             "circle.centre (line 10): is not a known key; known: center, normal, turn_",
         ),
         (
+            CORNER + "    - {arc: {through: [0, 0, 0], to: [1, 0, 0]}, turn: 3}\n",
+            "points[1].turn (line 10): is not a known key; known: arc",
+        ),
+        (
             CORNER + "    - {circle: {center: [0, 3146, 0], normal: [0, 0, 0]}}\n",
             "points[1] (line 10): has a normal without direction",
         ),

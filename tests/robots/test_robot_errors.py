@@ -260,6 +260,8 @@ def test_no_certificate_covers_errors(
         ("{slide: {turn: 1}}", (), "in degrees"),
         ("{obstacles: [{name: wall, shift: 1}]}", (), "expected one of ball, floor"),
         ("{joint_deg: {turn: -1}}", (), "0 or more"),
+        ("{}\ncolour: red", (), "known: length_unit, obstacles, vdsm_problem, name, r"),
+        ("{shift: 1}", (), "errors.shift (line 5): is not a known key; known: joint_d"),
         ("{}", ("--joint-error-deg", "1,turn=2"), "before each number"),
         ("{}", ("--slide-error-mm", "1,2"), "JOINT=MM"),
         ("{}", ("--slide-error-mm", "lift=2"), "lift"),

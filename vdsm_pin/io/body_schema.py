@@ -53,6 +53,6 @@ class MeshBody(_OnLink, shapes.MeshModel):
 
 
 BodyModel: TypeAlias = Annotated[
-    SphereBody | CapsuleBody | CylinderBody | BoxBody | PrismBody | MeshBody,
+    CylinderBody | CapsuleBody | SphereBody | BoxBody | PrismBody | MeshBody,
     Field(discriminator="shape"),
 ]

@@ -58,19 +58,19 @@ _CURVES: Final = ("arc", "circle", "spline", "file")
 
 
 def _kind(value: Any) -> str | None:
-    """Tag of a part; None where it is none."""
+    """Tag of a part, which is no key of it; None where it is none."""
     if isinstance(value, list):
-        return "point"
+        return "point part"
     has = value.__contains__ if isinstance(value, dict) else partial(hasattr, value)
-    return next((kind for kind in _CURVES if has(kind)), None)
+    return next((f"{kind} part" for kind in _CURVES if has(kind)), None)
 
 
 PathPart: TypeAlias = Annotated[
-    Annotated[Vector, Tag("point")]
-    | Annotated[ArcPart, Tag("arc")]
-    | Annotated[CirclePart, Tag("circle")]
-    | Annotated[SplinePart, Tag("spline")]
-    | Annotated[FilePart, Tag("file")],
+    Annotated[Vector, Tag("point part")]
+    | Annotated[ArcPart, Tag("arc part")]
+    | Annotated[CirclePart, Tag("circle part")]
+    | Annotated[SplinePart, Tag("spline part")]
+    | Annotated[FilePart, Tag("file part")],
     Discriminator(
         _kind,
         custom_error_type="part_of_path",

@@ -1,70 +1,18 @@
 """Pydantic's complaints in this package's words: field, line, value, expectation."""
 
-from collections.abc import Mapping
-from typing import Any, Final
+from collections.abc import Iterator, Mapping
+from typing import Any, Final, get_args
 
-from pydantic import ValidationError
+from pydantic import Tag, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from vdsm_pin.errors import InvalidFile
-from vdsm_pin.io import body_schema as bodies
-from vdsm_pin.io import motion_schema as movables
-from vdsm_pin.io import path_schema as paths
-from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.schema_types import NAME_PATTERN, FileModel
 from vdsm_pin.io.yaml_reader import Data, Location, YamlDocument
 
-_SOLIDS: Final = ("cylinder", "prism", "sphere", "capsule", "box", "half_space")
-_SHAPES: Final = (*_SOLIDS, "mesh", "points", "voxels")
-
 LONGEST_SHOWN: Final = 60
 """Values are cut to this many characters in a message."""
-
-_MODELS: Final[Mapping[str | int, type[FileModel]]] = {
-    "manipulator": schema.ManipulatorModel,
-    "value": schema.ManipulatorModel,
-    "cables": schema.CablesModel,
-    "tool": schema.ToolModel,
-    "feed": schema.FeedModel,
-    "errors": schema.ErrorsModel,
-    "ratios": schema.RatiosModel,
-    "base": schema.BasePoseModel,
-    "tip_path": schema.TipPathModel,
-    "pointing": schema.PointingModel,
-    "arc": paths.ArcModel,
-    "circle": paths.CircleModel,
-    "spline": paths.SplinePart,
-    "file": paths.FilePart,
-    "joints": schema.JointsModel,
-    "goal": schema.GoalModel,
-    "motion": movables.MotionModel,
-    "cylinder": movables.CylinderObstacle,
-    "capsule": movables.CapsuleObstacle,
-    "sphere": movables.SphereObstacle,
-    "box": movables.BoxObstacle,
-    "prism": movables.PrismObstacle,
-    "half_space": movables.HalfSpaceObstacle,
-    "mesh": movables.MeshObstacle,
-    "points": movables.PointsObstacle,
-    "voxels": movables.VoxelsObstacle,
-}
-"""The model that holds a field, by the step before it in pydantic's location."""
-
-_BODIES: Final[Mapping[str, type[FileModel]]] = {
-    "cylinder": bodies.CylinderBody,
-    "capsule": bodies.CapsuleBody,
-    "sphere": bodies.SphereBody,
-    "box": bodies.BoxBody,
-    "prism": bodies.PrismBody,
-    "mesh": bodies.MeshBody,
-}
-"""The same for what rides on links."""
-
-_LISTED: Final[Mapping[str, type[FileModel]]] = {
-    "others": schema.OtherModel,
-    "errors": schema.ObstacleErrorModel,
-}
-"""Those that stand in lists, of one form each."""
 
 _EITHER: Final[Mapping[str | int, str]] = {
     "manipulator": "the name of a built-in arm or a mapping",
@@ -79,7 +27,9 @@ _NAMES: Final = {
 }
 
 
-def first_error(error: ValidationError, document: YamlDocument) -> InvalidFile:
+def first_error(
+    error: ValidationError, document: YamlDocument, model: type[FileModel]
+) -> InvalidFile:
     """The error that most likely explains the others, which it carries.
 
     A wrong version comes first and a missing key last, since a misspelt key is missing
@@ -88,6 +38,7 @@ def first_error(error: ValidationError, document: YamlDocument) -> InvalidFile:
     Args:
         error: All that pydantic found.
         document: The file, for its lines.
+        model: What the file was held against.
 
     Returns:
         One error that names field, line, value and expectation.
@@ -104,8 +55,9 @@ def first_error(error: ValidationError, document: YamlDocument) -> InvalidFile:
 
     first, *rest = sorted(found, key=rank)
     more = f" (and {len(rest)} more)" if rest else ""
-    raised = document.invalid(first[0], _problem(first[1], first[0]) + more)
-    raised.others = tuple(document.invalid(at, _problem(what, at)) for at, what in rest)
+    said = [(at, _problem(details, at, model)) for at, details in (first, *rest)]
+    raised = document.invalid(first[0], said[0][1] + more)
+    raised.others = tuple(document.invalid(*one) for one in said[1:])
     return raised
 
 
@@ -128,36 +80,53 @@ def _location(details: ErrorDetails, data: Data) -> Location:
     return tuple(location)
 
 
-def _problem(details: ErrorDetails, at: Location) -> str:
+def _problem(details: ErrorDetails, at: Location, model: type[FileModel]) -> str:
     """One clause: the value found and what was expected."""
     loc, kind, context = details["loc"], details["type"], details.get("ctx", {})
     match kind:
         case "missing":
-            field = _model(loc).model_fields.get(str(loc[-1]))
-            hint = field.description if field else None
+            hint = _fields(_models(loc[:-1], model))[str(loc[-1])].description
             return f"is missing; expected: {hint}" if hint else "is missing"
         case "extra_forbidden":
-            fields = _model(loc).model_fields.items()
-            known = ", ".join(field.alias or name for name, field in fields)
+            known = ", ".join(_fields(_models(loc[:-1], model)))
             return f"is not a known key; known: {known}"
         case "union_tag_not_found":
-            return f"is missing; expected: one of {_known_shapes(loc)}"
+            return f"is missing; expected: one of {', '.join(_models(loc, model))}"
         case "union_tag_invalid":
-            return f"is {context['tag']!r}, expected one of {_known_shapes(loc)}"
+            known = ", ".join(_models(loc, model))
+            return f"is {context['tag']!r}, expected one of {known}"
     return f"is {_shown(details['input'])}, expected {_expected(details, at)}"
 
 
-def _known_shapes(loc: tuple[str | int, ...]) -> str:
-    return ", ".join(_BODIES if "bodies" in loc else _SHAPES)
+def _models(
+    loc: tuple[str | int, ...], model: type[FileModel]
+) -> dict[str, type[FileModel]]:
+    """The models that may stand at pydantic's location, by the tags of their union."""
+    found = {"": model}
+    for step in map(str, loc):
+        if step in found:
+            found = {"": found[step]}
+        elif field := _fields(found).get(step):
+            found = dict(_tagged(field.annotation))
+    return found
 
 
-def _model(loc: tuple[str | int, ...]) -> type[FileModel]:
-    """The model that a field belongs to, by pydantic's location of the field."""
-    if len(loc) > 2 and isinstance(loc[-2], int):
-        return _LISTED["others" if "others" in loc else "errors"]
-    if "bodies" in loc and str(loc[-2]) in _BODIES:
-        return _BODIES[str(loc[-2])]
-    return _MODELS[loc[-2]] if len(loc) > 1 else schema.ProblemModel
+def _fields(models: Mapping[str, type[FileModel]]) -> dict[str, FieldInfo]:
+    """Fields by their names in the file."""
+    fields = [pair for one in models.values() for pair in one.model_fields.items()]
+    return {field.alias or name: field for name, field in fields}
+
+
+def _tagged(kind: Any, tag: str = "") -> Iterator[tuple[str, type[FileModel]]]:
+    """The models in a type; a union tells them apart by a tag, or by their `shape`."""
+    if isinstance(kind, type) and issubclass(kind, FileModel):
+        shape = kind.model_fields.get("shape")
+        yield get_args(shape.annotation)[0] if shape else tag, kind
+        return
+    parts = get_args(kind)
+    for part in parts:
+        tags = (one.tag for one in parts if isinstance(one, Tag))
+        yield from _tagged(part, next(tags, tag))
 
 
 def _expected(details: ErrorDetails, at: Location) -> str:

@@ -98,7 +98,7 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
     try:
         model = ProblemModel.model_validate(document.data)
     except ValidationError as error:
-        raise first_error(error, document) from None
+        raise first_error(error, document, ProblemModel) from None
     stem = "".join(c if c.isalnum() else "_" for c in path.stem[:100])
     digest = hashlib.sha256(content)
     problem = build_problem(

@@ -50,12 +50,12 @@ def not_bool(value: Any) -> Any:
 
 def _kind_of_arm(value: Any) -> str:
     if isinstance(value, dict) and "urdf" in value:
-        return "urdf"
-    return "urdf" if hasattr(value, "urdf") else text_or_not(value)
+        return "from urdf"
+    return "from urdf" if hasattr(value, "urdf") else text_or_not(value)
 
 
 def _list_or_not(value: Any) -> str:
-    return "point" if isinstance(value, list) else "joints"
+    return "point" if isinstance(value, list) else "joint values"
 
 
 class CablesModel(FileModel):
@@ -179,7 +179,7 @@ class BasePoseModel(FileModel):
 ManipulatorField: TypeAlias = Annotated[
     Annotated[str, Tag("name")]
     | Annotated[ManipulatorModel, Tag("value")]
-    | Annotated[UrdfManipulatorModel, Tag("urdf")],
+    | Annotated[UrdfManipulatorModel, Tag("from urdf")],
     Discriminator(_kind_of_arm),
 ]
 
@@ -229,7 +229,7 @@ class GoalModel(FileModel):
 
 
 Start: TypeAlias = Annotated[
-    Annotated[Vector, Tag("point")] | Annotated[StartJointsModel, Tag("joints")],
+    Annotated[Vector, Tag("point")] | Annotated[StartJointsModel, Tag("joint values")],
     Discriminator(_list_or_not),
 ]
 

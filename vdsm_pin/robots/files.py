@@ -275,7 +275,7 @@ def read_cell_file(path: Path) -> CellFile:
     try:
         return CellFile(path, document, CellModel.model_validate(document.data))
     except ValidationError as error:
-        raise first_error(error, document) from None
+        raise first_error(error, document, CellModel) from None
 
 
 def source_of(

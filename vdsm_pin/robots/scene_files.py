@@ -96,7 +96,7 @@ def _ours(
     try:
         model = SceneModel.model_validate(document.data)
     except ValidationError as error:
-        raise first_error(error, document) from None
+        raise first_error(error, document, SceneModel) from None
     frame = Frame(model.length_unit, np.eye(3), np.zeros(3))
     digest = hashlib.sha256()
     builder = ObstacleBuilder(document, path.parent, frame, robot_size, digest)
