@@ -125,6 +125,24 @@ BROKEN = {
         replaced(TIP, SHAPE.format('<sphere radius="0"/>')),
         "link 'tip': sphere radius is '0', expected above 0",
     ),
+    "radius that Python alone reads": (
+        replaced(TIP, SHAPE.format('<sphere radius="0_1"/>')),
+        "link 'tip': sphere radius is '0_1'",
+    ),
+    "long axis": (replaced('xyz="1 0 0"', 'xyz="1e200 0 0"'), "axis '1e200 0 0'"),
+    "two geometries": (
+        replaced(
+            TIP,
+            SHAPE.format(
+                '<sphere radius="1"/></geometry><geometry><box size="9 9 9"/>'
+            ),
+        ),
+        "link 'tip': collision has 2 <geometry>, expected 1",
+    ),
+    "two axes": (
+        replaced('<axis xyz="1 0 0"', '<axis xyz="0 1 0"/><axis xyz="1 0 0"'),
+        "joint 'x0': joint has 2 <axis>, expected 1",
+    ),
     "flat box": (
         replaced(TIP, SHAPE.format('<box size="1 1"/>')),
         "link 'tip': box size is '1 1'",

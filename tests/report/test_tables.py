@@ -58,13 +58,16 @@ def test_a_pair_of_links_is_told_by_its_numbers(tmp_path: Path) -> None:
     assert (row["link"], row["obstacle"], row["other_link"]) == ("2", "", "5")
 
 
-def test_obstacle_names_with_commas_stay_one_field(tmp_path: Path) -> None:
-    judged = made_up.verification()
-    pair = Pair(1, 'a, "b"')
-    with ClearanceCsv(tmp_path / "c.csv", judged.problem, [pair]) as sink:
-        sink(made_up.chunk(0, 1, 1))
+def test_names_with_commas_stay_one_field(tmp_path: Path) -> None:
+    judged, name = made_up.verification(), 'a, "b"'
+    pairs = [Pair(1, name, body=name), Pair(1, "", 2, body=name, other_body=name)]
+    with ClearanceCsv(tmp_path / "c.csv", judged.problem, pairs) as sink:
+        sink(made_up.chunk(0, 1, 2))
         sink.write(judged)
-    assert read(tmp_path / "c.csv")[0]["obstacle"] == 'a, "b"'
+    found = [
+        (r["link"], r["obstacle"], r["other_link"]) for r in read(tmp_path / "c.csv")
+    ]
+    assert found == [(name, name, ""), (name, "", name)]
 
 
 def test_angles_and_cables_have_a_row_per_waypoint(tmp_path: Path) -> None:

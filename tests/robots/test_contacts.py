@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
-from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
+from vdsm_pin.geometry.convex import FlatCylinder, Hull, Hulls, Piece
 from vdsm_pin.geometry.solids import BOX_CORNERS
 from vdsm_pin.robots.contacts import common_ball, in_world
 
@@ -48,3 +48,32 @@ def test_no_ball_where_bodies_are_apart(one: str, other: str) -> None:
     theirs = placed(PIECES[other], 2.0 * WIDTH + 1e-6, np.eye(3))
     radius, _ = common_ball(mine, theirs, np.array([WIDTH, 0.0, 0.0]))
     assert radius == 0.0
+
+
+@pytest.mark.parametrize("one", PIECES)
+@pytest.mark.parametrize("depth", [1e-3, 0.05, -1e-6])
+def test_ball_about_a_point_of_a_triangle_that_goes_in(one: str, depth: float) -> None:
+    """It has no inside; its corner is that deep, and apart where that is negative."""
+    turn = rotation_from_rpy(np.array([0.3, -0.5, 1.1]))
+    tip = np.array([WIDTH - depth, 0.0, 0.0])
+    triangle = Hull(
+        (tip + np.array([[0, 0, 0], [1, 0.2, 0.3], [1, -0.4, 0.1]])) @ turn.T
+    )
+    radius, centre = common_ball(
+        placed(PIECES[one], 0.0, turn), [triangle], turn @ [WIDTH, 0.0, 0.0]
+    )
+    assert (radius > 0.0) == (depth > 0.0)
+    if depth > 0.0:
+        assert radius <= depth
+        assert 0.0 <= (centre - turn @ tip) @ turn[:, 0] <= depth
+
+
+def test_of_many_pieces_the_near_ones_are_looked_at() -> None:
+    """One triangle of a thousand crosses the body, the last."""
+    rng = np.random.default_rng(0)
+    far = rng.normal([5.0, 0.0, 0.0], 1.0, (1000, 3, 3))
+    through = np.array([[[-1.0, 0.01, 0], [1.0, 0.02, 1], [1.0, -0.03, -1]]])
+    body = placed(BOX, 0.0, np.eye(3))
+    radius, _ = common_ball(Hulls(np.concatenate([far, through])), body, np.zeros(3))
+    assert radius > 0.01
+    assert common_ball(Hulls(far), body, np.zeros(3))[0] == 0.0

@@ -93,6 +93,7 @@ def test_limits_that_are_not_stated_are_noted(tmp_path: Path, urdf: Path) -> Non
     robot = read_robot(free)
     assert robot.joints[0].upper == np.inf
     assert robot.notes == ("joint 'turn' states no limits, and none are checked",)
+    assert pose_difference(robot, np.array([[0.7, 0.1]])).max() < 1e-12
     limits = write(tmp_path, "joint_limits.yaml", LIMITS)
     turn, slide = read_robot(urdf, joint_limits=limits).joints
     assert (turn.velocity, turn.acceleration, turn.upper) == (0.5, np.inf, 3.0)
@@ -101,6 +102,31 @@ def test_limits_that_are_not_stated_are_noted(tmp_path: Path, urdf: Path) -> Non
     write(tmp_path, "joint_limits.yaml", LIMITS.replace("0.5", "-0.5"))
     with pytest.raises(InvalidFile, match="expected above 0"):
         read_limits(limits)
+
+
+def test_pinocchio_reads_joints_alone(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Its reader complains of a capsule, and takes no joint without limits."""
+    limit = '<limit lower="-3" upper="3" effort="1" velocity="1"/>'
+    text = URDF.replace("sphere", 'capsule length="0.1"').replace(limit, "<limit/>")
+    robot = read_robot(write(tmp_path, "two.urdf", text))
+    assert pose_difference(robot, np.array([[0.7, 0.1]])).max() < 1e-12
+    assert capfd.readouterr() == ("", "")
+
+
+def test_links_that_are_seen_alone_are_noted(tmp_path: Path) -> None:
+    seen = '<visual><geometry><box size="1 1 1"/></geometry></visual></link>'
+    text = URDF.replace('<link name="finger"/>', f'<link name="finger">{seen}')
+    (note,) = read_robot(write(tmp_path, "seen.urdf", text)).notes
+    assert note == "links without a collision solid are not judged: 'finger'"
+
+
+def test_parts_of_a_joint_have_names_of_their_own(tmp_path: Path) -> None:
+    text = URDF.replace('name="turn" type="revolute"', 'name="a" type="planar"')
+    text = text.replace("0 0 2", "0 0 1").replace('"slide"', '"a/x"')
+    with pytest.raises(InvalidFile, match="two joints have the value 'a/x'"):
+        read_robot(write(tmp_path, "two.urdf", text))
 
 
 def octahedron(folder: Path) -> Path:

@@ -27,8 +27,18 @@ SIZES: Final = {
 }
 """Shapes every reader takes, with the count of numbers in each of their sizes."""
 
-ANY_SIZES: Final = {**SIZES, "capsule": {"radius": 1, "length": 1}}
+ANY_SIZES: Final = {**SIZES, "capsule": {"radius": 1, "length": 1}, "mesh": {}}
 """Shapes of robots that are judged."""
+
+
+AXIS: Final = (1e-100, 1e100)
+"""Largest entry of a joint's axis, whose square is no overflow and not 0; [-]."""
+
+ONCE: Final = (
+    *("origin", "geometry", "axis", "limit", "mimic", "parent", "child", "inertial"),
+    *("mass", "inertia"),
+)
+"""Elements of which readers take the first and pass over others."""
 
 
 def validate_urdf(text: str, *, geometry_only: bool = False) -> None:
@@ -43,7 +53,7 @@ def validate_urdf(text: str, *, geometry_only: bool = False) -> None:
         InvalidInput: If the text is not XML; a name is missing or used twice; a joint
             names a link that does not exist; the links are not one tree; a mass,
             inertia or size is impossible; a limit is missing or upside down; an axis
-            is zero; a number is not one; or a shape is one that a reader would drop.
+            is zero; a number is not one; or an element is one that a reader would drop.
     """
     try:
         robot = ET.fromstring(text)
@@ -103,6 +113,7 @@ def _tree_problems(robot: ET.Element) -> Iterator[str]:
 def _joint_problems(joint: ET.Element, geometry_only: bool) -> Iterator[str]:
     where = f"joint {joint.get('name', '')!r}"
     kind = joint.get("type", "")
+    yield from _repeated(joint, where)
     kinds = ANY_JOINT_KINDS if geometry_only else JOINT_KINDS
     if kind not in kinds:
         yield f"{where}: type {kind!r}, expected one of {', '.join(kinds)}"
@@ -112,7 +123,7 @@ def _joint_problems(joint: ET.Element, geometry_only: bool) -> Iterator[str]:
     axis = None if joint.find("axis") is None else _numbers(joint, "axis", "xyz", 3)
     if joint.find("axis") is not None:
         text = _attribute(joint, "axis", "xyz")
-        if axis is None or not np.linalg.norm(axis) > 0.0:
+        if axis is None or not AXIS[0] < np.abs(axis).max() < AXIS[1]:
             yield f"{where}: axis {text!r} is no direction"
         elif kind == "planar" and (axis[:2].any() or not axis[2] > 0.0):
             yield f"{where}: axis {text!r}, expected 0 0 1 of a planar joint"
@@ -140,16 +151,18 @@ def _limit_problems(joint: ET.Element, where: str, optional: bool) -> Iterator[s
 
 def _link_problems(link: ET.Element, geometry_only: bool) -> Iterator[str]:
     where = f"link {link.get('name', '')!r}"
+    yield from _repeated(link, where)
     inertial = link.find("inertial")
     if inertial is not None and not geometry_only:
+        yield from _repeated(inertial, where)
         yield from _origin_problems(inertial, where)
         yield from _inertia_problems(inertial, where)
     shown = [] if geometry_only else link.findall("visual")
+    sizes = ANY_SIZES if geometry_only else SIZES
     for shape in shown + link.findall("collision"):
+        yield from _repeated(shape, where)
         yield from _origin_problems(shape, where)
-        if not (geometry_only and shape.find("geometry/mesh") is not None):
-            sizes = ANY_SIZES if geometry_only else SIZES
-            yield from _shape_problems(shape, where, sizes)
+        yield from _shape_problems(shape, where, sizes)
 
 
 def _inertia_problems(inertial: ET.Element, where: str) -> Iterator[str]:
@@ -199,6 +212,14 @@ def _origin_problems(element: ET.Element, where: str) -> Iterator[str]:
             yield f"{where}: origin {name} is {text!r}, expected 3 finite numbers"
 
 
+def _repeated(element: ET.Element, where: str) -> Iterator[str]:
+    """Elements within one that it has more than once."""
+    counts = Counter(child.tag for child in element if child.tag in ONCE)
+    for tag, count in counts.items():
+        if count > 1:
+            yield f"{where}: {element.tag} has {count} <{tag}>, expected 1"
+
+
 def _attribute(element: ET.Element, child: str, name: str) -> str:
     """An attribute of a child element; empty where either is missing."""
     found = element.find(child)
@@ -208,18 +229,28 @@ def _attribute(element: ET.Element, child: str, name: str) -> str:
 def _number(text: str) -> float:
     """A finite number; NaN where it is none."""
     try:
-        value = float(text)
+        value = float(text) if _plain(text) else np.nan
     except ValueError:
         return np.nan
     return value if np.isfinite(value) else np.nan
+
+
+def _plain(text: str) -> bool:
+    """Whether numbers are written as everybody reads them, unlike 1_0 or ١."""
+    return text.isascii() and "_" not in text
 
 
 def _numbers(
     element: ET.Element, child: str, name: str, count: int
 ) -> FloatArray | None:
     """The finite numbers in a child's attribute; None where they are not `count`."""
+    words = _attribute(element, child, name)
     try:
-        values = np.array(_attribute(element, child, name).split(), dtype=np.float64)
+        values = np.array(words.split(), dtype=np.float64)
     except ValueError:
         return None
-    return values if values.size == count and np.isfinite(values).all() else None
+    return (
+        values
+        if _plain(words) and values.size == count and np.isfinite(values).all()
+        else None
+    )

@@ -91,8 +91,8 @@ class ClearanceCsv(_OwnFile):
         pose = problem.T_world_base
         self._rotation, self._shift = pose[:3, :3].T, pose[:3, 3]
         partners = [
-            f"{pair.body or pair.link},{_quoted(pair.obstacle)},"
-            f"{pair.other_body or pair.other_link or ''}"
+            f"{_quoted(pair.body or str(pair.link))},{_quoted(pair.obstacle)},"
+            f"{_quoted(pair.other_body or str(pair.other_link or ''))}"
             for pair in pairs
         ]
         self._form = Form(_CLEARANCE_DECIMALS, _CLEARANCE_ROUNDING,

@@ -2,7 +2,9 @@
 
 The clearance of two hulls that meet is known to be 0 at most, which refutes no required
 clearance of 0. A climb finds a point that is deep in both; the corners of a small
-tetrahedron around it are proved to lie in a piece of each, so its ball does too.
+tetrahedron around it are proved to lie in a piece of each, so its ball does too. Of a
+piece without an inside, as a triangle is, the ball is about a point of it and lies in
+the other body.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -12,7 +14,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
+from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Hulls, Piece
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
 from vdsm_pin.robots.hulls import hull_planes
@@ -25,13 +27,19 @@ SHARES: Final = (0.9, 0.5, 0.1)
 """Sizes that are tried, as parts of the depth that was climbed to; [-]."""
 
 MOST_PIECES: Final = 64
-"""Of bodies of more pieces no common ball is looked for."""
+"""Of bodies of more pieces those nearest to the witness are looked at."""
 
 STEPS: Final = 200
 """Of a climb."""
 
 SHORTER: Final = 0.97
 """How much shorter each step is than the one before; [-]."""
+
+FIRST_RATE: Final = 10.0
+"""Of the weights of corners; [-]."""
+
+LEAST_WEIGHT: Final = 1e-9
+"""Of a corner, so that it can grow again; [-]."""
 
 Slack: TypeAlias = Callable[[FloatArray], tuple[float, FloatArray]]
 """How deep a point lies in a piece, at most, and the way to lie deeper; [m], [-]."""
@@ -48,19 +56,76 @@ def common_ball(
         point: Where it is looked for first, shape (3,); [m].
 
     Returns:
-        Radius, 0 if none is found, and centre; [m].
+        Radius, 0 if none is found, and centre; [m]. Where one of the pieces has no
+        inside the centre is in it and the ball in the other.
     """
-    if max(len(one), len(other)) > MOST_PIECES or not np.isfinite(point).all():
+    if not np.isfinite(point).all():
         return 0.0, point
     lost = TOLERANCES.bracket_gap + TOLERANCES.arithmetic
-    for mine, theirs in product(one, other):
-        depth, centre = _climb((_slack(mine), _slack(theirs)), point)
+    near = [
+        [(piece, _slack(piece)) for piece in nearest_pieces(body, point)]
+        for body in (one, other)
+    ]
+    for both in product(*near):
+        thick = [(piece, slack) for piece, slack in both if slack is not None]
+        if not thick:
+            continue
+        if len(thick) == 2:
+            depth, centre = _climb((thick[0][1], thick[1][1]), point)
+        else:
+            (flat,) = (piece for piece, slack in both if slack is None)
+            assert isinstance(flat, Hull)  # all others have an inside
+            depth, centre = _deepest_of(flat.points, thick[0][1])
         for share in SHARES:
             corners = centre + share * depth * CORNERS
             radius = share * depth / 3.0 - lost
-            if radius > 0.0 and all(_holds(p, corners, lost) for p in (mine, theirs)):
+            if radius > 0.0 and all(_holds(piece, corners, lost) for piece, _ in thick):
                 return radius, centre
     return 0.0, point
+
+
+def nearest_pieces(pieces: Sequence[Piece], point: FloatArray) -> list[Piece]:
+    """All pieces, or of many those whose boxes are nearest to a point."""
+    if len(pieces) <= MOST_PIECES:
+        return list(pieces)
+    if isinstance(pieces, Hulls):
+        low, high = pieces.corners.min(axis=1), pieces.corners.max(axis=1)
+    else:
+        boxes = np.array([_box(piece) for piece in pieces])
+        low, high = boxes[:, 0], boxes[:, 1]
+    gaps = np.linalg.norm(
+        np.maximum(np.maximum(low - point, point - high), 0.0), axis=1
+    )
+    nearest = np.argsort(gaps, kind="stable")[:MOST_PIECES]
+    return [pieces[k] for k in nearest.tolist()]
+
+
+def _box(piece: Piece) -> tuple[FloatArray, FloatArray]:
+    """Two corners of a box that holds a piece with bounds."""
+    if isinstance(piece, Hull):
+        return piece.points.min(axis=0), piece.points.max(axis=0)
+    assert isinstance(piece, FlatCylinder)  # a half-space is alone
+    reach = piece.half_length + piece.radius
+    return piece.centre - reach, piece.centre + reach
+
+
+def _deepest_of(points: FloatArray, slack: Slack) -> tuple[float, FloatArray]:
+    """The point of a flat hull that lies deepest in a piece, as far as steps find it.
+
+    The weights of its corners grow with how far each lies up the slope.
+    """
+    weights = np.full(len(points), 1.0 / len(points))
+    best, where, rate = -np.inf, points[0], FIRST_RATE
+    size = max(float(np.ptp(points, axis=0).max()), TOLERANCES.arithmetic)
+    for _ in range(STEPS):
+        at = weights @ points
+        depth, way = slack(at)
+        if depth > best:
+            best, where = depth, at
+        up = points @ way / size
+        weights = np.maximum(weights * np.exp(rate * (up - up.max())), LEAST_WEIGHT)
+        weights, rate = weights / weights.sum(), SHORTER * rate
+    return best, where
 
 
 def _climb(slacks: tuple[Slack, Slack], start: FloatArray) -> tuple[float, FloatArray]:
@@ -91,17 +156,17 @@ def _climb(slacks: tuple[Slack, Slack], start: FloatArray) -> tuple[float, Float
     return best, where
 
 
-def _slack(piece: Piece) -> Slack:
-    """How deep points lie in a piece; never in one without an inside."""
+def _slack(piece: Piece) -> Slack | None:
+    """How deep points lie in a piece; None of one without an inside."""
     if isinstance(piece, HalfSpacePiece):
         return lambda x: (piece.offset - float(piece.normal @ x), -piece.normal)
     if isinstance(piece, FlatCylinder):
         return lambda x: _in_cylinder(piece, x)
-    if len(piece.points) <= 2:
+    if len(piece.points) <= 2 and piece.radius > 0.0:
         return lambda x: _in_capsule(piece, x)
     planes = hull_planes(piece.points)
     if planes is None:
-        return lambda x: (-np.inf, np.zeros(3))
+        return None
     normals, offsets = planes
 
     def in_hull(x: FloatArray) -> tuple[float, FloatArray]:

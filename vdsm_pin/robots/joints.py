@@ -169,7 +169,7 @@ class JointReader:
         for joint in elements:
             name, parts = joint.get("name", ""), _parts(joint)
             if joint.get("type") == "fixed":
-                self._values[name] = _Value(None)
+                self._keep(name, _Value(None))
             elif joint.find("mimic") is not None and len(parts) == 1:
                 waiting.append(joint)
             else:
@@ -185,7 +185,7 @@ class JointReader:
                 )
                 raise self.invalid(problem)
             for joint in known:
-                self._values[joint.get("name", "")] = self._following(joint)
+                self._keep(joint.get("name", ""), self._following(joint))
                 waiting.remove(joint)
 
     def _following(self, joint: ET.Element) -> _Value:
@@ -214,7 +214,14 @@ class JointReader:
                     )
                 )
                 value = _Value(len(self.movable) - 1)
-            self._values[name + part.suffix] = value
+            self._keep(name + part.suffix, value)
+
+    def _keep(self, name: str, value: _Value) -> None:
+        """Take down a joint's value, or that of a part of it."""
+        if name in self._values:
+            problem = f"two joints have the value {name!r}, expected names that differ"
+            raise self.invalid(problem)
+        self._values[name] = value
 
     def _standing(self, joint: str, name: str, limits: Limits) -> _Value | None:
         """The value of a joint that stands still; None where it moves."""

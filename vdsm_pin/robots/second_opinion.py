@@ -1,5 +1,6 @@
 """Pinocchio and Coal about a robot: poses from the same URDF, distances of pairs."""
 
+import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, Final
@@ -58,6 +59,7 @@ def _model(text: str, base: Base | None) -> Any:
     """
     import pinocchio as pin
 
+    text = _bare(text)
     free = {"planar": pin.JointModelPlanar, "floating": pin.JointModelFreeFlyer}
     try:
         if base is None:
@@ -66,6 +68,26 @@ def _model(text: str, base: Base | None) -> Any:
     except (ValueError, RuntimeError) as error:
         message = f"Pinocchio refuses the URDF: {error}"
         raise VerificationFailed(message) from None
+
+
+def _bare(text: str) -> str:
+    """A URDF without what places no link: solids, masses and limits.
+
+    Pinocchio's reader writes about shapes that it does not know to the terminal, and
+    refuses joints without limits.
+    """
+    document = ET.fromstring(text)
+    for link in document.findall("link"):
+        for element in list(link):
+            link.remove(element)
+    for joint in document.findall("joint"):
+        for limit in joint.findall("limit"):
+            joint.remove(limit)
+        if joint.get("type") in ("revolute", "prismatic"):
+            ET.SubElement(
+                joint, "limit", lower="0", upper="0", effort="0", velocity="0"
+            )
+    return ET.tostring(document, encoding="unicode")
 
 
 def _configuration(pin: Any, model: Any, robot: Robot, values: FloatArray) -> Any:

@@ -1,11 +1,12 @@
 """A URDF and its SRDF to a robot: joints, solids, pairs that are held apart."""
 
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.io.tables import listed
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.files import HULLS, Solids
@@ -77,10 +78,20 @@ def read_robot(
         left_out=left_out,
         base=base,
         solids=solids,
-        notes=tuple(reader.notes),
+        notes=(*reader.notes, *_not_solid(document)),
         meshes=links.meshes(document),
         covers=links.covers,
     )
+
+
+def _not_solid(document: ET.Element) -> Iterator[str]:
+    """A note on links that are seen but not judged."""
+    links = [
+        link for link in document.findall("link") if link.find("visual") is not None
+    ]
+    names = [link.get("name", "") for link in links if link.find("collision") is None]
+    if names:
+        yield f"links without a collision solid are not judged: {listed(names)}"
 
 
 def _bodies(
