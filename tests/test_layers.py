@@ -50,6 +50,7 @@ CHECKER = PACKAGE / "certificate_checker"
 READING = {
     *("errors", "text", "geometry.solids"),
     *("problem.planning_problem", "problem.scene", "problem.trajectory"),
+    *("problem.error_boxes",),
     *("io.problem_file", "io.source", "io.trajectory_file", "io.mesh_file"),
     *("arm.urdf_validator", "robots.files", "robots.joint_limits", "robots.model"),
     *("robots.srdf", "robots.trajectory_files", "robots.xacro"),
@@ -59,6 +60,7 @@ READING = {
 WORKED_OUT = {
     *("axis_spans", "axis_radii", "axis_names"),
     *("pieces", "convex_sections", "closed_mesh", "corner_stations"),
+    *("of_obstacle", "angles", "widened"),
 }
 """What those types work out for planner and verifier; the checker does it again."""
 
@@ -162,7 +164,7 @@ def test_certificate_checker_runs_without_the_verifier() -> None:
 
 
 def test_certificate_checker_is_short_enough_to_audit() -> None:
-    assert sum(map(code_lines, CHECKER.glob("*.py"))) <= 1505
+    assert sum(map(code_lines, CHECKER.glob("*.py"))) <= 1539
 
 
 def code_lines(path: Path) -> int:

@@ -1,12 +1,14 @@
 """Given motions of robots and arms in a batch: rows, pages, JUnit, resumed."""
 
 import xml.etree.ElementTree as ET
+from math import radians
 from pathlib import Path
 
 import pytest
+from oracles.certificate_cases import certificate_lines
 
 from vdsm_pin.batch.run import Batch, run_batch
-from vdsm_pin.batch.task import Proving
+from vdsm_pin.batch.task import CERTIFICATE, Proving
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.report.files import VerificationFile
 
@@ -102,12 +104,15 @@ def test_errors_are_asked_about(folder: Path, degrees: float, passes: bool) -> N
     assert (outcomes["cell-clear"] == "certified") is passes
 
 
-def test_what_is_not_judged_of_robots_is_refused(folder: Path) -> None:
-    """Nothing green that covers less than was asked; and what is missing is named."""
+def test_certificates_are_written_under_errors(folder: Path) -> None:
     both = Proving(joint_error_deg=1.0, certificate=True)
-    rows = run_batch(asked(folder, proving=both))
-    why = {row.folder: row.reason for row in rows if row.outcome == "error"}
-    assert "errors of robots are not certified" in why["cell-clear"]
+    rows = {row.folder: row for row in run_batch(asked(folder, proving=both))}
+    assert rows["cell-clear"].outcome == "certified"
+    lines = certificate_lines(folder / "out" / "cell-clear" / CERTIFICATE)
+    assert lines[0]["errors"]["joints_rad"] == {"turn": pytest.approx(radians(1.0))}
+
+
+def test_what_is_missing_is_named(folder: Path) -> None:
     (row,) = run_batch(asked(folder, trajectories=()))
     assert row.outcome == "error"
     assert "expected manipulator" in row.reason

@@ -293,7 +293,7 @@ class OracleWriter:
             for i, other in self.partners()
         ]
         return {
-            "vdsm_certificate": 6,
+            "vdsm_certificate": 7,
             "problem_sha256": self.file.sha256,
             "trajectory_sha256": sha256(self.trajectory_path.read_bytes()),
             "versions": {"vdsm_pin": "0", "numpy": np.__version__},

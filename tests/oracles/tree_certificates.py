@@ -53,9 +53,8 @@ class Core:
         self.path = Path(Branch(motion.knots, None, inner))
         self.tree, (one, other) = tree_of(query, box), query.bodies
         body = Body(one.frame, solid_of(one.name, one.pieces[0]))
-        rests, lost = solid_of(other.name, other.pieces[0]), 0.0
-        lost += self.tree.slip(other.frame, one.frame)
-        self.pair = Pair(body, rests, other.frame, required, lost)
+        rests = solid_of(other.name, other.pieces[0])
+        self.pair = Pair(body, rests, other.frame, required, 0.0)
 
     def check(self, proofs: list[Any]) -> None:
         """Check the proofs of all intervals."""

@@ -8,7 +8,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from oracles.certificate_cases import certificate_lines
 
+from vdsm_pin.certificate_checker.program import main as check_certificate_main
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
@@ -244,13 +246,18 @@ def test_the_errors_of_a_file_and_of_options_are_told(tmp_path: Path) -> None:
     assert "±0.500° of turn" in (tmp_path / "out/report.html").read_text()
 
 
-def test_no_certificate_covers_errors(
+def test_the_certificate_covers_errors_of_options(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    file = tmp_path / "c.jsonl"
-    assert verified(tmp_path, "{joint_deg: 1}", "--certificate", str(file)) == 1
-    assert "errors of robots are not certified" in capsys.readouterr().out
-    assert not file.exists()
+    file, files = tmp_path / "c.jsonl", [tmp_path / "cell.yaml", tmp_path / "t.csv"]
+    options = "--joint-error-deg", "turn=1", "--base-error-mm", "2"
+    assert verified(tmp_path, "{base: 1}", *options, "--certificate", str(file)) == 0
+    capsys.readouterr()
+    assert check_certificate_main([*map(str, (file, *files))]) == 0
+    assert "accepted" in capsys.readouterr().out
+    stated = certificate_lines(file)[0]["errors"]
+    assert stated["joints_rad"] == {"turn": pytest.approx(np.radians(1.0))}
+    assert stated["base"] == [0.002, 0.0]
 
 
 @pytest.mark.parametrize(

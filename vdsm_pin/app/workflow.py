@@ -21,7 +21,6 @@ from vdsm_pin.io.trajectory_file import (
     read_trajectory,
     write_trajectory,
 )
-from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem, ProblemSource
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import step
@@ -323,11 +322,6 @@ def _certify(order: VerifyOrder, verification: Verification, record: RunRecord) 
         return "not asked for"
     if verification.verdict is not Verdict.CERTIFIED:
         return "no proof"
-    if not isinstance(verification, ArmVerification):
-        from vdsm_pin.robots.certificate import NO_ERRORS
-
-        if verification.errors != ErrorBox():
-            return NO_ERRORS
     # Imported by those who ask for one: its schema takes a while to build.
     from vdsm_pin.verification.certificate_lines import Hashes
 

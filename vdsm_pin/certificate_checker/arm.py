@@ -7,11 +7,12 @@ that carry obstacles.
 from collections.abc import Iterator, Mapping
 from itertools import combinations
 from pathlib import Path as File
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
-from vdsm_pin.certificate_checker.balls import belongs, claim, column, number
+from vdsm_pin.certificate_checker.balls import belongs, claim, column
+from vdsm_pin.certificate_checker.errors import grown
 from vdsm_pin.certificate_checker.motion import Branch, Path
 from vdsm_pin.certificate_checker.rows import Rows
 from vdsm_pin.certificate_checker.solids import Body, Mesh, Pair, Solid, solid
@@ -27,8 +28,6 @@ from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.problem import scene
-
-ERRORS: Final = {"joints_rad", "base", "obstacles"}
 
 
 def arm_joints(lengths: list[float], angles: list[float], base: Any) -> list[Joint]:
@@ -86,8 +85,9 @@ class Arm:
         self.lengths = self.arm.link_lengths.tolist()
         self.solids = [solid(one) for one in problem.scene.obstacles]
         self.meshes = {s.name: s for s in self.solids if isinstance(s, Mesh)}
-        angles, base, self.grown = self._errors(header["errors"])
-        joints = arm_joints(self.lengths, angles, base)
+        stated, least = header["errors"], {"joints_rad": self._asked()}
+        self.grown = grown(stated, problem.errors, least, self.solids)
+        joints = arm_joints(self.lengths, stated["joints_rad"], stated["base"])
         rates = [x for x in (rows.rates, rows.changes) if x is not None]
         own, first = Branch(rows.joints, rows.times, rates=rates), dict[Any, int]()
         self.own, branches = (Tree(joints), Path(own)), [own]
@@ -111,38 +111,12 @@ class Arm:
         self.notes = [note for mesh in self.meshes.values() for note in mesh.notes()]
         self.notes.append(f"{joined} pieces join the rows")
 
-    def _errors(self, stated: dict[str, Any]) -> tuple[list[float], Any, Any]:
-        """Errors of angles and base, and how far obstacles may be off.
-
-        Those stated cover those that the problem asks for.
-        """
-        claim(set(stated) == ERRORS, f"errors: expected {sorted(ERRORS)}")
-        asked, names = self.problem.errors, [one.name for one in self.solids]
-        known = set(stated["obstacles"]) == set(names)
-        claim(known, "errors: the obstacles are not those of the problem")
-        angles = [*map(number, stated["joints_rad"])]
-        base = [*map(number, stated["base"])]
-        off = [[*map(number, stated["obstacles"][name])] for name in names]
-        single = {one.name: (one.shift, one.turn) for one in asked.obstacles}
-        least = [[asked.base, asked.base_turn]]
-        for name in names:
-            shift, turn = single.get(name, (0.0, 0.0))
-            least.append([max(shift, asked.obstacle), turn])
+    def _asked(self) -> list[float]:
+        """Errors of yaw and pitch of each joint that the problem asks for."""
+        asked = self.problem.errors
         each = [e for pair in asked.joints for e in pair]
         each += [0.0] * (2 * len(self.lengths) - len(each))
-        least.append([max(asked.joint, e) for e in each])
-        given = [base, *off, angles]
-        covered = all(
-            len(one) == len(other)
-            and all(a >= b >= 0.0 for a, b in zip(one, other, strict=True))
-            for one, other in zip(given, least, strict=True)
-        )
-        claim(covered, "errors: less than the problem asks for")
-        grown = [
-            shift + (turn * one.size() if turn > 0.0 else 0.0)
-            for (shift, turn), one in zip(off, self.solids, strict=True)
-        ]
-        return angles, base, grown
+        return [max(asked.joint, e) for e in each]
 
     def _cover(self, pieces: dict[str, Any], joined: dict[str, Any]) -> None:
         """Take the bodies, and the pieces that cover them and the obstacles."""
@@ -163,14 +137,12 @@ class Arm:
         for one, rest, off in zip(self.solids, self.frames, self.grown, strict=True):
             for body in self.bodies:
                 if not self._ignored(body.solid.name, one.name):
-                    lost = off + self.tree.slip(rest, body.frame)
-                    yield Pair(body, one, rest, required, lost)
+                    yield Pair(body, one, rest, required, off)
         required = self.problem.required_self_clearance
         for both in combinations(self.bodies, 2):
             near, far = sorted(both, key=lambda body: body.frame)
             if self._parts(near, far):
-                lost = self.tree.slip(near.frame, far.frame)
-                yield Pair(far, near.solid, near.frame, required, lost)
+                yield Pair(far, near.solid, near.frame, required, 0.0)
 
     def _ignored(self, one: str, other: str) -> bool:
         """Whether the problem leaves two names, or parts of what they name, out."""

@@ -127,7 +127,8 @@ def clearances(pair: Pair, planes: Sequence[Plane], slices: Slices) -> Any:
     at = [slices.numbers[plane.slice] for plane in planes]
     reached, size = slices.reach(pair.body, pair.rest, at, n)
     begins = [solid.support(d, x.first, x.last) for d, x in zip(n, planes, strict=True)]
-    lost = pair.body.solid.radius + pair.lost
+    slip = slices.tree.slip(pair.rest, pair.body.frame)
+    lost = pair.body.solid.radius + pair.lost + slip
     steps = 64 + 8 * len(slices.tree.joints)
     rounding = steps * 2.0**-53 * (size + solid.extent + lost)
     return np.array(begins) - reached - lost - rounding

@@ -14,8 +14,10 @@ from flint import arb, arb_mat
 
 from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.certificate_checker.balls import SLACK, Ball, belongs, claim
+from vdsm_pin.certificate_checker.errors import grown
 from vdsm_pin.certificate_checker.motion import Branch, Path, Points, derivative, part
 from vdsm_pin.certificate_checker.solids import (
+    CUBE,
     Body,
     Compound,
     Mesh,
@@ -28,6 +30,7 @@ from vdsm_pin.certificate_checker.solids import (
 from vdsm_pin.certificate_checker.tree import FIXED, SLIDES, TURNS, Joint, Pose, Tree
 from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.robots.files import CellFile, RobotFiles, find_mesh
 from vdsm_pin.robots.joint_limits import Limits, read_limits, stated_limits
 from vdsm_pin.robots.model import RobotJoint
@@ -48,7 +51,6 @@ MOVES: Final = {
 }
 """What each type of joint is made of: suffix, movement and axis, None for its own."""
 
-CORNERS: Final = np.array([*product((-1.0, 1.0), repeat=3)])
 HALVINGS: Final = 20  # of a piece whose control points do not decide
 
 
@@ -148,6 +150,30 @@ class Joints:
             parent, place = len(self.joints), np.eye(4)
         return parent
 
+    def least_errors(self, asked: ErrorBox) -> dict[str, Any]:
+        """Of each joint, by the unit of its values, what a problem asks for."""
+        least: dict[str, Any] = {"joints_rad": {}, "joints_m": {}}
+        for joint in self.moved:
+            plain = asked.joint if joint.turns else asked.slide
+            least[f"joints_{joint.unit}"][joint.name] = plain
+        claim(not asked.joints, "errors of a robot's joints are by name")
+        for one in asked.named:
+            for key, error in (("joints_rad", one.turn), ("joints_m", one.shift)):
+                told = f"errors are of {one.name!r}, which does not move so"
+                claim(one.name in least[key] or not error, told)
+                if error:
+                    least[key][one.name] = max(least[key][one.name], error)
+        return least
+
+    def err(self, stated: Any) -> None:
+        """Take the errors that a certificate states; a follower has the leader's."""
+        values = stated["joints_rad"] | stated["joints_m"]
+        self.joints[0].err(0.0, *stated["base"])
+        for joint in self.joints:
+            if joint.column is not None:
+                error = values[self.moved[joint.column].name]
+                joint.err(joint.gain * error, 0.0, 0.0)
+
 
 class Robot:
     """What the files ask about.
@@ -159,8 +185,8 @@ class Robot:
     """
 
     judged = (
-        "clearances, limits of joints and of their rates hold as the problem asks; "
-        "errors are not judged"
+        "clearances hold under the errors stated, limits of joints and of their rates "
+        "without them"
     )
 
     def __init__(
@@ -173,9 +199,7 @@ class Robot:
         named = document.findall("link/collision/geometry/mesh")
         meshes = tuple(dict.fromkeys(map(self._mesh, named)))
         hashes = file.source(meshes).sha256, sha256_of_file(trajectory)
-        belongs(header, "links topic", *hashes)
-        asked = "errors" in file.model.model_fields_set
-        claim(not asked, "errors of robots are not checked yet")
+        belongs(header, "errors links topic", *hashes)
         srdf = Srdf(self.files.srdf, document) if self.files.srdf else None
         self.joints = Joints(self.files, document, srdf)
         self.tree, self.place = self.joints.tree, "header"
@@ -206,28 +230,33 @@ class Robot:
     ) -> Iterator[Pair]:
         """What the problem holds apart, in order."""
         size = float(sum(joint.lever for joint in self.tree.joints)) or 1.0
-        things = [solid(one) for one in file.scene(size).obstacles]
-        named, stated = {one.name: one for one in things}, header["links"]
+        scene = file.scene(size)
+        things = [solid(one) for one in scene.obstacles]
+        asked, stated = file.errors(scene), header["errors"]
+        off = grown(stated, asked, self.joints.least_errors(asked), things)
+        self.joints.err(stated)
+        named, told = {one.name: one for one in things}, header["links"]
         for name, order in header["pieces"].items():
             named[name].cut(order)
         links, as_read = dict[str, list[Solid]](), {"order": [], "meshes": list[Any]()}
         for link in document.findall("link"):
-            covers = stated.get(link.attrib["name"], as_read)["meshes"]
+            covers = told.get(link.attrib["name"], as_read)["meshes"]
             if parts := named_parts([*self._solids(link, [*covers])]):
                 links[link.attrib["name"]] = parts
-        claim(set(stated) <= set(links), "links without solids are told of")
+        claim(set(told) <= set(links), "links without solids are told of")
         required, own = file.required
         frames = self.joints.frames
-        for thing, (name, parts) in product(things, links.items()):
+        outer = product(zip(things, off, strict=True), links.items())
+        for (thing, lost), (name, parts) in outer:
             for each in parts:
-                yield Pair(Body(frames[name], each), thing, 0, required, 0.0)
+                yield Pair(Body(frames[name], each), thing, 0, required, lost)
         left = srdf.disabled() if srdf else {}
         every = [*combinations(links, 2)]
         apart = [both for both in every if self._held(*both, left, srdf)]
         for one, other in apart:
             swapped = len(links[other]) < len(links[one])  # the one of fewer moves
             moves, rests = (other, one) if swapped else (one, other)
-            order = stated.get(rests, as_read)["order"]
+            order = told.get(rests, as_read)["order"]
             rest = Compound(rests, links[rests], order)
             for each in links[moves]:
                 yield Pair(Body(frames[moves], each), rest, frames[rests], own, 0.0)
@@ -259,7 +288,7 @@ class Robot:
                     np.array(numbers(shape.get(word, "0")))
                     for word in ("size", "radius", "length")
                 )
-                points = {"box": CORNERS * size / 2, "sphere": np.zeros((1, 3))}
+                points = {"box": CUBE * size / 2, "sphere": np.zeros((1, 3))}
                 points = points.get(shape.tag, np.array([-Z, Z]) * length / 2)
                 far = np.abs(points).max() + np.abs(shift).max()
                 round_ = radius[0] if shape.tag == "cylinder" else 0.0

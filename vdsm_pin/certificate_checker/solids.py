@@ -7,7 +7,7 @@ ball or a disc. Of a half-space the point that its plane goes through is enough.
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import pairwise, product
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from vdsm_pin.certificate_checker.balls import UP, claim, column, dot, unit
 from vdsm_pin.certificate_checker.inside import Surface
 from vdsm_pin.geometry import solids
 from vdsm_pin.problem import scene
+
+CUBE: Final = np.array([*product((-1.0, 1.0), repeat=3)])
 
 
 class Solid:
@@ -171,7 +173,7 @@ def solid(obstacle: Any) -> Solid:
     """The solid of an obstacle as it was read, in the frame that carries it."""
     if isinstance(obstacle, scene.Moving):
         obstacle = obstacle.solid
-    name, cube = obstacle.name, np.array([*product((-1, 1), repeat=3)])
+    name = obstacle.name
     match obstacle:
         case solids.Sphere():
             return Solid(name, [[obstacle.centre]], radius=obstacle.radius)
@@ -183,10 +185,10 @@ def solid(obstacle: Any) -> Solid:
             axis = unit(column(*obstacle.axis.tolist())).entries()
             return Solid(name, ends, disc=([*map(float, axis)], radius))
         case solids.Box():
-            corners = cube * obstacle.half_size @ obstacle.rotation.T + obstacle.centre
+            corners = CUBE * obstacle.half_size @ obstacle.rotation.T + obstacle.centre
             return Solid(name, [corners], obstacle.centre)
         case solids.Voxels():
-            corners = cube * obstacle.half_size @ obstacle.rotation.T
+            corners = CUBE * obstacle.half_size @ obstacle.rotation.T
             corners = obstacle.centres[:, None] + corners
             return Solid(name, corners, obstacle.centres)
         case solids.Prism():
@@ -228,7 +230,7 @@ class Pair(NamedTuple):
         solid: Of any number of pieces.
         rest: The frame.
         required: Least clearance; [m].
-        lost: Errors that do not turn; [m].
+        lost: How far the surface of the solid may be off; [m].
     """
 
     body: Body

@@ -54,9 +54,13 @@ class Joint:
         x, y, z = self.axis.entries()
         self.cross = arb_mat([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         self.square = self.cross * self.cross
-        value, moved, self.tilt = (UP * error for error in errors)
-        self.turn_error = value if kind == TURNS else 0.0
-        self.slip = moved + (value if kind == SLIDES else 0.0)
+        self.err(*errors)
+
+    def err(self, value: float, moved: float, tilt: float) -> None:
+        """Take other errors."""
+        value, moved, self.tilt = UP * value, UP * moved, UP * tilt
+        self.turn_error = value if self.kind == TURNS else 0.0
+        self.slip = moved + (value if self.kind == SLIDES else 0.0)
 
 
 def frame_of(link: int) -> int:

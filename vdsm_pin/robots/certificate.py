@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces
@@ -16,6 +15,7 @@ from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.prover import start_proof
 from vdsm_pin.robots.cell import Cell
+from vdsm_pin.robots.errors import joint_errors, proof_box
 from vdsm_pin.robots.files import HULLS
 from vdsm_pin.robots.judgement import RobotVerification
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -24,6 +24,7 @@ from vdsm_pin.verification.certificate_file import (
     LinkPieces,
     Pair,
     Primitive,
+    RobotErrors,
     RobotHeaderLine,
 )
 from vdsm_pin.verification.certificate_lines import (
@@ -32,10 +33,9 @@ from vdsm_pin.verification.certificate_lines import (
     check_certified,
     write_lines,
 )
-from vdsm_pin.verification.certificate_writer import pieces_of_obstacles
+from vdsm_pin.verification.certificate_writer import errors_beside, pieces_of_obstacles
 
 DEGREES: Final[Mapping[int, Joined]] = {1: "linear", 3: "cubic", 5: "quintic"}
-NO_ERRORS: Final = "no certificate is written: errors of robots are not certified yet"
 EDGES: Final[Mapping[int, tuple[int, ...]]] = {1: (), 2: (1,), 8: (1, 2, 4)}
 """By the number of a primitive's corners those at the ends of the first one's edges."""
 
@@ -58,29 +58,42 @@ def write_robot_certificate(
 
     Raises:
         OutOfTime: If the time is over.
-        VerificationFailed: If the motion is not certified, or under errors: there is
-            nothing to write.
+        VerificationFailed: If the motion is not certified: there is nothing to write.
         InvalidFile: If the file cannot be written.
     """
     check_certified(verification)
-    if verification.errors != ErrorBox():
-        raise VerificationFailed(NO_ERRORS)
     cell, motion = verification.problem, verification.trajectory
     table, budget = PairTable.of(cell.pairs), Budget(until=deadline.end)
-    tree, bodies = cell.robot.tree, cell.bodies
-    proving, plan = start_proof(tree, bodies, motion, table, budget=budget)
+    tree, bodies, errors = cell.robot.tree, cell.bodies, verification.errors
+    box = proof_box(cell.robot, cell.scene, errors)
+    proving, plan = start_proof(tree, bodies, motion, table, box, budget)
     pieces = proving.task.pieces
     header = RobotHeaderLine(
         **hashes.told(),
         interpolation=DEGREES[motion.degree],
         pairs=_pairs(plan.bodies[len(bodies) :], plan.bodies, plan.pairs),
         pieces=pieces_of_obstacles(cell.scene.obstacles, pieces),
+        errors=_errors(cell, errors),
         links=_links(cell, pieces),
         topic=topic,
     )
     whole = np.zeros(len(pieces.root), np.int64)
     proof = Recorded(proving.task, proving.motion, whole)
     write_lines(path, header, proof, deadline)
+
+
+def _errors(cell: Cell, errors: ErrorBox) -> RobotErrors:
+    """Of each joint by its name and unit, of the base and of the obstacles."""
+    joints = cell.robot.joints
+    values = zip(joints, joint_errors(joints, errors).tolist(), strict=True)
+    by_unit: dict[str, dict[str, float]] = {"rad": {}, "m": {}}
+    for joint, error in values:
+        by_unit[joint.unit][joint.name] = error
+    return RobotErrors(
+        joints_rad=by_unit["rad"],
+        joints_m=by_unit["m"],
+        **errors_beside(errors, cell.scene),
+    )
 
 
 def _pairs(parts: list[Body], bodies: list[Body], pairs: PairTable) -> list[Pair]:

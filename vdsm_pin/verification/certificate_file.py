@@ -23,12 +23,9 @@ class LineModel(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
-class ErrorLimits(LineModel):
-    """The errors that every clearance is proved under."""
+class AnyErrors(LineModel):
+    """The errors that every clearance is proved under, of whatever moves."""
 
-    joints_rad: list[Error] = Field(
-        description="of alpha and theta of each joint in turn, either way"
-    )
     base: ShiftAndTurn = Field(
         description="displacement of the base, in any direction [m], and turn about "
         "its origin [rad]"
@@ -39,10 +36,27 @@ class ErrorLimits(LineModel):
     )
 
 
+class ErrorLimits(AnyErrors):
+    """Those of an arm."""
+
+    joints_rad: list[Error] = Field(
+        description="of alpha and theta of each joint in turn, either way"
+    )
+
+
+class RobotErrors(AnyErrors):
+    """Those of any robot."""
+
+    joints_rad: dict[str, Error] = Field(
+        description="by name, of each joint that turns and follows no other, either way"
+    )
+    joints_m: dict[str, Error] = Field(description="of each one that slides")
+
+
 class AnyHeader(LineModel):
     """Line 1, of whatever moves."""
 
-    vdsm_certificate: Literal[6] = Field(default=6, description="version of the format")
+    vdsm_certificate: Literal[7] = Field(default=7, description="version of the format")
     problem_sha256: Sha256 = Field(description="problem file and all that it names")
     trajectory_sha256: Sha256 = Field(description="the trajectory file")
     versions: dict[str, str] = Field(description="of the writer; told, not proved")
@@ -99,6 +113,7 @@ class LinkPieces(LineModel):
 class RobotHeaderLine(AnyHeader):
     """Line 1, of any robot."""
 
+    errors: RobotErrors
     links: dict[str, LinkPieces] = Field(description="by name, where there is any")
     topic: str | None = Field(description="of a bag, where the trajectory is one")
 

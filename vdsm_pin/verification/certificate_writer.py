@@ -16,8 +16,9 @@ from vdsm_pin.arm.bodies import triangle_groups
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.geometry.solids import Mesh, Prism
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import Obstacle, solid_of, with_hulls
+from vdsm_pin.problem.scene import Obstacle, Scene, solid_of, with_hulls
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -71,19 +72,26 @@ def _header(
 ) -> HeaderLine:
     problem, trajectory = verification.problem, verification.trajectory
     box = verification.errors
-    off = [box.of_obstacle(one.name) for one in problem.scene.obstacles]
     return HeaderLine(
         **hashes.told(),
         errors=ErrorLimits(
             joints_rad=box.angles(trajectory.n_links).ravel().tolist(),
-            base=(box.base, box.base_turn),
-            obstacles={one.name: (one.shift, one.turn) for one in off},
+            **errors_beside(box, problem.scene),
         ),
         interpolation=trajectory.interpolation,
         pairs=_pairs(problem),
         pieces=_pieces(problem, pieces),
         joined=_joined(problem),
     )
+
+
+def errors_beside(errors: ErrorBox, scene: Scene) -> dict[str, Any]:
+    """How far base and obstacles may be off, as every header has it."""
+    off = map(errors.of_obstacle, scene.names)
+    return {
+        "base": (errors.base, errors.base_turn),
+        "obstacles": {one.name: (one.shift, one.turn) for one in off},
+    }
 
 
 def _pairs(problem: PlanningProblem) -> list[Pair]:
