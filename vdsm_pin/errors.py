@@ -19,6 +19,7 @@
     │       └── NoWayOut      of the start, as finely as it was looked for
     ├── OutOfTime             exit 1: the time limit ended the work
     └── VerificationFailed    exit 1: a check could not be carried out
+        └── CertificateTooLarge  proved, but too much to be read by the checker
 
 Messages say what, where, how much and against what; the same facts are attributes.
 """
@@ -318,3 +319,7 @@ class OutOfTime(VdsmError):
 
 class VerificationFailed(VdsmError):
     """A check could not be carried out at all."""
+
+
+class CertificateTooLarge(VerificationFailed):
+    """A proof is more than a file can hold that is read again."""

@@ -1,5 +1,6 @@
 """What the verifier writes, the checker accepts: all shapes, errors, one row."""
 
+import gzip
 import json
 from pathlib import Path
 
@@ -11,10 +12,11 @@ from oracles.certificate_mutations import forged
 from oracles.certificate_oracle import sha256
 
 from vdsm_pin.certificate_checker import check_certificate
-from vdsm_pin.errors import InvalidFile
+from vdsm_pin.errors import CertificateTooLarge, InvalidFile
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.verification import certificate_lines as lines_module
 from vdsm_pin.verification.certificate_file import certificate_schema
 from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.certificate_writer import write_certificate
@@ -51,6 +53,27 @@ def test_the_verifiers_certificate_is_accepted(seed: int, tmp_path: Path) -> Non
     assert all(map(fits, lines))
     assert not fits(lines[0] | {"coverage": 2.0})
     assert not fits(lines[1] | {"proofs": [[[0.0, 1.0, [[0, 1, 0.0]]]]]})
+
+
+def test_lines_are_the_same_in_parts_and_none_is_too_long(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case = random_case(np.random.default_rng(5), tmp_path, [SHAPES[1], SHAPES[2]])
+    whole, parts, none = (tmp_path / name for name in ("whole", "parts", "none"))
+    written(case, whole)
+    monkeypatch.setattr(lines_module, "PAIRS", 3)
+    written(case, parts)
+    assert parts.read_bytes() == whole.read_bytes()
+    clearances = sum(len(line["proofs"]) for line in certificate_lines(whole)[1:-1])
+    longest = max(map(len, gzip.decompress(whole.read_bytes()).splitlines(True)[:-1]))
+    for name, enough in (("MOST_CLEARANCES", clearances), ("MAX_LINE", longest)):
+        with monkeypatch.context() as changed:
+            changed.setattr(lines_module, name, enough)
+            written(case, parts)
+            changed.setattr(lines_module, name, enough - 1)
+            with pytest.raises(CertificateTooLarge, match=r"at most|longest line"):
+                written(case, none)
+            assert not none.exists()
 
 
 def stood_away(path: Path, base: list[float]) -> None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 from pydantic import ValidationError
 
-from vdsm_pin.errors import Infeasible, InvalidFile, OutOfTime
+from vdsm_pin.errors import CertificateTooLarge, Infeasible, InvalidFile, OutOfTime
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import (
@@ -331,7 +331,7 @@ def _certify(order: VerifyOrder, verification: Verification, record: RunRecord) 
     )
     try:
         _write_certificate(order, order.certificate, verification, hashes)
-    except OutOfTime as error:
+    except (OutOfTime, CertificateTooLarge) as error:
         return str(error)
     return ""
 

@@ -19,9 +19,11 @@ from typing import IO, Any, Final, cast
 import numpy as np
 
 from vdsm_pin import __version__
-from vdsm_pin.errors import VerificationFailed
+from vdsm_pin.errors import CertificateTooLarge, VerificationFailed
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.io.atomic import atomic_path
+from vdsm_pin.io.source import MAX_LINE
+from vdsm_pin.progress import step, watched
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import CLAIM, FIRST, LAST, PLANE_NORMAL, RECORD
 from vdsm_pin.proof.packed_tree import Motion
@@ -43,6 +45,18 @@ CHUNK: Final = 512
 
 ROOM: Final = 65_536
 """Planes there is room for at first; doubled where one interval needs more."""
+
+PAIRS: Final = 4096
+"""Pairs whose planes become text at once."""
+
+SHORTEST: Final = len("[[0,1,[[0,1,0,0,1,0]]]],")
+"""Least that a pair takes in an interval's line; [bytes]."""
+
+TOO_LONG: Final = (
+    f"an interval takes more than {MAX_LINE >> 20} MB, the longest line that is read"
+)
+MOST_CLEARANCES: Final = 50_000_000
+"""One for each pair and interval at least; so many take half a gigabyte."""
 
 
 @dataclass(frozen=True)
@@ -100,17 +114,40 @@ def write_lines(
 
     Raises:
         OutOfTime: If the time is over.
+        CertificateTooLarge: If nobody would read it.
         VerificationFailed: If a proof is not found again.
         InvalidFile: If the file cannot be written.
     """
-    digest = hashlib.sha256()
+    _check_size(proof)
+    digest, length = hashlib.sha256(), 0
     with atomic_path(path) as temporary, _packed(temporary) as file:
-        for text in chain([header.model_dump_json()], _lines(proof, deadline)):
-            line = text.encode() + b"\n"
-            digest.update(line)
-            file.write(line)
+        for text in chain([header.model_dump_json() + "\n"], _lines(proof, deadline)):
+            part = text.encode()
+            digest.update(part)
+            file.write(part)
+            length += len(part)
+            if length > MAX_LINE:
+                raise CertificateTooLarge(TOO_LONG)
+            length *= not text.endswith("\n")
         last = LastLine(end=True, sha256=digest.hexdigest())
         file.write(last.model_dump_json().encode() + b"\n")
+
+
+def _check_size(proof: Recorded) -> None:
+    """Refuse what would take too much of a disk, and hours to check.
+
+    Raises:
+        CertificateTooLarge: If it would.
+    """
+    pairs, intervals = proof.task.pairs.body.size, max(1, len(proof.motion.knots) - 1)
+    if pairs * intervals > MOST_CLEARANCES:
+        message = (
+            f"{pairs} pairs in {intervals} intervals have {pairs * intervals} "
+            f"clearances, at most {MOST_CLEARANCES} are written"
+        )
+        raise CertificateTooLarge(message)
+    if pairs * SHORTEST > MAX_LINE:
+        raise CertificateTooLarge(TOO_LONG)
 
 
 @contextmanager
@@ -124,45 +161,55 @@ def _packed(path: Path) -> Iterator[IO[bytes]]:
 
 
 def _lines(proof: Recorded, deadline: Deadline) -> Iterator[str]:
-    """One line per interval."""
+    """One line per interval, in parts."""
+    step("writing the certificate")
     motion, task = proof.motion, proof.task
     n_intervals = max(1, len(motion.knots) - 1)
     work = new_workspace(task, motion.knots.shape[1], Budget().slices)
     records, first = np.zeros((ROOM, RECORD)), 0
-    while first < n_intervals:
-        last = min(first + CHUNK, n_intervals)
-        count, reached, pair = record(task, motion, work, first, last, records)
-        deadline.check()
-        if pair >= 0:
-            message = (
-                f"interval {reached}: the proof of pair {pair} was not found again"
+    with watched(lambda: first / n_intervals):
+        while first < n_intervals:
+            last = min(first + CHUNK, n_intervals)
+            count, reached, pair = record(task, motion, work, first, last, records)
+            deadline.check()
+            if pair >= 0:
+                message = (
+                    f"interval {reached}: the proof of pair {pair} was not found again"
+                )
+                raise VerificationFailed(message)
+            partner = task.pairs.obstacle[records[:count, 1].astype(np.int64)]
+            records[:count, LAST] = np.maximum(
+                records[:count, LAST], proof.whole[partner]
             )
-            raise VerificationFailed(message)
-        partner = task.pairs.obstacle[records[:count, 1].astype(np.int64)]
-        records[:count, LAST] = np.maximum(records[:count, LAST], proof.whole[partner])
-        if reached == first:
-            records = np.zeros((2 * len(records), RECORD))
-        yield from _interval_lines(task, records[:count], first, reached)
-        first = reached
+            if reached == first:
+                records = np.zeros((2 * len(records), RECORD))
+            yield from _interval_lines(task, records[:count], first, reached)
+            first = reached
 
 
 def _interval_lines(
     task: Task, records: FloatArray, first: int, last: int
 ) -> Iterator[str]:
-    """The lines of the intervals [first, last)."""
+    """The lines of the intervals [first, last), in parts that memory can hold."""
     order = np.lexsort((records[:, FIRST], records[:, 2], records[:, 1], records[:, 0]))
-    rows = records[order]
+    rows, n_pairs = records[order], task.pairs.body.size
     for k in range(first, last):
         low, high = np.searchsorted(rows[:, 0], [k, k + 1])
-        line = {"k": k, "proofs": _proofs(task, rows[low:high].tolist())}
-        yield json.dumps(line, separators=(",", ":"))
+        yield f'{{"k":{k},"proofs":['
+        for begin in range(0, n_pairs, PAIRS):
+            pairs = range(begin, min(begin + PAIRS, n_pairs))
+            ends = np.searchsorted(rows[low:high, 1], [pairs.start, pairs.stop])
+            proofs = _proofs(task, rows[low:high][slice(*ends)].tolist(), pairs)
+            text = json.dumps(proofs, separators=(",", ":"))
+            yield "," * bool(begin) + text[1:-1]
+        yield "]}\n"
 
 
-def _proofs(task: Task, rows: list[list[float]]) -> list[list[list[Any]]]:
-    """The proofs of one interval: per pair its slices, per slice its planes."""
-    proofs: list[list[list[Any]]] = [[] for _ in range(task.pairs.body.size)]
+def _proofs(task: Task, rows: list[list[float]], pairs: range) -> list[list[list[Any]]]:
+    """Of one interval and each of some pairs its slices, of each slice its planes."""
+    proofs: list[list[list[Any]]] = [[] for _ in pairs]
     for row in rows:
-        slices = proofs[int(row[1])]
+        slices = proofs[pairs.index(int(row[1]))]
         if not slices or slices[-1][0] != row[2]:
             slices.append([_short(row[2]), _short(row[3]), []])
         n = [_short(x) for x in row[PLANE_NORMAL:CLAIM]]
