@@ -12,7 +12,6 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.scene import Moving
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.robots.scene_files import read_scene
 
 HEAD = """vdsm_problem: 1
 length_unit: mm
@@ -109,14 +108,3 @@ def test_times_that_do_not_rise_name_their_line(tmp_path: Path) -> None:
     path.write_text(text)
     with pytest.raises(InvalidFile, match=r"line 3.*time_s is 0.1, expected a time"):
         read_trajectory(path, built_in("hrm8"))
-
-
-def test_a_scene_for_robots_takes_no_motion(tmp_path: Path) -> None:
-    path = tmp_path / "s.yaml"
-    path.write_text(
-        "length_unit: mm\nobstacles:\n  - {name: ball, shape: sphere, "
-        "center: [0, 0, 9], radius: 4,\n     motion: {times_s: [0], "
-        "positions: [[0, 0, 0]]}}\n"
-    )
-    with pytest.raises(InvalidFile, match=r"motion .*not judged for robots yet"):
-        read_scene(path, 1.0)

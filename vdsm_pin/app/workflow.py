@@ -13,7 +13,13 @@ from typing import TYPE_CHECKING, Final
 
 from pydantic import ValidationError
 
-from vdsm_pin.errors import CertificateTooLarge, Infeasible, InvalidFile, OutOfTime
+from vdsm_pin.errors import (
+    CertificateTooLarge,
+    Infeasible,
+    InvalidFile,
+    OutOfTime,
+    VerificationFailed,
+)
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import (
@@ -22,6 +28,7 @@ from vdsm_pin.io.trajectory_file import (
     write_trajectory,
 )
 from vdsm_pin.problem.planning_problem import PlanningProblem, ProblemSource
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import step
 from vdsm_pin.proof.paths import Path as Motion
@@ -239,15 +246,25 @@ def _judgement(order: VerifyOrder) -> Callable[[Path], tuple[str, Verification]]
 
         cell = order.source
         motion = read_path(order.trajectory, cell.robot, order.topic)
+        _check_times(order, cell.scene, motion)
         return partial(_judge_robot, order, cell, motion)
     problem = order.source.problem
     robot = load_robot(problem.manipulator)
     trajectory = read_trajectory(
         order.trajectory, problem.manipulator, order.interpolation
     )
-    if why := untimed(problem.scene, trajectory):
-        raise InvalidFile(file=order.trajectory, where="line 1", problem=why)
+    _check_times(order, problem.scene, trajectory)
     return partial(_judge_arm, order, problem, robot, trajectory)
+
+
+def _check_times(order: VerifyOrder, scene: Scene, motion: Trajectory | Motion) -> None:
+    """Refuse rows without times beside what moves.
+
+    Raises:
+        InvalidFile: If they have none.
+    """
+    if why := untimed(scene, motion):
+        raise InvalidFile(file=order.trajectory, where="line 1", problem=why)
 
 
 def _judge_arm(
@@ -331,7 +348,7 @@ def _certify(order: VerifyOrder, verification: Verification, record: RunRecord) 
     )
     try:
         _write_certificate(order, order.certificate, verification, hashes)
-    except (OutOfTime, CertificateTooLarge) as error:
+    except (OutOfTime, CertificateTooLarge, VerificationFailed) as error:
         return str(error)
     return ""
 

@@ -231,6 +231,7 @@ class Robot:
         """What the problem holds apart, in order."""
         size = float(sum(joint.lever for joint in self.tree.joints)) or 1.0
         scene = file.scene(size)
+        claim(not scene.moving, "robots beside what moves are not checked yet")
         things = [solid(one) for one in scene.obstacles]
         asked, stated = file.errors(scene), header["errors"]
         off = grown(stated, asked, self.joints.least_errors(asked), things)
@@ -244,8 +245,7 @@ class Robot:
             if parts := named_parts([*self._solids(link, [*covers])]):
                 links[link.attrib["name"]] = parts
         claim(set(told) <= set(links), "links without solids are told of")
-        required, own = file.required
-        frames = self.joints.frames
+        (required, own), frames = file.required, self.joints.frames
         outer = product(zip(things, off, strict=True), links.items())
         for (thing, lost), (name, parts) in outer:
             for each in parts:

@@ -75,11 +75,16 @@ def repair_robot(
         deadline: When to give up.
 
     Raises:
-        InvalidInput: If the motion is not of straight lines or has no such waypoint.
+        InvalidInput: If the motion is not of straight lines or has no such waypoint, or
+            an obstacle moves.
         Infeasible: If none was found; the message says why and where.
     """
     if path.degree != 1:
         message = "repair takes straight lines between waypoints, without velocities"
+        raise InvalidInput(message)
+    if cell.scene.moving:
+        name = cell.scene.moving[0].name
+        message = f"repair of robots takes obstacles at rest, but {name!r} moves"
         raise InvalidInput(message)
     origins = Origins.of(path.knots, [0, len(path.knots) - 1], pinned)
     return repaired(

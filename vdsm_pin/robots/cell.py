@@ -13,7 +13,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.bodies import Body, Pair
-from vdsm_pin.proof.terms import WORLD
+from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.coal_pairs import CoalPairs
 from vdsm_pin.robots.errors import check_errors
 from vdsm_pin.robots.files import RobotFiles, read_cell_file, source_of
@@ -21,6 +21,7 @@ from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.scene_files import read_scene_with_files
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.moving import frames_beside, tree_beside
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,10 +74,17 @@ class Cell:
         return () if self.source is None else self.source.files
 
     @cached_property
+    def tree(self) -> Tree:
+        """The robot's joints first, then those that carry obstacles."""
+        return tree_beside(self.robot.tree, self.scene)
+
+    @cached_property
     def bodies(self) -> list[Body]:
         """Links first, then obstacles."""
-        resting = (Body(WORLD, o.pieces, o.name) for o in self.scene.obstacles)
-        return [*self.robot.bodies, *resting]
+        frames = frames_beside(self.robot.tree, self.scene)
+        both = zip(frames, self.scene.obstacles, strict=True)
+        obstacles = (Body(frame, one.pieces, one.name) for frame, one in both)
+        return [*self.robot.bodies, *obstacles]
 
     @cached_property
     def pairs(self) -> list[Pair]:
@@ -91,7 +99,7 @@ class Cell:
     @cached_property
     def coal(self) -> CoalPairs:
         """Coal's distances of them."""
-        return CoalPairs(self.robot, self.scene)
+        return CoalPairs(self.bodies, self.robot, self.scene)
 
     def under(self, errors: ErrorBox) -> "Cell":
         """The same, its clearances asked for under more errors.
@@ -103,10 +111,9 @@ class Cell:
 
     def names(self, pair: Pair) -> str:
         """Both bodies of a pair in words, a link first."""
-        one, other = self.bodies[pair.one], self.bodies[pair.other]
-        if one.frame == WORLD:
-            one, other = other, one
-        return f"{one.name} and {other.name}"
+        both = (pair.one, pair.other)
+        one, other = both[::-1] if pair.one >= len(self.robot.bodies) else both
+        return f"{self.bodies[one].name} and {self.bodies[other].name}"
 
 
 def cell_of(

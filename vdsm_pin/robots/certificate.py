@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces
@@ -36,6 +37,7 @@ from vdsm_pin.verification.certificate_lines import (
 from vdsm_pin.verification.certificate_writer import errors_beside, pieces_of_obstacles
 
 DEGREES: Final[Mapping[int, Joined]] = {1: "linear", 3: "cubic", 5: "quintic"}
+MOVING: Final = "no certificate is written: not certified beside obstacles that move"
 EDGES: Final[Mapping[int, tuple[int, ...]]] = {1: (), 2: (1,), 8: (1, 2, 4)}
 """By the number of a primitive's corners those at the ends of the first one's edges."""
 
@@ -58,10 +60,13 @@ def write_robot_certificate(
 
     Raises:
         OutOfTime: If the time is over.
-        VerificationFailed: If the motion is not certified: there is nothing to write.
+        VerificationFailed: If the motion is not certified, or beside obstacles that
+            move: there is nothing to write.
         InvalidFile: If the file cannot be written.
     """
     check_certified(verification)
+    if verification.problem.scene.moving:
+        raise VerificationFailed(MOVING)
     cell, motion = verification.problem, verification.trajectory
     table, budget = PairTable.of(cell.pairs), Budget(until=deadline.end)
     tree, bodies, errors = cell.robot.tree, cell.bodies, verification.errors

@@ -206,16 +206,18 @@ def _holds(piece: Piece, corners: FloatArray, lost: float) -> bool:
 
 
 def in_world(pieces: Sequence[Piece], placement: FloatArray) -> Iterator[Piece]:
-    """Pieces of a link where it stands.
+    """Pieces of a body where it stands.
 
     Args:
-        pieces: In the frame of the link.
-        placement: T_world_link, shape (4, 4); [m].
+        pieces: In the frame that it rides on.
+        placement: T_world_frame, shape (4, 4); [m].
     """
     turn, shift = placement[:3, :3], placement[:3, 3]
     for piece in pieces:
-        assert not isinstance(piece, HalfSpacePiece)  # links have none
-        if isinstance(piece, Hull):
+        if isinstance(piece, HalfSpacePiece):
+            normal = turn @ piece.normal
+            yield HalfSpacePiece(normal, piece.offset + float(normal @ shift))
+        elif isinstance(piece, Hull):
             yield Hull(piece.points @ turn.T + shift, piece.radius)
         else:
             centre, axis = turn @ piece.centre + shift, turn @ piece.axis

@@ -20,9 +20,10 @@ from vdsm_pin.robots.rates import rate_checks
 from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.clearance import profile_of
+from vdsm_pin.verification.moving import Knots, path_beside
 from vdsm_pin.verification.records import (
     Check,
-    ClearanceProfile,
     ClosestApproach,
     LeastClearances,
     Pair,
@@ -74,11 +75,12 @@ def verify_robot(
     """The judgement of a motion; what is not judged in time is undecided."""
     robot = cell.robot
     columns, budget = np.arange(len(cell.bodies)), Budget(until=deadline.end)
-    tree, pairs = robot.tree, cell.pairs
     box = proof_box(robot, cell.scene, cell.errors)
-    proof = prove(tree, cell.bodies, path, pairs, box, budget, columns)
-    named, least = _named(cell), _met(cell, path, _least(cell, proof))
-    coal, measured = _coal(cell, path, proof)
+    whole, knots = path_beside(path, cell.scene)
+    proof = prove(cell.tree, cell.bodies, whole, cell.pairs, box, budget, columns)
+    named, least = _named(cell), _met(cell, whole, _least(cell, proof))
+    coal, measured = _coal(cell, whole, proof, knots)
+    least = _told(least, knots)
     late = "" if proof.in_time else f": {OutOfTime(deadline.limit)}"
     checks = [
         _poses(robot, path),
@@ -94,7 +96,7 @@ def verify_robot(
         pairs=named,
         checks=tuple(checks),
         approaches=_closest(named, least, measured),
-        profile=_profile(proof, len(robot.bodies)),
+        profile=profile_of(proof.profile, proof.stride, knots, len(robot.bodies)),
         least=least,
         time_limit=deadline.limit,
     )
@@ -135,6 +137,14 @@ def _least(cell: Cell, proof: Proof) -> LeastClearances:
     )
 
 
+def _told(least: LeastClearances, knots: Knots) -> LeastClearances:
+    """The same, its moments in intervals of the robot's own path."""
+    if knots.are_rows:
+        return least
+    time = knots.share(least.interval, least.time)
+    return replace(least, interval=knots.interval(least.interval), time=time)
+
+
 def _met(cell: Cell, path: Path, least: LeastClearances) -> LeastClearances:
     """The same, refuted and so deep where a ball is proved to lie in both bodies."""
     near = (least.verdict != CERTIFIED) & (least.upper <= MEETING)
@@ -145,7 +155,7 @@ def _met(cell: Cell, path: Path, least: LeastClearances) -> LeastClearances:
         moments = np.clip(moment + np.array(BESIDE), 0.0, path.n_intervals)
         intervals = np.minimum(moments.astype(np.int64), path.n_intervals - 1)
         shares = moments - intervals
-        poses = cell.robot.tree.poses(path.within(intervals, shares))
+        poses = cell.tree.poses(path.within(intervals, shares))
         for at, pose in enumerate(poses):
             bodies = cell.coal.pieces(cell.pairs[k], pose)
             radius, centre = common_ball(*bodies, middle)
@@ -179,17 +189,6 @@ def _closest(
             coal=float(coal[k]),
         )
         for k in order[:CLOSEST]
-    )
-
-
-def _profile(proof: Proof, n_links: int) -> ClearanceProfile:
-    lower, upper = proof.profile
-    return ClearanceProfile(
-        link_lower=lower[:n_links].T,
-        link_upper=upper[:n_links].T,
-        obstacle_lower=lower[n_links:].T,
-        obstacle_upper=upper[n_links:].T,
-        first_interval=frozen(np.arange(lower.shape[1]) * proof.stride, np.int64),
     )
 
 
@@ -274,15 +273,23 @@ def _clearances(
     return rows
 
 
-def _coal(cell: Cell, path: Path, proof: Proof) -> tuple[Check, FloatArray]:
+def _coal(
+    cell: Cell, path: Path, proof: Proof, knots: Knots
+) -> tuple[Check, FloatArray]:
     """Coal's distance of each pair at its witness, which the bracket must hold.
+
+    Args:
+        cell: Robot and scene.
+        path: Of all that moves.
+        proof: Of the pairs along it.
+        knots: Those of the robot's own path.
 
     Returns:
         The check, and the distances, NaN where there is none, shape (n_pairs,); [m].
     """
     found = np.full(len(cell.pairs), nan)
     seen = np.flatnonzero(np.isfinite(proof.upper))
-    poses = cell.robot.tree.poses(path.within(proof.interval[seen], proof.share[seen]))
+    poses = cell.tree.poses(path.within(proof.interval[seen], proof.share[seen]))
     for pose, k in zip(poses, seen.tolist(), strict=True):
         found[k] = cell.coal.measured(cell.pairs[k], pose).distance
     # Where bodies meet only the sign counts, on both sides.
@@ -302,6 +309,6 @@ def _coal(cell: Cell, path: Path, proof: Proof) -> tuple[Check, FloatArray]:
         TOLERANCES.coal_agreement,
         "m",
         f"{count} of {len(cell.pairs)} pairs measured, each where it was found nearest",
-        float(proof.interval[k] + proof.share[k]) if count else nan,
+        float(knots.moments(proof.interval, proof.share)[k]) if count else nan,
     )
     return check, found

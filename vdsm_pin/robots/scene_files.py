@@ -18,7 +18,7 @@ from vdsm_pin.io.problem_file import files_of_obstacles
 from vdsm_pin.io.schema_types import FileModel
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
-from vdsm_pin.problem.scene import Moving, Obstacle, Scene
+from vdsm_pin.problem.scene import Obstacle, Scene, solid_of
 from vdsm_pin.robots.mjcf import read_mjcf
 from vdsm_pin.robots.places import Place
 from vdsm_pin.robots.scene_text import read_scene_text
@@ -76,13 +76,11 @@ def check_judged(document: YamlDocument, scene: Scene) -> None:
     """Refuse obstacles that are not judged for robots.
 
     Raises:
-        InvalidFile: If one moves or may have an inside.
+        InvalidFile: If one may have an inside.
     """
     for k, obstacle in enumerate(scene.obstacles):
-        if isinstance(obstacle, Moving):
-            problem = "moves its obstacle, which is not judged for robots yet"
-            raise document.invalid(("obstacles", k, "motion"), problem)
-        if isinstance(obstacle, Mesh) and not obstacle.is_surface:
+        solid = solid_of(obstacle)
+        if isinstance(solid, Mesh) and not solid.is_surface:
             problem = (
                 f"{obstacle.name!r} may have an inside, which is not judged for robots "
                 "yet; expected solid: false, where its surface is all that is meant"

@@ -30,7 +30,7 @@ from vdsm_pin.verification.certificate_lines import (
     write_lines,
 )
 from vdsm_pin.verification.inside import locate_start, unlocated
-from vdsm_pin.verification.moving import whole_motion
+from vdsm_pin.verification.moving import whole_path
 from vdsm_pin.verification.records import ArmVerification
 from vdsm_pin.verification.task import all_pairs, make_task
 
@@ -60,11 +60,11 @@ def write_certificate(
     hulls = unlocated(locate_start(problem, trajectory))
     scene = with_hulls(problem.scene, hulls)
     asked, budget = replace(problem, scene=scene), Budget(until=deadline.end)
-    motion, reach, _ = whole_motion(asked, trajectory)
-    task = make_task(asked, verification.errors, budget=budget, reach=reach)
+    motion, _ = whole_path(asked, trajectory)
+    task = make_task(asked, verification.errors, budget=budget, reach=motion.reach)
     header = _header(verification, hashes, task.pieces)
     whole = _whole(problem, task, hulls)
-    write_lines(path, header, Recorded(task, motion, whole), deadline)
+    write_lines(path, header, Recorded(task, motion.packed(), whole), deadline)
 
 
 def _header(

@@ -31,7 +31,6 @@ from vdsm_pin.proof.layouts import (
     UP,
 )
 from vdsm_pin.proof.proving import dense_rows, room_for
-from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.terms import (
     CERTIFIED,
@@ -133,11 +132,19 @@ def _merged(chunk: ClearanceChunk, knots: Knots, last: int) -> ClearanceChunk:
     )
 
 
-def _profile(
-    problem: PlanningProblem, results: Results, knots: Knots
+def profile_of(
+    profile: FloatArray, stride: int, knots: Knots, n_links: int
 ) -> ClearanceProfile:
-    n_links, profile = problem.manipulator.n_links, results.profile
-    first = np.arange(profile.shape[2]) * results.stride
+    """Brackets along a motion, by intervals of its trajectory.
+
+    Args:
+        profile: By column in bins of intervals of the joint path, those of links first,
+            shape (2, n_columns, n_bins); [m].
+        stride: Intervals of a bin.
+        knots: Of the trajectory.
+        n_links: Columns of links.
+    """
+    first = np.arange(profile.shape[2]) * stride
     if not knots.are_rows:
         first, begins = np.unique(knots.interval(first), return_index=True)
         profile = np.minimum.reduceat(profile, begins, axis=2)
@@ -181,13 +188,14 @@ def prove_clearance(
     with watched(lambda: proof.proving.share):
         late = not proof.proving.run()
     results, sent = proof.proving.results, 0
+    n_links = problem.manipulator.n_links
     if sinks:
         sent = _send(problem, trajectory, errors, proof, sinks, reach)
     return ClearanceProof(
         pairs=all_pairs(problem),
         counts=frozen(results.counts, np.int64),
         best=frozen(proof.best),
-        profile=_profile(problem, results, proof.knots),
+        profile=profile_of(results.profile, results.stride, proof.knots, n_links),
         slices=int(results.tally[SLICES]),
         n_intervals=len(proof.knots.first) - 1,
         late=late,

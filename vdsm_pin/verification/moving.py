@@ -1,4 +1,4 @@
-"""What moves besides the arm: one tree and one path of arm, obstacles and other arms.
+"""What moves besides an arm or a robot: one tree and one path of all that moves.
 
 The rows of a trajectory and the knots of what carries obstacles are joined in time.
 Every interval of the trajectory is one or more intervals of the joint path; results
@@ -9,40 +9,37 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdsm_pin.arm.tree import arm_tree
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Moving, Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, TIME
-from vdsm_pin.proof.packed_tree import Motion
 from vdsm_pin.proof.paths import Path, together
 from vdsm_pin.proof.terms import WORLD
 from vdsm_pin.proof.tree import Tree
 
 
-def whole_tree(problem: PlanningProblem) -> Tree:
-    """The arm's joints first, then those that carry obstacles."""
-    tree = arm_tree(problem.manipulator)
-    for carrier in problem.scene.carriers:
+def tree_beside(tree: Tree, scene: Scene) -> Tree:
+    """The joints of a tree first, then those that carry obstacles."""
+    for carrier in scene.carriers:
         tree = tree.joined(carrier.tree)
     return tree
 
 
-def obstacle_frames(problem: PlanningProblem) -> list[int]:
+def frames_beside(tree: Tree, scene: Scene) -> list[int]:
     """The frame of the whole tree in which each obstacle rests."""
-    first, before = {}, len(arm_tree(problem.manipulator).joints)
-    for carrier in problem.scene.carriers:
+    first, before = {}, len(tree.joints)
+    for carrier in scene.carriers:
         first[carrier] = before
         before += len(carrier.tree.joints)
     return [
         first[one.carrier] + one.frame if isinstance(one, Moving) else WORLD
-        for one in problem.scene.obstacles
+        for one in scene.obstacles
     ]
 
 
-def untimed(scene: Scene, trajectory: Trajectory) -> str:
+def untimed(scene: Scene, trajectory: Trajectory | Path) -> str:
     """Why a motion cannot be judged beside what moves; empty where it can."""
     if trajectory.times is not None or not scene.moving:
         return ""
@@ -50,7 +47,7 @@ def untimed(scene: Scene, trajectory: Trajectory) -> str:
     return f"has no column 'time_s', but obstacle {name!r} moves: rows need their times"
 
 
-def check_timed(scene: Scene, trajectory: Trajectory) -> None:
+def check_timed(scene: Scene, trajectory: Trajectory | Path) -> None:
     """Refuse a motion without times beside what moves.
 
     Raises:
@@ -75,13 +72,18 @@ class Knots:
     first: IntArray
 
     @classmethod
-    def of(cls, trajectory: Trajectory, times: FloatArray | None) -> "Knots":
-        """The knots of a path over a trajectory; its rows where there are no times."""
-        rows = np.arange(float(trajectory.n_samples))
-        if times is None or trajectory.times is None or len(rows) == 1:
+    def of(cls, path: Path, times: FloatArray | None) -> "Knots":
+        """The knots of a path over a trajectory's; its rows where there are no times.
+
+        Args:
+            path: The trajectory's.
+            times: Of the knots of what moves at once; [s].
+        """
+        rows = np.arange(float(path.n_samples))
+        if times is None or path.times is None or len(rows) == 1:
             return cls(rows, np.arange(max(2, len(rows))))
-        first = np.searchsorted(times, trajectory.times)
-        return cls(np.interp(times, trajectory.times, rows), first)
+        first = np.searchsorted(times, path.times)
+        return cls(np.interp(times, path.times, rows), first)
 
     @property
     def are_rows(self) -> bool:
@@ -92,11 +94,15 @@ class Knots:
         """Of the trajectory, that intervals of the path lie in."""
         return np.asarray(np.searchsorted(self.first, inner, side="right") - 1)
 
-    def share(self, inner: IntArray, share: FloatArray) -> FloatArray:
-        """A share of intervals of the path as one of the trajectory's; [-]."""
+    def moments(self, inner: IntArray, share: FloatArray) -> FloatArray:
+        """Shares of intervals of the path in waypoints of the trajectory."""
         after = np.minimum(inner + 1, len(self.moment) - 1)
         step = self.moment[after] - self.moment[inner]
-        found = self.moment[inner] + share * step - self.interval(inner)
+        return np.asarray(self.moment[inner] + share * step)
+
+    def share(self, inner: IntArray, share: FloatArray) -> FloatArray:
+        """The same as shares of the trajectory's intervals; [-]."""
+        found = self.moments(inner, share) - self.interval(inner)
         return np.minimum(np.maximum(found, 0.0), 1.0)
 
     def told(self, best: FloatArray) -> FloatArray:
@@ -110,28 +116,31 @@ class Knots:
         return found
 
 
-def whole_motion(
-    problem: PlanningProblem, trajectory: Trajectory
-) -> tuple[Motion, FloatArray, Knots]:
+def path_beside(path: Path, scene: Scene) -> tuple[Path, Knots]:
     """How all columns of the whole tree move, from the first row to the last.
 
+    Args:
+        path: Of the columns of the tree beside which obstacles move.
+        scene: The obstacles.
+
     Returns:
-        The motion, how large each column gets, shape (n_columns,), and its knots.
+        The path, and where its intervals lie in the given one.
 
     Raises:
         InvalidInput: If something moves beside rows without times.
     """
-    check_timed(problem.scene, trajectory)
-    path, carriers = _arm_path(trajectory), problem.scene.carriers
-    if not carriers:
-        return path.packed(), path.reach, Knots.of(trajectory, None)
+    check_timed(scene, path)
+    if not scene.carriers:
+        return path, Knots.of(path, None)
     ends = float(path.own_times[0]), float(path.own_times[-1])
-    path = together(path, *(one.path for one in carriers), within=ends)
-    return path.packed(), path.reach, Knots.of(trajectory, path.times)
+    whole = together(path, *(one.path for one in scene.carriers), within=ends)
+    return whole, Knots.of(path, whole.times)
 
 
-def _arm_path(trajectory: Trajectory) -> Path:
-    return Path(trajectory.joints, trajectory.inner, trajectory.times)
+def whole_path(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Path, Knots]:
+    """`path_beside` of a snake arm's trajectory."""
+    path = Path(trajectory.joints, trajectory.inner, trajectory.times)
+    return path_beside(path, problem.scene)
 
 
 def whole_rows(

@@ -9,7 +9,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.proving import Proving, new_proving
-from vdsm_pin.verification.moving import Knots, whole_motion
+from vdsm_pin.verification.moving import Knots, whole_path
 from vdsm_pin.verification.task import make_task
 
 BUDGET = Budget()
@@ -49,8 +49,9 @@ def prove_problem(
         pieces: `pack_scene(problem)`, where it is known already.
         budget: Sizes and when to stop.
     """
-    motion, reach, knots = whole_motion(problem, trajectory)
-    task = make_task(problem, errors, pieces, budget, reach)
+    path, knots = whole_path(problem, trajectory)
+    task = make_task(problem, errors, pieces, budget, path.reach)
     n_obstacles = len(problem.scene.obstacles)
     columns = problem.manipulator.n_links + n_obstacles
-    return ProblemProof(new_proving(task, motion, columns, n_obstacles, budget), knots)
+    proving = new_proving(task, path.packed(), columns, n_obstacles, budget)
+    return ProblemProof(proving, knots)

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from vdsm_pin.arm.bodies import ArmBody, LeftOut, SelfPairs, arm_bodies, self_pairs
-from vdsm_pin.arm.tree import RAIL, link_frame
+from vdsm_pin.arm.tree import RAIL, arm_tree, link_frame
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.pieces import PackedPieces
@@ -21,7 +21,7 @@ from vdsm_pin.proof.packing import pack_task
 from vdsm_pin.proof.packing import with_errors as with_box
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.verification.link_clearance import arithmetic_pad
-from vdsm_pin.verification.moving import obstacle_frames, whole_tree
+from vdsm_pin.verification.moving import frames_beside, tree_beside
 from vdsm_pin.verification.records import Pair
 
 
@@ -168,14 +168,15 @@ def make_task(
     table, arm = ArmPairs(problem), problem.manipulator
     obstacles = problem.scene.obstacles
     pieces = pieces or pack_scene(problem)
-    frames = zip(obstacles, obstacle_frames(problem), strict=True)
+    own = arm_tree(arm)
+    frames = zip(obstacles, frames_beside(own, problem.scene), strict=True)
     bodies = [Body(frame, one.pieces, one.name) for one, frame in frames]
     bodies += [Body(link_frame(b.link), (b.piece,), b.name) for b in table.bodies]
     columns = arm.n_links + np.arange(len(bodies))
     # The feed counts as what link 1 is mounted on.
     columns[len(obstacles) :] = [max(0, body.link - 1) for body in table.bodies]
     rules = (budget or Budget()).rules(arithmetic_pad(problem, pieces))
-    tree, numbers = whole_tree(problem), table.numbers()
+    tree, numbers = tree_beside(own, problem.scene), table.numbers()
     task = pack_task(tree, bodies, numbers, rules, reach, columns, pieces)
     return with_errors(task, problem, errors)
 
