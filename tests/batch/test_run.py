@@ -20,7 +20,6 @@ from batch_folders import tree
 from problem_files import BEHIND_A_WALL, NEAR, OUT_OF_REACH, write_problem
 
 import vdsm_pin.batch.task as task_module
-from vdsm_pin.batch.progress import Progress
 from vdsm_pin.batch.run import Batch, Interrupted, expanded, run_batch
 from vdsm_pin.batch.task import MANIFEST, TIMING, Done, Task, folder_names, perform
 from vdsm_pin.errors import InvalidFile, InvalidInput, UnknownName
@@ -110,12 +109,13 @@ def test_rows_can_be_read_as_they_come(
 ) -> None:
     out, seen = tmp_path / "out", []
 
-    def look(_: Progress, done: Done) -> None:
+    def look(done: Done) -> None:
         rows = read_summary(out / "running.csv")
         assert rows[-1] == done.row
         seen.append([row.folder for row in rows])
 
-    monkeypatch.setattr(Progress, "show", look)
+    shown = contextlib.nullcontext(look)
+    monkeypatch.setattr("vdsm_pin.batch.run.progress", lambda *_: shown)
     run_batch(Batch((str(problems),), out, "paper", jobs=2))
     assert [len(rows) for rows in seen] == [1, 2, 3, 4]
     assert all(later[:-1] == sooner for sooner, later in pairwise(seen))
@@ -220,14 +220,12 @@ def test_ctrl_c_ends_with_what_is_done(tmp_path: Path) -> None:
 def test_ctrl_c_is_heard_even_where_python_loses_it(
     problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    show = Progress.show
-
-    def lose(self: Progress, done: Done) -> None:
-        show(self, done)
+    def lose(done: Done) -> None:
         with contextlib.suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(Progress, "show", lose)
+    shown = contextlib.nullcontext(lose)
+    monkeypatch.setattr("vdsm_pin.batch.run.progress", lambda *_: shown)
     with pytest.raises(Interrupted, match="1 of 4 problems"):
         run_batch(Batch((str(problems),), tmp_path / "out", "paper"))
     assert len(read_summary(tmp_path / "out" / "summary.csv")) == 1

@@ -5,6 +5,7 @@ Nothing is judged here: problems are read, planned, verified and written down.
 
 import math
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from hashlib import sha256
@@ -278,7 +279,7 @@ def _judge_arm(
     reach = math.inf if order.all_pairs else reach_of(problem)
     # No name for all pairs: of many obstacles they would take much memory.
     table = ClearanceCsv(aside / CLEARANCE, problem, all_pairs(problem), reach)
-    with table as clearance:
+    with closing(table) as clearance:
         verification = verify(
             problem,
             trajectory,
@@ -304,7 +305,8 @@ def _judge_robot(
 
     verification = verify_robot(cell, motion, order.deadline)
     step("writing the results")
-    with ClearanceCsv(aside / CLEARANCE, cell, verification.pairs) as clearance:
+    table = ClearanceCsv(aside / CLEARANCE, cell, verification.pairs)
+    with closing(table) as clearance:
         clearance.write(verification)
     return sha256(cell.robot.text.encode()).hexdigest(), verification
 

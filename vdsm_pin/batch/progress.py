@@ -1,8 +1,9 @@
 """Progress of a batch: a bar on a terminal, plain lines elsewhere."""
 
 import sys
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import count
 
 from vdsm_pin.batch.task import Done
 from vdsm_pin.report.files import BatchRow
@@ -10,72 +11,62 @@ from vdsm_pin.report.words import outcome, percent, quantity, term
 from vdsm_pin.text import printable
 from vdsm_pin.tolerances import TOLERANCES
 
-if TYPE_CHECKING:
-    from rich.progress import Progress as Bar
 
-
-class Progress:
-    """Says which problem ended, and how.
+@contextmanager
+def progress(total: int, quiet: bool = False) -> Iterator[Callable[[Done], None]]:
+    """Says which problems ended, and how.
 
     Args:
         total: Number of problems.
-        quiet: Whether there is no bar.
+        quiet: Whether nothing is said.
+
+    Yields:
+        What says it of one problem.
     """
+    numbers, width = count(1), len(str(total))
 
-    def __init__(self, total: int, quiet: bool = False) -> None:
-        self._wanted = not quiet and sys.stdout.isatty()
-        self._total, self._count = total, 0
-        self._bar: Bar | None = None
+    def head() -> str:
+        return f"[{next(numbers):>{width}}/{total}]"
 
-    def __enter__(self) -> Self:
-        """Start the bar where there is a terminal."""
-        if self._wanted:
-            from rich.progress import Progress as Bar
-
-            self._bar = Bar(transient=True)
-            self._bar.add_task("batch", total=self._total)
-            self._bar.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Take the bar away."""
-        if self._bar is not None:
-            self._bar.stop()
-
-    def show(self, done: Done) -> None:
-        """One problem that ended."""
-        self._count += 1
-        row, known = done.row, outcome(done.row.outcome)
-        width = len(str(self._total))
-        head = f"[{self._count:>{width}}/{self._total}]"
-        verdict = f"{known.mark} {known.word:<10}"
-        tail = printable(row.reason)
-        if known.passed:
-            near = _said(row, "min_clearance_lower_m", "m")
-            near = near if row.closest_link else "no obstacle"
-            tail = near
-            if row.max_link_angle_rad is not None:
-                tail += f", {_said(row, 'max_link_angle_rad', 'rad')}"
-            if row.coverage is not None and row.coverage < 1.0 - TOLERANCES.coverage:
-                tail += f", {percent(row.coverage)} drawn"
-        place = printable(row.folder) + (" (kept)" if done.kept else "")
-        if self._bar is None:
-            sys.stdout.write(f"{head} {verdict} {place}  {tail}\n")
-            sys.stdout.flush()
-            return
+    if quiet:
+        yield lambda done: None
+    elif not sys.stdout.isatty():
+        yield lambda done: print(head(), *_said(done), flush=True)  # noqa: T201
+    else:
+        from rich.progress import Progress
         from rich.text import Text
 
-        line = Text.assemble(
-            head + " ", (verdict, known.colour), f" {place}  ", (tail, "dim")
-        )
-        self._bar.console.print(line)
-        self._bar.advance(self._bar.task_ids[0])
+        with Progress(transient=True) as bar:
+            task = bar.add_task("batch", total=total)
+
+            def show(done: Done) -> None:
+                verdict, place, tail = _said(done)
+                colour = outcome(done.row.outcome).colour
+                parts = (verdict, colour), f" {place} ", (tail, "dim")
+                bar.console.print(Text.assemble(head() + " ", *parts))
+                bar.advance(task)
+
+            yield show
 
 
-def _said(row: BatchRow, key: str, unit: str) -> str:
+def _said(done: Done) -> tuple[str, str, str]:
+    """Verdict, place and what there is to say of a problem."""
+    row, known = done.row, outcome(done.row.outcome)
+    tail = _measures(row) if known.passed else printable(row.reason)
+    place = printable(row.folder) + (" (kept)" if done.kept else "")
+    return f"{known.mark} {known.word:<10}", place, " " + tail
+
+
+def _measures(row: BatchRow) -> str:
+    """The numbers of a problem that passed."""
+    near = _measure(row, "min_clearance_lower_m", "m")
+    parts = [near if row.closest_link else "no obstacle"]
+    if row.max_link_angle_rad is not None:
+        parts.append(_measure(row, "max_link_angle_rad", "rad"))
+    if row.coverage is not None and row.coverage < 1.0 - TOLERANCES.coverage:
+        parts.append(f"{percent(row.coverage)} drawn")
+    return ", ".join(parts)
+
+
+def _measure(row: BatchRow, key: str, unit: str) -> str:
     return f"{term(key)} {quantity(getattr(row, key), unit)}"

@@ -14,7 +14,7 @@ from typing import Final
 
 from vdsm_pin.app.workflow import NO_PLAN, REPORT
 from vdsm_pin.batch.pool import Ended, run_tasks
-from vdsm_pin.batch.progress import Progress
+from vdsm_pin.batch.progress import progress
 from vdsm_pin.batch.task import (
     ALL,
     MANIFEST,
@@ -38,7 +38,7 @@ from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.folder import check_kept, check_output_folder
 from vdsm_pin.report.html import write_index
 from vdsm_pin.report.junit import junit_text
-from vdsm_pin.report.tables import SummaryCsv, write_summary
+from vdsm_pin.report.tables import summary_csv, write_summary
 
 SUMMARY: Final = "summary.csv"
 RUNNING: Final = "running.csv"
@@ -120,17 +120,13 @@ def run_batch(batch: Batch) -> tuple[BatchRow, ...]:
         shutil.rmtree(batch.folder / _ASIDE, ignore_errors=True)
         rows: list[BatchRow] = []
         running = batch.folder / RUNNING
-        with (
-            Progress(len(tasks), batch.quiet) as progress,
-            SummaryCsv(running) as so_far,
-        ):
+        with progress(len(tasks), batch.quiet) as show, summary_csv(running) as so_far:
             try:
                 for ended in _all_ended(batch, tasks):
                     done = _settle(ended)
                     rows.append(done.row)
                     so_far(done.row)
-                    if not batch.quiet:
-                        progress.show(done)
+                    show(done)
                     if stop.asked:
                         break
             except KeyboardInterrupt:

@@ -4,10 +4,10 @@ import csv
 import math
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
-from types import TracebackType
-from typing import IO, Any, Final, Self
+from typing import Final
 
 import numpy as np
 
@@ -48,26 +48,7 @@ _DECIMALS: Final = 12  # of metres and radians at the rows
 _CHUNK: Final = 8192  # rows held at one time
 
 
-class _OwnFile:
-    """Closes its file when the `with` that made it ends."""
-
-    _file: IO[Any]
-
-    def __enter__(self) -> Self:
-        """Itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Close the file."""
-        self._file.close()
-
-
-class ClearanceCsv(_OwnFile):
+class ClearanceCsv:
     """clearance.csv, one row per interval and pair.
 
     Rows come while the motion is proved and wait aside as numbers: Coal measures after
@@ -116,6 +97,10 @@ class ClearanceCsv(_OwnFile):
         )
         self._written[pairs] = True
         self._table(pairs, part).tofile(self._file)
+
+    def close(self) -> None:
+        """Give up the rows that wait aside."""
+        self._file.close()
 
     def write(self, verification: Verification) -> None:
         """Write the file: all rows so far, then one of every pair that has none.
@@ -233,28 +218,24 @@ def write_cables(path: Path, problem: PlanningProblem, rows: Trajectory) -> None
     _write_rows(path, header, 2, values, rows.n_samples)
 
 
-class SummaryCsv(_OwnFile):
+@contextmanager
+def summary_csv(path: Path) -> Iterator[Callable[[BatchRow], None]]:
     """A table of problems, written row by row; whoever reads it finds whole rows.
 
-    Args:
-        path: The file.
+    Yields:
+        What writes a row.
     """
-
-    def __init__(self, path: Path) -> None:
-        # Buffered by line: a row is there as soon as it is written.
-        self._file = path.open("w", encoding="utf-8", newline="", buffering=1)
+    # Buffered by line: a row is there as soon as it is written.
+    with path.open("w", encoding="utf-8", newline="", buffering=1) as file:
         columns = list(BatchRow.model_fields)
-        self._writer = csv.DictWriter(self._file, columns, lineterminator="\n")
-        self._writer.writeheader()
-
-    def __call__(self, row: BatchRow) -> None:
-        """Write one row."""
-        self._writer.writerow(row.model_dump())
+        writer = csv.DictWriter(file, columns, lineterminator="\n")
+        writer.writeheader()
+        yield lambda row: writer.writerow(row.model_dump())
 
 
 def write_summary(path: Path, rows: Iterable[BatchRow]) -> None:
     """summary.csv of a batch."""
-    with SummaryCsv(path) as write:
+    with summary_csv(path) as write:
         for row in rows:
             write(row)
 
