@@ -21,8 +21,7 @@ from vdsm_pin.io import (
     pcd,
     points_file,
     problem_file,
-    trajectory_file,
-    waypoint_tables,
+    tables,
     yaml_reader,
 )
 from vdsm_pin.io.clouds import read_cloud
@@ -106,19 +105,19 @@ LIMITS: dict[str, tuple[ModuleType, str, int, Reader, Made]] = {
     "cloud": (clouds, "MAX_BYTES", len(XYZ), cloud, lambda f: made(f, "a.xyz", XYZ)),
     "pcd": (pcd, "_MOST_LINES", 6, cloud, lambda f: made(f, "a.pcd", PCD)),
     "path": (
-        points_file, "MAX_ROWS", 7, points, lambda f: made(f, "a.csv", "x,y,z\n" + XYZ)
+        tables, "MAX_ROWS", 7, points, lambda f: made(f, "a.csv", "x,y,z\n" + XYZ)
     ),
     "path bytes": (
         points_file, "MAX_BYTES", 6 + len(XYZ), points,
         lambda f: made(f, "a.csv", "x,y,z\n" + XYZ),
     ),
     "rows": (
-        trajectory_file, "MAX_ROWS", 7,
+        tables, "MAX_ROWS", 7,
         lambda path: read_trajectory(path, built_in("hrm8")),
         table(lambda path: write_trajectory(path, motion(7))),
     ),
     "centres": (
-        waypoint_tables, "MAX_ROWS", 7, lambda path: read_centres(path, FREE),
+        tables, "MAX_ROWS", 7, lambda path: read_centres(path, FREE),
         table(lambda path: write_centres(path, FREE, motion(7))),
     ),
     "problem": (

@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.errors import InvalidFile
-from vdsm_pin.io import tables, trajectory_file
+from vdsm_pin.io import tables
 from vdsm_pin.io.trajectory_file import column_names, read_trajectory, write_trajectory
 from vdsm_pin.problem.trajectory import Trajectory
 
@@ -232,7 +232,7 @@ def test_what_is_no_table_is_refused(tmp_path: Path) -> None:
 def test_more_rows_than_any_trajectory_has_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(trajectory_file, "MAX_ROWS", 2)
+    monkeypatch.setattr(tables, "MAX_ROWS", 2)
     assert refused(tmp_path, "\n".join(csv()) + "\n") == "has more than 2 rows"
 
 

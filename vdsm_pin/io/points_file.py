@@ -4,13 +4,9 @@ from io import BytesIO
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
-from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.source import Digest, read_bytes
 from vdsm_pin.io.tables import Table, as_text
-from vdsm_pin.problem.trajectory import MAX_ROWS
 
 MAX_BYTES: Final = 1 << 29
 """Some hundred bytes for each of the rows that a motion may have."""
@@ -32,12 +28,5 @@ def read_points(path: Path, digest: Digest) -> FloatArray:
     """
     content = read_bytes(path, limit=MAX_BYTES)
     digest.update(content)
-    tables, count = [], 0
-    for rows in Table(path, as_text(BytesIO(content)), ("x", "y", "z")).rows():
-        count += len(rows)
-        if count > MAX_ROWS:
-            raise InvalidFile(file=path, problem=f"has more than {MAX_ROWS} rows")
-        tables.append(rows)
-    if not tables:
-        raise InvalidFile(file=path, problem="has no row")
-    return np.concatenate(tables)
+    table = Table(path, as_text(BytesIO(content)), ("x", "y", "z"))
+    return table.all_rows()

@@ -70,6 +70,20 @@ def check_is_file(path: Path, *, named: object = None) -> None:
         raise InvalidFile(file=name, problem=f"cannot be opened: {reason}") from None
 
 
+@contextmanager
+def readable(path: Path) -> Iterator[None]:
+    """Tells what the system says of a file that is read within, or of its packing.
+
+    Raises:
+        InvalidFile: If it cannot be read.
+    """
+    try:
+        yield
+    except (OSError, EOFError, zlib.error) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InvalidFile(file=path, problem=f"cannot be read: {reason}") from None
+
+
 def read_bytes(path: Path, *, limit: int) -> bytes:
     """The content of a file of bounded size.
 
@@ -84,12 +98,8 @@ def read_bytes(path: Path, *, limit: int) -> bytes:
         InvalidFile: If it cannot be read, is empty or is too large.
     """
     check_is_file(path)
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(limit + 1)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InvalidFile(file=path, problem=f"cannot be read: {reason}") from None
+    with readable(path), path.open("rb") as stream:
+        data = stream.read(limit + 1)
     _check_size(path, len(data), limit)
     return data
 
@@ -131,17 +141,13 @@ def opened(path: Path, *, limit: int, digest: Digest) -> Iterator[OpenFile]:
         InvalidFile: If it cannot be read, is empty or is too large.
     """
     check_is_file(path)
-    try:
-        with path.open("rb", buffering=0) as raw:
-            size = os.fstat(raw.fileno()).st_size
-            _check_size(path, size, limit)
-            content = io.BufferedReader(_Hashed(raw, digest, size), BLOCK)
-            yield OpenFile(size, content)
-            while content.read(BLOCK):
-                pass
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InvalidFile(file=path, problem=f"cannot be read: {reason}") from None
+    with readable(path), path.open("rb", buffering=0) as raw:
+        size = os.fstat(raw.fileno()).st_size
+        _check_size(path, size, limit)
+        content = io.BufferedReader(_Hashed(raw, digest, size), BLOCK)
+        yield OpenFile(size, content)
+        while content.read(BLOCK):
+            pass
 
 
 def _check_size(path: Path, size: int, limit: int) -> None:
@@ -183,19 +189,13 @@ def bounded_lines(path: Path, *, limit: int = MAX_LINE) -> Iterator[bytes]:
         InvalidFile: If a line is longer, or the file cannot be read.
     """
     number = 0
-    try:
-        with _unpacked(path) as stream:
-            while line := stream.readline(limit + 1):
-                number += 1
-                if len(line) > limit:
-                    problem = f"is longer than {limit >> 20} MB, the most that is read"
-                    raise InvalidFile(
-                        file=path, where=f"line {number}", problem=problem
-                    )
-                yield line
-    except (OSError, EOFError, zlib.error) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InvalidFile(file=path, problem=f"cannot be read: {reason}") from None
+    with readable(path), _unpacked(path) as stream:
+        while line := stream.readline(limit + 1):
+            number += 1
+            if len(line) > limit:
+                problem = f"is longer than {limit >> 20} MB, the most that is read"
+                raise InvalidFile(file=path, where=f"line {number}", problem=problem)
+            yield line
 
 
 @contextmanager

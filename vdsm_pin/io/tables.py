@@ -22,6 +22,7 @@ import pydantic_core
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.problem.trajectory import MAX_ROWS
 
 CHUNK_ROWS: Final = 5_000
 """Rows held as text at one time."""
@@ -67,6 +68,7 @@ class Table:
         optional: Of those that are wanted where they are there.
 
     Attributes:
+        file: The file.
         columns: Names of the columns read, those wanted first.
         ignored: Names of the other columns.
         open_ended: Whether the last line that was read has no line end.
@@ -82,7 +84,7 @@ class Table:
         columns: Sequence[str],
         optional: Sequence[str] = (),
     ) -> None:
-        self._file, self._text = file, text
+        self.file, self._text = file, text
         self.open_ended = False
         self._decimal = ""  # the sign of the first number that has one
         line = text.readline(MAX_LINE)
@@ -100,7 +102,7 @@ class Table:
         self._places = self._found(names)
 
     def _found(self, names: list[str]) -> list[int]:
-        head = Row(self._file, 1, not self.open_ended)
+        head = Row(self.file, 1, not self.open_ended)
         for name in self.columns:
             if names.count(name) > 1:
                 problem = f"has the column {name!r} {names.count(name)} times"
@@ -119,6 +121,22 @@ class Table:
         if near:
             return f", but {near[0][:40]!r}; expected in {unit}"
         return f"; found {listed(self.ignored)}" if self.ignored else ""
+
+    def all_rows(self) -> FloatArray:
+        """The wanted columns, shape (n, n_columns), n >= 1.
+
+        Raises:
+            InvalidFile: As `rows`, or if there is no row, or too many.
+        """
+        parts: list[FloatArray] = []
+        for part in self.rows():
+            parts.append(part)
+            if sum(map(len, parts)) > MAX_ROWS:
+                problem = f"has more than {MAX_ROWS} rows"
+                raise InvalidFile(file=self.file, problem=problem)
+        if not parts:
+            raise InvalidFile(file=self.file, problem="has no row")
+        return np.concatenate(parts)
 
     def rows(self) -> Iterator[FloatArray]:
         """The wanted columns of all rows, shape (k, n_columns), in order.
@@ -147,10 +165,10 @@ class Table:
             if line[-1] != "\n":
                 if len(line) == MAX_LINE:
                     problem = f"is longer than {MAX_LINE} characters"
-                    raise Row(self._file, number + i).invalid(problem)
+                    raise Row(self.file, number + i).invalid(problem)
                 if _CUT.search(line):
                     problem = f"ends in {line[-8:]!r}, whose exponent may be cut short"
-                    raise Row(self._file, number + i, ended=False).invalid(problem)
+                    raise Row(self.file, number + i, ended=False).invalid(problem)
                 self.open_ended = True
 
     def _blank(self, lines: list[str], number: int, before: int) -> int:
@@ -161,7 +179,7 @@ class Table:
                 blank = blank or number + i
             elif blank:
                 problem = "is blank, and rows follow; expected none in between"
-                raise Row(self._file, blank).invalid(problem)
+                raise Row(self.file, blank).invalid(problem)
         return blank
 
     def _fast(self, lines: list[str]) -> FloatArray:
@@ -190,7 +208,7 @@ class Table:
         return np.asarray(table[:, self._places])
 
     def _row(self, line: str, number: int) -> list[float]:
-        row = Row(self._file, number, line.endswith("\n"))
+        row = Row(self.file, number, line.endswith("\n"))
         words = _split(line, self._between)
         values = []
         for name, place in zip(self.columns, self._places, strict=True):

@@ -12,7 +12,6 @@ and named in a note.
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal, TextIO, TypeAlias
 
@@ -21,11 +20,12 @@ import pydantic_core
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidFile
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.atomic import atomic_path
-from vdsm_pin.io.source import check_is_file
+from vdsm_pin.io.source import check_is_file, readable
 from vdsm_pin.io.tables import CHUNK_ROWS, Table, listed, open_text
-from vdsm_pin.problem.trajectory import MAX_ROWS, Trajectory
+from vdsm_pin.io.waypoint_rows import LENGTH, PLACE, WAYPOINT, Waypoints, read_waypoints
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 
 Interpolation: TypeAlias = Literal["linear", "cubic", "quintic", "auto"]
@@ -33,7 +33,7 @@ Interpolation: TypeAlias = Literal["linear", "cubic", "quintic", "auto"]
 by their accelerations too; or whichever the file has columns for."""
 
 TIME: Final = "time_s"
-_FIXED: Final = ("waypoint", "on_path", "path_m", "x0_m")
+X0: Final = "x0_m"
 _JOINT: Final = re.compile(r"(alpha|theta)[0-9]+_rad")
 
 
@@ -45,7 +45,8 @@ def joint_names(n_links: int) -> tuple[str, ...]:
 
 def column_names(n_links: int) -> tuple[str, ...]:
     """The header of a trajectory of an arm of N links."""
-    return _FIXED + tuple(f"{name}_rad" for name in joint_names(n_links)[1:])
+    angles = (f"{name}_rad" for name in joint_names(n_links)[1:])
+    return (WAYPOINT, *PLACE, X0, *angles)
 
 
 def rate_names(n_links: int, order: int) -> tuple[str, ...]:
@@ -124,12 +125,8 @@ def read_trajectory(
     """
     file = Path(path)
     check_is_file(file)
-    try:
-        with open_text(file) as text:
-            return _read(file, text, manipulator, interpolation)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InvalidFile(file=path, problem=f"cannot be read: {reason}") from None
+    with readable(file), open_text(file) as text:
+        return _read(file, text, manipulator, interpolation)
 
 
 def _read(
@@ -142,28 +139,13 @@ def _read(
     _check_arm(file, table.ignored, arm)
     found = table.columns
     smooth = _smooth_columns(file, found, (rates, changes), interpolation)
-    tables: list[FloatArray] = []
-    count, previous, before = 0, -1.0, -np.inf
-    for rows in table.rows():
-        some = _Rows(file, found, rows, count)
-        _check_values(some, previous)
-        if TIME in found:
-            times = rows[:, found.index(TIME)]
-            rises = np.diff(times, prepend=before) > 0.0
-            some.check(rises, found.index(TIME), "a time above that of the row before")
-            before = float(times[-1])
-        count, previous = count + len(rows), float(rows[-1, 0])
-        if count > MAX_ROWS:
-            raise InvalidFile(file=file, problem=f"has more than {MAX_ROWS} rows")
-        tables.append(rows)
-    if not tables:
-        raise InvalidFile(file=file, problem="has no row")
+    rows = read_waypoints(table)
+    _check_values(rows)
+    whole = rows.rows
     notes = [f"columns that are not read: {listed(table.ignored)}"]
     notes = notes if table.ignored else []
     if table.open_ended:
         notes.append("the last row has no line end; its last number is read as it is")
-    whole = np.concatenate(tables)
-    tables.clear()
     n, first = len(columns), [found.index(names[0]) for names in smooth]
     further = [whole[:, k : k + n - 3] for k in first] + [None, None]
     return Trajectory(
@@ -222,41 +204,11 @@ def _check_arm(file: Path, ignored: Sequence[str], arm: Manipulator) -> None:
             raise InvalidFile(file=file, where="line 1", problem=problem)
 
 
-@dataclass(frozen=True)
-class _Rows:
-    """Some rows and where they stand in the file."""
-
-    file: Path
-    columns: tuple[str, ...]
-    table: FloatArray
-    first: int
-
-    def check(self, good: BoolArray, column: int, expected: str) -> None:
-        """Refuse the first row whose value in a column is not good."""
-        if not good.all():
-            row = int(np.argmin(good))
-            value = f"{self.columns[column]} is {self.table[row, column]:g}"
-            where = f"line {self.first + row + 2}"
-            problem = f"{value}, expected {expected}"
-            raise InvalidFile(file=self.file, where=where, problem=problem)
-
-
-def _check_values(rows: _Rows, previous: float) -> None:
-    waypoint, on_path, path_m, x0 = rows.table[:, :4].T
-    rises = np.diff(waypoint, prepend=previous) > 0.0
-    whole = "a whole number above that of the row before"
-    rows.check(rises & (waypoint == np.floor(waypoint)), 0, whole)
-    rows.check((on_path == 0.0) | (on_path == 1.0), 1, "0 or 1")
-    most = TOLERANCES.path_extent
-    rows.check((path_m >= 0.0) & (path_m <= most), 2, f"0 to {most:g} m")
-    reach = TOLERANCES.scene_extent
-    metres = f"metres, at most {reach:g} either way; is it in millimetres?"
-    rows.check(np.abs(x0) <= reach, 3, metres)
+def _check_values(rows: Waypoints) -> None:
+    rows.check(X0, np.abs(rows[X0]) <= TOLERANCES.scene_extent, LENGTH)
     radians = "radians, at most pi either way; is it in degrees?"
-    for column in _angles(rows.columns):
-        rows.check(np.abs(rows.table[:, column]) <= np.pi, column, radians)
-
-
-def _angles(columns: Sequence[str]) -> list[int]:
-    """Numbers of the columns of joint angles."""
-    return [k for k, name in enumerate(columns) if _JOINT.fullmatch(name)]
+    for name in filter(_JOINT.fullmatch, rows.columns):
+        rows.check(name, np.abs(rows[name]) <= np.pi, radians)
+    if TIME in rows.columns:
+        rises = np.diff(rows[TIME], prepend=-np.inf) > 0.0
+        rows.check(TIME, rises, "a time above that of the row before")

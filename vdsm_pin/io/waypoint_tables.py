@@ -15,16 +15,15 @@ import numpy as np
 from vdsm_pin.arm.cables import angles_from_cables
 from vdsm_pin.arm.kinematics import joint_angles
 from vdsm_pin.errors import InconsistentCables, InvalidFile, LinkTooShort
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.io.source import check_is_file
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.source import check_is_file, readable
 from vdsm_pin.io.tables import Table, open_text
+from vdsm_pin.io.waypoint_rows import LENGTH, PLACE, WAYPOINT, read_waypoints
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.trajectory import MAX_ROWS, Trajectory
+from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M
 
-NUMBER: Final = ("waypoint",)
-PLACE: Final = ("on_path", "path_m")
 HOLES: Final = "abc"
 
 
@@ -104,46 +103,15 @@ def _read(path: Path, columns: tuple[str, ...]) -> FloatArray:
         InvalidFile: If the file breaks its contract.
     """
     check_is_file(path)
-    try:
-        with open_text(path) as text:
-            missing = set(PLACE) - set(Table(path, text, (*NUMBER, *columns)).ignored)
+    with readable(path), open_text(path) as text:
+        missing = set(PLACE) - set(Table(path, text, (WAYPOINT, *columns)).ignored)
         places = () if len(missing) == len(PLACE) else PLACE
-        with open_text(path) as text:
-            table = Table(path, text, (*NUMBER, *places, *columns))
-            parts = list(_bounded(path, table))
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InvalidFile(file=path, problem=f"cannot be read: {reason}") from None
-    if not parts:
-        raise InvalidFile(file=path, problem="has no row")
-    rows = np.concatenate(parts)
-    if not places:
-        rows = np.insert(rows, [1, 1], 0.0, axis=1)
-    _check(path, np.diff(rows[:, 0], prepend=-1.0) > 0.0, "waypoint does not rise")
-    on_path = (rows[:, 1] == 0.0) | (rows[:, 1] == 1.0)
-    _check(path, on_path, "on_path is neither 0 nor 1")
-    most = TOLERANCES.path_extent
-    along = (rows[:, 2] >= 0.0) & (rows[:, 2] <= most)
-    _check(path, along, f"path_m is not 0 to {most:g} m")
-    extent = TOLERANCES.scene_extent
-    near = np.abs(rows[:, 3:]).max(axis=1) <= extent
-    _check(path, near, f"a length is beyond {extent:g} m; is it in millimetres?")
-    return rows
-
-
-def _bounded(path: Path, table: Table) -> list[FloatArray]:
-    parts, count = [], 0
-    for rows in table.rows():
-        count += len(rows)
-        if count > MAX_ROWS:
-            raise InvalidFile(file=path, problem=f"has more than {MAX_ROWS} rows")
-        parts.append(rows)
-    return parts
-
-
-def _check(path: Path, good: BoolArray, problem: str) -> None:
-    if not good.all():
-        raise _bad_row(path, int(np.argmin(good)), problem)
+        text.seek(0)
+        table = read_waypoints(Table(path, text, (WAYPOINT, *places, *columns)))
+    for name in columns:
+        near = np.abs(table[name]) <= TOLERANCES.scene_extent
+        table.check(name, near, LENGTH)
+    return table.rows if places else np.insert(table.rows, [1, 1], 0.0, axis=1)
 
 
 def _bad_row(path: Path, row: int, problem: str) -> InvalidFile:

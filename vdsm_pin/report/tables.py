@@ -15,12 +15,8 @@ from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.arm.kinematics import joint_centres, link_angles, position_angles
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.decimals import WORD
-from vdsm_pin.io.waypoint_tables import (
-    NUMBER,
-    PLACE,
-    cable_columns,
-    centre_columns,
-)
+from vdsm_pin.io.waypoint_rows import PLACE, WAYPOINT
+from vdsm_pin.io.waypoint_tables import cable_columns, centre_columns
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.files import BatchRow
@@ -193,7 +189,7 @@ def write_centres(
             from its angles otherwise; [m].
     """
     arm, pose = problem.manipulator, problem.T_world_base
-    header = [*NUMBER, *PLACE, *centre_columns(rows.n_links)]
+    header = [WAYPOINT, *PLACE, *centre_columns(rows.n_links)]
 
     def values(part: slice) -> FloatArray:
         joints = rows.x0[part], rows.alpha[part], rows.theta[part]
@@ -207,7 +203,7 @@ def write_centres(
 
 def write_cables(path: Path, problem: PlanningProblem, rows: Trajectory) -> None:
     """cables.csv: the base position and the 3N cable lengths at every row."""
-    header = [*NUMBER, *PLACE, *cable_columns(rows.n_links)]
+    header = [WAYPOINT, *PLACE, *cable_columns(rows.n_links)]
 
     def values(part: slice) -> FloatArray:
         angles = rows.alpha[part], rows.theta[part]
