@@ -63,10 +63,7 @@ def show_verification(
     """
     typer.echo(_headline(file, file.problem))
     typer.echo(f"  {printable(file.reason)}")
-    if sys.stdout.isatty():
-        _rich_checks(file)
-    else:
-        plain_checks(file.checks)
+    show_checks(file.checks)
     more = (*_under(file), *more)
     if file.path_length_m is not None:
         more = ((term("coverage"), percent(file.coverage)), *more)
@@ -95,47 +92,28 @@ def _under(file: PlanFile | VerificationFile) -> tuple[tuple[str, str], ...]:
 
 def _headline(file: PlanFile | VerificationFile, subject: str) -> str:
     """Verdict, problem, and what the verdict rests on that nobody stated."""
-    known = outcome(file.verdict)
-    colour = known.colour if sys.stdout.isatty() else None
-    verdict = typer.style(f"{known.mark} {known.word}", fg=colour, bold=True)
+    verdict = _verdict(file.verdict, bold=True)
     rests_on = assumption(file.assumed_sizes)
     return f"{verdict}  {printable(', '.join(filter(None, (subject, rests_on))))}"
 
 
-def _cells(check: CheckRow) -> tuple[str, str, str, str, str]:
-    known = outcome(check.verdict)
-    return (
-        check.name,
-        depth(check.worst, check.deeper, check.unit),
-        limit(check.limit, check.unit),
-        str(check.count),
-        f"{known.mark} {known.word}",
-    )
+def _verdict(word: str, *, bold: bool | None = None) -> str:
+    """A verdict as people read it, in its colour on a terminal."""
+    known = outcome(word)
+    colour = known.colour if sys.stdout.isatty() else None
+    return typer.style(f"{known.mark} {known.word}", fg=colour, bold=bold)
 
 
-def plain_checks(checks: tuple[CheckRow, ...]) -> None:
+def show_checks(checks: tuple[CheckRow, ...]) -> None:
     """Print checks in columns."""
-    titles = ("check", "worst", "limit", "count", "verdict")
-    rows = [titles, *(_cells(check) for check in checks)]
-    widths = [max(len(row[i]) for row in rows) for i in range(len(titles))]
-    for row in rows:
-        left = f"{row[0]:<{widths[0]}}"
-        middle = "  ".join(f"{row[i]:>{widths[i]}}" for i in (1, 2, 3))
-        typer.echo(f"  {left}  {middle}  {row[4]}")
-
-
-def _rich_checks(file: VerificationFile) -> None:
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    table.add_column("check")
-    for title in ("worst", "limit", "count"):
-        table.add_column(title, justify="right")
-    table.add_column("verdict")
-    for check in file.checks:
-        *cells, verdict = _cells(check)
-        colour = outcome(check.verdict).colour
-        table.add_row(*cells, f"[{colour}]{verdict}[/]")
-    Console().print(table)
+    rows = [("check", "worst", "limit", "count", "verdict")]
+    for one in checks:
+        worst = depth(one.worst, one.deeper, one.unit)
+        cells = worst, limit(one.limit, one.unit), str(one.count)
+        rows.append((one.name, *cells, _verdict(one.verdict)))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for name, *numbers, verdict in rows:
+        middle = "  ".join(
+            f"{cell:>{width}}" for cell, width in zip(numbers, widths[1:4], strict=True)
+        )
+        typer.echo(f"  {name:<{widths[0]}}  {middle}  {verdict}")
