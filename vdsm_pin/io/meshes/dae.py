@@ -14,7 +14,7 @@ from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.io.meshes.faces import cut_faces
 from vdsm_pin.io.meshes.raw import MeshStream, RawMesh
-from vdsm_pin.io.meshes.scene import Part, Placed, composed
+from vdsm_pin.io.meshes.scene import Part, Placed, composed, strip_triangles
 
 MAX_BYTES: Final = 256 << 20
 """Largest file read, as XML takes several times its size; [bytes]."""
@@ -158,7 +158,8 @@ class _Reader:
             case "triangles":
                 sizes = np.full(sum(map(len, loops)) // 3, 3)
             case strip:
-                loops = [_unrolled(loop, fan=strip == "trifans") for loop in loops]
+                fan = strip == "trifans"
+                loops = [strip_triangles(loop, fan=fan).reshape(-1) for loop in loops]
                 sizes = np.full(sum(map(len, loops)) // 3, 3)
         corners = np.concatenate([np.zeros(0, np.int64), *loops])
         good = (corners >= 0) & (corners < len(vertices))
@@ -249,17 +250,6 @@ class _Reader:
 
     def _invalid(self, problem: str) -> InvalidFile:
         return self._stream.invalid(problem)
-
-
-def _unrolled(loop: IntArray, *, fan: bool) -> IntArray:
-    """Corners of the triangles of a strip or a fan, one after the other."""
-    i = np.arange(max(len(loop) - 2, 0))
-    odd = i % 2
-    if fan:
-        triangles = [np.zeros_like(i), i + 1, i + 2]
-    else:
-        triangles = [i, i + 1 + odd, i + 2 - odd]
-    return np.asarray(loop[np.column_stack(triangles).reshape(-1)])
 
 
 def _translated(vector: FloatArray) -> FloatArray:

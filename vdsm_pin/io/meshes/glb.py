@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.io.meshes.raw import MeshStream, RawMesh, doubles
-from vdsm_pin.io.meshes.scene import Part, Placed, composed
+from vdsm_pin.io.meshes.scene import Part, Placed, composed, strip_triangles
 from vdsm_pin.io.schema_types import LARGEST
 
 _LOOKS: Final = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_")
@@ -289,9 +289,4 @@ def _triangles(order: IntArray, mode: int) -> IntArray:
     """Vertex indices of triangles from a list, a strip or a fan."""
     if mode == _TRIANGLES:
         return order[: len(order) // 3 * 3].reshape(-1, 3)
-    count = max(len(order) - 2, 0)
-    i = np.arange(count)
-    if mode == _FAN:
-        return np.column_stack([order[i + 1], order[i + 2], order[np.zeros_like(i)]])
-    odd = i % 2
-    return np.column_stack([order[i], order[i + 1 + odd], order[i + 2 - odd]])
+    return strip_triangles(order, fan=mode == _FAN)

@@ -37,6 +37,19 @@ def composed(stream: MeshStream, pose: FloatArray, move: FloatArray) -> FloatArr
     return np.asarray(result)
 
 
+def strip_triangles(corners: IntArray, *, fan: bool) -> IntArray:
+    """The triangles of a strip or a fan, shape (n - 2, 3), in the order of the file.
+
+    Args:
+        corners: Vertex indices, shape (n,).
+        fan: Whether all triangles share the first corner.
+    """
+    i = np.arange(max(len(corners) - 2, 0))
+    odd = i % 2
+    places = (0 * i, i + 1, i + 2) if fan else (i, i + 1 + odd, i + 2 - odd)
+    return np.asarray(corners[np.column_stack(places)])
+
+
 @dataclass
 class Placed:
     """Parts as they are put into the frame of the file.
