@@ -242,7 +242,7 @@ def test_a_time_limit_makes_a_row(problems: Path, tmp_path: Path) -> None:
 def test_a_worker_that_never_asks_the_clock_ends_by_itself(
     problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def for_ever(*_: object) -> None:
+    def for_ever(*_: object, **__: object) -> None:
         while True:
             pass
 
