@@ -12,16 +12,31 @@ from vdsm_pin.geometry.arrays import FloatArray, frozen
 
 
 @dataclass(frozen=True)
+class FewCorners:
+    """Some corners of a hull that nearly span it.
+
+    Args:
+        points: Shape (n, 3); [m].
+        missed: How far the hull's points are from theirs at most; [m].
+    """
+
+    points: FloatArray
+    missed: float
+
+
+@dataclass(frozen=True)
 class Hull:
     """Convex hull of points, grown by a radius.
 
     Args:
         points: Shape (n, 3), n >= 1; [m].
         radius: 0 or more; [m].
+        few: Some of its corners, where it has many.
     """
 
     points: FloatArray
     radius: float = 0.0
+    few: FewCorners | None = None
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from vdsm_pin.compiled import apart, borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.proof.broad_phase import BroadPhase, settle_far
 from vdsm_pin.proof.cached_planes import bound_above, bound_below, served
-from vdsm_pin.proof.layouts import OWN_POINT, UP, WIDTH
+from vdsm_pin.proof.layouts import OWN_POINT, ROW, UP, WIDTH
 from vdsm_pin.proof.packed_tree import Motion
 from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
 from vdsm_pin.proof.results import Results, note_block, note_upper
@@ -24,7 +24,8 @@ def _serves(
     The quick way out, of segments under errors that cost the same everywhere: most
     blocks of most pairs end here.
     """
-    mover, plane, runs = mover_of(task, pair), work.planes[pair], work.runs
+    plane, runs = work.planes[pair], work.runs
+    mover = mover_of(task, int(plane[ROW]))
     rules, count, group = task.rules, stretch.size, task.pairs.group[pair]
     bound_below(mover, work.rows.tracks, runs, plane, 0, count)
     bound_above(mover, work.rows.tracks, runs, plane, 0, count)

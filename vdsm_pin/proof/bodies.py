@@ -48,17 +48,22 @@ class Pair:
 
 @dataclass(frozen=True)
 class PairTable:
-    """Pairs as columns, one row each.
+    """Pairs as columns, one row each, perhaps followed by rough versions of some.
 
     Args:
-        one: Numbers of the first bodies, shape (n_pairs,).
-        other: Of the second ones, shape (n_pairs,).
-        required: Least clearances, shape (n_pairs,); [m].
+        one: Numbers of the first bodies, shape (n_rows,).
+        other: Of the second ones, shape (n_rows,).
+        required: Least clearances, shape (n_rows,); [m].
+        rough: The row of each pair's rough version, -1 for none, shape (n_pairs,); None
+            where no pair has one.
+        loose: What a rough version misses of its bodies, 0 of pairs, (n_rows,); [m].
     """
 
     one: IntArray
     other: IntArray
     required: FloatArray
+    rough: IntArray | None = None
+    loose: FloatArray | None = None
 
     @classmethod
     def of(cls, pairs: Iterable[Pair]) -> "PairTable":
@@ -74,4 +79,4 @@ class PairTable:
     @property
     def size(self) -> int:
         """Number of pairs."""
-        return int(self.one.size)
+        return int(self.one.size if self.rough is None else self.rough.size)

@@ -298,7 +298,7 @@ def try_plane(
             raise_to_held(mover, rows.tracks, plane, first, last, runs.lower)
         if demand.fresh:
             lower[0] = max(lower[0], demand.proved)
-            plane[WIDTH] = upper[0] - lower[0]
+            plane[WIDTH] = upper[0] - lower[0] - mover.loose
         width = 2.0 * plane[WIDTH]
         done = first + served(lower, upper, demand.bar, demand.slack, width)
         if not crudely or done == last:

@@ -6,10 +6,12 @@ SUPPORT: Final = 3
 OWN_POINT: Final = 4
 POINT: Final = 7
 WIDTH: Final = 10
-HELD_CLEARANCE: Final = 11
-HELD_AT: Final = 12
+ROW: Final = 11
+HELD_CLEARANCE: Final = 12
+HELD_AT: Final = 13
 """Layout of what a pair remembers: n (3), support in n, witness on the body in its
-link's frame (3) and on the partner (3), width of the bracket when they were found; of a
+link's frame (3) and on the partner (3), width of the bracket when they were found less
+what a rough version loses, the row of the pair or rough version that they are of; of a
 partner of many pieces the clearance proved at one configuration, else -inf, and the
 corners of the body there (3 each)."""
 
@@ -24,7 +26,9 @@ SLICE: Final = 5
 MET: Final = 0
 WHEN: Final = 1
 INSTANT: Final = 2
-"""Layout of a witness: least upper bound, its time, least bound of one instant."""
+KNOWN: Final = 3
+"""Layout of a witness: least upper bound, its time, least bound of one instant, least
+upper bound known from elsewhere."""
 
 LOW: Final = 0
 AT_LOWER: Final = 1

@@ -255,11 +255,12 @@ def pack_task(
         one, other = pairs.one[same[0]], pairs.other[same[0]]
         message = f"bodies {one} and {other} ride on one frame: they cannot part"
         raise ValueError(message)
-    branch, n = _branches(tree), pairs.size
+    branch, n = _branches(tree), pairs.one.size
     apart = branch[frames[pairs.one]] != branch[frames[pairs.other]]
     group = np.where(apart, OBSTACLES, LINKS)
     column, none = np.where(apart, columns[pairs.other], -1), np.zeros(n, np.int64)
     packed = Pairs(
+        rough=np.full(n, -1) if pairs.rough is None else pairs.rough,
         body=mover.astype(np.int64),
         obstacle=pairs.other.astype(np.int64),
         way=none,
@@ -268,6 +269,7 @@ def pack_task(
         group=group,
         column=column.astype(np.int64),
         required=pairs.required.astype(np.float64),
+        loose=np.zeros(n) if pairs.loose is None else pairs.loose,
         lost=np.zeros(n),
         rise=np.zeros(n),
     )
@@ -294,9 +296,14 @@ def with_errors(task: Task, box: ErrorBox) -> Task:
 
 
 def _erring(task: Task, errors: WayErrors, shift: FloatArray) -> Task:
-    """The same with what errors come to, and by how much each pair is shifted."""
+    """The same with what errors come to, and by how much each pair is shifted.
+
+    Where errors turn, what bodies sweep is told corner by corner: no pair is rough.
+    """
     pairs, pad, steady = task.pairs, task.rules.pad, not errors.any_turn
     rules = task.rules._replace(steady=steady, nominal=steady and not shift.any())
     radius = task.bodies.radius[pairs.body]
-    pairs = pairs._replace(lost=radius + pad + shift, rise=pad - radius)
+    rough = pairs.rough if steady else np.full_like(pairs.rough, -1)
+    lost = radius + pad + shift + pairs.loose
+    pairs = pairs._replace(rough=rough, lost=lost, rise=pad - radius)
     return task._replace(pairs=pairs, rules=rules, errors=errors)

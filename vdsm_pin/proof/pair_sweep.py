@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from vdsm_pin.compiled import apart, clock, compiled
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.geometry.kernels import BRACKET, FAR, LOWER, NEAR, NORMAL
 from vdsm_pin.geometry.obstacles import node_support
@@ -22,12 +23,14 @@ from vdsm_pin.proof.layouts import (
     INSTANT,
     INTERVAL,
     KEY,
+    KNOWN,
     MET,
     OWN,
     OWN_POINT,
     PAIR,
     POINT,
     RENEWED,
+    ROW,
     SLICE,
     SLICES,
     START,
@@ -75,7 +78,7 @@ class Stretch(NamedTuple):
 @compiled
 def _renew(
     task: Task,
-    mover: Mover,
+    row: int,
     work: Workspace,
     local: int,
     pair: int,
@@ -86,7 +89,7 @@ def _renew(
 
     Args:
         task: The scene, pairs and rules.
-        mover: The body of the pair.
+        row: The row of the pair or of its rough version, of which they are to be.
         work: Working space, its rows filled.
         local: The interval.
         pair: The pair.
@@ -99,14 +102,15 @@ def _renew(
     """
     apart()
     pieces, space, plane = task.pieces, work.space, work.planes[pair]
-    root, proved = pieces.root[task.pairs.obstacle[pair]], -np.inf
+    root, proved = pieces.root[task.pairs.obstacle[row]], -np.inf
+    mover, plane[ROW] = mover_of(task, row), row
     p, last = pieces.node_range[root]
     load_rows(task, mover, work, local, local + 1)
     space.out[NORMAL:NEAR] = plane[:3]
     if last - p == 1:
         leaf_bracket(pieces, space, p, goal, True, space.out)
     else:
-        loaded_bound(task, space, pair, True, bar)
+        loaded_bound(task, space, row, True, bar)
         proved = space.out[LOWER]
         if space.body.discs[0, RADIUS] == 0.0:
             hold(plane, proved, space.body)
@@ -114,19 +118,19 @@ def _renew(
     n, stack, point = plane[:3], space.stack, space.scratch[0]
     plane[SUPPORT] = node_support(pieces, root, n, stack, point)
     if mover.inverse < 0.0:
-        _renew_witness(task, mover, work, local, pair)
+        _renew_witness(task, row, work, local, plane)
     return proved
 
 
 @compiled
 def _renew_witness(
-    task: Task, mover: Mover, work: Workspace, local: int, pair: int
+    task: Task, row: int, work: Workspace, local: int, plane: FloatArray
 ) -> None:
     """Witnesses on a body that is no segment and on its partner, both at one row."""
+    mover, space, rows = mover_of(task, row), work.space, work.rows
     load_rows(task, mover, work, local, local)
-    plane, space, rows = work.planes[pair], work.space, work.rows
     space.out[NORMAL:NEAR] = plane[:3]
-    loaded_bound(task, space, pair, True, np.inf)
+    loaded_bound(task, space, row, True, np.inf)
     plane[POINT:WIDTH] = space.out[FAR:BRACKET]
     own = plane[OWN_POINT:POINT]
     own[:] = space.out[NEAR:FAR]
@@ -137,11 +141,11 @@ def _renew_witness(
 
 @compiled
 def _look_at_row(
-    task: Task, mover: Mover, work: Workspace, results: Results, local: int, pair: int
+    task: Task, work: Workspace, results: Results, local: int, pair: int
 ) -> None:
     """Lower the limit to what can be proved at a row at all, within the error box."""
     apart()
-    load_rows(task, mover, work, local, local)
+    load_rows(task, mover_of(task, pair), work, local, local)
     space = work.space
     space.out[NORMAL:NEAR] = work.planes[pair, :3]
     loaded_bound(task, space, pair, False, np.inf)
@@ -164,6 +168,7 @@ def _subdivide(
     row, witness = np.zeros(SLICE), new_witness()
     k, ends, space = stretch.start + local, work.ends, work.space
     row[INTERVAL], row[PAIR], row[END] = k, pair, 1.0
+    witness.value[KNOWN] = results.best[pair, UP]
     verdict, count = resolve(task, motion, ends, space, work.heap, row, witness)
     results.tally[SLICES] += count
     lower, upper, time = row[KEY], witness.value[MET], witness.value[WHEN]
@@ -268,7 +273,7 @@ def sweep_pair(
         goal = max(rules.goal, ROUGH * rules.slack * required)
     slack = np.inf if yes_or_no else rules.slack
     local, tried, fresh, proved = 0, count, False, -np.inf
-    mover = mover_of(task, pair)
+    rough, mover = task.pairs.rough[pair], mover_of(task, int(plane[ROW]))
     place_disc(mover, rows, runs, count)
     place_own(mover, rows, runs, plane, count)
     while clock() <= rules.until:
@@ -278,6 +283,12 @@ def sweep_pair(
         demand = Demand(local, last, bar, slack, fresh, proved)
         done = try_plane(task, mover, rows, runs, plane, demand)
         if fresh and done == local:
+            most = runs.lower[local] + mover.loose + rules.goal
+            if mover.loose > 0.0 and most >= required:
+                # What few corners do not settle all of them may.
+                proved = _renew(task, pair, work, local, pair, goal, bar)
+                mover = mover_of(task, pair)
+                continue
             # This interval allows no more, and may be proved nevertheless.
             done += runs.lower[local] >= required
         if done > local:
@@ -296,9 +307,11 @@ def sweep_pair(
         if done == last:
             tried *= 2
             continue
-        proved = _renew(task, mover, work, local, pair, goal, bar)
+        row = rough if rough >= 0 else pair
+        proved = _renew(task, row, work, local, pair, goal, bar)
+        mover = mover_of(task, row)
         results.tally[RENEWED] += 1
         if not (rules.nominal or yes_or_no):
-            _look_at_row(task, mover, work, results, local, pair)
+            _look_at_row(task, work, results, local, pair)
         fresh, tried = True, FIRST_TRIED
     return False

@@ -20,6 +20,7 @@ from vdsm_pin.proof.packing import pack_task, with_errors
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.proving import Proving, new_proving
 from vdsm_pin.proof.results import Results
+from vdsm_pin.proof.rough import with_rough
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED, WORLD
 from vdsm_pin.proof.tree import Tree
 
@@ -162,15 +163,17 @@ def start_proof(
     """Everything ready, nothing judged; arguments as for `prove`."""
     budget, plan = budget or Budget(), _planned(bodies, pairs)
     _check(tree, bodies, path)
-    pieces = pack_pieces([body.pieces for body in plan.bodies])
+    rough = with_rough(plan.bodies, plan.pairs)
+    number, every = plan.number[rough.original], rough.bodies
+    pieces = pack_pieces([body.pieces for body in every])
     rules = budget.rules(rounding_pad(_extent(tree, path, pieces)))
     count = 1 if columns is None else int(columns.max(initial=0)) + 1
-    columns = None if columns is None else columns[plan.number]
-    task = pack_task(tree, plan.bodies, plan.pairs, rules, path.reach, columns, pieces)
+    columns = None if columns is None else columns[number]
+    task = pack_task(tree, every, rough.pairs, rules, path.reach, columns, pieces)
     if errors is not None:
         surfaces = errors.surfaces
         if surfaces is not None:
-            surfaces = np.asarray(surfaces, dtype=np.float64)[plan.number]
+            surfaces = np.asarray(surfaces, dtype=np.float64)[number]
         task = with_errors(
             task, ErrorBox(errors.joints, errors.shifts, errors.tilts, surfaces)
         )

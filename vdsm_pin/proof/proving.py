@@ -168,7 +168,8 @@ class Proving:
     def _narrow(self, group: int) -> None:
         """Narrow the least bracket of one group of pairs."""
         task, results = self.task, self.results
-        mine, order = task.pairs.group == group, self._candidates(group)
+        groups = task.pairs.group[: task.pairs.rough.size]
+        mine, order = groups == group, self._candidates(group)
         if not order.size:
             return
         found = _no_witnesses(len(mine))
@@ -235,7 +236,7 @@ def new_proving(
         work=new_workspace(
             task, motion.knots.shape[1], budget.slices, min(BLOCK, n_intervals)
         ),
-        results=new_results(task.pairs.body.size, columns, n_intervals, budget),
+        results=new_results(task.pairs.rough.size, columns, n_intervals, budget),
         broad=new_broad_phase(task, n_obstacles),
         budget=budget,
     )

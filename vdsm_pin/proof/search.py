@@ -14,6 +14,7 @@ from vdsm_pin.proof.layouts import (
     INSTANT,
     INTERVAL,
     KEY,
+    KNOWN,
     MET,
     PAIR,
     SLICE,
@@ -39,7 +40,8 @@ class Witness(NamedTuple):
     """The least upper bound met so far, as arrays that compiled code can write.
 
     Args:
-        value: Upper bound, its time, and the least instant lower bound, shape (3,).
+        value: Upper bound, its time, the least instant lower bound, and the least upper
+            bound known from elsewhere, shape (4,).
         points: Core points of the body in its link's frame and of the partner in its
             own, shape (6,); [m].
     """
@@ -72,8 +74,8 @@ class Witnesses(NamedTuple):
 def new_witness() -> Witness:
     """A witness of nothing: infinite bounds."""
     apart()
-    value = np.zeros(3)
-    value[MET] = value[INSTANT] = np.inf
+    value = np.zeros(4)
+    value[MET] = value[INSTANT] = value[KNOWN] = np.inf
     return Witness(value, np.zeros(6))
 
 
@@ -91,15 +93,58 @@ def bound_between(
         row: The slice.
     """
     apart()
-    k, start, end, pair = int(row[INTERVAL]), row[START], row[END], int(row[PAIR])
+    _place(task, motion, ends, row)
+    slice_bound(task, ends, space, int(row[PAIR]), row[END] - row[START])
+    row[KEY] = space.out[LOWER]
+
+
+@compiled
+def _place(task: Task, motion: Motion, ends: Ends, row: FloatArray) -> None:
+    """The configurations at the ends of a slice and what lies between."""
+    k, start, end = int(row[INTERVAL]), row[START], row[END]
     interpolate(motion, k, start, ends.q)
     place_tree(task.tree, ends.q, ends.start)
     interpolate(motion, k, end, ends.q)
     place_tree(task.tree, ends.q, ends.end)
-    way = task.pairs.way[pair]
+    way = task.pairs.way[int(row[PAIR])]
     bend_between(task, motion, ends.bends, way, k, start, end)
-    slice_bound(task, ends, space, pair, end - start)
+
+
+@compiled
+def _bound_towards(
+    task: Task,
+    motion: Motion,
+    ends: Ends,
+    space: Space,
+    row: FloatArray,
+    aim: float,
+) -> bool:
+    """Bound a slice by a pair's rough version where that shows whether it is enough.
+
+    Args:
+        task: The scene, pairs and rules.
+        motion: Rows of joint values.
+        ends: Working space for two configurations.
+        space: Working space; holds the bracket on return.
+        row: The slice; row[KEY] is written.
+        aim: A bound that is enough; [m].
+
+    Returns:
+        Whether the bound is that of the pair itself.
+    """
+    apart()
+    _place(task, motion, ends, row)
+    pair, h = int(row[PAIR]), row[END] - row[START]
+    rough = task.pairs.rough[pair]
+    if rough >= 0:
+        slice_bound(task, ends, space, rough, h)
+        row[KEY], loose = space.out[LOWER], task.pairs.loose[rough]
+        hopeless = h > 0.0 and row[KEY] + loose + task.rules.goal < aim
+        if row[KEY] >= aim or hopeless:
+            return False
+    slice_bound(task, ends, space, pair, h)
     row[KEY] = space.out[LOWER]
+    return True
 
 
 @compiled
@@ -111,17 +156,18 @@ def examine(
     row: FloatArray,
     t: float,
     witness: Witness,
-) -> float:
+) -> None:
     """Look at one instant of a slice's interval; keeps the least upper bound.
 
-    Returns:
-        The clearance that a plane proves at this instant alone; [m].
+    It is as low as can be where that is news: below the least one known.
     """
     apart()
     instant = row.copy()
     instant[START] = instant[END] = t
-    bound_between(task, motion, ends, space, instant)
     pair = int(row[PAIR])
+    least = min(witness.value[MET], witness.value[KNOWN])
+    aim = max(task.pairs.required[pair], least)
+    exact = _bound_towards(task, motion, ends, space, instant, aim)
     upper = space.out[UPPER] + task.pairs.rise[pair]
     if upper < witness.value[MET]:
         witness.value[MET], witness.value[WHEN] = upper, t
@@ -129,8 +175,8 @@ def examine(
             witness.points[c - NEAR] = space.out[c]
         own, mover = witness.points[:3], mover_of(task, pair)
         to_body(mover, ends.start, own)
-    witness.value[INSTANT] = min(witness.value[INSTANT], instant[KEY])
-    return float(instant[KEY])
+    if exact:
+        witness.value[INSTANT] = min(witness.value[INSTANT], instant[KEY])
 
 
 @compiled
@@ -142,18 +188,22 @@ def split(
     row: FloatArray,
     heap: FloatArray,
     count: int,
+    aim: float,
 ) -> int:
-    """Push the two halves of a slice; returns the new count of the heap."""
+    """Push the two halves of a slice; returns the new count of the heap.
+
+    Bounds are as good as can be where that decides whether they come up to the aim.
+    """
     apart()
     start, end = row[START], row[END]
     middle = 0.5 * (start + end)
     half = row.copy()
     half[END] = middle
-    bound_between(task, motion, ends, space, half)
+    _bound_towards(task, motion, ends, space, half, aim)
     half[KEY] = max(half[KEY], row[KEY])
     count = push(heap, count, half)
     half[START], half[END] = middle, end
-    bound_between(task, motion, ends, space, half)
+    _bound_towards(task, motion, ends, space, half, aim)
     half[KEY] = max(half[KEY], row[KEY])
     return push(heap, count, half)
 
@@ -188,7 +238,7 @@ def resolve(
     rounding = task.rules.pad + task.rules.goal
     examine(task, motion, ends, space, row, 0.0, witness)
     examine(task, motion, ends, space, row, 1.0, witness)
-    bound_between(task, motion, ends, space, row)
+    _bound_towards(task, motion, ends, space, row, required)
     count = push(heap, 0, row)
     while True:
         if heap[0, KEY] >= required:
@@ -213,7 +263,7 @@ def resolve(
             break
         middle = 0.5 * (row[START] + row[END])
         examine(task, motion, ends, space, row, middle, witness)
-        count = split(task, motion, ends, space, row, heap, count)
+        count = split(task, motion, ends, space, row, heap, count, required)
     row[KEY] = heap[0, KEY]
     return verdict, count
 
@@ -255,6 +305,7 @@ def tighten(
             count = push(heap, count, row)
             break
         witness = new_witness()
+        witness.value[KNOWN] = least
         middle = 0.5 * (row[START] + row[END])
         examine(task, motion, ends, space, row, middle, witness)
         least = min(least, witness.value[INSTANT])
@@ -265,5 +316,6 @@ def tighten(
             witnesses.interval[pair] = int(row[INTERVAL])
             witnesses.time[pair] = middle
             witnesses.points[pair] = witness.points
-        count = split(task, motion, ends, space, row, heap, count)
+        aim = least - task.rules.gap
+        count = split(task, motion, ends, space, row, heap, count, aim)
     return count

@@ -76,21 +76,30 @@ class Places(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """All pairs, in the order of the certificate.
+    """All pairs, in the order of the certificate, then rough versions of some.
+
+    A pair's rough version is of bodies that lie within its own and span them but for a
+    distance: less that, what is proved of it is proved of the pair, and what it comes
+    to at most the pair does too.
 
     Args:
-        body: The moving body, shape (n_pairs,).
-        obstacle: Its partner in the packed scene, shape (n_pairs,).
-        way: From the partner's frame to the body's, shape (n_pairs,).
-        slot: Where the numbers of its corners' places start, shape (n_pairs,).
+        rough: The row of each pair's rough version, -1 for none, shape (n_pairs,); all
+            others have n_rows.
+        body: The moving body, shape (n_rows,).
+        obstacle: Its partner in the packed scene, shape (n_rows,).
+        way: From the partner's frame to the body's, shape (n_rows,).
+        slot: Where the numbers of its corners' places start, shape (n_rows,).
         slots: Numbers of places, for each pair one a corner of its body.
-        group: OBSTACLES or LINKS, shape (n_pairs,).
-        column: Where the profile has the partner's bounds, -1 for nowhere, (n_pairs,).
-        required: Least clearance, shape (n_pairs,); [m].
-        lost: What every plane loses: radius, shifts, rounding, shape (n_pairs,); [m].
-        rise: What turns a distance of core points into an upper bound, (n_pairs,); [m].
+        group: OBSTACLES or LINKS, shape (n_rows,).
+        column: Where the profile has the partner's bounds, -1 for nowhere, (n_rows,).
+        required: Least clearance, shape (n_rows,); [m].
+        loose: What a rough version misses of both bodies, shape (n_rows,); [m].
+        lost: What every plane loses: radius, shifts, rounding and what is missed, shape
+            (n_rows,); [m].
+        rise: What turns a distance of core points into an upper bound, (n_rows,); [m].
     """
 
+    rough: IntArray
     body: IntArray
     obstacle: IntArray
     way: IntArray
@@ -99,6 +108,7 @@ class Pairs(NamedTuple):
     group: IntArray
     column: IntArray
     required: FloatArray
+    loose: FloatArray
     lost: FloatArray
     rise: FloatArray
 
@@ -115,6 +125,7 @@ class Mover(NamedTuple):
         disc: Axis and radius, shape (4,).
         radius: Of the ball that grows it; [m].
         inverse: As in `Bodies`.
+        loose: As in `Pairs`; [m].
         lost: As in `Pairs`; [m].
         rise: As in `Pairs`; [m].
     """
@@ -127,6 +138,7 @@ class Mover(NamedTuple):
     disc: FloatArray
     radius: float
     inverse: float
+    loose: float
     lost: float
     rise: float
 
@@ -170,7 +182,7 @@ class Task(NamedTuple):
 
 @compiled
 def mover_of(task: Task, pair: int) -> Mover:
-    """The moving side of a pair."""
+    """The moving side of a pair, or of a rough version."""
     pairs, bodies = task.pairs, task.bodies
     body, way = pairs.body[pair], pairs.way[pair]
     first, last = bodies.first[body], bodies.first[body + 1]
@@ -184,6 +196,7 @@ def mover_of(task: Task, pair: int) -> Mover:
         bodies.discs[body],
         bodies.radius[body],
         bodies.inverse[body],
+        pairs.loose[pair],
         pairs.lost[pair],
         pairs.rise[pair],
     )

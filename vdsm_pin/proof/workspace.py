@@ -8,7 +8,7 @@ from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.proof.cached_planes import Runs, new_runs
-from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE, SLICE, SUPPORT
+from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE, ROW, SLICE, SUPPORT
 from vdsm_pin.proof.packed_tree import Pose
 from vdsm_pin.proof.rows import BLOCK, DRIFT, TURN, Rows, new_rows
 from vdsm_pin.proof.slices import Space, new_space
@@ -40,6 +40,8 @@ class Workspace(NamedTuple):
 def forget(planes: FloatArray) -> None:
     """No pair remembers a plane any more, one row each."""
     planes[:] = 0.0
+    for pair in range(planes.shape[0]):
+        planes[pair, ROW] = pair
     planes[:, 0] = 1.0
     planes[:, SUPPORT] = planes[:, HELD_CLEARANCE] = -np.inf
 
@@ -59,7 +61,7 @@ def new_workspace(
     corners = int(np.diff(task.bodies.first).max(initial=1))
     many = np.diff(task.pieces.first_piece).max(initial=0) > 1
     held = HELD_AT + 3 * corners if many else HELD_AT
-    planes = np.zeros((task.pairs.body.size, held))
+    planes = np.zeros((task.pairs.rough.size, held))
     forget(planes)
     return Workspace(
         new_rows(n_joints + 1, n_ways, task.places.way.size, block),

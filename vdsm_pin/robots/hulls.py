@@ -5,8 +5,8 @@ from typing import Any, Final
 import numpy as np
 
 from vdsm_pin.arm.bodies import outer_points
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.convex import Hull
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.geometry.convex import FewCorners, Hull
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
 from vdsm_pin.geometry.solids import BOX_CORNERS
@@ -16,6 +16,15 @@ FLAT: Final = 1e-6
 """Coal's hull of points flatter than this part of their size ends the process; [-]."""
 
 UNIT_BOX: Final = (BOX_CORNERS + 1.0) / 2.0
+
+MANY_CORNERS: Final = 32
+"""From so many on a hull is also known by some of its corners."""
+
+FEW_CORNERS: Final = 24
+"""How many those are."""
+
+WAYS: Final = np.concatenate([np.eye(3), -np.eye(3), BOX_CORNERS])
+"""Directions in which the first of them are the outermost."""
 
 MOST_GROWN: Final = 1e-6
 """By how much a hull may be grown to hold what Qhull takes for its surface; [m]."""
@@ -29,14 +38,40 @@ def covering_hull(points: FloatArray) -> Hull:
     """
     if (hull := coal_hull(points)) is not None:
         corners = np.array(hull.points())
-        pieces = pack_pieces([[Hull(corners)]])
-        ends = np.ascontiguousarray(np.repeat(points[:, None], 2, axis=1))
-        none = np.zeros(len(points), np.int64)
-        off = row_brackets(pieces, ends, none, TOLERANCES.bracket_gap)[:, 1]
-        grown = float(max(off.max(), 0.0))
+        grown = float(_distances(points, corners).max(initial=0.0))
         if grown <= MOST_GROWN:
-            return Hull(corners, grown)
-    return Hull(outer_points(points))
+            return Hull(corners, grown, few_corners(corners))
+    corners = outer_points(points)
+    return Hull(corners, few=few_corners(corners))
+
+
+def few_corners(points: FloatArray) -> FewCorners | None:
+    """Some of the corners that nearly span a hull; None where it has few anyway.
+
+    The outermost in some directions, then, one by one, those that are missed most.
+
+    Args:
+        points: Shape (n, 3); [m].
+    """
+    if len(points) < MANY_CORNERS:
+        return None
+    _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+    outermost = np.argmax(points @ (WAYS @ axes).T, axis=0).tolist()
+    chosen = list(dict.fromkeys(outermost))
+    missed = _distances(points, points[chosen])
+    while len(chosen) < FEW_CORNERS:
+        chosen.append(int(np.argmax(missed)))
+        missed = _distances(points, points[chosen])
+    most = float(missed.max(initial=0.0)) + TOLERANCES.arithmetic
+    return FewCorners(frozen(points[chosen]), most)
+
+
+def _distances(points: FloatArray, corners: FloatArray) -> FloatArray:
+    """Bounds from above of how far points are from a hull, shape (n,); [m]."""
+    pieces = pack_pieces([[Hull(corners)]])
+    ends = np.ascontiguousarray(np.repeat(points[:, None], 2, axis=1))
+    none = np.zeros(len(points), np.int64)
+    return row_brackets(pieces, ends, none, TOLERANCES.bracket_gap)[:, 1]
 
 
 def covering_primitive(points: FloatArray) -> Hull:

@@ -1,0 +1,100 @@
+"""Oracles: the same proof without rough versions, distances at sampled times."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from oracles.tree_queries import make_query
+
+from vdsm_pin.geometry.convex import FewCorners, Hull
+from vdsm_pin.proof.bodies import Body, Pair
+from vdsm_pin.proof.error_box import ErrorBox
+from vdsm_pin.proof.prover import prove
+from vdsm_pin.proof.terms import CERTIFIED
+from vdsm_pin.robots.hulls import FEW_CORNERS, few_corners
+from vdsm_pin.tolerances import TOLERANCES
+
+
+def shrunk(body: Body, share: float, told: float = 1.0) -> Body:
+    """The body, its one hull also known by one that is smaller by a share.
+
+    Args:
+        body: The body.
+        share: How much smaller; [-].
+        told: Part of what is missed that is told; [-].
+    """
+    piece = body.pieces[0]
+    if len(body.pieces) > 1 or not isinstance(piece, Hull) or len(piece.points) < 2:
+        return body
+    away = piece.points - piece.points.mean(axis=0)
+    missed = share * np.linalg.norm(away, axis=1).max() + TOLERANCES.arithmetic
+    few = FewCorners(piece.points - share * away, told * missed)
+    return replace(body, pieces=(replace(piece, few=few),))
+
+
+@pytest.mark.parametrize("degree", [1, 3, 5])
+@pytest.mark.parametrize("seed", range(10))
+def test_rough_versions_change_no_verdict(degree: int, seed: int) -> None:
+    """Limits just missed and just kept; bodies that miss little and much."""
+    rng = np.random.default_rng([degree, seed])
+    for _ in range(5):
+        query = make_query(rng, degree, int(rng.integers(1, 21)))
+        share = float(10.0 ** rng.uniform(-4, -0.5))
+        bodies = [shrunk(body, share) for body in query.bodies]
+        off = float(10.0 ** rng.uniform(-8, -3))
+        for required in (query.nearest + off, query.nearest - off):
+            pairs = [Pair(0, 1, required)]
+            rough = prove(query.tree, bodies, query.path, pairs)
+            exact = prove(query.tree, query.bodies, query.path, pairs)
+            assert rough.verdict[0] == exact.verdict[0]
+            assert rough.lower[0] <= query.nearest + 1e-9
+            if exact.lower[0] > 0.0:
+                narrow = TOLERANCES.least_bracket + 1e-9
+                assert rough.upper[0] - rough.lower[0] <= narrow
+
+
+def test_bodies_that_miss_more_than_is_told_are_found_out() -> None:
+    """Were what is missed not taken off, some wrong motions would be certified."""
+    rng, wrong = np.random.default_rng(4), 0
+    for _ in range(60):
+        query = make_query(rng, 1, int(rng.integers(1, 6)))
+        bodies = [shrunk(body, 0.3, told=0.01) for body in query.bodies]
+        pairs = [Pair(0, 1, query.nearest + 1e-4)]
+        verdict = prove(query.tree, bodies, query.path, pairs).verdict[0]
+        wrong += verdict == CERTIFIED
+    assert wrong > 0
+
+
+def test_where_errors_turn_all_corners_are_asked() -> None:
+    """What a turn adds differs from corner to corner: few of them do not tell."""
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        query = make_query(rng, 1, 3)
+        n = len(query.tree.joints)
+        box = ErrorBox(np.full(n, 0.01), np.zeros(n), np.zeros(n))
+        bodies = [shrunk(body, 0.3, told=0.01) for body in query.bodies]
+        args = query.path, [Pair(0, 1, 0.0)], box
+        rough = prove(query.tree, bodies, *args)
+        exact = prove(query.tree, query.bodies, *args)
+        assert rough.verdict[0] == exact.verdict[0]
+        if (query.tree.turning(np.ones((1, query.tree.n_columns))) > 0.0).any():
+            np.testing.assert_array_equal(rough.lower, exact.lower)
+
+
+@pytest.mark.parametrize("n", [32, 300])
+def test_few_corners_miss_no_more_than_they_tell(n: int) -> None:
+    """A support of all corners exceeds that of few by no more, and by about as much."""
+    rng = np.random.default_rng(n)
+    ways = rng.normal(size=(20_000, 3))
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    for _ in range(10):
+        points = 0.1 * ways[rng.integers(len(ways), size=n)]
+        few = few_corners(points)
+        assert few is not None and len(few.points) == FEW_CORNERS
+        more = (points @ ways.T).max(axis=0) - (few.points @ ways.T).max(axis=0)
+        assert 0.8 * few.missed - 1e-6 <= more.max() <= few.missed
+
+
+def test_few_corners_of_few_are_none() -> None:
+    """They would cost as much as all."""
+    assert few_corners(np.random.default_rng(0).normal(size=(31, 3))) is None
