@@ -19,6 +19,10 @@ from vdsm_pin.report.facts import batch_row, verification_file
 from vdsm_pin.report.html import write_index, write_report
 from vdsm_pin.report.picture import picture
 from vdsm_pin.report.words import OUTCOMES
+from vdsm_pin.simulation.closed_loop import Simulation
+from vdsm_pin.simulation.folder import Cleared, SimulationFile
+from vdsm_pin.simulation.page import page
+from vdsm_pin.simulation.settings import Settings
 from vdsm_pin.verification.records import (
     Check,
     Counterexample,
@@ -340,3 +344,38 @@ def test_the_arm_of_a_counterexample_is_a_ghost_at_its_moment(
     less_green = pixels(watched.page)[:, 1] - with_ghost[:, 1]
     assert (less_green > 0.1).sum() > 200, "no ghost is drawn"
     assert watched.errors == []
+
+
+def test_the_plots_of_a_simulation_share_one_moment(
+    browser: Any, tmp_path: Path
+) -> None:
+    n, times = 30, np.linspace(0.0, 5.0, 30)
+    planned = np.random.default_rng(0).normal(size=(n, 17))
+    beside = np.column_stack([times[[0, -1]], [90.0, 60.0]])
+    none, tensions = np.zeros(n), np.full((n, 24), 50.0)
+    run = Simulation(
+        times, planned, planned + 0.001, tensions, none, none, beside, beside
+    )
+    clear = Cleared(verdict="certified", min_clearance_m=0.01)
+    facts = dict.fromkeys(SimulationFile.model_fields, 0.0)
+    facts |= dict.fromkeys(("planned", "executed", "within_error_box"), clear)
+    file = SimulationFile.model_construct(**facts)
+    path = tmp_path / "simulation.html"
+    path.write_text(page(file, run, Settings(), 0.0), encoding="utf-8")
+    watched = Watched(browser, path.as_uri(), viewport={"width": 1300, "height": 900})
+    assert watched.errors == []
+    assert watched.requests == [path.as_uri()]
+    plots = watched.page.locator("svg.plot")
+    assert plots.count() == 7
+    assert plots.nth(0).locator("g.series").count() == 16
+    assert plots.nth(1).locator("path.upper").count() == 8
+    watched.page.evaluate("clock.go(29)")
+    places = plots.locator("line.cursor").evaluate_all(
+        "all => all.map((one) => one.getAttribute('x1'))"
+    )
+    assert len(set(places)) == 1
+    assert "60.00 Nm/rad" in watched.page.inner_text("figure:nth-of-type(6)")
+    plots.nth(5).hover()
+    assert " s" in plots.nth(5).locator("g.hover").text_content()
+    watched.shot("simulation")
+    watched.page.close()

@@ -1,16 +1,15 @@
 """The page of a simulation: its curves, its limits, and the margin of the tensions."""
 
-import re
+import base64
 
 import numpy as np
 import pytest
-from lxml import etree
 
 from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.simulation.closed_loop import Simulation
 from vdsm_pin.simulation.feed_forward import Statics
-from vdsm_pin.simulation.page import assumptions, plots
-from vdsm_pin.simulation.plots import MOST_POINTS, Curve, Plot, thin
+from vdsm_pin.simulation.page import assumptions, charts, thinned
 from vdsm_pin.simulation.settings import Cables, Settings
 
 HRM8 = built_in("hrm8")
@@ -27,33 +26,43 @@ def simulation(n: int = 50) -> Simulation:
     )  # fmt: skip
 
 
-def test_every_plot_draws_all_its_curves_and_limits() -> None:
-    for plot in plots(simulation(), Settings()):
-        root = etree.fromstring(plot.svg.encode())
-        assert len(list(root.iter("polyline"))) == len(plot.curves)
-        lines = [one for one in root.iter("line") if one.get("class") == "limit"]
-        assert len(lines) == len(plot.limits)
-        assert "nan" not in plot.svg
-    titles = [plot.title for plot in plots(simulation(), Settings())]
-    assert "Least joint stiffness" in titles
-    assert len(plots(simulation(), Settings())[0].curves) == 16
+def drawn(text: str) -> FloatArray:
+    return np.frombuffer(base64.b64decode(text), "<f4")
 
 
-def test_a_thinned_curve_keeps_its_extremes() -> None:
-    values = np.sin(np.linspace(0.0, 400.0, 20_001))
-    values[12_345] = 7.0
-    curve = Curve("a", np.linspace(0.0, 1.0, values.size), values, "red")
-    kept = thin(curve)
-    assert len(kept) <= MOST_POINTS
-    assert max(v for _, v in kept) == 7.0
-    assert min(v for _, v in kept) == values.min()
-    assert [t for t, _ in kept] == sorted(t for t, _ in kept)
+def test_every_plot_has_all_its_curves_and_limits() -> None:
+    found = simulation()
+    errors, *angles, tensions, slack, stiffness, margin = charts(found, Settings())
+    names = [f"{letter}{i}" for i in range(1, 9) for letter in "αθ"]
+    assert [one["name"] for one in errors["series"]] == names
+    for one, column in zip(errors["series"], found.errors.T, strict=True):
+        np.testing.assert_allclose(drawn(one["values"]), np.rad2deg(column), atol=1e-4)
+    for k, chart in enumerate(angles):
+        for i, one in enumerate(chart["series"]):
+            column = np.rad2deg(found.planned[:, 1 + k + 2 * i])
+            np.testing.assert_allclose(drawn(one["upper"]), column, rtol=1e-6)
+    limits = {one["label"]: one["value"] for one in tensions["limits"]}
+    assert limits == {"largest allowed": 4000.0, "least held": 30.0}
+    assert drawn(tensions["series"][0]["values"]).max() == found.tensions.max().astype(
+        "f"
+    )
+    assert drawn(slack["series"][0]["values"]).max() <= 100.0
+    for chart, values in ((stiffness, [90.0, 60.0]), (margin, [500.0, 300.0])):
+        assert [one["value"] for one in chart["limits"]] == [0.0]
+        np.testing.assert_allclose(drawn(chart["series"][0]["values"])[[0, -1]], values)
 
 
-def test_a_level_curve_and_odd_words_can_be_drawn() -> None:
-    flat = Curve("<a>", np.array([0.0]), np.array([0.0]), "red")
-    root = etree.fromstring(Plot("a & b", "N", (flat,)).svg.encode())
-    assert "a & b" in root.xpath("string(title)")
+def test_a_thinned_run_keeps_its_extremes_and_the_times_of_its_stiffness() -> None:
+    found = simulation(20_001)
+    found.tensions[12_345, 3] = 7000.0
+    found.executed[1_111, 4] += 9.0
+    few = thinned(found)
+    assert few.times.size < 3000
+    assert (np.diff(few.times) > 0.0).all()
+    assert few.tensions.max() == 7000.0
+    np.testing.assert_array_equal(few.errors.max(axis=0), found.errors.max(axis=0))
+    np.testing.assert_array_equal(few.errors.min(axis=0), found.errors.min(axis=0))
+    np.testing.assert_array_equal(few.least_stiffness[[0, -1]], found.least_stiffness)
 
 
 def test_every_assumption_stands_on_the_page() -> None:
@@ -80,8 +89,3 @@ def test_the_margin_is_where_the_stiffness_vanishes(bent: float) -> None:
     assert close.tension_margin(angles, held) == pytest.approx(5.0)
     full = Statics(HRM8, Settings(cables=Cables(largest_tension_n=float(held.max()))))
     assert full.tension_margin(angles, held) == 0.0
-
-
-def test_the_page_names_no_other_page() -> None:
-    text = plots(simulation(), Settings())[0].svg
-    assert not re.search(r"https?://", text)

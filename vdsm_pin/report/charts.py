@@ -65,7 +65,8 @@ def _per_joint(symbol: str, values: FloatArray) -> list[dict[str, Any]]:
     ]
 
 
-def _limit(label: str, value: float) -> dict[str, Any]:
+def limit(label: str, value: float) -> dict[str, Any]:
+    """A line across a plot."""
     return {"label": label, "value": value}
 
 
@@ -78,7 +79,7 @@ def _link_angle_chart(verification: ArmVerification, psi: FloatArray) -> dict[st
         "unit": "°",
         "axis": "ψ [°]",
         "floor": 0.0,
-        "limits": [_limit(f"cone {cone:g}°", cone)],
+        "limits": [limit(f"cone {cone:g}°", cone)],
         "series": _per_joint("ψ", psi),
     }
 
@@ -92,7 +93,7 @@ def _base_chart(verification: ArmVerification, shown: Thinned) -> dict[str, Any]
         "note": f"Along the rail, from {low:g} to {high:g} mm.".replace("-", "−"),
         "unit": " mm",
         "axis": "x₀ [mm]",
-        "limits": [_limit("rail end", low), _limit("rail end", high)],
+        "limits": [limit("rail end", low), limit("rail end", high)],
         "far_limits": True,
         "series": [series("x₀", _INK, x0)],
     }
@@ -109,7 +110,7 @@ def _clearance_charts(
         "unit": " mm",
         "axis": "clearance [mm]",
         "scale": "asinh",
-        "limits": [_limit(f"required {required:g} mm", required)],
+        "limits": [limit(f"required {required:g} mm", required)],
     }
     note = "Solid: proved lower bound. Dashed: proved upper bound."
     # What is proved for the whole motion holds in every interval of it.
@@ -184,7 +185,7 @@ def _joint_charts(
 ) -> list[dict[str, Any]]:
     rows = verification.trajectory
     box = math.degrees(verification.problem.manipulator.max_joint_angle)
-    limits = [_limit(f"+{box:g}°", box), _limit(f"−{box:g}°", -box)]
+    limits = [limit(f"+{box:g}°", box), limit(f"−{box:g}°", -box)]
     pairs = (("theta", "θ", "pitch", rows.theta), ("alpha", "α", "yaw", rows.alpha))
     return [
         {

@@ -218,7 +218,7 @@ def report_data(verification: Verification) -> PageData:
     obstacles = verification.problem.scene.obstacles
     drawn = [obstacles[k] for k in nearest_obstacles(verification, MOST_DRAWN)]
     scene, motion = _drawn(verification, drawn, shown)
-    text = _embedded(
+    text = embedded(
         {
             "scene": scene,
             "motion": motion,
@@ -238,7 +238,7 @@ def report_data(verification: Verification) -> PageData:
 def view_data(problem: PlanningProblem, trajectory: Trajectory) -> str:
     """The data of a 3D view; without a verification nothing is claimed."""
     shown = thinned(trajectory, np.zeros(0, dtype=np.int64))
-    return _embedded(
+    return embedded(
         {
             "scene": scene_data(
                 problem, problem.scene.obstacles[:MOST_DRAWN], trajectory
@@ -275,7 +275,7 @@ def impasse_data(problem: PlanningProblem, place: Impasse) -> str:
         "otherPoint": None,
     }
     shown = thinned(place.arm, np.zeros(0, dtype=np.int64))
-    return _embedded(
+    return embedded(
         {
             "scene": scene_data(problem, drawn, place.arm) | {"pins": pins},
             "motion": motion_data(problem, place.arm, shown),
@@ -290,7 +290,7 @@ def _point(point: FloatArray) -> list[float] | None:
     return point.tolist() if np.isfinite(point).all() else None
 
 
-def _embedded(data: dict[str, Any]) -> str:
+def embedded(data: dict[str, Any]) -> str:
     """JSON with `<` escaped: no name of an obstacle can end the script element."""
     text = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c")

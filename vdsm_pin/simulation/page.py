@@ -5,14 +5,19 @@ from typing import Any
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.report.charts import limit, packed, series
 from vdsm_pin.report.html import rendered
+from vdsm_pin.report.page_data import embedded
 from vdsm_pin.report.palette import AXES, link_colours
+from vdsm_pin.report.thinning import MOST_ROWS
 from vdsm_pin.simulation.closed_loop import SLACK, Simulation
-from vdsm_pin.simulation.plots import Curve, Plot
 from vdsm_pin.simulation.settings import Part, Settings
 
 BAND_DEG = 0.3
 """The paper's main range of joint errors (Fig. 21); [deg]."""
+
+ACCENT = "var(--accent)"
+FOLLOWED = "Solid: executed. Dashed: planned (Fig. 20)."
 
 
 def page(file: Any, found: Simulation, settings: Settings, required: float) -> str:
@@ -24,88 +29,117 @@ def page(file: Any, found: Simulation, settings: Settings, required: float) -> s
         settings: What was assumed.
         required: Clearance that the problem asks for; [m].
     """
+    shown = thinned(found)
+    plots = charts(shown, settings)
+    clock = {
+        "rows": packed(np.arange(shown.times.size), "<i4"),
+        "times": packed(shown.times, "<f8"),
+        "nSamples": shown.times.size,
+    }
     return rendered(
         "simulation.html.j2",
         file=file,
-        plots=plots(found, settings),
+        charts=plots,
+        data=embedded({"clock": clock, "charts": plots}),
         assumed=assumptions(settings),
         band=BAND_DEG,
         required=required,
     )
 
 
-def plots(found: Simulation, settings: Settings) -> tuple[Plot, ...]:
-    """Every plot of the page, in order."""
-    cables = settings.cables
-    margin, stiffness = found.tension_margin, found.least_stiffness
-    return (
-        _errors(found),
-        _angles(found, "alpha", 0),
-        _angles(found, "theta", 1),
-        _tensions(found, cables.least_tension_n, cables.largest_tension_n),
-        Plot(
-            "Slack cables", "share",
-            (_one(found.times, (found.tensions < SLACK).mean(axis=1)),),
-            note=f"Cables with less than {SLACK:g} N, of all.",
-        ),
-        Plot(
-            "Least joint stiffness", "Nm/rad", (_one(*stiffness.T),),
-            (("buckles", 0.0),),
-            "Of the arm held by its cables at the planned tensions.",
-        ),
-        Plot(
-            "Tension that may be added to every cable", "N", (_one(*margin.T),),
-            (("buckles", 0.0),),
-            "Before the arm buckles, or a cable has its largest tension.",
-        ),
-    )  # fmt: skip
+def thinned(found: Simulation) -> Simulation:
+    """The run at few enough times to plot, those of every extreme among them."""
+    n, stiffness = found.times.size, found.least_stiffness
+    curves = np.hstack([found.executed, found.errors, found.tensions])
+    even = np.linspace(0, n - 1, min(n, MOST_ROWS)).astype(np.int64)
+    rows = np.concatenate([even, curves.argmin(axis=0), curves.argmax(axis=0)])
+    times = np.union1d(found.times[rows], stiffness[:, 0])
 
+    def at(values: FloatArray, own: FloatArray = found.times) -> FloatArray:
+        return np.column_stack([np.interp(times, own, column) for column in values.T])
 
-def _one(times: FloatArray, values: FloatArray) -> Curve:
-    return Curve("", times, values, "var(--accent)")
-
-
-def _names(found: Simulation) -> list[str]:
-    count = found.errors.shape[1] // 2
-    return [f"{letter}{i + 1}" for i in range(count) for letter in ("α", "θ")]
-
-
-def _errors(found: Simulation) -> Plot:
-    """Errors of all joint angles, as Fig. 21."""
-    errors, names = np.rad2deg(found.errors), _names(found)
-    colours = np.repeat(link_colours(errors.shape[1] // 2), 2).tolist()
-    curves = (
-        Curve(name, found.times, column, colour)
-        for name, column, colour in zip(names, errors.T, colours, strict=True)
+    return Simulation(
+        times,
+        at(found.planned),
+        at(found.executed),
+        at(found.tensions),
+        np.interp(times, found.times, found.on_path),
+        np.interp(times, found.times, found.path_m),
+        at(stiffness, stiffness[:, 0]),
+        at(found.tension_margin, found.tension_margin[:, 0]),
     )
-    limits = (f"+{BAND_DEG}°", BAND_DEG), (f"−{BAND_DEG}°", -BAND_DEG)
-    note = "Executed less planned; the band is the paper's main range (Fig. 21)."
-    return Plot("Joint errors", "°", tuple(curves), limits, note)
 
 
-def _angles(found: Simulation, kind: str, offset: int) -> Plot:
-    """Executed angles over the planned ones, as Fig. 20."""
-    letter = {"alpha": "α", "theta": "θ"}[kind]
-    planned = np.rad2deg(found.planned[:, 1 + offset :: 2])
-    executed = np.rad2deg(found.executed[:, 1 + offset :: 2])
-    colours = link_colours(planned.shape[1])
-    curves = [Curve("", found.times, column, "var(--rule)") for column in planned.T] + [
-        Curve(f"{letter}{i + 1}", found.times, column, colours[i])
-        for i, column in enumerate(executed.T)
+def charts(found: Simulation, settings: Settings) -> list[dict[str, Any]]:
+    """Every plot of the page, in order, as `plots.js` draws it."""
+    cables, slack = settings.cables, 100.0 * (found.tensions < SLACK).mean(axis=1)
+    stiffness, margin = found.least_stiffness[:, 1], found.tension_margin[:, 1]
+    band = {f"+{BAND_DEG}°": BAND_DEG, f"−{BAND_DEG}°": -BAND_DEG}
+    held = {
+        "largest allowed": cables.largest_tension_n,
+        "least held": cables.least_tension_n,
+    }
+    tensions = [
+        series("largest", AXES["x"], found.tensions.max(axis=1)),
+        series("mean", ACCENT, found.tensions.mean(axis=1)),
+        series("least", AXES["y"], found.tensions.min(axis=1)),
     ]
-    title = {"alpha": "Yaw angles α", "theta": "Pitch angles θ"}[kind]
-    return Plot(title, "°", tuple(curves), (), "Executed; grey: planned (Fig. 20).")
+    return [
+        _chart("Joint errors", "error [°]", _errors(found), band,
+               "Executed less planned; the band is the paper's main range (Fig. 21)."),
+        _chart("Yaw angles α", "α [°]", _angles(found, "α"), {}, FOLLOWED),
+        _chart("Pitch angles θ", "θ [°]", _angles(found, "θ"), {}, FOLLOWED),
+        _chart("Tensions of the cables", "tension [N]", tensions, held,
+               "Of all cables."),
+        _chart("Slack cables", "cables [%]", [series("slack", ACCENT, slack)], {},
+               f"Cables with less than {SLACK:g} N, of all."),
+        _chart("Least joint stiffness", "stiffness [Nm/rad]",
+               [series("least", ACCENT, stiffness)], {"buckles": 0.0},
+               "Of the arm held by its cables at the planned tensions."),
+        _chart("Tension that may be added to every cable", "tension [N]",
+               [series("margin", ACCENT, margin)], {"buckles": 0.0},
+               "Before the arm buckles, or a cable has its largest tension."),
+    ]  # fmt: skip
 
 
-def _tensions(found: Simulation, least: float, largest: float) -> Plot:
-    """Largest and least tension of any cable."""
-    curves = (
-        Curve("largest", found.times, found.tensions.max(axis=1), AXES["x"]),
-        Curve("mean", found.times, found.tensions.mean(axis=1), "var(--accent)"),
-        Curve("least", found.times, found.tensions.min(axis=1), AXES["y"]),
-    )
-    limits = ("largest allowed", largest), ("least held", least)
-    return Plot("Tensions of the cables", "N", curves, limits)
+def _chart(
+    title: str,
+    axis: str,
+    lines: list[dict[str, Any]],
+    limits: dict[str, float],
+    note: str,
+) -> dict[str, Any]:
+    unit = axis.partition("[")[2].rstrip("]")
+    return {
+        "id": title,
+        "title": title,
+        "note": note,
+        "unit": unit if unit == "°" else f" {unit}",
+        "axis": axis,
+        "limits": [limit(label, value) for label, value in limits.items()],
+        "series": lines,
+    }
+
+
+def _errors(found: Simulation) -> list[dict[str, Any]]:
+    """Errors of all joint angles, as Fig. 21."""
+    errors = np.rad2deg(found.errors)
+    colours = link_colours(errors.shape[1] // 2)
+    return [
+        series(f"{'αθ'[k % 2]}{k // 2 + 1}", colours[k // 2], column)
+        for k, column in enumerate(errors.T)
+    ]
+
+
+def _angles(found: Simulation, letter: str) -> list[dict[str, Any]]:
+    """Executed angles beside the planned ones, as Fig. 20."""
+    both = np.rad2deg([found.executed, found.planned])
+    executed, planned = both[:, :, 1 + "αθ".index(letter) :: 2].transpose(0, 2, 1)
+    colours = link_colours(len(planned))
+    return [
+        series(f"{letter}{k + 1}", colours[k], executed[k], upper=packed(planned[k]))
+        for k in range(len(planned))
+    ]
 
 
 def assumptions(settings: Settings) -> tuple[tuple[str, str, str], ...]:

@@ -124,6 +124,11 @@ class Motion {
     return between(this.rows, time);
   }
 
+  // A moment in waypoints.
+  moment(time) {
+    return time.toFixed(1);
+  }
+
   // When a moment is, in words; nothing where nobody knows.
   timeText(time) {
     if (!this.times) return "";

@@ -326,7 +326,7 @@ class Plot {
     const x = this.x(time);
     const level = this.y(best.value);
     const text = this.tip.querySelector("text");
-    text.textContent = `${best.one.name}: ${this.text(best.value)} at ${time.toFixed(1)}`;
+    text.textContent = `${best.one.name}: ${this.text(best.value)} at ${this.motion.moment(time)}`;
     const width = text.getComputedTextLength() + 12;
     this.tip.querySelector("rect").setAttribute("width", width);
     const left = x + width + 12 > this.right ? x - width - 8 : x + 8;
