@@ -96,8 +96,8 @@ def test_scene_text_is_read_in_both_forms(tmp_path: Path) -> None:
     [
         (
             "box\n0.1",
-            "mesh\n0.1",
-            "line 4: is the shape 'mesh', expected one of sphere",
+            "cone\n0.1",
+            "line 4: is the shape 'cone', expected one of sphere",
         ),
         ("0.2 0.4", "0.2 x", "line 5: is 'x', expected a number"),
         ("\n.\n", "\n", "the file ends"),

@@ -175,20 +175,10 @@ class Arm:
         own = [body for body in self.bodies if body.own]
         thinnest = min(body.solid.radius for body in own)
         for mesh in self.meshes.values():
-            if mesh.surface_only or mesh.whole:
-                continue
-            mine = [pair.body for pair in self.pairs if pair.solid is mesh]
-            points = []
-            if all(body in mine for body in own):
-                points = [(1, column(0, 0, 0), thinnest)]
-                mine = [body for body in mine if not body.own]
-            for body in mine:
-                middle = column(*body.solid.points[0].mean(axis=0).tolist())
-                kept = body.solid.radius + self.problem.required_clearance
-                points.append((body.frame, middle, kept))
-            zero, axes = first[self.frames[self.solids.index(mesh)]]
-            for frame, at, radius in points:
-                origin, turned = first[frame]
-                seen = axes.transpose() * (origin + turned * at - zero)
-                why = mesh.surface.not_outside([*map(float, seen.entries())], radius)
-                claim(not why, f"the arm is not proved outside {mesh.name}: {why}")
+            pairs, points = [pair for pair in self.pairs if pair.solid is mesh], []
+            held = [pair.body for pair in pairs]
+            if all(body in held for body in own):
+                points = [(first[1], column(0, 0, 0), thinnest)]
+                pairs = [pair for pair in pairs if not pair.body.own]
+            points += [pair.inner(first) for pair in pairs]
+            mesh.check_outside(first[self.frames[self.solids.index(mesh)]], points)

@@ -316,12 +316,15 @@ class Robot:
         for points in hulls(name, corners, groups):
             yield Solid(name, [points], far)
 
-    def check(self, _: Pose) -> None:
-        """Check that joints and their rates keep their limits.
+    def check(self, first: Pose) -> None:
+        """Check that links begin outside of meshes, and that joints keep their limits.
 
         Raises:
             Rejected: If one does not; `place` says where.
         """
+        for pair in self.pairs:
+            if isinstance(pair.solid, Mesh):
+                pair.solid.check_outside(first[pair.rest], [pair.inner(first)])
         for k in range(self.path.size):
             self.place, step = f"interval {k}", arb(0)
             if self.timed:

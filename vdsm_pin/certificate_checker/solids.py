@@ -158,6 +158,23 @@ class Mesh(Solid):
         self.surface, self.surface_only = Surface(self.points), mesh.solid is False
         self.assumed_size = mesh.assumed_size
 
+    def check_outside(
+        self, rest: Any, points: Iterable[tuple[Any, Any, float]]
+    ) -> None:
+        """Check that points are not inside; it is enough that its hull is proved clear.
+
+        Args:
+            rest: The pose of its frame: origin and rotation.
+            points: Of each that of another frame, the point there, and how far from the
+                triangles it stays.
+        """
+        zero, axes = rest
+        for (origin, turned), at, off in points:
+            if not (self.surface_only or self.whole):
+                seen = axes.transpose() * (origin + turned * at - zero)
+                why = self.surface.not_outside([*map(float, seen.entries())], off)
+                claim(not why, f"a body is not proved outside {self.name}: {why}")
+
     def notes(self) -> list[str]:
         """What was assumed of it."""
         gap, size = 1e3 * self.surface.gap, self.assumed_size
@@ -243,3 +260,9 @@ class Pair(NamedTuple):
     def names(self) -> list[str]:
         """As the header has them."""
         return [self.body.solid.name, self.solid.name]
+
+    def inner(self, pose: Any) -> tuple[Any, Any, float]:
+        """The body's frame, its middle there, and how far off the other it stays."""
+        solid = self.body.solid
+        middle = column(*solid.points[0].mean(axis=0).tolist())
+        return pose[self.body.frame], middle, solid.radius + self.required

@@ -36,19 +36,25 @@ class Location(NamedTuple):
 
     Of a mesh without known inside the convex hull decides: whatever counts as inside
     lies in it, so that an arm that keeps clear of it is outside.
+
+    Args:
+        side: Where.
+        reason: Why that is unknown.
+        who: The arm, or what of a robot lies there.
     """
 
     side: Side
     reason: str = ""
+    who: str = "the arm"
 
     def words(self, mesh: str) -> str:
         """The same of a mesh of that name as a sentence."""
         if self.side is not Side.UNKNOWN:
-            return f"the arm is {self.side.value} {mesh!r}"
+            return f"{self.who} is {self.side.value} {mesh!r}"
         return (
-            f"whether the arm is inside {mesh!r} cannot be decided: {self.reason}, and "
-            "the arm is not proved clear of its convex hull; write `solid: false` "
-            f"under {mesh!r} in the problem file if only its surface is meant"
+            f"whether {self.who} is inside {mesh!r} cannot be decided: {self.reason}, "
+            f"and {self.who} is not proved clear of its convex hull; write `solid: "
+            f"false` under {mesh!r} in the problem file if only its surface is meant"
         )
 
 

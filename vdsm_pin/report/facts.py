@@ -37,8 +37,7 @@ from vdsm_pin.report.run_record import RunRecord, machine, versions
 from vdsm_pin.report.words import depth, percent, place, quantity
 from vdsm_pin.tolerances import TOLERANCES, UNITS
 from vdsm_pin.verification.fk import PLANNED
-from vdsm_pin.verification.inside import NAME as INSIDE
-from vdsm_pin.verification.inside import surfaces
+from vdsm_pin.verification.inside import ARM, LINKS, surfaces
 from vdsm_pin.verification.records import (
     ArmVerification,
     Check,
@@ -290,13 +289,14 @@ def reason(verification: Verification) -> str:
         return "No check was carried out, so nothing is proved."
     first = bad[0]
     found = f"{first.name} is {depth(first.worst, first.deeper, first.unit)}"
-    if first.name == INSIDE:
+    inside = first.name in (ARM, LINKS)
+    if inside:
         found = first.where
     elif math.isnan(first.worst):
         found = f'there is no evidence for "{first.name}"'
     elif not math.isnan(first.limit):
         found += f" against a limit of {quantity(first.limit, first.unit)}"
-    where = "" if first.name == INSIDE else first.where
+    where = "" if inside else first.where
     at = place(finite(first.moment), where, time_at(verification, first.moment))
     if at:
         found += f" ({at})"

@@ -9,6 +9,7 @@ from vdsm_pin.report.files import JointRow, LeftOutRow, RobotFacts
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification
 from vdsm_pin.robots.model import RobotJoint
+from vdsm_pin.verification.inside import mesh_notes
 
 _PIECES: Final = {1: "linear", 3: "cubic", 5: "quintic"}
 
@@ -17,7 +18,7 @@ def robot_facts(verification: RobotVerification) -> dict[str, Any]:
     """The fields of verification.json that are a robot's own."""
     cell, path = verification.problem, verification.trajectory
     return {
-        "notes": cell.robot.notes,
+        "notes": (*cell.robot.notes, *mesh_notes(cell)),
         "coverage": None,
         "path_length_m": None,
         "undrawn_m": (),

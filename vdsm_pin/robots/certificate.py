@@ -11,7 +11,9 @@ from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces
+from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.prover import start_proof
@@ -37,7 +39,8 @@ from vdsm_pin.verification.certificate_lines import (
 from vdsm_pin.verification.certificate_writer import errors_beside, pieces_of_obstacles
 
 DEGREES: Final[Mapping[int, Joined]] = {1: "linear", 3: "cubic", 5: "quintic"}
-MOVING: Final = "no certificate is written: not certified beside obstacles that move"
+MOVING: Final = "beside obstacles that move none is written"
+UNCLEAR: Final = "the inside of {!r} has gaps, and then none is written"
 EDGES: Final[Mapping[int, tuple[int, ...]]] = {1: (), 2: (1,), 8: (1, 2, 4)}
 """By the number of a primitive's corners those at the ends of the first one's edges."""
 
@@ -60,13 +63,12 @@ def write_robot_certificate(
 
     Raises:
         OutOfTime: If the time is over.
-        VerificationFailed: If the motion is not certified, or beside obstacles that
-            move: there is nothing to write.
+        VerificationFailed: If the motion is not certified, an obstacle moves, or a mesh
+            has no certain inside: there is nothing to write.
         InvalidFile: If the file cannot be written.
     """
     check_certified(verification)
-    if verification.problem.scene.moving:
-        raise VerificationFailed(MOVING)
+    _check_scene(verification.problem.scene)
     cell, motion = verification.problem, verification.trajectory
     table, budget = PairTable.of(cell.pairs), Budget(until=deadline.end)
     tree, bodies, errors = cell.robot.tree, cell.bodies, verification.errors
@@ -85,6 +87,21 @@ def write_robot_certificate(
     whole = np.zeros(len(pieces.root), np.int64)
     proof = Recorded(proving.task, proving.motion, whole)
     write_lines(path, header, proof, deadline)
+
+
+def _check_scene(scene: Scene) -> None:
+    """Refuse obstacles of which no certificate tells.
+
+    Raises:
+        VerificationFailed: If one moves, or is a mesh that has gaps or is not closed.
+    """
+    if scene.moving:
+        raise VerificationFailed(MOVING)
+    for mesh in scene.obstacles:
+        if isinstance(mesh, Mesh) and not mesh.is_surface:
+            surface = mesh.closed_mesh
+            if not surface.closed or surface.gap:
+                raise VerificationFailed(UNCLEAR.format(mesh.name))
 
 
 def _errors(cell: Cell, errors: ErrorBox) -> RobotErrors:

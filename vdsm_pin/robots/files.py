@@ -29,7 +29,7 @@ from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.problem.scene import Scene
-from vdsm_pin.robots.scene_files import MAX_BYTES, SceneModel, check_judged
+from vdsm_pin.robots.scene_files import MAX_BYTES, SceneModel
 
 MeshCover: TypeAlias = Literal["hull", "parts", "primitives"]
 
@@ -247,9 +247,7 @@ class CellFile:
         """
         more = self.path.parent, self.frame, robot_size, sha256()
         builder = ObstacleBuilder(self.document, *more)
-        scene = Scene(builder.build_all(self.model.obstacles, ("obstacles",)))
-        check_judged(self.document, scene)
-        return scene
+        return Scene(builder.build_all(self.model.obstacles, ("obstacles",)))
 
     def errors(self, scene: Scene) -> ErrorBox:
         """The errors under which every clearance is asked for.

@@ -15,12 +15,15 @@ from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.contacts import common_ball
 from vdsm_pin.robots.errors import proof_box
+from vdsm_pin.robots.inside import by_mesh, enclosed, enclosed_profile, locate_links
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.rates import rate_checks
 from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.clearance import profile_of
+from vdsm_pin.verification.inside import LINKS as INSIDE
+from vdsm_pin.verification.inside import check_inside
 from vdsm_pin.verification.moving import Knots, path_beside
 from vdsm_pin.verification.records import (
     Check,
@@ -78,14 +81,17 @@ def verify_robot(
     box = proof_box(robot, cell.scene, cell.errors)
     whole, knots = path_beside(path, cell.scene)
     proof = prove(cell.tree, cell.bodies, whole, cell.pairs, box, budget, columns)
+    located = locate_links(cell, whole, box, budget)
     named, least = _named(cell), _met(cell, whole, _least(cell, proof))
     coal, measured = _coal(cell, whole, proof, knots)
-    least = _told(least, knots)
+    least = _told(enclosed(least, located), knots)
+    profile = profile_of(proof.profile, proof.stride, knots, len(robot.bodies))
     late = "" if proof.in_time else f": {OutOfTime(deadline.limit)}"
     checks = [
         _poses(robot, path),
         *_limits(robot, path),
         *rate_checks(robot.joints, path),
+        *check_inside(by_mesh(cell, located), INSIDE),
         *_clearances(cell, named, least, late),
         coal,
     ]
@@ -96,7 +102,7 @@ def verify_robot(
         pairs=named,
         checks=tuple(checks),
         approaches=_closest(named, least, measured),
-        profile=profile_of(proof.profile, proof.stride, knots, len(robot.bodies)),
+        profile=enclosed_profile(profile, cell, located),
         least=least,
         time_limit=deadline.limit,
     )

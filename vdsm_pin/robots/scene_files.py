@@ -1,8 +1,9 @@
 """Scenes for robots: obstacles as in a problem file, or a PlanningScene of MoveIt."""
 
 import hashlib
+from collections.abc import Callable
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final, Literal, TypeAlias
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -18,10 +19,13 @@ from vdsm_pin.io.problem_file import files_of_obstacles
 from vdsm_pin.io.schema_types import FileModel
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
-from vdsm_pin.problem.scene import Obstacle, Scene, solid_of
+from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.robots.mjcf import read_mjcf
 from vdsm_pin.robots.places import Place
 from vdsm_pin.robots.scene_text import read_scene_text
+
+Reader: TypeAlias = Callable[[Place, str, FloatArray], Obstacle]
+"""Of a shape by its place in the file, its name and T_world_shape."""
 
 MAX_BYTES: Final = 32 << 20
 UNIT_NORM: Final = 1e-3
@@ -57,8 +61,8 @@ def read_scene_with_files(
         The obstacles, and the names of those that have a file of their own, with it.
 
     Raises:
-        InvalidFile: If the file breaks its contract, or has what is not judged: meshes
-            with an inside, attached objects.
+        InvalidFile: If the file breaks its contract, or has attached objects, which are
+            not judged.
     """
     kind = path.suffix.lower()
     if kind in (".xml", ".mjcf"):
@@ -72,22 +76,6 @@ def read_scene_with_files(
     return _ours(document, path, robot_size)
 
 
-def check_judged(document: YamlDocument, scene: Scene) -> None:
-    """Refuse obstacles that are not judged for robots.
-
-    Raises:
-        InvalidFile: If one may have an inside.
-    """
-    for k, obstacle in enumerate(scene.obstacles):
-        solid = solid_of(obstacle)
-        if isinstance(solid, Mesh) and not solid.is_surface:
-            problem = (
-                f"{obstacle.name!r} may have an inside, which is not judged for robots "
-                "yet; expected solid: false, where its surface is all that is meant"
-            )
-            raise document.invalid(("obstacles", k, "solid"), problem)
-
-
 def _ours(
     document: YamlDocument, path: Path, robot_size: float
 ) -> tuple[Scene, tuple[tuple[str, Path], ...]]:
@@ -99,7 +87,6 @@ def _ours(
     digest = hashlib.sha256()
     builder = ObstacleBuilder(document, path.parent, frame, robot_size, digest)
     scene = Scene(builder.build_all(model.obstacles, ("obstacles",)))
-    check_judged(document, scene)
     return scene, files_of_obstacles(model.obstacles, path.parent)
 
 
@@ -130,26 +117,23 @@ def _solids(thing: Place) -> list[Obstacle]:
     if not isinstance(name, str) or not name:
         problem = "is no name"
         raise thing["id"].invalid(problem)
-    if thing.get("meshes", []).value:
-        problem = f"{name!r} has meshes, which are not read from a PlanningScene yet"
-        raise thing.invalid(problem)
-    base, found = _pose(thing.get("pose", {})), list[Obstacle]()
-    shapes = thing.get("primitives", []).items()
-    poses = thing.get("primitive_poses", []).items()
-    planes, at = thing.get("planes", []).items(), thing.get("plane_poses", []).items()
-    if len(shapes) != len(poses) or len(planes) != len(at):
-        problem = f"{name!r} has not one pose for each of its shapes"
-        raise thing.invalid(problem)
-    count = len(shapes) + len(planes)
+    base, shapes = _pose(thing.get("pose", {})), list[tuple[Reader, Place, Place]]()
+    for kind, plural, reader in KINDS:
+        some = thing.get(plural, []).items()
+        poses = thing.get(f"{kind}_poses", []).items()
+        if len(some) != len(poses):
+            problem = f"{name!r} has not one pose for each of its {plural}"
+            raise thing.invalid(problem)
+        shapes += [(reader, *both) for both in zip(some, poses, strict=True)]
+    count = len(shapes)
     if not count:
         problem = f"{name!r} has no shape"
         raise thing.invalid(problem)
     names = [name if count == 1 else f"{name}/{k}" for k in range(1, count + 1)]
-    for shape, pose in zip(shapes, poses, strict=True):
-        found.append(_primitive(shape, names[len(found)], base @ _pose(pose)))
-    for plane, pose in zip(planes, at, strict=True):
-        found.append(_plane(plane, names[len(found)], base @ _pose(pose)))
-    return found
+    return [
+        reader(shape, one, base @ _pose(pose))
+        for one, (reader, shape, pose) in zip(names, shapes, strict=True)
+    ]
 
 
 def _primitive(shape: Place, name: str, placement: FloatArray) -> Obstacle:
@@ -186,6 +170,36 @@ def _plane(plane: Place, name: str, placement: FloatArray) -> Obstacle:
     normal = placement[:3, :3] @ (np.array([a, b, c]) / length)
     foot = placement[:3, 3] - d / length * normal
     return HalfSpace(name, foot, normal)
+
+
+def _mesh(mesh: Place, name: str, placement: FloatArray) -> Obstacle:
+    """Triangles, in metres; an inside is theirs if they are closed."""
+    corners = [_named(one, "xyz") for one in mesh["vertices"].items()]
+    triangles = [_triangle(one, len(corners)) for one in mesh["triangles"].items()]
+    vertices = np.reshape(corners, (-1, 3)) @ placement[:3, :3].T + placement[:3, 3]
+    try:
+        return Mesh(name, vertices, np.array(triangles, np.int64).reshape(-1, 3))
+    except InvalidInput as error:
+        raise mesh.invalid(str(error)) from None
+
+
+def _triangle(triangle: Place, count: int) -> FloatArray:
+    """Numbers of its three corners, of so many vertices."""
+    named = isinstance(triangle.value, dict)
+    place = triangle["vertex_indices"] if named else triangle
+    found = place.numbers(3)
+    if not ((found >= 0) & (found < count) & (found % 1 == 0)).all():
+        problem = f"is {found.tolist()}, expected three numbers of {count} vertices"
+        raise place.invalid(problem)
+    return found
+
+
+KINDS: Final[tuple[tuple[str, str, Reader], ...]] = (
+    ("primitive", "primitives", _primitive),
+    ("plane", "planes", _plane),
+    ("mesh", "meshes", _mesh),
+)
+"""What a collision object is made of: each kind, the key of all, and what reads one."""
 
 
 def _pose(pose: Place) -> FloatArray:

@@ -79,7 +79,7 @@ def read_scene_text(file: Path, text: str) -> YamlDocument:
 
     Raises:
         InvalidFile: If a word is not what is expected, or a shape is of another kind
-            than box, sphere, cylinder and plane.
+            than box, sphere, cylinder, plane and mesh.
     """
     words = _Words(file, text)
     with_pose, things = words.has_poses(), list[dict[str, Any]]()
@@ -100,28 +100,36 @@ def _thing(words: _Words, with_pose: bool) -> dict[str, Any]:
     thing: dict[str, Any] = {"id": words.next("a name")}
     if with_pose:
         thing["pose"] = _pose(words)
-    for key in ("primitives", "primitive_poses", "planes", "plane_poses"):
-        thing[key] = []
     for _ in range(words.count("shapes")):
         kind = words.next("a shape")
-        if kind not in SIZES:
-            known = ", ".join(SIZES)
-            problem = f"is the shape {kind!r}, expected one of {known}"
-            raise words.invalid(problem)
-        sizes = words.numbers(SIZES[kind])
-        of = "plane" if kind == "plane" else "primitive"
-        shape: dict[str, Any] = {"coef": sizes}
-        if of == "primitive":
-            sizes = sizes[::-1] if kind == "cylinder" else sizes
-            shape = {"type": kind, "dimensions": sizes}
-        thing[f"{of}s"].append(shape)
-        thing[f"{of}_poses"].append(_pose(words))
+        key, poses, shape = _shape(words, kind)
+        thing.setdefault(key, []).append(shape)
+        thing.setdefault(poses, []).append(_pose(words))
         words.numbers(4)  # its colour
     if with_pose:
         for _ in range(words.count("subframes")):
             words.next("a name")
             _pose(words)
     return thing
+
+
+def _shape(words: _Words, kind: str) -> tuple[str, str, dict[str, Any]]:
+    """Keys of its shapes and of their poses in a PlanningScene, and the shape."""
+    if kind == "mesh":
+        corners, faces = words.count("vertices"), words.count("triangles")
+        vertices = [words.numbers(3) for _ in range(corners)]
+        triangles = [words.numbers(3) for _ in range(faces)]
+        return "meshes", "mesh_poses", {"vertices": vertices, "triangles": triangles}
+    if kind not in SIZES:
+        known = ", ".join((*SIZES, "mesh"))
+        problem = f"is the shape {kind!r}, expected one of {known}"
+        raise words.invalid(problem)
+    sizes = words.numbers(SIZES[kind])
+    if kind == "plane":
+        return "planes", "plane_poses", {"coef": sizes}
+    sizes = sizes[::-1] if kind == "cylinder" else sizes
+    shape = {"type": kind, "dimensions": sizes}
+    return "primitives", "primitive_poses", shape
 
 
 def _pose(words: _Words) -> dict[str, list[float]]:

@@ -30,8 +30,9 @@ from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.records import Check, Problem, Verdict, combine
 
-NAME: Final = "arm outside the meshes"
-"""Name of the row."""
+ARM: Final = "arm outside the meshes"
+LINKS: Final = "links outside the meshes"
+"""Names of the row, of an arm and of a robot."""
 
 Enclosed: TypeAlias = Mapping[str, Mapping[str, FloatArray]]
 """Bodies inside a mesh, by its name and theirs, each with a point there; base frame."""
@@ -51,7 +52,7 @@ def locate_start(
     The first of the arm's points that is inside, or else unknown, speaks for all.
     """
     return {
-        mesh.name: _worst(
+        mesh.name: worst_location(
             [
                 locate(mesh.closed_mesh, point, radius)
                 for point, radius in _points(problem, trajectory, mesh.name)
@@ -62,7 +63,7 @@ def locate_start(
     }
 
 
-def _worst(found: Sequence[Location]) -> Location:
+def worst_location(found: Sequence[Location]) -> Location:
     """The location that says the most against a motion; outside where there is none."""
     order = list(VERDICTS)
     none = Location(Side.OUTSIDE)
@@ -204,11 +205,12 @@ def arm_inside(located: Mapping[str, Location]) -> tuple[str, ...]:
     return tuple(name for name, where in found if where.side is Side.INSIDE)
 
 
-def check_inside(located: Mapping[str, Location]) -> tuple[Check, ...]:
-    """The arm is not inside a mesh.
+def check_inside(located: Mapping[str, Location], name: str = ARM) -> tuple[Check, ...]:
+    """Nothing that is held off a mesh is inside.
 
     Args:
         located: What `locate_arm` found.
+        name: Of the row.
 
     Returns:
         One row for all meshes that may have an inside; none without.
@@ -223,7 +225,7 @@ def check_inside(located: Mapping[str, Location]) -> tuple[Check, ...]:
     }
     return (
         Check(
-            name=NAME,
+            name=name,
             verdict=verdict,
             count=len(located),
             worst=float(len(bad)),
@@ -241,7 +243,7 @@ def surfaces(problem: Problem) -> tuple[str, ...]:
     return tuple(mesh.name for mesh in meshes if mesh.is_surface)
 
 
-def mesh_notes(problem: PlanningProblem) -> tuple[str, ...]:
+def mesh_notes(problem: Problem) -> tuple[str, ...]:
     """What a reader must know of the meshes: surfaces only, and gaps that were joined.
 
     Args:

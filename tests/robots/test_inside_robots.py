@@ -1,0 +1,174 @@
+"""Links inside meshes of a scene: solid angles, checker, and what cannot be told."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from tests.robots.test_robots import write
+from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.proof.paths import Path as Motion
+from vdsm_pin.robots.cell import Cell, read_cell
+from vdsm_pin.robots.certificate import write_robot_certificate
+from vdsm_pin.robots.judgement import RobotVerification, verify_robot
+from vdsm_pin.robots.scene_files import read_scene
+from vdsm_pin.robots.trajectory_files import read_path
+from vdsm_pin.verification.certificate_lines import Hashes
+from vdsm_pin.verification.inside import LINKS
+from vdsm_pin.verification.records import Verdict
+
+URDF = """<robot name="one"><link name="base"/>
+  <link name="arm"><collision><origin xyz="0.5 0 0"/>
+    <geometry><sphere radius="0.02"/></geometry></collision></link>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="arm"/>
+    <axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="9"/></joint>
+</robot>
+"""
+ROWS = "turn_rad\n0\n0.2\n"
+
+
+def cell_in(folder: Path, mesh: Any, more: str = "") -> Cell:
+    """The robot in a scene of one mesh; its ball starts at (0.5, 0, 0)."""
+    write(folder, "one.urdf", URDF)
+    write(folder, "t.csv", ROWS)
+    mesh.export(folder / "m.stl")
+    return read_cell(
+        write(
+            folder,
+            "cell.yaml",
+            "vdsm_problem: 1\nlength_unit: m\nrobot: {urdf: one.urdf}\n"
+            "required_clearance: 0.005\nobstacles:\n"
+            f"  - {{name: shell, shape: mesh, file: m.stl, length_unit: m{more}}}\n",
+        )
+    )
+
+
+def judged(cell: Cell, folder: Path) -> RobotVerification:
+    return verify_robot(cell, read_path(folder / "t.csv", cell.robot))
+
+
+def winding(mesh: Any, point: FloatArray) -> float:
+    """Solid angle of the triangles over 4 pi (Van Oosterom and Strackee 1983)."""
+    a, b, c = np.moveaxis(mesh.triangles - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
+    triple = np.einsum("ij,ij->i", a, np.cross(b, c))
+    dots = (
+        np.einsum("ij,ij->i", x, y) * z
+        for x, y, z in ((a, b, lc), (a, c, lb), (b, c, la))
+    )
+    return float(np.arctan2(triple, la * lb * lc + sum(dots)).sum() / (2.0 * np.pi))
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_verdicts_are_those_of_solid_angles(seed: int, tmp_path: Path) -> None:
+    rng = np.random.default_rng(seed)
+    shapes = (
+        lambda: trimesh.creation.torus(0.3, 0.12, 24, 16),
+        lambda: trimesh.creation.annulus(0.15, 0.4, 0.5, sections=24),
+        lambda: trimesh.creation.icosphere(2, 0.35),
+        lambda: trimesh.creation.box((0.5, 0.4, 0.6)),
+    )
+    mesh = shapes[seed % 4]()
+    mesh.apply_transform(trimesh.transformations.random_rotation_matrix(rng.random(3)))
+    mesh.apply_translation(np.array([0.5, 0.0, 0.0]) + rng.uniform(-0.4, 0.4, 3))
+    result = judged(cell_in(tmp_path, mesh), tmp_path)
+    (row,) = (check for check in result.checks if check.name == LINKS)
+    inside = abs(winding(mesh, np.array([0.5, 0.0, 0.0]))) > 0.5
+    assert row.verdict is (Verdict.REFUTED if inside else Verdict.CERTIFIED)
+    if inside:
+        assert result.verdict is Verdict.REFUTED
+        assert row.where == "link 'arm' is inside 'shell'"
+        assert result.closest(1)[0].upper <= 0.0
+        np.testing.assert_allclose(result.closest(1)[0].link_point, [0.5, 0, 0])
+
+
+def test_between_two_shells_is_outside_and_in_their_wall_is_not(tmp_path: Path) -> None:
+    outer = trimesh.creation.icosphere(2, 2.0)
+    inner = trimesh.creation.icosphere(2, 1.0)
+    inner.invert()
+    hollow = trimesh.util.concatenate([outer, inner])  # the ball is in the cavity
+    assert judged(cell_in(tmp_path, hollow), tmp_path).verdict is Verdict.CERTIFIED
+    nested = trimesh.util.concatenate([outer, trimesh.creation.icosphere(2, 1.0)])
+    assert judged(cell_in(tmp_path, nested), tmp_path).verdict is Verdict.REFUTED
+
+
+def test_an_inside_that_cannot_be_told_is_undecided_or_far(tmp_path: Path) -> None:
+    bowl = trimesh.creation.icosphere(2, 0.3)
+    bowl.update_faces(bowl.triangles_center[:, 0] > -0.1)
+    bowl.apply_translation([0.5, 0.0, 0.0])
+    result = judged(cell_in(tmp_path, bowl), tmp_path)
+    assert result.verdict is Verdict.UNDECIDED
+    row = next(check for check in result.checks if check.name == LINKS)
+    assert row.where.startswith(
+        "whether link 'arm' is inside 'shell' cannot be decided"
+    )
+    stated = cell_in(tmp_path, bowl, ", solid: false")
+    assert judged(stated, tmp_path).verdict is Verdict.CERTIFIED
+    bowl.apply_translation([0.5, 0.0, 0.0])
+    assert judged(cell_in(tmp_path, bowl), tmp_path).verdict is Verdict.CERTIFIED
+
+
+def test_a_mesh_that_moves_over_a_link_is_refuted(tmp_path: Path) -> None:
+    box = trimesh.creation.box((0.5, 0.5, 0.5))
+    motion = ", motion: {times_s: [0, 1], positions: [[0.5, 0, 0], [0.6, 0, 0]]}"
+    cell = cell_in(tmp_path, box, motion)
+    q, times = np.array([[0.0], [0.1]]), np.array([0.0, 1.0])
+    assert verify_robot(cell, Motion(q, times=times)).verdict is Verdict.REFUTED
+    away = cell_in(tmp_path, box, motion.replace("0.5, 0, 0]", "-0.5, 0, 0]"))
+    late = Motion(q, times=np.array([-2.0, -1.0]))
+    assert verify_robot(away, late).verdict is Verdict.CERTIFIED
+
+
+def test_the_checker_asks_for_the_inside_too(tmp_path: Path) -> None:
+    files = tmp_path / "cell.yaml", tmp_path / "t.csv"
+    beside = trimesh.creation.icosphere(2, 0.3)
+    around = trimesh.creation.icosphere(2, 2.0)
+    for mesh, is_outside in ((beside, True), (around, False)):
+        # Proved of the surface alone, and then told of the solid.
+        found = judged(cell_in(tmp_path, mesh, ", solid: false"), tmp_path)
+        assert found.verdict is Verdict.CERTIFIED
+        source = cell_in(tmp_path, mesh).source
+        assert source is not None
+        hashes = Hashes(source.sha256, sha256_of_file(files[1]))
+        write_robot_certificate(tmp_path / "c", found, hashes)
+        outcome = check_certificate(tmp_path / "c", *files)
+        assert outcome.accepted is is_outside
+        if not is_outside:
+            assert "a body is not proved outside shell: it is inside" in outcome.reason
+
+
+def test_a_planning_scene_brings_its_meshes(tmp_path: Path) -> None:
+    box = trimesh.creation.box((0.2, 0.4, 0.6))
+    corners = [dict(zip("xyz", map(float, v), strict=True)) for v in box.vertices]
+    faces = [{"vertex_indices": [int(k) for k in face]} for face in box.faces]
+    yaml = write(
+        tmp_path,
+        "m.yaml",
+        "world:\n  collision_objects:\n    - id: crate\n"
+        f"      meshes: [{{vertices: {corners}, triangles: {faces}}}]\n"
+        "      mesh_poses: [{position: [0, 0, 1], orientation: [0, 0, 1, 0]}]\n",
+    )
+    numbers = [*map(str, box.vertices.ravel().tolist()), *map(str, box.faces.ravel())]
+    text = write(
+        tmp_path,
+        "m.scene",
+        f"crates\n* crate\n1\nmesh\n8 12\n{' '.join(numbers)}\n"
+        "0 0 1\n0 0 1 0\n0 0 0 0\n.\n",
+    )
+    for file in (yaml, text):
+        (mesh,) = read_scene(file, 1.0).obstacles
+        np.testing.assert_allclose(
+            mesh.closed_mesh.corners.mean(axis=(0, 1)), [0, 0, 1], atol=1e-15
+        )
+        assert mesh.has_inside
+        np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), [0.2, 0.4, 0.6])
+    good, first = yaml.read_text(), str(faces[0]["vertex_indices"])
+    for bad in ("[0, 1, 99]", "[0, 1, -1]", "[0, 1, 1e30]", "[0, 1, 0.5]", "[0, 1]"):
+        text = write(tmp_path, "bad.yaml", good.replace(first, bad, 1))
+        with pytest.raises(InvalidFile, match=r"of 8 vertices|3 num"):
+            read_scene(text, 1.0)

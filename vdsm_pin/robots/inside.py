@@ -1,0 +1,153 @@
+"""Whether links of a robot are inside a mesh: where they are as the motion begins.
+
+Every convex part of a link that is proved to keep off a mesh's triangles stays on its
+side of them, so one point of it at the first row decides for the whole motion. Where
+the inside of a mesh cannot be told, a link is outside if it is proved to keep its
+clearance from the mesh's hull.
+"""
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
+from vdsm_pin.geometry.solids import Mesh
+from vdsm_pin.geometry.winding import Location, Side, locate
+from vdsm_pin.problem.scene import solid_of, with_hulls
+from vdsm_pin.proof.bodies import Body
+from vdsm_pin.proof.budget import Budget
+from vdsm_pin.proof.error_box import ErrorBox
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.prover import prove
+from vdsm_pin.proof.terms import CERTIFIED, REFUTED
+from vdsm_pin.robots.cell import Cell
+from vdsm_pin.verification.inside import worst_location
+from vdsm_pin.verification.records import ClearanceProfile, LeastClearances
+
+
+class Place(NamedTuple):
+    """Where a link begins as seen from a mesh, and a point of it that tells.
+
+    Args:
+        where: As seen from the mesh.
+        point: In the world, shape (3,); [m].
+    """
+
+    where: Location
+    point: FloatArray
+
+
+def locate_links(
+    cell: Cell, path: Path, box: ErrorBox | None, budget: Budget
+) -> dict[int, Place]:
+    """Where each link begins as seen from each mesh that may have an inside.
+
+    Args:
+        cell: Robot and scene.
+        path: Of all that moves.
+        box: The errors of the proof.
+        budget: Of the proof off hulls.
+
+    Returns:
+        By the number of their pair.
+    """
+    solids = [solid_of(one) for one in cell.scene.obstacles]
+    n, poses = len(cell.robot.bodies), cell.tree.poses(path.knots[:1])[0]
+    found = dict[int, Place]()
+    for k, pair in enumerate(cell.pairs):
+        mesh = solids[pair.one - n] if pair.one >= n else None
+        if isinstance(mesh, Mesh) and not mesh.is_surface:
+            link, rest = cell.bodies[pair.other], poses[cell.bodies[pair.one].frame]
+            found[k] = _place(mesh, link, poses[link.frame], rest, pair.required)
+    return found | _clear_of_hulls(cell, path, box, budget, found)
+
+
+def _place(
+    mesh: Mesh, link: Body, pose: FloatArray, rest: FloatArray, required: float
+) -> Place:
+    """Where a link stands as seen from a mesh: what of its parts says the most.
+
+    Args:
+        mesh: In its own frame.
+        link: In its own.
+        pose: T_world_link, shape (4, 4); [m].
+        rest: T_world_mesh, shape (4, 4); [m].
+        required: How far the link keeps off the mesh; [m].
+    """
+    places = []
+    for piece in link.pieces:
+        middle, radius = _middle(piece)
+        point = pose[:3, :3] @ middle + pose[:3, 3]
+        seen = (point - rest[:3, 3]) @ rest[:3, :3]
+        where = locate(mesh.closed_mesh, seen, radius + required)
+        places.append(Place(where._replace(who=f"link {link.name!r}"), point))
+    worst = worst_location([place.where for place in places])
+    return next(place for place in places if place.where == worst)
+
+
+def _middle(piece: Piece) -> tuple[FloatArray, float]:
+    """A point of a convex part of a link, and how far off its skin it lies; [m]."""
+    if isinstance(piece, FlatCylinder):
+        return piece.centre, 0.0
+    assert isinstance(piece, Hull)  # links have no half-spaces
+    return piece.points.mean(axis=0), piece.radius
+
+
+def _clear_of_hulls(
+    cell: Cell,
+    path: Path,
+    box: ErrorBox | None,
+    budget: Budget,
+    located: Mapping[int, Place],
+) -> dict[int, Place]:
+    """Pairs of an unknown inside whose link keeps clear of the mesh's hull."""
+    unknown = [k for k, one in located.items() if one.where.side is Side.UNKNOWN]
+    if not unknown:
+        return {}
+    pairs = [cell.pairs[k] for k in unknown]
+    n = len(cell.robot.bodies)
+    names = {cell.scene.obstacles[pair.one - n].name for pair in pairs}
+    hulls = replace(cell, scene=with_hulls(cell.scene, names))
+    proof = prove(cell.tree, hulls.bodies, path, pairs, box, budget)
+    clear = [unknown[k] for k in np.flatnonzero(proof.verdict == CERTIFIED)]
+    outside = Location(Side.OUTSIDE)
+    return {k: located[k]._replace(where=outside) for k in clear}
+
+
+def by_mesh(cell: Cell, located: Mapping[int, Place]) -> dict[str, Location]:
+    """What of each mesh says the most against the motion."""
+    found = dict[str, list[Location]]()
+    for k, one in located.items():
+        found.setdefault(cell.bodies[cell.pairs[k].one].name, []).append(one.where)
+    return {name: worst_location(each) for name, each in found.items()}
+
+
+def enclosed(least: LeastClearances, located: Mapping[int, Place]) -> LeastClearances:
+    """The least clearances with meshes as solids: no room for a link inside of one."""
+    changed = {one.name: getattr(least, one.name).copy() for one in fields(least)}
+    for k, one in located.items():
+        if one.where.side is Side.INSIDE:
+            found = 0, 0.0, 0.0, 0.0, REFUTED, one.point, one.point
+            for values, value in zip(changed.values(), found, strict=True):
+                values[k] = value
+    return LeastClearances(**changed)
+
+
+def enclosed_profile(
+    profile: ClearanceProfile, cell: Cell, located: Mapping[int, Place]
+) -> ClearanceProfile:
+    """The profile with meshes as solids, until links that begin inside may come out."""
+    changed = {one.name: getattr(profile, one.name).copy() for one in fields(profile)}
+    for k, one in located.items():
+        if one.where.side is Side.INSIDE:
+            pair, n = cell.pairs[k], len(cell.robot.bodies)
+            met = changed["obstacle_lower"][:, pair.one - n] <= 0.0
+            inside = ~np.logical_or.accumulate(met)
+            for name, column in (("link", pair.other), ("obstacle", pair.one - n)):
+                for side in ("lower", "upper"):
+                    values = changed[f"{name}_{side}"]
+                    values[inside, column] = np.minimum(values[inside, column], 0.0)
+    return ClearanceProfile(**changed)
