@@ -9,7 +9,8 @@ import made_up
 import numpy as np
 import pytest
 
-from vdsm_pin.report.facts import batch_row, cables, verification_file
+from vdsm_pin.arm.cables import cable_lengths
+from vdsm_pin.report.facts import batch_row, verification_file
 from vdsm_pin.report.tables import (
     ClearanceCsv,
     read_summary,
@@ -81,7 +82,8 @@ def test_angles_and_cables_have_a_row_per_waypoint(tmp_path: Path) -> None:
     assert len(angles) == len(lengths) == 7
     head = ["waypoint", "on_path", "path_m", "x0_m", "l1a_m", "l1b_m", "l1c_m"]
     assert list(lengths[0])[:7] == head
-    expected = cables(judged.problem, judged.trajectory)
+    arm, rows = judged.problem.manipulator, judged.trajectory
+    expected = cable_lengths(arm, rows.alpha, rows.theta)
     got = [[float(v) for v in list(row.values())[4:]] for row in lengths]
     np.testing.assert_allclose(got, expected.reshape(7, -1), rtol=1e-11)
     assert float(angles[3]["x0_m"]) == pytest.approx(judged.trajectory.x0[3])

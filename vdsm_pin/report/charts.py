@@ -9,9 +9,8 @@ import numpy as np
 from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.report.facts import cables, changed_angles, min_clearance
+from vdsm_pin.report.facts import changed_angles, min_clearance
 from vdsm_pin.report.palette import link_colours, obstacle_colours
-from vdsm_pin.report.postures import straight_arm
 from vdsm_pin.report.thinning import MOST_PLOTTED, Thinned, nearest_obstacles
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.records import ArmVerification, Verification
@@ -203,10 +202,10 @@ def _joint_charts(
 
 
 def _cable_chart(verification: ArmVerification, shown: Thinned) -> dict[str, Any]:
-    straight = cables(verification.problem, straight_arm(verification.problem))
     arm, rows = verification.problem.manipulator, verification.trajectory
+    zero = np.zeros((1, arm.n_links))
     lengths = cable_lengths(arm, rows.alpha[shown.rows], rows.theta[shown.rows])
-    change = (lengths - straight) * MM_PER_M
+    change = (lengths - cable_lengths(arm, zero, zero)) * MM_PER_M
     colours = link_colours(change.shape[1])
     return {
         "id": "cables",

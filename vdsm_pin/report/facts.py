@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.planner.records import Plan
@@ -497,8 +496,3 @@ def batch_row(folder: str, strategy: str, file: VerificationFile) -> BatchRow:
         waypoints=motion.waypoints,
         reason="; ".join(filter(None, (file.reason, assumption(file.assumed_sizes)))),
     )
-
-
-def cables(problem: PlanningProblem, rows: Trajectory) -> FloatArray:
-    """Cable lengths of every row, shape (n_samples, N, 3); [m]."""
-    return cable_lengths(problem.manipulator, rows.alpha, rows.theta)

@@ -16,23 +16,18 @@ def one_row(joints: FloatArray) -> Trajectory:
     )
 
 
-def straight_arm(problem: PlanningProblem) -> Trajectory:
-    """The straight arm along its rail."""
-    low, high = problem.manipulator.base_range
-    joints = np.zeros(1 + 2 * problem.manipulator.n_links)
-    joints[0] = min(max(low, 0.0), high)
-    return one_row(joints)
-
-
 def at_start(problem: PlanningProblem) -> Trajectory:
     """The arm where it begins.
 
     A start known by its tip is the straight arm's; where any start will do the arm is
     straight along its rail.
     """
-    begin = problem.begin
+    arm, begin = problem.manipulator, problem.begin
     if begin is None:
-        return straight_arm(problem)
+        low, high = arm.base_range
+        joints = np.zeros(1 + 2 * arm.n_links)
+        joints[0] = min(max(low, 0.0), high)
+        return one_row(joints)
     if begin.joints is None:
-        return one_row(straight_joints(problem.manipulator, begin.tip))
+        return one_row(straight_joints(arm, begin.tip))
     return one_row(begin.joints)

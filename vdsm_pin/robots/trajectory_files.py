@@ -18,7 +18,7 @@ from vdsm_pin.io.joint_trajectory import (
     JointTrajectory,
     read_joint_trajectory,
 )
-from vdsm_pin.io.source import check_is_file
+from vdsm_pin.io.source import check_is_file, readable
 from vdsm_pin.io.tables import Table, open_text
 from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.units import MM_PER_M
@@ -131,7 +131,8 @@ def _read_csv(file: File, joints: Sequence[RobotJoint]) -> JointTrajectory:
         problem = f"has velocities, expected {TIME} too"
         raise InvalidFile(file=file, where="line 1", problem=problem)
     wanted = [*columns, *times, *smooth[0], *smooth[1]]
-    table, n = _table(file, wanted), len(columns)
+    with readable(file), open_text(file) as text:
+        table, n = Table(file, text, wanted).all_rows(), len(columns)
     _check_degrees(file, table, columns)
     rest = table[:, n + len(times) :]
     parts = [
@@ -195,19 +196,6 @@ def _smooth_columns(
             raise InvalidFile(file=file, where="line 1", problem=problem)
         _check_kind(file, *found[joint.name], joint)
     return [found[joint.name][0] for joint in joints] if mine else []
-
-
-def _table(file: File, columns: Sequence[str]) -> FloatArray:
-    """The numbers of some columns, shape (n_rows, n_columns)."""
-    try:
-        with open_text(file) as text:
-            parts = list(Table(file, text, list(columns)).rows())
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InvalidFile(file=file, problem=f"cannot be read: {reason}") from None
-    if not parts:
-        raise InvalidFile(file=file, problem="has no row")
-    return np.concatenate(parts)
 
 
 def _check_degrees(file: File, table: FloatArray, columns: Sequence[str]) -> None:
