@@ -1,5 +1,7 @@
 """Errors as people state them: in degrees and millimetres, by joint and by obstacle."""
 
+import json
+import shlex
 from math import radians
 from pathlib import Path
 
@@ -8,7 +10,7 @@ from typer.testing import CliRunner
 
 import vdsm_pin as vp
 from vdsm_pin.cli import app
-from vdsm_pin.cli.options import errors_of
+from vdsm_pin.cli.options import ErrorOptions
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.problem import error_boxes
 
@@ -27,7 +29,7 @@ ROW = "waypoint,on_path,path_m,x0_m,alpha1_rad,theta1_rad,alpha2_rad,theta2_rad\
 
 def test_options_and_python_say_the_same() -> None:
     words = ["1", "crate=2.5", "a=b=4"]
-    typed = errors_of("0.1,0.2,0.3", 2.0, 0.01, words, ["crate=0.5"])
+    typed = ErrorOptions("0.1,0.2,0.3", 2.0, 0.01, words, ["crate=0.5"]).box()
     box = vp.ErrorBox(
         joint_deg=[0.1, 0.2, 0.3],
         base_mm=2.0,
@@ -42,7 +44,7 @@ def test_options_and_python_say_the_same() -> None:
     crate = typed.of_obstacle("crate")
     assert crate.shift == 0.0025 and crate.turn == radians(0.5)
     assert typed.of_obstacle("other").shift == 0.001
-    assert errors_of("0.1", 0.0, 0.0, None, None).angles(2).max() == radians(0.1)
+    assert ErrorOptions("0.1").box().angles(2).max() == radians(0.1)
 
 
 @pytest.mark.parametrize(
@@ -63,7 +65,7 @@ def test_what_is_no_error_is_refused(
     joint: str, shifts: list[str] | None, turns: list[str] | None, words: str
 ) -> None:
     with pytest.raises(InvalidInput, match=words):
-        errors_of(joint, 0.0, 0.0, shifts, turns)
+        ErrorOptions(joint, 0.0, 0.0, shifts, turns).box()
 
 
 def write(folder: Path) -> list[str]:
@@ -102,6 +104,19 @@ def test_errors_count_for_their_joint_and_obstacle(
 ) -> None:
     code, text = run([*write(tmp_path), *options])
     assert code == (0 if passes else 1), text
+
+
+def test_a_batch_takes_them_all_and_tells_how_to_repeat_it(tmp_path: Path) -> None:
+    _, problem, _, motion, *_ = write(tmp_path)
+    errors = ["--joint-error-deg", "0.5,0.5", "--obstacle-error-mm", "a=55.1"]
+    out = tmp_path / "out"
+    words = ["batch", problem, "--trajectories", motion, *errors, "--out", str(out)]
+    code, text = run(words)
+    assert code == 1, text
+    told = json.loads((out / "p-t" / "verification.json").read_text())
+    assert told["error_box"]["obstacles"][0]["name"] == "a"
+    assert told["verdict"] != "certified"
+    assert shlex.split(told["command"])[5:9] == errors
 
 
 def test_an_unknown_obstacle_and_a_list_of_another_arm_are_named(

@@ -10,6 +10,7 @@ from oracles.certificate_cases import certificate_lines
 from vdsm_pin.batch.run import Batch, run_batch
 from vdsm_pin.batch.task import CERTIFICATE, Proving
 from vdsm_pin.errors import InvalidFile
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.report.files import VerificationFile
 
 URDF = """<robot name="r"><link name="foot"/><link name="arm"><collision>
@@ -99,13 +100,13 @@ def test_what_changed_is_done_again(folder: Path) -> None:
 @pytest.mark.parametrize(("degrees", "passes"), [(10.0, True), (20.0, False)])
 def test_errors_are_asked_about(folder: Path, degrees: float, passes: bool) -> None:
     """By 18.5 deg more the arm, 30 deg from the ball, comes nearer than 10 mm."""
-    rows = run_batch(asked(folder, proving=Proving(joint_error_deg=degrees)))
+    rows = run_batch(asked(folder, proving=Proving(ErrorBox(joint=radians(degrees)))))
     outcomes = {row.folder: row.outcome for row in rows}
     assert (outcomes["cell-clear"] == "certified") is passes
 
 
 def test_certificates_are_written_under_errors(folder: Path) -> None:
-    both = Proving(joint_error_deg=1.0, certificate=True)
+    both = Proving(ErrorBox(joint=radians(1.0)), certificate=True)
     rows = {row.folder: row for row in run_batch(asked(folder, proving=both))}
     assert rows["cell-clear"].outcome == "certified"
     lines = certificate_lines(folder / "out" / "cell-clear" / CERTIFICATE)

@@ -107,9 +107,7 @@ def run_batch(batch: Batch) -> tuple[BatchRow, ...]:
         Interrupted: On Ctrl-C or SIGTERM, after everything finished is written down.
     """
     strategy(batch.strategy)
-    asked = batch.proving
-    _ = asked.errors  # refused before anything is written
-    if asked.pdf:
+    if batch.proving.pdf:
         find_browser()
     check_output_folder(batch.folder)
     tasks = _tasks(batch)

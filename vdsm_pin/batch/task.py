@@ -7,7 +7,7 @@ import shutil
 import time
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -74,39 +74,22 @@ class Proving:
     """What each problem of a batch is proved for and written besides.
 
     Args:
-        joint_error_deg: Largest error of every joint angle; [deg].
-        base_error_mm: Largest shift of the base; [mm].
-        obstacle_error_mm: Largest error of the obstacles; [mm].
+        errors: That every clearance is asked for under, besides the problem's own.
+        words: The options of the command line that say so.
         certificate: Whether each certified motion gets its certificate.
         pdf: Whether each report is printed too.
-        base_error_deg: Largest turn of the base; [deg].
     """
 
-    joint_error_deg: float = 0.0
-    base_error_mm: float = 0.0
-    obstacle_error_mm: float = 0.0
+    errors: ErrorBox = field(default_factory=ErrorBox)
+    words: tuple[str, ...] = ()
     certificate: bool = False
     pdf: bool = False
-    base_error_deg: float = 0.0
-
-    @property
-    def errors(self) -> ErrorBox:
-        """The error box of every problem."""
-        return ErrorBox.typed(
-            self.joint_error_deg,
-            self.base_error_mm,
-            self.obstacle_error_mm,
-            self.base_error_deg,
-        )
 
     @property
     def options(self) -> list[str]:
         """The options of the command line that ask for it."""
-        found = []
-        for one in fields(self):
-            value, option = getattr(self, one.name), f"--{one.name.replace('_', '-')}"
-            found += [option] if value is True else [option, f"{value:g}"] * bool(value)
-        return found
+        more = {"--certificate": self.certificate, "--pdf": self.pdf}
+        return [*self.words, *(name for name, asked in more.items() if asked)]
 
 
 @dataclass(frozen=True)

@@ -9,16 +9,15 @@ from vdsm_pin.cli.options import (
     NOT_PASSED,
     PASSED,
     AsJson,
-    BaseError,
-    BaseTurn,
-    JointError,
-    ObstacleError,
+    ErrorOptions,
     OutFolder,
     Quiet,
+    SlideErrors,
     Strategy,
     TimeLimit,
     examples,
     family,
+    grouped,
 )
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
 
@@ -32,8 +31,10 @@ commands = family()
         "vdsm batch cell.yaml --trajectories plans --out out/plans",
     ),
 )
+@grouped
 def batch(
     out: OutFolder,
+    *,
     problems: Annotated[
         list[str] | None,
         typer.Argument(
@@ -67,10 +68,8 @@ def batch(
         Literal["all", "failed", "none"],
         typer.Option(help="Whose files stay; every problem keeps its row."),
     ] = "all",
-    joint_error_deg: JointError = 0.0,
-    base_error_mm: BaseError = 0.0,
-    base_error_deg: BaseTurn = 0.0,
-    obstacle_error_mm: ObstacleError = 0.0,
+    errors: ErrorOptions,
+    slide_error_mm: SlideErrors = "0",
     certificate: Annotated[
         bool, typer.Option("--certificate", help="Write a proof of each to its folder.")
     ] = False,
@@ -90,6 +89,9 @@ def batch(
     from vdsm_pin.batch.task import Proving
     from vdsm_pin.report.words import outcome
 
+    words = errors.words()
+    if slide_error_mm != "0":
+        words += ("--slide-error-mm", slide_error_mm)
     asked = Batch(
         problems=tuple(problems or ()),
         folder=out,
@@ -99,14 +101,7 @@ def batch(
         time_limit=time_limit,
         scheduler=scheduler,
         keep=keep,
-        proving=Proving(
-            joint_error_deg=joint_error_deg,
-            base_error_mm=base_error_mm,
-            obstacle_error_mm=obstacle_error_mm,
-            certificate=certificate,
-            pdf=pdf,
-            base_error_deg=base_error_deg,
-        ),
+        proving=Proving(errors.box(slide_error_mm), words, certificate, pdf),
         quiet=quiet or as_json,
         trajectories=tuple(trajectories or ()),
     )

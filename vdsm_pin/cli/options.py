@@ -1,10 +1,12 @@
 """What commands share: arguments and options, exit codes, help pages."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import wraps
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
 import typer
 
@@ -36,12 +38,6 @@ Strategy = Annotated[
     str, typer.Option(metavar="NAME", help=f"One of {', '.join(STRATEGIES)}.")
 ]
 
-JointError = Annotated[
-    float,
-    typer.Option(
-        min=0.0, metavar="DEG", help="Largest error of every joint angle [deg]."
-    ),
-]
 BaseError = Annotated[
     float,
     typer.Option(
@@ -54,11 +50,6 @@ BaseTurn = Annotated[
         min=0.0, metavar="DEG", help="Largest turn of the base about its origin [deg]."
     ),
 ]
-ObstacleError = Annotated[
-    float,
-    typer.Option(min=0.0, metavar="MM", help="Largest error of the obstacles [mm]."),
-]
-
 JointErrors = Annotated[
     str,
     typer.Option(
@@ -125,39 +116,90 @@ def examples(*lines: str) -> str:
     return "\n".join(["\b", "Examples:", *(f"  {line}" for line in lines)])
 
 
-def errors_of(
-    joint_deg: str,
-    base_mm: float,
-    base_deg: float,
-    obstacles_mm: Sequence[str] | None,
-    obstacles_deg: Sequence[str] | None,
-    slide_mm: str = "0",
-) -> "ErrorBox":
-    """The error box that a user types.
+class ErrorOptions(NamedTuple):
+    """Errors as they were given, see `grouped`."""
 
-    Raises:
-        InvalidInput: If one is no number, or negative, or has no name and needs one.
+    joint_error_deg: JointErrors = "0"
+    base_error_mm: BaseError = 0.0
+    base_error_deg: BaseTurn = 0.0
+    obstacle_error_mm: ObstacleErrors = None
+    obstacle_error_deg: ObstacleTurns = None
+
+    def box(self, slide_mm: str = "0") -> "ErrorBox":
+        """The error box that they say, with what joints that slide are off by.
+
+        Raises:
+            InvalidInput: If one is no number, or negative, or has no name and needs
+                one.
+        """
+        from vdsm_pin.problem.error_boxes import ErrorBox
+
+        shifts = _by_name("--obstacle-error-mm", self.obstacle_error_mm or ())
+        turns = _by_name("--obstacle-error-deg", self.obstacle_error_deg or ())
+        if "" in turns:
+            message = "--obstacle-error-deg needs the obstacle's name, NAME=DEG"
+            raise InvalidInput(message)
+        slide = _of_joints("--slide-error-mm", slide_mm)
+        if isinstance(slide, list):
+            message = f"--slide-error-mm is {slide_mm!r}, expected a number or JOINT=MM"
+            raise InvalidInput(message)
+        return ErrorBox.typed(
+            _of_joints("--joint-error-deg", self.joint_error_deg),
+            self.base_error_mm,
+            shifts.pop("", 0.0),
+            self.base_error_deg,
+            shifts,
+            turns,
+            slide,
+        )
+
+    def words(self) -> tuple[str, ...]:
+        """The options as on a command line, those that were left out missing."""
+        found: list[str] = []
+        for name, value in self._asdict().items():
+            if value != self._field_defaults[name]:
+                option = f"--{name.replace('_', '-')}"
+                each = value if isinstance(value, list) else [value]
+                found += [word for one in each for word in (option, str(one))]
+        return tuple(found)
+
+
+def grouped(command: Callable[..., None]) -> Callable[..., None]:
+    """A command whose parameters that are groups of options become these options.
+
+    A group is a `NamedTuple` of options with their defaults.
     """
-    from vdsm_pin.problem.error_boxes import ErrorBox
+    asked = signature(command).parameters.values()
+    groups = {one.name: one.annotation for one in asked if _is_group(one.annotation)}
 
-    shifts = _by_name("--obstacle-error-mm", obstacles_mm or ())
-    turns = _by_name("--obstacle-error-deg", obstacles_deg or ())
-    if "" in turns:
-        message = "--obstacle-error-deg needs the obstacle's name, NAME=DEG"
-        raise InvalidInput(message)
-    slide = _of_joints("--slide-error-mm", slide_mm)
-    if isinstance(slide, list):
-        message = f"--slide-error-mm is {slide_mm!r}, expected a number or JOINT=MM"
-        raise InvalidInput(message)
-    return ErrorBox.typed(
-        _of_joints("--joint-error-deg", joint_deg),
-        base_mm,
-        shifts.pop("", 0.0),
-        base_deg,
-        shifts,
-        turns,
-        slide,
-    )
+    @wraps(command)
+    def run(**given: Any) -> None:
+        for name, group in groups.items():
+            given[name] = group(*(given.pop(field) for field in group._fields))
+        command(**given)
+
+    parameters: list[Parameter] = []
+    for one in asked:
+        if one.name not in groups:
+            parameters.append(one.replace(kind=Parameter.KEYWORD_ONLY))
+            continue
+        group = groups[one.name]
+        parameters += [
+            Parameter(
+                name,
+                Parameter.KEYWORD_ONLY,
+                default=group._field_defaults[name],
+                annotation=option,
+            )
+            for name, option in group.__annotations__.items()
+        ]
+    run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {one.name: one.annotation for one in parameters}
+    return run
+
+
+def _is_group(annotation: Any) -> bool:
+    return isinstance(annotation, type) and hasattr(annotation, "_field_defaults")
 
 
 def _of_joints(option: str, text: str) -> float | list[float] | dict[str, float]:

@@ -10,19 +10,15 @@ from vdsm_pin.cli.options import (
     NOT_PASSED,
     PASSED,
     AsJson,
-    BaseError,
-    BaseTurn,
-    JointErrors,
-    ObstacleErrors,
-    ObstacleTurns,
+    ErrorOptions,
     OutFolder,
     PlanningTime,
     Problem,
     Quiet,
     Strategy,
-    errors_of,
     examples,
     family,
+    grouped,
 )
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime, VdsmError
 from vdsm_pin.planner.strategies import DEFAULT_STRATEGY
@@ -41,16 +37,14 @@ commands = family()
         "vdsm plan paper/obs1 --joint-error-deg 0.1 --out out/sturdy",
     )
 )
+@grouped
 def plan(
     context: typer.Context,
     problem: Problem,
     out: OutFolder,
+    *,
     strategy: Strategy = DEFAULT_STRATEGY,
-    joint_error_deg: JointErrors = "0",
-    base_error_mm: BaseError = 0.0,
-    base_error_deg: BaseTurn = 0.0,
-    obstacle_error_mm: ObstacleErrors = None,
-    obstacle_error_deg: ObstacleTurns = None,
+    errors: ErrorOptions,
     time_limit: PlanningTime = None,
     quiet: Quiet = False,
     as_json: AsJson = False,
@@ -69,20 +63,13 @@ def plan(
     from vdsm_pin.report.terminal import show_plan
     from vdsm_pin.report.words import outcome
 
-    errors = errors_of(
-        joint_error_deg,
-        base_error_mm,
-        base_error_deg,
-        obstacle_error_mm,
-        obstacle_error_deg,
-    )
-    limit = time_limit
+    box, limit = errors.box(), time_limit
     if limit is None:
         limit = COLD_LIMIT if is_cold() else LIMIT
     deadline, begin = Deadline.after(limit), time.monotonic()
     try:
         with enforced(deadline, grace=0.0):
-            source = read_problem(problem).under(errors)
+            source = read_problem(problem).under(box)
         told = nullcontext() if quiet or as_json else shown(limit=limit)
         with enforced(deadline), told:
             file = plan_to_folder(source, strategy, out, context.obj, deadline)

@@ -4,8 +4,15 @@ from typing import Annotated
 
 import typer
 
-from vdsm_pin.cli.options import OutFolder, TimeLimit, Trajectory, examples, family
-from vdsm_pin.cli.robot import RobotOptions, Topic, of_robots
+from vdsm_pin.cli.options import (
+    OutFolder,
+    TimeLimit,
+    Trajectory,
+    examples,
+    family,
+    grouped,
+)
+from vdsm_pin.cli.robot import RobotOptions, Topic
 from vdsm_pin.cli.verify import read_source
 from vdsm_pin.time_limit import Deadline, enforced
 
@@ -20,7 +27,7 @@ commands = family()
         "--trajectory plan.csv --out out/ur5",
     )
 )
-@of_robots
+@grouped
 def repair(
     context: typer.Context,
     trajectory: Trajectory,

@@ -1,10 +1,8 @@
 """What commands ask about a robot of a URDF: by options, or in a problem file."""
 
-from collections.abc import Callable, Mapping
-from functools import wraps
-from inspect import Parameter, Signature, signature
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
@@ -71,7 +69,7 @@ RequiredSelfClearance = Annotated[
 
 
 class RobotOptions(NamedTuple):
-    """Options as they were given; None where they were not."""
+    """Options as they were given, see `grouped`; None where they were not."""
 
     urdf: Urdf = None
     srdf: Srdf = None
@@ -124,34 +122,6 @@ class RobotOptions(NamedTuple):
         """By the names of the command line."""
         given = self._asdict().items()
         return {f"--{name.replace('_', '-')}": value for name, value in given}
-
-
-def of_robots(command: Callable[..., None]) -> Callable[..., None]:
-    """A command whose parameter `robot` becomes the options about a robot."""
-
-    @wraps(command)
-    def asked(**given: Any) -> None:
-        robot = RobotOptions(*(given.pop(name) for name in RobotOptions._fields))
-        command(robot=robot, **given)
-
-    options = [
-        Parameter(
-            name,
-            Parameter.KEYWORD_ONLY,
-            default=RobotOptions._field_defaults[name],
-            annotation=kind,
-        )
-        for name, kind in RobotOptions.__annotations__.items()
-    ]
-    own = [
-        one.replace(kind=Parameter.KEYWORD_ONLY)
-        for one in signature(command).parameters.values()
-    ]
-    place = [one.name for one in own].index("robot")
-    parameters = [*own[:place], *options, *own[place + 1 :]]
-    asked.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
-    asked.__annotations__ = {one.name: one.annotation for one in parameters}
-    return asked
 
 
 def refuse_beside(what: str, options: Mapping[str, object]) -> None:

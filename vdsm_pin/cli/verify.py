@@ -10,21 +10,17 @@ from vdsm_pin.cli.options import (
     NOT_PASSED,
     PASSED,
     AsJson,
-    BaseError,
-    BaseTurn,
-    JointErrors,
-    ObstacleErrors,
-    ObstacleTurns,
+    ErrorOptions,
     OutFolder,
     Quiet,
     SlideErrors,
     TimeLimit,
     Trajectory,
-    errors_of,
     examples,
     family,
+    grouped,
 )
-from vdsm_pin.cli.robot import RobotOptions, Topic, of_robots, refuse_beside
+from vdsm_pin.cli.robot import RobotOptions, Topic, refuse_beside
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.time_limit import Deadline, enforced
 
@@ -61,7 +57,7 @@ class Said(NamedTuple):
         "--trajectory plan.csv --required-clearance-mm 5 --out out/ur5",
     )
 )
-@of_robots
+@grouped
 def verify(
     context: typer.Context,
     trajectory: Trajectory,
@@ -74,12 +70,8 @@ def verify(
             help="A built-in name or a problem file; none with --urdf.",
         ),
     ] = None,
-    joint_error_deg: JointErrors = "0",
+    errors: ErrorOptions,
     slide_error_mm: SlideErrors = "0",
-    base_error_mm: BaseError = 0.0,
-    base_error_deg: BaseTurn = 0.0,
-    obstacle_error_mm: ObstacleErrors = None,
-    obstacle_error_deg: ObstacleTurns = None,
     certificate: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the proof to this file.")
     ] = None,
@@ -123,20 +115,13 @@ def verify(
     }
     said = Said(quiet, as_json)
     deadline = Deadline.after(time_limit)
-    errors = errors_of(
-        joint_error_deg,
-        base_error_mm,
-        base_error_deg,
-        obstacle_error_mm,
-        obstacle_error_deg,
-        slide_error_mm,
-    )
+    box = errors.box(slide_error_mm)
     from vdsm_pin.app.workflow import VerifyOrder
     from vdsm_pin.report.run_record import now
 
     with enforced(deadline, grace=0.0):
         order = VerifyOrder(
-            source=read_source(problem, errors, robot, of_arm, topic),
+            source=read_source(problem, box, robot, of_arm, topic),
             trajectory=trajectory,
             folder=out,
             command=context.obj,
