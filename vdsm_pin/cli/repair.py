@@ -48,11 +48,11 @@ def repair(
     ] = None,
     time_limit: TimeLimit = None,
 ) -> None:
-    """Move the waypoints of a trajectory until it is certified.
+    """Mend a trajectory until it is certified.
 
-    Of a snake arm the tip stays on its path. Writes trajectory.csv, repair.json (how
-    far each waypoint moved) and what verify writes; where no such trajectory is found,
-    nothing, and says why.
+    Moves its waypoints; of a snake arm the tip stays on its path. Writes
+    trajectory.csv, repair.json (how far each waypoint moved) and what verify writes;
+    where no such trajectory is found, nothing, and says why.
     """
     from vdsm_pin.app.repair import repair_to_folder
     from vdsm_pin.app.workflow import VerifyOrder

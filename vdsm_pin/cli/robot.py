@@ -36,17 +36,23 @@ Locks = Annotated[
 ]
 Group = Annotated[
     str | None,
-    typer.Option(help="Group of the SRDF whose joints move; others stand still."),
+    typer.Option(
+        metavar="NAME", help="Group of the SRDF whose joints move; others stand still."
+    ),
 ]
 Bodies = Annotated[
     Literal["hull", "parts", "primitives"] | None,
     typer.Option(help="What stands for the mesh of a link; its hull by default."),
 ]
 Parts = Annotated[
-    int | None, typer.Option(min=1, max=256, help="Hulls of one mesh [8].")
+    int | None,
+    typer.Option(min=1, max=256, metavar="NUMBER", help="Hulls of one mesh [8]."),
 ]
 JointLimits = Annotated[
-    Path | None, typer.Option(help="A joint_limits.yaml; the stricter limit counts.")
+    Path | None,
+    typer.Option(
+        metavar="FILE", help="A joint_limits.yaml; the stricter limit counts."
+    ),
 ]
 Topic = Annotated[
     str | None,
