@@ -29,7 +29,7 @@ def shrunk(body: Body, share: float, told: float = 1.0) -> Body:
     away = piece.points - piece.points.mean(axis=0)
     missed = share * np.linalg.norm(away, axis=1).max() + TOLERANCES.arithmetic
     few = FewCorners(piece.points - share * away, told * missed)
-    return replace(body, pieces=(replace(piece, few=few),))
+    return replace(body, pieces=(replace(piece, few=(few,)),))
 
 
 @pytest.mark.parametrize("degree", [1, 3, 5])
@@ -81,7 +81,7 @@ def test_where_errors_turn_all_corners_are_asked() -> None:
             np.testing.assert_array_equal(rough.lower, exact.lower)
 
 
-@pytest.mark.parametrize("n", [32, 300])
+@pytest.mark.parametrize("n", [32, 600])
 def test_few_corners_miss_no_more_than_they_tell(n: int) -> None:
     """A support of all corners exceeds that of few by no more, and by about as much."""
     rng = np.random.default_rng(n)
@@ -89,12 +89,14 @@ def test_few_corners_miss_no_more_than_they_tell(n: int) -> None:
     ways /= np.linalg.norm(ways, axis=1)[:, None]
     for _ in range(10):
         points = 0.1 * ways[rng.integers(len(ways), size=n)]
-        few = few_corners(points)
-        assert few is not None and len(few.points) == FEW_CORNERS
-        more = (points @ ways.T).max(axis=0) - (few.points @ ways.T).max(axis=0)
-        assert 0.8 * few.missed - 1e-6 <= more.max() <= few.missed
+        found = few_corners(points)
+        asked = [few for many, few in FEW_CORNERS.items() if many <= n]
+        assert [len(few.points) for few in found] == asked
+        for few in found:
+            more = (points @ ways.T).max(axis=0) - (few.points @ ways.T).max(axis=0)
+            assert 0.8 * few.missed - 1e-6 <= more.max() <= few.missed
 
 
 def test_few_corners_of_few_are_none() -> None:
     """They would cost as much as all."""
-    assert few_corners(np.random.default_rng(0).normal(size=(31, 3))) is None
+    assert few_corners(np.random.default_rng(0).normal(size=(31, 3))) == ()

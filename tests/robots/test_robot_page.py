@@ -75,14 +75,15 @@ def test_the_page_moves_the_links_as_the_tree_does(out: Path) -> None:
     q = np.column_stack([np.interp(moments, [0, 1, 2], rows[:, k]) for k in (0, 1)])
     assert np.abs(np.diff(q, axis=0)).max() < np.radians(4.1)
     poses = robot.poses(q)
+    frames = {body.name: poses[:, body.frame] for body in robot.bodies}
     places = unpacked(motion["places"]).reshape(3, len(moments), 3)
     turns = unpacked(motion["turns"]).reshape(3, len(moments), 4)
     for k, (body, link) in enumerate(zip(robot.bodies, links, strict=True)):
         x, y, z, w = turns[k].astype(float).T
         quarter = [1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)]
         ahead = np.stack(quarter, axis=1)
-        np.testing.assert_allclose(ahead, poses[body.name][:, :3, 0], atol=1e-5)
-        first = poses[body.name][0]
+        np.testing.assert_allclose(ahead, frames[body.name][:, :3, 0], atol=1e-5)
+        first = frames[body.name][0]
         corners = unpacked(link["vertices"]).reshape(-1, 3).astype(float)
         placed = corners @ first[:3, :3].T + places[k, 0]
         inner = (placed - first[:3, 3]) @ first[:3, :3]

@@ -25,7 +25,8 @@ RADIUS: Final = 3
 class Body(NamedTuple):
     """A convex body, in arrays that may have room for more.
 
-    Point k stands for corner k % corners at instant k // corners.
+    Point k stands for corner k % corners at instant k // corners. Where the arrays of
+    what grows corners are of size 0 nothing but discs does.
 
     Args:
         points: Shape (room, 3); [m].
@@ -63,8 +64,16 @@ def new_body(n_points: int, n_corners: int, room: int) -> Body:
 
 
 @compiled
+def _is_bare(body: Body) -> bool:
+    """Whether a body is the hull of its points alone."""
+    return bool(body.balls.size == 0 and not body.discs[0, RADIUS] > 0.0)
+
+
+@compiled
 def _growth(body: Body, corner: int, nx: float, ny: float, nz: float) -> float:
     """Largest n.x over the zonotope and ball of a corner, n of unit length; [m]."""
+    if body.balls.size == 0:
+        return 0.0
     g, total = body.swings, body.balls[corner]
     for k in range(body.sizes[corner]):
         total += abs(nx * g[corner, k, 0] + ny * g[corner, k, 1] + nz * g[corner, k, 2])
@@ -85,6 +94,11 @@ def body_reach(body: Body, nx: float, ny: float, nz: float) -> float:
     """Largest n.x over a body, n of unit length; [m]."""
     p, reach = body.points, -np.inf
     n_points, n_corners = body.used[0], body.used[1]
+    if _is_bare(body):
+        for k in range(n_points):
+            along = nx * p[k, 0] + ny * p[k, 1] + nz * p[k, 2]
+            reach = along if along > reach else reach
+        return reach
     first = second = 0.0
     if body.discs[0, RADIUS] > 0.0:
         first = _disc_reach(body, 0, nx, ny, nz)
@@ -116,6 +130,14 @@ def body_support(
     """
     p, g = body.points, body.swings
     n_points, n_corners = body.used[0], body.used[1]
+    if _is_bare(body):
+        most, k = -np.inf, 0
+        for j in range(n_points):
+            along = nx * p[j, 0] + ny * p[j, 1] + nz * p[j, 2]
+            if along > most:
+                most, k = along, j
+        point[0], point[1], point[2] = p[k, 0], p[k, 1], p[k, 2]
+        return most
     first = second = 0.0
     has_disc = body.discs[0, RADIUS] > 0.0
     if has_disc:
@@ -129,9 +151,11 @@ def body_support(
             if value > best:
                 best, at, corner = value, k, c
             disc, k = second, k + n_corners
-    ball = body.balls[corner]
+    ball, size = 0.0, 0
+    if body.balls.size > 0:
+        ball, size = body.balls[corner], body.sizes[corner]
     x, y, z = p[at, 0] + ball * nx, p[at, 1] + ball * ny, p[at, 2] + ball * nz
-    for k in range(body.sizes[corner]):
+    for k in range(size):
         along = nx * g[corner, k, 0] + ny * g[corner, k, 1] + nz * g[corner, k, 2]
         side = 1.0 if along >= 0.0 else -1.0
         x, y, z = (

@@ -31,12 +31,12 @@ class Hull:
     Args:
         points: Shape (n, 3), n >= 1; [m].
         radius: 0 or more; [m].
-        few: Some of its corners, where it has many.
+        few: Some of its corners, where it has many, and more of them.
     """
 
     points: FloatArray
     radius: float = 0.0
-    few: FewCorners | None = None
+    few: tuple[FewCorners, ...] = ()
 
 
 @dataclass(frozen=True)

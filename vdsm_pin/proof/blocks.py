@@ -59,9 +59,8 @@ def _sweep_block(
     quick = task.rules.steady and results.dense.verdict.shape[0] == 0
     for pair in near:
         closely = settled[pairs.group[pair]]
-        asked = Stretch(
-            stretch.start, stretch.offset, count, closely, stretch.yes_or_no
-        )
+        yes_or_no = stretch.yes_or_no
+        asked = Stretch(stretch.start, stretch.offset, count, closely, yes_or_no, False)
         segment = task.bodies.inverse[pairs.body[pair]] >= 0.0
         if not (quick and segment and _serves(task, work, results, pair, asked)):
             if not sweep_pair(task, motion, work, results, pair, asked):
@@ -117,7 +116,7 @@ def sweep(
             settled[group] &= limit[group] < np.inf and not yes_or_no
             before[group] = limit[group]
         count = min(BLOCK, last - start)
-        stretch = Stretch(start, start - first, count, False, yes_or_no)
+        stretch = Stretch(start, start - first, count, False, yes_or_no, False)
         fill_rows(task, motion, work.rows, start, count)
         n_near = settle_far(task, work, results, broad, stretch)
         near = broad.near[:n_near]

@@ -54,8 +54,8 @@ class PairTable:
         one: Numbers of the first bodies, shape (n_rows,).
         other: Of the second ones, shape (n_rows,).
         required: Least clearances, shape (n_rows,); [m].
-        rough: The row of each pair's rough version, -1 for none, shape (n_pairs,); None
-            where no pair has one.
+        rough: The rows of each pair's rough versions, the roughest first, -1 for none,
+            shape (n_pairs, n_levels); None where no pair has one.
         loose: What a rough version misses of its bodies, 0 of pairs, (n_rows,); [m].
     """
 
@@ -79,4 +79,4 @@ class PairTable:
     @property
     def size(self) -> int:
         """Number of pairs."""
-        return int(self.one.size if self.rough is None else self.rough.size)
+        return len(self.one if self.rough is None else self.rough)

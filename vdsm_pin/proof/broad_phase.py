@@ -24,6 +24,7 @@ from vdsm_pin.proof.terms import (
     OBSTACLES,
     WORLD,
     Task,
+    finer,
     mover_of,
 )
 from vdsm_pin.proof.workspace import Workspace, load_rows
@@ -81,7 +82,7 @@ def new_broad_phase(task: Task, n_obstacles: int) -> BroadPhase:
     """Nothing settled yet; the first obstacles of the packed scene are looked at."""
     apart()
     pieces, pairs, ways = task.pieces, task.pairs, task.ways
-    n_bodies, n_pairs = task.bodies.frame.size, pairs.rough.size
+    n_bodies, n_pairs = task.bodies.frame.size, pairs.rough.shape[0]
     n, shape = n_obstacles, (n_bodies, n_obstacles)
     box, point = np.zeros((2, 3, n)), np.zeros((3, n))
     for o in range(n):
@@ -144,8 +145,7 @@ def _nearest_upper(task: Task, work: Workspace, broad: BroadPhase, body: int) ->
             pair, least = broad.number[body, o], broad.gap[body, o]
     if pair < 0:
         return np.inf
-    if task.pairs.rough[pair] >= 0:
-        pair = task.pairs.rough[pair]
+    pair = finer(task.pairs, pair, pair)
     mover = mover_of(task, pair)
     place_disc(mover, work.rows, work.runs, 1)
     load_rows(task, mover, work, 0, 0)

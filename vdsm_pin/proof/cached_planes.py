@@ -6,12 +6,12 @@ operations an interval, many at a time.
 """
 
 from math import sqrt
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from vdsm_pin.compiled import apart, compiled
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.proof.cached_clearances import raise_to_held
 from vdsm_pin.proof.error_growth import grow_corners, set_direction
@@ -31,6 +31,9 @@ from vdsm_pin.proof.rows import (
     turn_axis,
 )
 from vdsm_pin.proof.terms import Mover, Task
+
+MANY_ROWS: Final = 8
+"""From so many rows on loops over rows are quicker than over corners."""
 
 
 class Runs(NamedTuple):
@@ -154,12 +157,41 @@ def _distances(
 
 
 @compiled
+def _bound_few(
+    tracks: Tracks,
+    slots: IntArray,
+    growth: FloatArray,
+    plane: FloatArray,
+    first: int,
+    most: FloatArray,
+) -> None:
+    """Largest n.x over the corners of few intervals, corner by corner."""
+    nx, ny, nz = plane[0], plane[1], plane[2]
+    most[:] = -np.inf
+    for k in range(slots.size):
+        x, y, z = tracks.places[slots[k]]
+        sags = tracks.sags[slots[k]]
+        before = nx * x[first] + ny * y[first] + nz * z[first]
+        for r in range(most.size):
+            row = first + r
+            after = nx * x[row + 1] + ny * y[row + 1] + nz * z[row + 1]
+            reach = (after if after > before else before) + sags[row] + growth[k, row]
+            most[r] = reach if reach > most[r] else most[r]
+            before = after
+
+
+@compiled
 def bound_below(
     mover: Mover, tracks: Tracks, runs: Runs, plane: FloatArray, first: int, last: int
 ) -> None:
     """Lower bounds of the intervals [first, last) of a block by one plane."""
     gap, low = plane[SUPPORT] - mover.lost, runs.lower[first:last]
     work, slots = runs.work, mover.slots
+    if low.size < MANY_ROWS < slots.size:
+        _bound_few(tracks, slots, runs.growth, plane, first, low)
+        for r in range(low.size):
+            low[r] = gap - low[r]
+        return
     most, along = work[0, first:last], work[2, first : last + 1]
     for k in range(slots.size):
         reach = work[k if k < 2 else 3, first:last]

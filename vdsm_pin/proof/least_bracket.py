@@ -57,7 +57,7 @@ def _look_again(
         if start != filled:
             fill_rows(task, motion, work.rows, start, size)
             filled = start
-        stretch = Stretch(start, 0, size, True, False)
+        stretch = Stretch(start, 0, size, True, False, True)
         sweep_pair(task, motion, work, results, pair, stretch)
         for local in range(size):
             if not lower[local] < results.limit[group] - task.rules.gap:

@@ -189,13 +189,61 @@ def _move_frame(
 def place_tree(tree: PackedTree, q: FloatArray, pose: Pose) -> None:
     """All frames of one configuration q, shape (n_columns,)."""
     apart()
-    origins, frames = pose.origins, pose.frames
     for joint in range(tree.parent.size):
-        column = tree.column[joint]
-        value = tree.offset[joint]
-        if column >= 0:
-            value += tree.ratio[joint] * q[column]
-        _move_frame(tree, joint, value, origins, frames)
+        _move_joint(tree, q, joint, pose)
+
+
+@compiled
+def place_two(
+    tree: PackedTree,
+    q: FloatArray,
+    frames: tuple[int, int],
+    steps: IntArray,
+    pose: Pose,
+) -> None:
+    """Two frames of one configuration and those that they hang on.
+
+    Args:
+        tree: The joints.
+        q: Shape (n_columns,).
+        frames: The two.
+        steps: Working space, shape (n_frames,).
+        pose: Written; other frames are as they were.
+    """
+    apart()
+    (one, other), size = frames, 0
+    while one > 0 or other > 0:
+        # The later one hangs on one that comes before it: they go down to the world.
+        later = max(one, other)
+        steps[size], size = later - 1, size + 1
+        before = tree.parent[later - 1]
+        one, other = (
+            before if one == later else one,
+            before if other == later else other,
+        )
+    for step in range(size - 1, -1, -1):
+        _move_joint(tree, q, steps[step], pose)
+
+
+@compiled
+def _move_joint(tree: PackedTree, q: FloatArray, joint: int, pose: Pose) -> None:
+    """The frame of a joint in a configuration q, from that of its parent."""
+    column, value = tree.column[joint], tree.offset[joint]
+    if column >= 0:
+        value += tree.ratio[joint] * q[column]
+    _move_frame(tree, joint, value, pose.origins, pose.frames)
+
+
+@compiled
+def place_rows(tree: PackedTree, q: FloatArray) -> FloatArray:
+    """All frames at rows of q (n_rows, n_columns), (n_rows, n_frames, 4, 4)."""
+    n = tree.parent.size + 1
+    pose, out = new_pose(n), np.zeros((q.shape[0], n, 4, 4))
+    for row in range(q.shape[0]):
+        place_tree(tree, q[row], pose)
+        out[row, :, :3, :3], out[row, :, :3, 3] = pose.frames, pose.origins
+        out[row, :, 3, 3] = 1.0
+    return out
 
 
 @compiled

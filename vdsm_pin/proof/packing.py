@@ -96,8 +96,9 @@ class _PlaceTable:
         self._frames: list[int] = []
         self._at: list[FloatArray] = [np.zeros((0, 3))]
         self._lever: list[FloatArray] = [np.zeros(0)]
-        self._points: list[int] = []
-        self._seen_on: list[int] = []
+        self._points: list[IntArray] = [np.zeros(0, np.int64)]
+        self._seen_on: list[IntArray] = [np.zeros(0, np.int64)]
+        self._n_seen = 0
 
     def places(self, bodies: Bodies, body: int, rest: int) -> IntArray:
         """Where the corners of a body are seen from a frame.
@@ -114,10 +115,7 @@ class _PlaceTable:
             points = self._blocks[body]
             if rest == WORLD:
                 return points
-            way, first = self.ways.number(rest, frame), len(self._points)
-            self._points += points.tolist()
-            self._seen_on += [way] * len(points)
-            return -1 - np.arange(first, first + len(points))
+            return self._see(points, self.ways.number(rest, frame))
         found = [
             self._place(rest, *self._corner(rest, frame, *corner))
             for corner in zip(at, lever.tolist(), strict=True)
@@ -148,10 +146,16 @@ class _PlaceTable:
         if rest == WORLD:
             return point
         if (point, way) not in self._local:
-            self._local[point, way] = len(self._points)
-            self._points.append(point)
-            self._seen_on.append(way)
-        return -1 - self._local[point, way]
+            self._local[point, way] = int(self._see(np.array([point]), way)[0])
+        return self._local[point, way]
+
+    def _see(self, points: IntArray, way: int) -> IntArray:
+        """Numbers of new places, of points as seen from the start of a way."""
+        first = self._n_seen
+        self._points.append(points)
+        self._seen_on.append(np.full(len(points), way))
+        self._n_seen += len(points)
+        return -1 - np.arange(first, self._n_seen)
 
     def _add(self, frame: int, at: FloatArray, lever: FloatArray) -> IntArray:
         """Numbers of new points of a frame."""
@@ -167,11 +171,11 @@ class _PlaceTable:
         frames = dict.fromkeys(self._frames)
         way_of = {frame: self.ways.number(WORLD, frame) for frame in frames}
         ways = [way_of[frame] for frame in self._frames]
-        points = np.array([*range(n), *self._points], dtype=np.int64)
+        points = np.concatenate([np.arange(n), *self._points])
         return Places(
             n_points=n,
             point=points,
-            way=np.array([*ways, *self._seen_on], dtype=np.int64),
+            way=np.concatenate([np.array(ways, dtype=np.int64), *self._seen_on]),
             at=np.concatenate(self._at)[points],
             lever=np.concatenate(self._lever)[points],
         )
@@ -260,7 +264,7 @@ def pack_task(
     group = np.where(apart, OBSTACLES, LINKS)
     column, none = np.where(apart, columns[pairs.other], -1), np.zeros(n, np.int64)
     packed = Pairs(
-        rough=np.full(n, -1) if pairs.rough is None else pairs.rough,
+        rough=np.zeros((n, 0), np.int64) if pairs.rough is None else pairs.rough,
         body=mover.astype(np.int64),
         obstacle=pairs.other.astype(np.int64),
         way=none,

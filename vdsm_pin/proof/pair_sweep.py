@@ -45,9 +45,9 @@ from vdsm_pin.proof.results import Results, note_upper
 from vdsm_pin.proof.search import bound_between, new_witness, resolve
 from vdsm_pin.proof.slices import leaf_bracket, loaded_bound
 from vdsm_pin.proof.swept_bodies import to_body
-from vdsm_pin.proof.terms import CERTIFIED, Mover, Task, mover_of
+from vdsm_pin.proof.terms import CERTIFIED, Mover, Task, finer, mover_of
 from vdsm_pin.proof.witnesses import witness_at
-from vdsm_pin.proof.workspace import Workspace, load_rows, take_frame, take_row
+from vdsm_pin.proof.workspace import Workspace, load_rows, take_frame
 
 FIRST_TRIED: Final = 8
 """Intervals that a new plane is tried on at first; doubled as long as it serves."""
@@ -66,6 +66,7 @@ class Stretch(NamedTuple):
         closely: Whether bounds below the least clearance met are made as good as they
             can be.
         yes_or_no: Whether to stop at the first interval that is not proved.
+        whole: Whether no interval is subdivided: its bound is what one plane proves.
     """
 
     start: int
@@ -73,6 +74,7 @@ class Stretch(NamedTuple):
     size: int
     closely: bool
     yes_or_no: bool
+    whole: bool
 
 
 @compiled
@@ -134,7 +136,8 @@ def _renew_witness(
     plane[POINT:WIDTH] = space.out[FAR:BRACKET]
     own = plane[OWN_POINT:POINT]
     own[:] = space.out[NEAR:FAR]
-    take_row(rows, local, work.ends.start)
+    for frame in (mover.rest, mover.frame):
+        take_frame(rows, local, frame, work.ends.start)
     to_body(mover, work.ends.start, own)
     place_own(mover, rows, work.runs, plane, rows.ways.shape[2])
 
@@ -273,7 +276,8 @@ def sweep_pair(
         goal = max(rules.goal, ROUGH * rules.slack * required)
     slack = np.inf if yes_or_no else rules.slack
     local, tried, fresh, proved = 0, count, False, -np.inf
-    rough, mover = task.pairs.rough[pair], mover_of(task, int(plane[ROW]))
+    row = int(plane[ROW])
+    mover = mover_of(task, row)
     place_disc(mover, rows, runs, count)
     place_own(mover, rows, runs, plane, count)
     while clock() <= rules.until:
@@ -281,16 +285,19 @@ def sweep_pair(
         if stretch.closely:
             bar = max(bar, results.limit[group] - rules.gap)
         demand = Demand(local, last, bar, slack, fresh, proved)
-        done = try_plane(task, mover, rows, runs, plane, demand)
+        done = local
+        if fresh or plane[SUPPORT] > -np.inf:
+            done = try_plane(task, mover, rows, runs, plane, demand)
         if fresh and done == local:
             most = runs.lower[local] + mover.loose + rules.goal
-            if mover.loose > 0.0 and most >= required:
-                # What few corners do not settle all of them may.
-                proved = _renew(task, pair, work, local, pair, goal, bar)
-                mover = mover_of(task, pair)
+            if row != pair and most >= required:
+                # What few corners do not settle more of them may.
+                row = finer(task.pairs, pair, row)
+                mover = mover_of(task, row)
+                proved = _renew(task, row, work, local, pair, goal, bar)
                 continue
             # This interval allows no more, and may be proved nevertheless.
-            done += runs.lower[local] >= required
+            done += runs.lower[local] >= required or stretch.whole
         if done > local:
             span = local, done
             _note_stretch(task, mover, work, results, pair, stretch, span)
@@ -307,9 +314,9 @@ def sweep_pair(
         if done == last:
             tried *= 2
             continue
-        row = rough if rough >= 0 else pair
-        proved = _renew(task, row, work, local, pair, goal, bar)
+        row = finer(task.pairs, pair, pair)
         mover = mover_of(task, row)
+        proved = _renew(task, row, work, local, pair, goal, bar)
         results.tally[RENEWED] += 1
         if not (rules.nominal or yes_or_no):
             _look_at_row(task, work, results, local, pair)

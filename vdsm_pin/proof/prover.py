@@ -86,37 +86,35 @@ class _Plan:
 
 
 def _mover(one: Body, other: Body) -> bool:
-    """Whether the second of two bodies moves past the first, not the reverse.
-
-    Raises:
-        ValueError: If both have a half-space.
-    """
-    if not one.is_bounded and not other.is_bounded:
-        message = (
-            f"{one.name!r} and {other.name!r} are both unbounded: they always meet"
-        )
-        raise ValueError(message)
-    if not one.is_bounded:
-        return True
-    if not other.is_bounded:
-        return False
+    """Whether the second of two bounded bodies moves past the first, not reversed."""
     if WORLD in (one.frame, other.frame):
         return one.frame == WORLD
     return len(other.pieces) < len(one.pieces)
 
 
 def _planned(bodies: Sequence[Body], pairs: PairTable) -> _Plan:
-    """Which side of each pair moves, and its convex parts."""
+    """Which side of each pair moves, and its convex parts.
+
+    Raises:
+        ValueError: If both have a half-space.
+    """
     order = sorted(range(len(bodies)), key=lambda k: bodies[k].frame != WORLD)
     place = {number: k for k, number in enumerate(order)}
     all_bodies, number = [bodies[k] for k in order], list(order)
     parts: dict[int, range] = {}
+    bounded = [body.is_bounded for body in bodies]
     rows: list[tuple[int, int, float, int, bool]] = []
     asked = zip(
         pairs.one.tolist(), pairs.other.tolist(), pairs.required.tolist(), strict=True
     )
     for row, (one, other, required) in enumerate(asked):
-        swapped = _mover(bodies[one], bodies[other])
+        if not (bounded[one] or bounded[other]):
+            names = f"{bodies[one].name!r} and {bodies[other].name!r}"
+            message = f"{names} are both unbounded: they always meet"
+            raise ValueError(message)
+        swapped = not bounded[one]
+        if bounded[one] and bounded[other]:
+            swapped = _mover(bodies[one], bodies[other])
         mover, partner = (other, one) if swapped else (one, other)
         if mover not in parts:
             body, first = bodies[mover], len(all_bodies)

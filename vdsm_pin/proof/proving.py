@@ -168,7 +168,7 @@ class Proving:
     def _narrow(self, group: int) -> None:
         """Narrow the least bracket of one group of pairs."""
         task, results = self.task, self.results
-        groups = task.pairs.group[: task.pairs.rough.size]
+        groups = task.pairs.group[: len(task.pairs.rough)]
         mine, order = groups == group, self._candidates(group)
         if not order.size:
             return
@@ -236,7 +236,7 @@ def new_proving(
         work=new_workspace(
             task, motion.knots.shape[1], budget.slices, min(BLOCK, n_intervals)
         ),
-        results=new_results(task.pairs.rough.size, columns, n_intervals, budget),
+        results=new_results(len(task.pairs.rough), columns, n_intervals, budget),
         broad=new_broad_phase(task, n_obstacles),
         budget=budget,
     )

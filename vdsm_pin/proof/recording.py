@@ -227,7 +227,7 @@ def record(
     row, count = np.zeros(SLICE), 0
     for k in range(first, last):
         before = count
-        for pair in range(task.pairs.rough.size):
+        for pair in range(task.pairs.rough.shape[0]):
             if clock() > task.rules.until:
                 return before, k, -1
             row[INTERVAL], row[PAIR] = k, pair

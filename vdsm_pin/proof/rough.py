@@ -30,25 +30,40 @@ class Rough:
 
 
 def with_rough(bodies: Sequence[Body], pairs: PairTable) -> Rough:
-    """Pairs and, where a body has many corners, their rough versions."""
-    every, few_of, missed = list(bodies), np.arange(len(bodies)), np.zeros(len(bodies))
-    original = list(range(len(bodies)))
-    for k in np.unique(np.concatenate([pairs.one, pairs.other])).tolist():
-        body = bodies[k]
-        piece = body.pieces[0] if len(body.pieces) == 1 else None
-        if isinstance(piece, Hull) and piece.few is not None:
-            few_of[k], missed[k] = len(every), piece.few.missed
-            few = Hull(piece.few.points, piece.radius)
-            every.append(replace(body, pieces=(few,)))
-            original.append(k)
-    loose = missed[pairs.one] + missed[pairs.other]
-    has, rough = np.flatnonzero(loose > 0.0), np.full(pairs.size, -1)
-    rough[has] = pairs.size + np.arange(has.size)
+    """Pairs and, where bodies have many corners, their rough versions."""
+    hulls = [_only_hull(body) for body in bodies]
+    n_levels = max((len(hull.few) for hull in hulls if hull), default=0)
+    every, original = list(bodies), list(range(len(bodies)))
+    one, other, needed = [pairs.one], [pairs.other], [pairs.required]
+    loose, n = [np.zeros(pairs.size)], pairs.size
+    rough = np.full((n, n_levels), -1)
+    for level in range(n_levels):
+        number, missed = np.arange(len(bodies)), np.zeros(len(bodies))
+        for k, (body, hull) in enumerate(zip(bodies, hulls, strict=True)):
+            if hull is not None and level < len(hull.few):
+                number[k], missed[k] = len(every), hull.few[level].missed
+                few = Hull(hull.few[level].points, hull.radius)
+                every.append(replace(body, pieces=(few,)))
+                original.append(k)
+        both = missed[pairs.one] + missed[pairs.other]
+        has = np.flatnonzero(both > 0.0)
+        rough[has, level] = n + np.arange(has.size)
+        n += has.size
+        one.append(number[pairs.one[has]])
+        other.append(number[pairs.other[has]])
+        needed.append(pairs.required[has])
+        loose.append(both[has])
     table = PairTable(
-        np.concatenate([pairs.one, few_of[pairs.one[has]]]),
-        np.concatenate([pairs.other, few_of[pairs.other[has]]]),
-        np.concatenate([pairs.required, pairs.required[has]]),
+        np.concatenate(one),
+        np.concatenate(other),
+        np.concatenate(needed),
         rough,
-        np.concatenate([np.zeros(pairs.size), loose[has]]),
+        np.concatenate(loose),
     )
     return Rough(every, np.array(original, dtype=np.int64), table)
+
+
+def _only_hull(body: Body) -> Hull | None:
+    """The hull that a body is, if it is one."""
+    piece = body.pieces[0] if len(body.pieces) == 1 else None
+    return piece if isinstance(piece, Hull) else None

@@ -21,7 +21,7 @@ from vdsm_pin.proof.layouts import (
     START,
     WHEN,
 )
-from vdsm_pin.proof.packed_tree import Motion, interpolate, place_tree
+from vdsm_pin.proof.packed_tree import Motion, interpolate, place_two
 from vdsm_pin.proof.slices import Space, slice_bound
 from vdsm_pin.proof.swept_bodies import Ends, to_body
 from vdsm_pin.proof.terms import (
@@ -29,6 +29,7 @@ from vdsm_pin.proof.terms import (
     REFUTED,
     UNDECIDED,
     Task,
+    finer,
     mover_of,
 )
 
@@ -100,13 +101,15 @@ def bound_between(
 
 @compiled
 def _place(task: Task, motion: Motion, ends: Ends, row: FloatArray) -> None:
-    """The configurations at the ends of a slice and what lies between."""
+    """A pair's frames at the ends of a slice and how they move between."""
     k, start, end = int(row[INTERVAL]), row[START], row[END]
+    way, steps = task.pairs.way[int(row[PAIR])], ends.bends.steps
+    frames = task.ways.rest[way], task.ways.frame[way]
     interpolate(motion, k, start, ends.q)
-    place_tree(task.tree, ends.q, ends.start)
-    interpolate(motion, k, end, ends.q)
-    place_tree(task.tree, ends.q, ends.end)
-    way = task.pairs.way[int(row[PAIR])]
+    place_two(task.tree, ends.q, frames, steps, ends.start)
+    if end > start:
+        interpolate(motion, k, end, ends.q)
+        place_two(task.tree, ends.q, frames, steps, ends.end)
     bend_between(task, motion, ends.bends, way, k, start, end)
 
 
@@ -119,7 +122,7 @@ def _bound_towards(
     row: FloatArray,
     aim: float,
 ) -> bool:
-    """Bound a slice by a pair's rough version where that shows whether it is enough.
+    """Bound a slice by the roughest version of its pair that shows if it is enough.
 
     Args:
         task: The scene, pairs and rules.
@@ -135,13 +138,14 @@ def _bound_towards(
     apart()
     _place(task, motion, ends, row)
     pair, h = int(row[PAIR]), row[END] - row[START]
-    rough = task.pairs.rough[pair]
-    if rough >= 0:
-        slice_bound(task, ends, space, rough, h)
-        row[KEY], loose = space.out[LOWER], task.pairs.loose[rough]
+    version = finer(task.pairs, pair, pair)
+    while version != pair:
+        slice_bound(task, ends, space, version, h)
+        row[KEY], loose = space.out[LOWER], task.pairs.loose[version]
         hopeless = h > 0.0 and row[KEY] + loose + task.rules.goal < aim
         if row[KEY] >= aim or hopeless:
             return False
+        version = finer(task.pairs, pair, version)
     slice_bound(task, ends, space, pair, h)
     row[KEY] = space.out[LOWER]
     return True

@@ -39,7 +39,7 @@ class Space(NamedTuple):
     Args:
         body: The body over the slice and the error box, in its partner's frame: its
             corners at the start, then at the end.
-        core: The same points, not grown.
+        core: The same points, grown by discs alone.
         scratch: Shape (SCRATCH_ROWS + 2, 3).
         nodes: Nodes still to look at, shape (STACK,).
         stack: The same while a support is looked for, shape (STACK,).
@@ -59,11 +59,11 @@ class Space(NamedTuple):
 
 
 @compiled
-def new_space(n_joints: int, corners: int) -> Space:
-    """Fresh working space for bodies of up to so many corners."""
+def new_space(n_turning: int, corners: int) -> Space:
+    """Fresh working space for bodies of up to so many corners, and joints that turn."""
     apart()
-    body = new_body(2 * corners, corners, room_of(n_joints))
-    core = new_body(0, corners, 0)
+    body = new_body(2 * corners, corners, room_of(n_turning))
+    core = new_body(0, 0, 0)
     return Space(
         body,
         Body(body.points, core.swings, core.sizes, core.balls, body.discs, body.used),
@@ -126,9 +126,10 @@ def leaf_bracket(
             and the witnesses are of the hull of the points alone, inf where not wanted.
     """
     body, wide = space.body, space.wide
-    grown = False
+    grown, ball = False, 0.0
     for corner in range(body.used[1]):
         grown |= body.sizes[corner] > 0
+        ball = max(ball, body.balls[corner])
     wide[NORMAL:NEAR] = out[NORMAL:NEAR]
     if sighted or not grown:
         bracket(pieces, p, space.core, goal, space.scratch, out)
@@ -138,7 +139,7 @@ def leaf_bracket(
         bracket(pieces, p, body, goal, space.scratch, wide)
         out[LOWER] = wide[LOWER]
         out[NORMAL:NEAR] = wide[NORMAL:NEAR]
-    else:
+    elif ball > 0.0:
         nx, ny, nz = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
         out[LOWER] -= body_reach(body, nx, ny, nz) - body_reach(space.core, nx, ny, nz)
 

@@ -48,9 +48,9 @@ def new_ends(n_frames: int, n_ways: int, n_columns: int) -> Ends:
 
 
 @compiled
-def room_of(n_joints: int) -> int:
-    """Most generators of one corner: every joint at two instants."""
-    return 2 * n_joints
+def room_of(n_turning: int) -> int:
+    """Most generators of one corner: joints that turn at two instants, one tried."""
+    return 2 * n_turning + 1
 
 
 @compiled
@@ -198,13 +198,11 @@ def load_body(task: Task, mover: Mover, ends: Ends, loaded: Body, h: float) -> N
     """A body over a slice and the error box; arguments as for `load_errors`."""
     apart()
     corners, places, bends = mover.slots.size, task.places, ends.bends
-    loaded.used[0], loaded.used[1] = 2 * corners, corners
-    for instant in range(2):
+    instants = 2 if h > 0.0 else 1
+    loaded.used[0], loaded.used[1] = instants * corners, corners
+    for instant in range(instants):
         pose = ends.end if instant else ends.start
-        for k in range(corners):
-            point = loaded.points[instant * corners + k]
-            place_point(pose, mover.frame, mover.corners[k], point)
-            local_point(pose, mover.rest, point)
+        _load_corners(mover, pose, loaded.points[instant * corners :])
         load_disc(mover, pose, loaded.discs[instant])
     for k in range(corners):
         place = mover.slots[k]
@@ -213,6 +211,23 @@ def load_body(task: Task, mover: Mover, ends: Ends, loaded: Body, h: float) -> N
         bend = bends.bends[way] + lever * (rate * rate + bends.swings[way])
         loaded.balls[k] = 0.125 * bend * h * h
     load_errors(task, mover, ends, loaded, h)
+
+
+@compiled
+def _load_corners(mover: Mover, pose: Pose, points: FloatArray) -> None:
+    """The corners of a body in the frame of its partner, the first rows of points."""
+    place = np.zeros((4, 3))
+    x, y, z, shift = place[0], place[1], place[2], place[3]
+    for c in range(3):
+        f = pose.frames[mover.frame, c]
+        x[c], y[c], z[c], shift[c] = f[0], f[1], f[2], pose.origins[mover.frame, c]
+    for axis in (x, y, z):
+        turn_back(pose, mover.rest, axis)
+    local_point(pose, mover.rest, shift)
+    for k in range(mover.corners.shape[0]):
+        at = mover.corners[k]
+        for c in range(3):
+            points[k, c] = shift[c] + (x[c] * at[0] + y[c] * at[1] + z[c] * at[2])
 
 
 @compiled

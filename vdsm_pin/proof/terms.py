@@ -78,13 +78,13 @@ class Places(NamedTuple):
 class Pairs(NamedTuple):
     """All pairs, in the order of the certificate, then rough versions of some.
 
-    A pair's rough version is of bodies that lie within its own and span them but for a
-    distance: less that, what is proved of it is proved of the pair, and what it comes
+    A rough version of a pair is of bodies that lie within its own and span them but for
+    a distance: less that, what is proved of it is proved of the pair, and what it comes
     to at most the pair does too.
 
     Args:
-        rough: The row of each pair's rough version, -1 for none, shape (n_pairs,); all
-            others have n_rows.
+        rough: The rows of each pair's rough versions, the roughest first, -1 for none,
+            shape (n_pairs, n_levels); all others have n_rows.
         body: The moving body, shape (n_rows,).
         obstacle: Its partner in the packed scene, shape (n_rows,).
         way: From the partner's frame to the body's, shape (n_rows,).
@@ -178,6 +178,24 @@ class Task(NamedTuple):
     bodies: Bodies
     pairs: Pairs
     rules: Rules
+
+
+@compiled
+def finer(pairs: Pairs, pair: int, row: int) -> int:
+    """The row of the next finer version of a pair, the pair itself at last.
+
+    Args:
+        pairs: All pairs.
+        pair: The pair.
+        row: That of a version; of the pair itself it leads to the roughest.
+    """
+    passed = row == pair
+    for level in range(pairs.rough.shape[1]):
+        found = pairs.rough[pair, level]
+        if passed and found >= 0:
+            return int(found)
+        passed |= found == row
+    return pair
 
 
 @compiled

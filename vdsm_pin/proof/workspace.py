@@ -9,7 +9,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.proof.cached_planes import Runs, new_runs
 from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE, ROW, SLICE, SUPPORT
-from vdsm_pin.proof.packed_tree import Pose
+from vdsm_pin.proof.packed_tree import REVOLUTE, Pose
 from vdsm_pin.proof.rows import BLOCK, DRIFT, TURN, Rows, new_rows
 from vdsm_pin.proof.slices import Space, new_space
 from vdsm_pin.proof.swept_bodies import Ends, load_errors, new_ends
@@ -61,14 +61,14 @@ def new_workspace(
     corners = int(np.diff(task.bodies.first).max(initial=1))
     many = np.diff(task.pieces.first_piece).max(initial=0) > 1
     held = HELD_AT + 3 * corners if many else HELD_AT
-    planes = np.zeros((task.pairs.rough.size, held))
+    planes = np.zeros((len(task.pairs.rough), held))
     forget(planes)
     return Workspace(
         new_rows(n_joints + 1, n_ways, task.places.way.size, block),
         new_runs(corners),
         planes,
         new_ends(n_joints + 1, n_ways, n_columns),
-        new_space(n_joints, corners),
+        new_space(int((task.tree.kind == REVOLUTE).sum()), corners),
         np.zeros((budget, SLICE)),
     )
 
@@ -99,14 +99,16 @@ def load_rows(task: Task, mover: Mover, work: Workspace, first: int, last: int) 
     apart()
     rows, runs, loaded, ends = work.rows, work.runs, work.space.body, work.ends
     corners, tracks = mover.slots.size, rows.tracks
-    loaded.used[0], loaded.used[1] = 2 * corners, corners
+    instants = 2 if last > first else 1
+    loaded.used[0], loaded.used[1] = instants * corners, corners
     for k in range(corners):
         place = tracks.places[mover.slots[k]]
         sag = tracks.sags[mover.slots[k], first] if last > first else 0.0
         loaded.balls[k] = sag
         for c in range(3):
             loaded.points[k, c] = place[c, first]
-            loaded.points[corners + k, c] = place[c, last]
+            if last > first:
+                loaded.points[corners + k, c] = place[c, last]
     disc = mover.disc[RADIUS]
     loaded.discs[0, RADIUS] = loaded.discs[1, RADIUS] = disc
     if disc > 0.0:

@@ -100,7 +100,7 @@ class _Slopes:
     """How much room pairs have beyond what is asked, and where it grows."""
 
     def __init__(self, cell: Cell, pairs: Sequence[Pair], margins: FloatArray) -> None:
-        self._tree, self._coal, self._pairs = cell.robot.tree, cell.coal, pairs
+        self._cell, self._pairs = cell, pairs
         self._target = np.array([pair.required for pair in pairs]) + margins
         joints = cell.robot.joints
         self._limits = [j.lower for j in joints], [j.upper for j in joints]
@@ -131,6 +131,6 @@ class _Slopes:
 
     def _of(self, k: int, q: FloatArray) -> FloatArray:
         """Room of one pair at rows of q, shape (n_rows,); [m]."""
-        pair, poses = self._pairs[k], self._tree.poses(q)
-        found = [self._coal.measured(pair, row).distance for row in poses]
-        return np.asarray(np.array(found) - self._target[k])
+        pairs, poses = [self._pairs[k]] * len(q), self._cell.poses(q)
+        found = self._cell.coal.distances(pairs, poses)
+        return np.asarray(found - self._target[k])

@@ -13,6 +13,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.bodies import Body, Pair
+from vdsm_pin.proof.packed_tree import PackedTree, pack_tree, place_rows
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.coal_pairs import CoalPairs
 from vdsm_pin.robots.errors import check_errors
@@ -77,6 +78,15 @@ class Cell:
     def tree(self) -> Tree:
         """The robot's joints first, then those that carry obstacles."""
         return tree_beside(self.robot.tree, self.scene)
+
+    def poses(self, q: FloatArray) -> FloatArray:
+        """T_world_frame at rows of q as the proof has it, (n, n_frames, 4, 4); [m]."""
+        rows = np.ascontiguousarray(q, dtype=np.float64)
+        return np.asarray(place_rows(self._packed, rows))
+
+    @cached_property
+    def _packed(self) -> PackedTree:
+        return pack_tree(self.tree)
 
     @cached_property
     def bodies(self) -> list[Body]:

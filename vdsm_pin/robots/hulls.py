@@ -17,11 +17,11 @@ FLAT: Final = 1e-6
 
 UNIT_BOX: Final = (BOX_CORNERS + 1.0) / 2.0
 
-MANY_CORNERS: Final = 32
-"""From so many on a hull is also known by some of its corners."""
+FEW_CORNERS: Final = {32: 24, 400: 100}
+"""From so many corners on a hull is also known by so few of them."""
 
-FEW_CORNERS: Final = 24
-"""How many those are."""
+SOME: Final = 64
+"""Of so many points at once it is looked how far they are missed."""
 
 WAYS: Final = np.concatenate([np.eye(3), -np.eye(3), BOX_CORNERS])
 """Directions in which the first of them are the outermost."""
@@ -45,25 +45,43 @@ def covering_hull(points: FloatArray) -> Hull:
     return Hull(corners, few=few_corners(corners))
 
 
-def few_corners(points: FloatArray) -> FewCorners | None:
-    """Some of the corners that nearly span a hull; None where it has few anyway.
+def few_corners(points: FloatArray) -> tuple[FewCorners, ...]:
+    """Some of the corners that nearly span a hull, and more; none where it has few.
 
     The outermost in some directions, then, one by one, those that are missed most.
 
     Args:
         points: Shape (n, 3); [m].
     """
-    if len(points) < MANY_CORNERS:
-        return None
     _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
     outermost = np.argmax(points @ (WAYS @ axes).T, axis=0).tolist()
-    chosen = list(dict.fromkeys(outermost))
-    missed = _distances(points, points[chosen])
-    while len(chosen) < FEW_CORNERS:
-        chosen.append(int(np.argmax(missed)))
-        missed = _distances(points, points[chosen])
-    most = float(missed.max(initial=0.0)) + TOLERANCES.arithmetic
-    return FewCorners(frozen(points[chosen]), most)
+    chosen, found = list(dict.fromkeys(outermost)), []
+    missed = np.full(len(points), np.inf)
+    for many, few in FEW_CORNERS.items():
+        if len(points) < many:
+            break
+        while len(chosen) < few:
+            chosen.append(_most_missed(points, chosen, missed))
+        most = float(missed[_most_missed(points, chosen, missed)])
+        few_points = frozen(points[chosen])
+        found.append(FewCorners(few_points, most + TOLERANCES.arithmetic))
+    return tuple(found)
+
+
+def _most_missed(points: FloatArray, chosen: list[int], missed: FloatArray) -> int:
+    """The point farthest from the hull of those that are chosen.
+
+    Args:
+        points: Shape (n, 3); [m].
+        chosen: Numbers of some.
+        missed: Bounds from above of how far each is, from when fewer were chosen or
+            from now, shape (n,); renewed where that decides; [m].
+    """
+    fresh = np.zeros(len(points), bool)
+    while not fresh[worst := int(np.argmax(missed))]:
+        some = np.argsort(missed)[-SOME:]
+        missed[some], fresh[some] = _distances(points[some], points[chosen]), True
+    return worst
 
 
 def _distances(points: FloatArray, corners: FloatArray) -> FloatArray:

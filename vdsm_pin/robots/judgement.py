@@ -161,7 +161,7 @@ def _met(cell: Cell, path: Path, least: LeastClearances) -> LeastClearances:
         moments = np.clip(moment + np.array(BESIDE), 0.0, path.n_intervals)
         intervals = np.minimum(moments.astype(np.int64), path.n_intervals - 1)
         shares = moments - intervals
-        poses = cell.tree.poses(path.within(intervals, shares))
+        poses = cell.poses(path.within(intervals, shares))
         for at, pose in enumerate(poses):
             bodies = cell.coal.pieces(cell.pairs[k], pose)
             radius, centre = common_ball(*bodies, middle)
@@ -295,9 +295,8 @@ def _coal(
     """
     found = np.full(len(cell.pairs), nan)
     seen = np.flatnonzero(np.isfinite(proof.upper))
-    poses = cell.tree.poses(path.within(proof.interval[seen], proof.share[seen]))
-    for pose, k in zip(poses, seen.tolist(), strict=True):
-        found[k] = cell.coal.measured(cell.pairs[k], pose).distance
+    poses = cell.poses(path.within(proof.interval[seen], proof.share[seen]))
+    found[seen] = cell.coal.distances([cell.pairs[k] for k in seen], poses)
     # Where bodies meet only the sign counts, on both sides.
     value = np.maximum(found, 0.0)
     low, high = np.maximum(proof.lower, 0.0), np.maximum(proof.upper, 0.0)

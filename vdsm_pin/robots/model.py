@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.proof.bodies import Body
+from vdsm_pin.proof.packed_tree import PackedTree, pack_tree, place_rows
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.files import HULLS, Solids
 from vdsm_pin.robots.srdf import Base
@@ -92,7 +94,12 @@ class Robot:
         default_factory=dict
     )
 
-    def poses(self, q: FloatArray) -> dict[str, FloatArray]:
-        """T_world_link of every link at rows of q, shape (n_rows, 4, 4); [m]."""
-        poses = self.tree.poses(q)
-        return {name: poses[:, frame] for name, frame in self.frames.items()}
+    @cached_property
+    def _packed(self) -> PackedTree:
+        """The tree as the proof reads it."""
+        return pack_tree(self.tree)
+
+    def poses(self, q: FloatArray) -> FloatArray:
+        """T_world_frame at rows of q as the proof has it, (n, n_frames, 4, 4); [m]."""
+        rows = np.ascontiguousarray(q, dtype=np.float64)
+        return np.asarray(place_rows(self._packed, rows))

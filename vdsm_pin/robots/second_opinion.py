@@ -35,7 +35,8 @@ def pose_difference(robot: Robot, q: FloatArray) -> FloatArray:
 
     model = _model(robot.text, robot.base)
     data, values = model.createData(), robot.tree.values(q)
-    poses, worst = robot.poses(q), np.zeros(len(q))
+    ours = robot.poses(q)[:, [*robot.frames.values()]]
+    theirs = np.zeros_like(ours)
     numbers = {name: model.getFrameId(name, pin.BODY) for name in robot.frames}
     missing = [name for name, number in numbers.items() if number >= model.nframes]
     if missing:
@@ -44,10 +45,8 @@ def pose_difference(robot: Robot, q: FloatArray) -> FloatArray:
     for row in range(len(q)):
         full = _configuration(pin, model, robot, values[row])
         pin.framesForwardKinematics(model, data, full)
-        for name, number in numbers.items():
-            off = np.abs(data.oMf[number].homogeneous - poses[name][row]).max()
-            worst[row] = max(worst[row], off)
-    return worst
+        theirs[row] = [data.oMf[number].homogeneous for number in numbers.values()]
+    return np.asarray(np.abs(theirs - ours).max(axis=(1, 2, 3)))
 
 
 @lru_cache(maxsize=KEPT)
@@ -150,11 +149,3 @@ def coal_parts(pieces: Sequence[Piece]) -> tuple[CoalBody, ...] | None:
             return None
         found.append(CoalBody(shape, pose))
     return tuple(found)
-
-
-def placed(T_world_link: FloatArray, body: CoalBody) -> CoalBody:
-    """A shape of a link where the link stands."""
-    import coal
-
-    link = coal.Transform3s(T_world_link[:3, :3].copy(), T_world_link[:3, 3].copy())
-    return CoalBody(body.geometry, link * body.pose)

@@ -139,7 +139,7 @@ def _check_size(proof: Recorded) -> None:
     Raises:
         CertificateTooLarge: If it would.
     """
-    pairs, intervals = proof.task.pairs.rough.size, max(1, len(proof.motion.knots) - 1)
+    pairs, intervals = len(proof.task.pairs.rough), max(1, len(proof.motion.knots) - 1)
     if pairs * intervals > MOST_CLEARANCES:
         message = (
             f"{pairs} pairs in {intervals} intervals have {pairs * intervals} "
@@ -192,7 +192,7 @@ def _interval_lines(
 ) -> Iterator[str]:
     """The lines of the intervals [first, last), in parts that memory can hold."""
     order = np.lexsort((records[:, FIRST], records[:, 2], records[:, 1], records[:, 0]))
-    rows, n_pairs = records[order], task.pairs.rough.size
+    rows, n_pairs = records[order], len(task.pairs.rough)
     for k in range(first, last):
         low, high = np.searchsorted(rows[:, 0], [k, k + 1])
         yield f'{{"k":{k},"proofs":['
