@@ -254,7 +254,7 @@ def test_the_commands_write_and_check_it(
     assert ends("check-certificate", proof, problem, rows) == 0
     said = capsys.readouterr().out
     assert said.startswith("accepted: clearances hold under the errors stated")
-    assert "4 of 10 pairs of links left out" in said
+    assert "4 of 10 link pairs left out" in said
     moved(made)
     made.write()
     assert ends("check-certificate", proof, problem, rows) == 1

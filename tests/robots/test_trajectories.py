@@ -1,6 +1,7 @@
 """Trajectories of robots in every format: the same numbers back, limits of rates."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,8 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.paths import cubic_path, quintic_path
 from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.robots.rates import rate_checks
-from vdsm_pin.robots.trajectory_files import csv_text, read_motion, read_path
+from vdsm_pin.robots.trajectory_csv import csv_text
+from vdsm_pin.robots.trajectory_files import read_motion, read_path
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.verification.records import Verdict
 
@@ -26,8 +28,13 @@ FORMATS = [".csv", ".yaml", ".json", ".bag", ".mcap"]
 
 
 @pytest.fixture
-def robot(tmp_path: Path) -> Robot:
-    return read_robot(write(tmp_path, "two.urdf", URDF))
+def urdf(tmp_path: Path) -> Path:
+    return write(tmp_path, "two.urdf", URDF)
+
+
+@pytest.fixture
+def robot(urdf: Path) -> Robot:
+    return read_robot(urdf)
 
 
 def motion(smooth: int, rows: int = 5) -> JointTrajectory:
@@ -45,6 +52,7 @@ def motion(smooth: int, rows: int = 5) -> JointTrajectory:
 
 def written(folder: Path, ending: str, given: JointTrajectory, robot: Robot) -> Path:
     file = folder / f"plan{ending}"
+    file.unlink(missing_ok=True)
     if ending == ".csv":
         file.write_text(csv_text(given, robot))
     elif ending in (".bag", ".mcap"):
@@ -263,3 +271,68 @@ def test_trajectories_are_converted(tmp_path: Path, robot: Robot) -> None:
         assert run(*words, out / f"trajectory{ending}", "--out", back) == 0
         found = read_trajectory(back / "trajectory.csv", source.problem.manipulator)
         np.testing.assert_array_equal(found.joints, arm.joints)
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_joints_that_stand_still_are_not_moved(
+    tmp_path: Path, urdf: Path, ending: str
+) -> None:
+    """Where the file moves a joint that is held, its motion is not what is judged."""
+    whole, given = read_robot(urdf), motion(0)
+    held = float(given.q[0, 1])
+    robot = read_robot(urdf, lock={"slide": held})
+    file = written(tmp_path, ending, given, whole)
+    with pytest.raises(InvalidFile, match=r"'slide' at .* stands still and is judged"):
+        read_motion(file, robot.joints, values=robot.values)
+    q = given.q.copy()
+    q[:, 1] = held
+    file = written(tmp_path, ending, replace(given, q=q), whole)
+    found = read_motion(file, robot.joints, values=robot.values)
+    assert found.names == ("turn",)
+    assert found.notes == ()
+    q[2, 1] += 5e-4
+    file = written(tmp_path, ending, replace(given, q=q), whole)
+    found = read_motion(file, robot.joints, values=robot.values)
+    assert found.notes == ("joint 'slide' is up to 0.0005 off where it is judged",)
+
+
+def test_joints_that_follow_agree_with_what_they_follow(
+    tmp_path: Path, robot: Robot
+) -> None:
+    """Follow = 2 slide + 0.1."""
+    for value, why in ((0.3, ""), (0.31, "mimics another and is judged at 0.3")):
+        rows = f"turn_rad,slide_m,follow_rad\n0,0.1,{value}\n"
+        file = write(tmp_path, "t.csv", rows)
+        if not why:
+            assert read_motion(file, robot.joints, values=robot.values).notes == ()
+            continue
+        with pytest.raises(InvalidFile, match=why):
+            read_motion(file, robot.joints, values=robot.values)
+
+
+def test_what_is_not_read_is_noted(tmp_path: Path, robot: Robot) -> None:
+    file = write(tmp_path, "t.csv", "turn_rad,slide_m,wheel_rad,label\n0,0,9,1\n")
+    (note,) = read_motion(file, robot.joints, values=robot.values).notes
+    assert note == "columns that are not read: 'wheel_rad', 'label'"
+    rows = {
+        "joint_names": ["turn", "slide", "wheel"],
+        "points": [{"positions": [0] * 3}],
+    }
+    file = write(tmp_path, "t.json", json.dumps(rows))
+    (note,) = read_motion(file, robot.joints, values=robot.values).notes
+    assert note == "joints that are not read: 'wheel'"
+
+
+def test_a_joint_has_one_column(tmp_path: Path, robot: Robot) -> None:
+    file = write(tmp_path, "t.csv", "turn_rad,slide_m,turn_deg\n0,0,90\n")
+    with pytest.raises(InvalidFile, match="expected one of them"):
+        read_motion(file, robot.joints)
+
+
+def test_names_with_signs_of_csv_are_read_back(tmp_path: Path) -> None:
+    name = "a;b, 'c' &quot;d&quot;"
+    text = URDF.replace('"turn"', f'"{name}"')
+    robot = read_robot(write(tmp_path, "odd.urdf", text))
+    given = replace(motion(0), names=tuple(joint.name for joint in robot.joints))
+    file = write(tmp_path, "t.csv", csv_text(given, robot))
+    np.testing.assert_array_equal(read_motion(file, robot.joints).q, given.q)

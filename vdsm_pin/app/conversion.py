@@ -28,7 +28,8 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.tables import write_cables, write_centres
 from vdsm_pin.robots.cell import Cell
-from vdsm_pin.robots.trajectory_files import csv_text, read_motion
+from vdsm_pin.robots.trajectory_csv import csv_text
+from vdsm_pin.robots.trajectory_files import read_motion
 
 CONVERTED: Final = TRAJECTORY, CENTRES, CABLES
 """What a conversion writes to its folder."""
@@ -128,7 +129,7 @@ def convert_robot(cell: Cell, file: Path, folder: Path, also: Sequence[str]) -> 
     names = (TRAJECTORY, *map(message_name, also))
     check_kept([folder / name for name in names], [*cell.files, file])
     robot = cell.robot
-    motion = read_motion(file, robot.joints)
+    motion = read_motion(file, robot.joints, values=robot.values)
     with staged(folder) as aside:
         (aside / TRAJECTORY).write_text(csv_text(motion, robot), encoding="utf-8")
         write_messages(aside, motion, also)

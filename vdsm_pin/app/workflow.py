@@ -243,12 +243,14 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
 def _judgement(order: VerifyOrder) -> Callable[[Path], tuple[str, Verification]]:
     """What judges the motion, which is read before anything is written."""
     if not isinstance(order.source, ProblemFile):
-        from vdsm_pin.robots.trajectory_files import read_path
+        from vdsm_pin.robots.trajectory_files import path_of, read_motion
 
-        cell = order.source
-        motion = read_path(order.trajectory, cell.robot, order.topic)
-        _check_times(order, cell.scene, motion)
-        return partial(_judge_robot, order, cell, motion)
+        file, cell = order.trajectory, order.source
+        joints, values = cell.robot.joints, cell.robot.values
+        motion = read_motion(file, joints, order.topic, values)
+        path = path_of(file, motion)
+        _check_times(order, cell.scene, path)
+        return partial(_judge_robot, order, cell, path, motion.notes)
     problem = order.source.problem
     robot = load_robot(problem.manipulator)
     trajectory = read_trajectory(
@@ -298,12 +300,17 @@ def _judge_arm(
 
 
 def _judge_robot(
-    order: VerifyOrder, cell: "Cell", motion: Motion, aside: Path
+    order: VerifyOrder,
+    cell: "Cell",
+    motion: Motion,
+    notes: tuple[str, ...],
+    aside: Path,
 ) -> tuple[str, Verification]:
     """The same of any other robot."""
     from vdsm_pin.robots.judgement import verify_robot
 
     verification = verify_robot(cell, motion, order.deadline)
+    verification = replace(verification, notes=notes)
     step("writing the results")
     table = ClearanceCsv(aside / CLEARANCE, cell, verification.pairs)
     with closing(table) as clearance:

@@ -214,7 +214,8 @@ class Robot:
         return found
 
     def _path(self, header: Mapping[str, Any], trajectory: File) -> None:
-        motion = read_motion(trajectory, self.joints.moved, header["topic"])
+        joints = self.joints
+        motion = read_motion(trajectory, joints.moved, header["topic"], joints.values)
         times, rates = motion.times, [motion.rates, motion.changes]
         rates = [x for x in rates if x is not None and times is not None]
         branch = Branch(motion.q, times, rates=rates)
@@ -260,8 +261,7 @@ class Robot:
             rest = Compound(rests, links[rests], order)
             for each in links[moves]:
                 yield Pair(Body(frames[moves], each), rest, frames[rests], own, 0.0)
-        few = f"{len(every) - len(apart)} of {len(every)}"
-        self.notes.append(f"{few} pairs of links left out")
+        self.notes += [f"{len(every) - len(apart)} of {len(every)} link pairs left out"]
         for mesh in (one for one in things if isinstance(one, Mesh)):
             self.notes += mesh.notes()
 

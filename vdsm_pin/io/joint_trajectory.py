@@ -37,6 +37,7 @@ class JointTrajectory:
         times: Shape (n_rows,); [s]. None where not stated.
         rates: As q; per [s]. None where not stated.
         changes: As q; per [s^2]. None where not stated.
+        notes: What else a reader should know, a sentence each.
     """
 
     names: tuple[str, ...]
@@ -44,6 +45,7 @@ class JointTrajectory:
     times: FloatArray | None = None
     rates: FloatArray | None = None
     changes: FloatArray | None = None
+    notes: tuple[str, ...] = ()
 
     def of(self, names: Sequence[str]) -> "JointTrajectory":
         """The columns of some of its joints, in their order."""

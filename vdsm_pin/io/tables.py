@@ -33,7 +33,7 @@ MAX_LINE: Final = 1 << 16
 PLAIN: Final = b"0123456789+-.eE, \r\n"
 """Bytes that rows of numbers are made of."""
 
-_BETWEEN: Final = (",", ";", "\t")
+BETWEEN: Final = (",", ";", "\t")
 _NUMBER: Final = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*", re.ASCII)
 _CUT: Final = re.compile(r"\d\.?[eE][-+]?\d\Z", re.ASCII)
 """A last number with one digit of an exponent, which most programs write with two."""
@@ -92,7 +92,7 @@ class Table:
             raise InvalidFile(file=file, problem="is empty")
         self._check_ends([line], 1)
         self._between, names = max(
-            ((sign, _split(line, sign)) for sign in _BETWEEN),
+            ((sign, split(line, sign)) for sign in BETWEEN),
             key=lambda found: len(set(found[1]) & set(columns)),
         )
         self._width = len(names)
@@ -209,7 +209,7 @@ class Table:
 
     def _row(self, line: str, number: int) -> list[float]:
         row = Row(self.file, number, line.endswith("\n"))
-        words = _split(line, self._between)
+        words = split(line, self._between)
         values = []
         for name, place in zip(self.columns, self._places, strict=True):
             if place < len(words):
@@ -252,7 +252,14 @@ def listed(names: Sequence[str]) -> str:
     return f"{shown} and {more} more" if more > 0 else shown
 
 
-def _split(line: str, between: str) -> list[str]:
+def quoted(text: str) -> str:
+    """A CSV field that may hold a comma or a quote."""
+    if any(sign in text for sign in ',"\n'):
+        return '"' + text.replace('"', '""') + '"'
+    return text
+
+
+def split(line: str, between: str) -> list[str]:
     """The values of a line, without quotes and without blanks around them."""
     try:
         (words,) = csv.reader([line.strip("\n")], delimiter=between)

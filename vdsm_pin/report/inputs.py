@@ -41,19 +41,20 @@ def assumption(sizes: Sequence[str]) -> str:
 
 def input_notes(problem: PlanningProblem, trajectory: Trajectory) -> tuple[str, ...]:
     """What the readers have to say and what is behind the base, a sentence each."""
-    solids = map(solid_of, problem.scene.obstacles)
-    files = (one for one in solids if isinstance(one, FromFile))
-    of_files = (
-        f"{'mesh' if isinstance(one, Mesh) else 'cloud'} {one.name!r}: {note}"
-        for one in files
-        for note in one.notes
-    )
     of_rows = (f"trajectory: {note}" for note in trajectory.notes)
     of_time = (*_pieces(trajectory), *_longer(problem, trajectory))
     unknown = problem.scene.obstacles and not problem.manipulator.feed
     behind = (BEHIND,) if unknown else ()
     notes = (*behind, *_covers(problem), *mesh_notes(problem))
-    return (*notes, *of_time, *of_files, *of_rows)
+    return (*notes, *of_time, *file_notes(problem), *of_rows)
+
+
+def file_notes(problem: Problem) -> Iterator[str]:
+    """What the readers of meshes and clouds have to say, a sentence each."""
+    solids = map(solid_of, problem.scene.obstacles)
+    for one in (solid for solid in solids if isinstance(solid, FromFile)):
+        kind = "mesh" if isinstance(one, Mesh) else "cloud"
+        yield from (f"{kind} {one.name!r}: {note}" for note in one.notes)
 
 
 def _pieces(trajectory: Trajectory) -> tuple[str, ...]:

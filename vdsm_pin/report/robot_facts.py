@@ -6,6 +6,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.report.facts import error_box, finite
 from vdsm_pin.report.files import JointRow, LeftOutRow, RobotFacts
+from vdsm_pin.report.inputs import file_notes
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification
 from vdsm_pin.robots.model import RobotJoint
@@ -18,7 +19,12 @@ def robot_facts(verification: RobotVerification) -> dict[str, Any]:
     """The fields of verification.json that are a robot's own."""
     cell, path = verification.problem, verification.trajectory
     return {
-        "notes": (*cell.robot.notes, *mesh_notes(cell)),
+        "notes": (
+            *cell.robot.notes,
+            *mesh_notes(cell),
+            *file_notes(cell),
+            *(f"trajectory: {note}" for note in verification.notes),
+        ),
         "coverage": None,
         "path_length_m": None,
         "undrawn_m": (),

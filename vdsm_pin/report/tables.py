@@ -15,6 +15,7 @@ from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.arm.kinematics import joint_centres, link_angles, position_angles
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.decimals import WORD
+from vdsm_pin.io.tables import quoted
 from vdsm_pin.io.waypoint_rows import PLACE, WAYPOINT
 from vdsm_pin.io.waypoint_tables import cable_columns, centre_columns
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -68,8 +69,8 @@ class ClearanceCsv:
         pose = problem.T_world_base
         self._rotation, self._shift = pose[:3, :3].T, pose[:3, 3]
         partners = [
-            f"{_quoted(pair.body or str(pair.link))},{_quoted(pair.obstacle)},"
-            f"{_quoted(pair.other_body or str(pair.other_link or ''))}"
+            f"{quoted(pair.body or str(pair.link))},{quoted(pair.obstacle)},"
+            f"{quoted(pair.other_body or str(pair.other_link or ''))}"
             for pair in pairs
         ]
         self._form = Form(_CLEARANCE_DECIMALS, _CLEARANCE_ROUNDING,
@@ -269,10 +270,3 @@ def _write_rows(
             part = slice(first, min(first + _CHUNK, n_rows))
             numbers = np.arange(part.start, part.stop, dtype=np.float64)
             file.write(form.rows(np.column_stack([numbers, values(part)])))
-
-
-def _quoted(text: str) -> str:
-    """A CSV field that may hold a comma or a quote."""
-    if any(sign in text for sign in ',"\n'):
-        return '"' + text.replace('"', '""') + '"'
-    return text

@@ -65,11 +65,13 @@ class RobotVerification(Verification):
         problem: The robot, its obstacles, the clearances asked for.
         trajectory: What was judged.
         least: The least clearance of every pair.
+        notes: Of the trajectory's file, a sentence each.
     """
 
     problem: Cell
     trajectory: Path
     least: LeastClearances
+    notes: tuple[str, ...] = ()
 
 
 def verify_robot(

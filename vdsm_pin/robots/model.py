@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from vdsm_pin.proof.packed_tree import PackedTree, pack_tree, place_rows
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.files import HULLS, Solids
 from vdsm_pin.robots.srdf import Base
+
+Values: TypeAlias = Mapping[str, tuple[int | None, float, float]]
+"""Of a joint by name: column of q, None where it stands still, ratio and offset."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,12 @@ class Robot:
     covers: Mapping[str, Sequence[tuple[IntArray, ...] | Hull]] = field(
         default_factory=dict
     )
+
+    @property
+    def values(self) -> Values:
+        """The value of every joint by the columns of q."""
+        joints = (joint for joint in self.tree.joints if joint.name)
+        return {one.name: (one.column, one.ratio, one.offset) for one in joints}
 
     @cached_property
     def _packed(self) -> PackedTree:

@@ -1,8 +1,6 @@
 """Trajectories of robots: CSV with named columns, messages and bags of ROS."""
 
-import json
-import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Final
@@ -18,28 +16,26 @@ from vdsm_pin.io.joint_trajectory import (
     JointTrajectory,
     read_joint_trajectory,
 )
-from vdsm_pin.io.source import check_is_file, readable
-from vdsm_pin.io.tables import Table, open_text
-from vdsm_pin.robots.model import Robot, RobotJoint
-from vdsm_pin.units import MM_PER_M
+from vdsm_pin.io.source import check_is_file
+from vdsm_pin.io.tables import listed
+from vdsm_pin.robots.model import Robot, RobotJoint, Values
+from vdsm_pin.robots.trajectory_csv import csv_text, read_csv
 
 if TYPE_CHECKING:  # whoever reads waypoints alone needs no pieces
     from vdsm_pin.proof.paths import Path
 
-UNITS: Final = {"rad": 1.0, "deg": np.pi / 180.0, "m": 1.0, "mm": 1.0 / MM_PER_M}
 MOST_TURNS: Final = 4.0 * np.pi
 """An angle beyond this must be in degrees; [rad]."""
 
-TIME: Final = "time_s"
-RATES: Final = "velocity", "s"
-CHANGES: Final = "acceleration", "s2"
-
-_COLUMN: Final = re.compile(r"(.+)_(rad|deg|mm|m)")
-_SMOOTH: Final = re.compile(r"(.+)_(velocity|acceleration)_(rad|deg|mm|m)_(s|s2)")
+NOISE: Final = 1e-3
+"""How far a joint that is judged by others may be measured elsewhere; [rad], [m]."""
 
 
 def read_motion(
-    file: File, joints: Sequence[RobotJoint], topic: str | None = None
+    file: File,
+    joints: Sequence[RobotJoint],
+    topic: str | None = None,
+    values: Values | None = None,
 ) -> JointTrajectory:
     """The waypoints of a trajectory, a column for each joint that moves.
 
@@ -48,24 +44,64 @@ def read_motion(
             `NAME_mm`; a JointTrajectory or RobotTrajectory as YAML or JSON; or a bag.
         joints: Those that move.
         topic: Of a bag.
+        values: Of all joints by those that move; a column of one that stands still or
+            mimics another has to agree with them.
 
     Raises:
-        InvalidFile: If a joint is missing or unknown, or a value is no number or in
-            another unit than stated.
+        InvalidFile: If a joint is missing, there twice or elsewhere than it is judged,
+            or a value is no number or in another unit than stated.
     """
     if topic is not None and not is_bag(file):
         problem = f"is no bag, so --topic {topic} has no meaning"
         raise InvalidFile(file=file, problem=problem)
     if is_bag(file):
-        found = _of_joints(file, read_bag(file, topic), joints)
+        whole = read_bag(file, topic)
     else:
         check_is_file(file)
         if file.suffix.lower() in ENDINGS:
-            found = _of_joints(file, read_joint_trajectory(file), joints)
+            whole = read_joint_trajectory(file)
         else:
-            found = _read_csv(file, joints)
+            whole = read_csv(file, joints, values or {})
+    found = _of_joints(file, whole, joints)
     _check_units(file, found.q, joints)
-    return found
+    others = {
+        name: whole.q[:, k]
+        for k, name in enumerate(whole.names)
+        if name in (values or {}) and name not in found.names
+    }
+    known = {*(values or {}), *found.names}
+    unread = [
+        name
+        for name in whole.names
+        if name not in known and f"{name.rpartition('/')[0]}/theta" not in known
+    ]
+    notes = [f"joints that are not read: {listed(unread)}"] if unread else []
+    notes += _agree(file, found.q, others, values or {})
+    return replace(found, notes=(*whole.notes, *notes))
+
+
+def _agree(
+    file: File, q: FloatArray, others: Mapping[str, FloatArray], values: Values
+) -> Iterator[str]:
+    """Notes on joints that are judged by others, near where the file has them.
+
+    Raises:
+        InvalidFile: If one is farther off than what is measured of it may be.
+    """
+    for name, stated in others.items():
+        column, ratio, offset = values[name]
+        judged = offset + (ratio * q[:, column] if column is not None else 0.0 * stated)
+        off = np.abs(stated - judged)
+        row = int(np.argmax(off))
+        if not off[row] <= NOISE:
+            why = "stands still" if column is None else "mimics another"
+            problem = (
+                f"has joint {name!r} at {stated[row]:.6g} at waypoint {row}, but it "
+                f"{why} and is judged at {judged[row]:.6g}"
+            )
+            raise InvalidFile(file=file, problem=problem)
+        if off[row] > STILL:
+            yield f"joint {name!r} is up to {off[row]:.2g} off where it is judged"
 
 
 def read_path(file: File, robot: Robot, topic: str | None = None) -> "Path":
@@ -77,9 +113,17 @@ def read_path(file: File, robot: Robot, topic: str | None = None) -> "Path":
     Raises:
         InvalidFile: As `read_motion`, or if times do not rise.
     """
+    return path_of(file, read_motion(file, robot.joints, topic, robot.values))
+
+
+def path_of(file: File, motion: JointTrajectory) -> "Path":
+    """The pieces through some waypoints.
+
+    Raises:
+        InvalidFile: If times do not rise.
+    """
     from vdsm_pin.proof.paths import Path, cubic_path, quintic_path
 
-    motion = read_motion(file, robot.joints, topic)
     try:
         if motion.times is None or motion.rates is None:
             return Path(motion.q, times=motion.times)
@@ -117,101 +161,6 @@ def _of_joints(
     return replace(motion, names=tuple(names)).of(wanted)
 
 
-def _read_csv(file: File, joints: Sequence[RobotJoint]) -> JointTrajectory:
-    with open_text(file) as text:
-        head = text.readline()
-    names = [word.strip().strip('"') for word in re.split("[,;\t]", head.strip())]
-    columns, factors = _position_columns(file, names, joints)
-    smooth = [_smooth_columns(file, names, joints, *w) for w in (RATES, CHANGES)]
-    if smooth[1] and not smooth[0]:
-        problem = "has accelerations, expected velocities too"
-        raise InvalidFile(file=file, where="line 1", problem=problem)
-    times = [TIME] if TIME in names else []
-    if smooth[0] and not times:
-        problem = f"has velocities, expected {TIME} too"
-        raise InvalidFile(file=file, where="line 1", problem=problem)
-    wanted = [*columns, *times, *smooth[0], *smooth[1]]
-    with readable(file), open_text(file) as text:
-        table, n = Table(file, text, wanted).all_rows(), len(columns)
-    _check_degrees(file, table, columns)
-    rest = table[:, n + len(times) :]
-    parts = [
-        rest[:, k * n : (k + 1) * n]
-        * np.array([UNITS[m[3]] for name in found if (m := _SMOOTH.fullmatch(name))])
-        if found
-        else None
-        for k, found in enumerate(smooth)
-    ]
-    return JointTrajectory(
-        tuple(joint.name for joint in joints),
-        table[:, :n] * np.array(factors),
-        table[:, n] if times else None,
-        parts[0],
-        parts[1],
-    )
-
-
-def _position_columns(
-    file: File, names: Sequence[str], joints: Sequence[RobotJoint]
-) -> tuple[list[str], list[float]]:
-    """Names of the columns of the joints, and what makes them SI units."""
-    named = {m[1]: (name, m[2]) for name in names if (m := _COLUMN.fullmatch(name))}
-    columns, factors = [], []
-    for joint in joints:
-        if joint.name not in named:
-            problem = (
-                f"has no column for joint {joint.name!r}, expected "
-                f"{joint.name}_{joint.unit}; or state its value with --lock"
-            )
-            raise InvalidFile(file=file, where="line 1", problem=problem)
-        name, unit = named[joint.name]
-        _check_kind(file, name, unit, joint)
-        columns.append(name)
-        factors.append(UNITS[unit])
-    return columns, factors
-
-
-def _check_kind(file: File, name: str, unit: str, joint: RobotJoint) -> None:
-    """Refuse lengths of a joint that turns, and angles of one that slides."""
-    if (unit in ("rad", "deg")) != joint.turns:
-        expected = "_rad or _deg" if joint.turns else "_m or _mm"
-        problem = f"has the column {name!r}, expected {expected} for this joint"
-        raise InvalidFile(file=file, where="line 1", problem=problem)
-
-
-def _smooth_columns(
-    file: File, names: Sequence[str], joints: Sequence[RobotJoint], what: str, per: str
-) -> list[str]:
-    """Names of the velocities or accelerations of all joints, or none at all."""
-    found = {
-        m[1]: (name, m[3])
-        for name in names
-        if (m := _SMOOTH.fullmatch(name)) and (m[2], m[4]) == (what, per)
-    }
-    mine = [joint for joint in joints if joint.name in found]
-    for joint in joints if mine else []:
-        if joint.name not in found:
-            expected = f"{joint.name}_{what}_{joint.unit}_{per}"
-            problem = f"has no column {expected}, but one for {mine[0].name!r}"
-            raise InvalidFile(file=file, where="line 1", problem=problem)
-        _check_kind(file, *found[joint.name], joint)
-    return [found[joint.name][0] for joint in joints] if mine else []
-
-
-def _check_degrees(file: File, table: FloatArray, columns: Sequence[str]) -> None:
-    """Refuse radians under the name of degrees."""
-    angles = [k for k, name in enumerate(columns) if name.endswith("_deg")]
-    if not angles or not np.ptp(table[:, angles], axis=0).any():
-        return
-    most = float(np.abs(table[:, angles]).max())
-    if most <= np.pi and (np.abs(table[:, angles]) % 1.0 > 0.0).any():
-        problem = (
-            f"its columns in degrees stay within {most:.4g}, which is at most pi: they "
-            "look like radians; expected _rad, also for degrees as small as these"
-        )
-        raise InvalidFile(file=file, problem=problem)
-
-
 def _check_units(file: File, q: FloatArray, joints: Sequence[RobotJoint]) -> None:
     """Refuse degrees under the name of radians."""
     for k, joint in enumerate(joints):
@@ -224,21 +173,6 @@ def _check_units(file: File, q: FloatArray, joints: Sequence[RobotJoint]) -> Non
                 "is it in degrees? expected _deg, or radians"
             )
             raise InvalidFile(file=file, problem=problem)
-
-
-def csv_text(motion: JointTrajectory, robot: Robot) -> str:
-    """Waypoints as CSV, which `read_motion` reads back to the same numbers."""
-    heads = [f"{joint.name}_{joint.unit}" for joint in robot.joints]
-    parts = [motion.q]
-    if motion.times is not None:
-        heads.append(TIME)
-        parts.append(motion.times[:, None])
-    for values, (what, per) in ((motion.rates, RATES), (motion.changes, CHANGES)):
-        if values is not None:
-            heads += [f"{j.name}_{what}_{j.unit}_{per}" for j in robot.joints]
-            parts.append(values)
-    rows = [json.dumps(row)[1:-1].replace(" ", "") for row in np.hstack(parts).tolist()]
-    return "\n".join([",".join(heads), *rows]) + "\n"
 
 
 def path_text(path: "Path", robot: Robot) -> str:

@@ -1,0 +1,164 @@
+"""Trajectories of robots as CSV with named columns."""
+
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path as File
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.joint_trajectory import JointTrajectory
+from vdsm_pin.io.source import readable
+from vdsm_pin.io.tables import BETWEEN, Table, listed, open_text, quoted, split
+from vdsm_pin.robots.model import Robot, RobotJoint, Values
+from vdsm_pin.units import MM_PER_M
+
+UNITS: Final = {"rad": 1.0, "deg": np.pi / 180.0, "m": 1.0, "mm": 1.0 / MM_PER_M}
+TIME: Final = "time_s"
+RATES: Final = "velocity", "s"
+CHANGES: Final = "acceleration", "s2"
+
+Stated: TypeAlias = dict[str, tuple[str, str]]
+"""Column and unit of a joint by its name."""
+
+_COLUMN: Final = re.compile(r"(.+)_(rad|deg|mm|m)")
+_SMOOTH: Final = re.compile(r"(.+)_(velocity|acceleration)_(rad|deg|mm|m)_(s|s2)")
+
+
+def read_csv(
+    file: File, joints: Sequence[RobotJoint], values: Values
+) -> JointTrajectory:
+    """The joints that move and, without rates, others that `values` has."""
+    with open_text(file) as text:
+        head = text.readline()
+    known = {joint.name for joint in joints}
+    names = max(
+        (split(head, sign) for sign in BETWEEN),
+        key=lambda found: len(known & _stated(found).keys()),
+    )
+    stated = _stated(names)
+    _check_once(file, names, stated)
+    columns, factors = _position_columns(file, stated, joints)
+    others = [one for one in stated if one in values and one not in known]
+    smooth = [_smooth_columns(file, names, joints, *w) for w in (RATES, CHANGES)]
+    if smooth[1] and not smooth[0]:
+        problem = "has accelerations, expected velocities too"
+        raise InvalidFile(file=file, where="line 1", problem=problem)
+    times = [TIME] if TIME in names else []
+    if smooth[0] and not times:
+        problem = f"has velocities, expected {TIME} too"
+        raise InvalidFile(file=file, where="line 1", problem=problem)
+    wanted = [*columns, *times, *smooth[0], *smooth[1]]
+    more = [stated[one][0] for one in others]
+    with readable(file), open_text(file) as text:
+        table, n = Table(file, text, [*wanted, *more]).all_rows(), len(columns)
+    _check_degrees(file, table, columns)
+    rest = table[:, n + len(times) :]
+    parts = [
+        rest[:, k * n : (k + 1) * n]
+        * np.array([UNITS[m[3]] for name in found if (m := _SMOOTH.fullmatch(name))])
+        if found
+        else None
+        for k, found in enumerate(smooth)
+    ]
+    factors += [UNITS[stated[one][1]] for one in others]
+    unread = [name for name in names if name not in (*wanted, *more)]
+    return JointTrajectory(
+        (*(joint.name for joint in joints), *others),
+        np.hstack([table[:, :n], table[:, len(wanted) :]]) * np.array(factors),
+        table[:, n] if times else None,
+        parts[0],
+        parts[1],
+        (f"columns that are not read: {listed(unread)}",) if unread else (),
+    )
+
+
+def _stated(names: Sequence[str]) -> Stated:
+    """Column and unit of each joint that has one."""
+    return {m[1]: (name, m[2]) for name in names if (m := _COLUMN.fullmatch(name))}
+
+
+def _check_once(file: File, names: Sequence[str], stated: Stated) -> None:
+    """Refuse a second column of a joint, in another unit."""
+    for name in names:
+        if (m := _COLUMN.fullmatch(name)) and stated[m[1]][0] != name:
+            problem = f"has {name!r} and {stated[m[1]][0]!r}, expected one of them"
+            raise InvalidFile(file=file, where="line 1", problem=problem)
+
+
+def _position_columns(
+    file: File, named: Stated, joints: Sequence[RobotJoint]
+) -> tuple[list[str], list[float]]:
+    """Names of the columns of the joints, and what makes them SI units."""
+    columns, factors = [], []
+    for joint in joints:
+        if joint.name not in named:
+            problem = (
+                f"has no column for joint {joint.name!r}, expected "
+                f"{joint.name}_{joint.unit}; or state its value with --lock"
+            )
+            raise InvalidFile(file=file, where="line 1", problem=problem)
+        name, unit = named[joint.name]
+        _check_kind(file, name, unit, joint)
+        columns.append(name)
+        factors.append(UNITS[unit])
+    return columns, factors
+
+
+def _check_kind(file: File, name: str, unit: str, joint: RobotJoint) -> None:
+    """Refuse lengths of a joint that turns, and angles of one that slides."""
+    if (unit in ("rad", "deg")) != joint.turns:
+        expected = "_rad or _deg" if joint.turns else "_m or _mm"
+        problem = f"has the column {name!r}, expected {expected} for this joint"
+        raise InvalidFile(file=file, where="line 1", problem=problem)
+
+
+def _smooth_columns(
+    file: File, names: Sequence[str], joints: Sequence[RobotJoint], what: str, per: str
+) -> list[str]:
+    """Names of the velocities or accelerations of all joints, or none at all."""
+    found = {
+        m[1]: (name, m[3])
+        for name in names
+        if (m := _SMOOTH.fullmatch(name)) and (m[2], m[4]) == (what, per)
+    }
+    mine = [joint for joint in joints if joint.name in found]
+    for joint in joints if mine else []:
+        if joint.name not in found:
+            expected = f"{joint.name}_{what}_{joint.unit}_{per}"
+            problem = f"has no column {expected}, but one for {mine[0].name!r}"
+            raise InvalidFile(file=file, where="line 1", problem=problem)
+        _check_kind(file, *found[joint.name], joint)
+    return [found[joint.name][0] for joint in joints] if mine else []
+
+
+def _check_degrees(file: File, table: FloatArray, columns: Sequence[str]) -> None:
+    """Refuse radians under the name of degrees."""
+    angles = [k for k, name in enumerate(columns) if name.endswith("_deg")]
+    if not angles or not np.ptp(table[:, angles], axis=0).any():
+        return
+    most = float(np.abs(table[:, angles]).max())
+    if most <= np.pi and (np.abs(table[:, angles]) % 1.0 > 0.0).any():
+        problem = (
+            f"its columns in degrees stay within {most:.4g}, which is at most pi: they "
+            "look like radians; expected _rad, also for degrees as small as these"
+        )
+        raise InvalidFile(file=file, problem=problem)
+
+
+def csv_text(motion: JointTrajectory, robot: Robot) -> str:
+    """Waypoints as CSV, which `read_motion` reads back to the same numbers."""
+    heads = [f"{joint.name}_{joint.unit}" for joint in robot.joints]
+    parts = [motion.q]
+    if motion.times is not None:
+        heads.append(TIME)
+        parts.append(motion.times[:, None])
+    for values, (what, per) in ((motion.rates, RATES), (motion.changes, CHANGES)):
+        if values is not None:
+            heads += [f"{j.name}_{what}_{j.unit}_{per}" for j in robot.joints]
+            parts.append(values)
+    rows = [json.dumps(row)[1:-1].replace(" ", "") for row in np.hstack(parts).tolist()]
+    return "\n".join([",".join(map(quoted, heads)), *rows]) + "\n"
