@@ -264,6 +264,8 @@ BAD = {
     "g.xyz": (b"1 2 inf\n", "point 1: has a coordinate that is not a number"),
     "h.xyz": (b"nan nan nan\n", "has no point"),
     "i.npy": (b"no", "is no array of numbers"),
+    "i.csv": (b"i,x,y,z\n0,1,2,3\n", "line 1: has the columns i x y z"),
+    "i.txt": (b"x z y\n1 2 3\n", "expected x, y and z first"),
     "j.pcd": (b"DATA binary\n", "has a header that is no PCD's"),
     "k.pcd": (b"hello\n" * 300, "no line DATA"),
     "l.pcd": (pcd("binary", b"123"), "promises 3 points"),
@@ -292,6 +294,9 @@ def test_arrays_of_other_shapes_are_refused(tmp_path: Path) -> None:
     odd = (
         np.zeros(3),
         np.zeros((3, 2)),
+        np.zeros((3, 7)),  # points in columns
+        np.zeros((200, 200), np.uint8),  # a map of two dimensions
+        np.zeros((5, 3), np.bool_),
         np.full((1, 1, 1), 2),
         np.zeros((2, 2, 2)),
         np.array([["a", "b", "c"]]),

@@ -219,6 +219,23 @@ def test_planning_scenes_are_read_as_they_stand(tmp_path: Path) -> None:
     assert floor.normal @ floor.point == pytest.approx(-1.5)
 
 
+def test_planning_scenes_are_whole_and_in_one_frame(tmp_path: Path) -> None:
+    files = RobotFiles(write(tmp_path, "two.urdf", URDF))
+
+    def framed(text: str, of: str, frame: str) -> str:
+        return text.replace(of, f"{of}\n      header: {{frame_id: {frame}}}")
+
+    both = framed(framed(MOVEIT, "id: can", "world"), "id: floor", "world")
+    assert len(cell_of(files, write(tmp_path, "s.yaml", both)).scene.obstacles) == 2
+    for text, expected in (
+        (f"is_diff: true\n{MOVEIT}", "expected a whole one"),
+        (framed(MOVEIT, "id: can", "world"), "in the frame '', expected that of"),
+        (both.replace("world}", "/hand}"), "in the frame '/hand', expected that of"),
+    ):
+        with pytest.raises(InvalidFile, match=expected):
+            cell_of(files, write(tmp_path, "s.yaml", text))
+
+
 def test_pairs_follow_the_srdf(tmp_path: Path) -> None:
     urdf = write(tmp_path, "two.urdf", URDF)
     assert [one.reason for one in read_robot(urdf).left_out] == [

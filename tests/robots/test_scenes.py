@@ -133,8 +133,11 @@ def test_worlds_stand_where_mujoco_has_them(tmp_path: Path) -> None:
     joint = WORLD.replace(
         "<body pos=", "<body><freejoint/><geom size='1'/></body>\n<body pos=", 1
     )
+    flex = '<flexcomp name="f" type="grid" count="3 3 1" dim="2" rigid="true"/>'
+    bent = WORLD.replace("</worldbody>", f"{flex}</worldbody>")
     for text, expected in (
         (joint, "rides on a joint"),
+        (bent, "world.xml: has a flex, which bends"),
         (
             WORLD.replace('"sphere" size="0.1"', '"ellipsoid" size="1 1 1"'),
             "is a ellipsoid, expected plane",
@@ -143,6 +146,14 @@ def test_worlds_stand_where_mujoco_has_them(tmp_path: Path) -> None:
     ):
         with pytest.raises(InvalidFile, match=expected):
             read_scene(write(tmp_path, "world.xml", text), 1.0)
+
+
+def test_a_geom_that_collides_by_a_pair_is_there(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    pair = '<contact><pair geom1="crate" geom2="picture"/></contact>'
+    text = WORLD.replace("</mujoco>", f"{pair}</mujoco>").replace("ellipsoid", "sphere")
+    names = read_scene(write(tmp_path, "world.xml", text), 1.0).names
+    assert "picture" in names
 
 
 @pytest.mark.parametrize(

@@ -99,10 +99,11 @@ def _npy(stream: MeshStream) -> FloatArray:
             problem = "has values besides 0 and 1, expected one of them for each cell"
             raise stream.invalid(problem)
         return np.asarray(array)
-    if array.ndim != 2 or array.shape[1] < 3:
-        problem = f"has an array of shape {array.shape}, expected (n, 3)"
+    if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind == "b":
+        problem = f"has an array of {array.dtype} of shape {array.shape}, "
+        problem += "expected points (n, 3), or cells in three dimensions"
         raise stream.invalid(problem)
-    return doubles(array[:, :3])
+    return doubles(array)
 
 
 def _text(stream: MeshStream) -> FloatArray:
@@ -131,9 +132,19 @@ def _line_by_line(stream: MeshStream, data: bytes) -> FloatArray:
             problem = "has commas inside numbers, expected decimal points"
             raise stream.invalid(problem, line=number)
         title = number == 1 and (len(words) == 1 or words[0][:1].isalpha())
-        if words != [""] and not title:
+        if title:
+            _check_title(stream, [word.strip('"').lower() for word in words])
+        elif words != [""]:
             rows.append(stream.numbers(words[:3], 3, number))
     return np.array(rows).reshape(-1, 3)
+
+
+def _check_title(stream: MeshStream, names: list[str]) -> None:
+    """Refuse columns of which x, y and z are not the first."""
+    for place, name in enumerate("xyz"):
+        if name in names and names.index(name) != place:
+            problem = f"has the columns {' '.join(names)}, expected x, y and z first"
+            raise stream.invalid(problem, line=1)
 
 
 _READERS: Final[dict[str, Callable[[MeshStream], FloatArray]]] = {

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from vdsm_pin.robots.scene_files import read_scene_with_files
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.moving import frames_beside, tree_beside
+
+BASE: Final = 1
+"""The frame that obstacles stand in: of the root link, where it does not move."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +152,8 @@ def cell_of(
     if scene is None:
         source = source_of(named, ())
         return Cell(robot, Scene(), required, required_self, source=source)
-    solids, of_files = read_scene_with_files(scene, _size(robot))
+    links = [name for name, frame in robot.frames.items() if frame != BASE]
+    solids, of_files = read_scene_with_files(scene, _size(robot), links)
     source = source_of((*named, scene), of_files)
     return Cell(robot, solids, required, required_self, source=source)
 

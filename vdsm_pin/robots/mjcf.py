@@ -28,6 +28,8 @@ def read_mjcf(file: Path) -> Scene:
         raise InvalidFile(file=file, problem=problem)
     try:
         return Scene(tuple(_solids(file)))
+    except InvalidFile:
+        raise
     except InvalidInput as error:
         raise InvalidFile(file=file, problem=str(error)) from None
 
@@ -52,10 +54,14 @@ def _solids(file: Path) -> list[Obstacle]:
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
         problem = f"is refused by mujoco: {' '.join(str(error).split())[:200]}"
         raise InvalidFile(file=file, problem=problem) from None
+    if model.nflex:
+        problem = "has a flex, which bends, expected a world that stands still"
+        raise InvalidFile(file=file, problem=problem)
+    paired = {*model.pair_geom1.tolist(), *model.pair_geom2.tolist()}
     return [
         _solid(file, model, data, k, names[k])
         for k in range(model.ngeom)
-        if model.geom_contype[k] or model.geom_conaffinity[k]
+        if model.geom_contype[k] or model.geom_conaffinity[k] or k in paired
     ]
 
 

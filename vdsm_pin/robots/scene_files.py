@@ -1,7 +1,7 @@
 """Scenes for robots: obstacles as in a problem file, or a PlanningScene of MoveIt."""
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Final, Literal, TypeAlias
 
@@ -47,7 +47,7 @@ def read_scene(path: Path, robot_size: float) -> Scene:
 
 
 def read_scene_with_files(
-    path: Path, robot_size: float
+    path: Path, robot_size: float, links: Collection[str] = ()
 ) -> tuple[Scene, tuple[tuple[str, Path], ...]]:
     """The obstacles of a scene file, in the robot's base frame.
 
@@ -56,6 +56,7 @@ def read_scene_with_files(
             PlanningScene as MoveIt writes it; its `.scene` text; or a world in MJCF
             (`.xml`, `.mjcf`).
         robot_size: For judging the size of a mesh; [m].
+        links: Of the robot, besides the root link.
 
     Returns:
         The obstacles, and the names of those that have a file of their own, with it.
@@ -69,10 +70,10 @@ def read_scene_with_files(
         return read_mjcf(path), ()
     text = read_text(path, limit=MAX_BYTES)
     if kind == ".scene":
-        return _moveit(read_scene_text(path, text)), ()
+        return _moveit(read_scene_text(path, text), links), ()
     document = read_yaml(text, file=path)
     if isinstance(document.data, dict) and "world" in document.data:
-        return _moveit(document), ()
+        return _moveit(document, links), ()
     return _ours(document, path, robot_size)
 
 
@@ -90,7 +91,7 @@ def _ours(
     return scene, files_of_obstacles(model.obstacles, path.parent)
 
 
-def _moveit(document: YamlDocument) -> Scene:
+def _moveit(document: YamlDocument, links: Collection[str]) -> Scene:
     """The collision objects of a PlanningScene, all solids of one as one obstacle each.
 
     Its allowed collision matrix is not read: the SRDF says which links may touch.
@@ -103,13 +104,28 @@ def _moveit(document: YamlDocument) -> Scene:
     if whole["world"].get("octomap", {}).get("octomap", {}).get("data", []).value:
         problem = "has an octomap, which is not read"
         raise whole["world"].invalid(problem)
+    if whole.get("is_diff", default=False).value:
+        problem = "is what changes in a scene, expected a whole one (is_diff: false)"
+        raise whole["is_diff"].invalid(problem)
     found: list[Obstacle] = []
-    for thing in whole["world"].get("collision_objects", []).items():
+    things = whole["world"].get("collision_objects", []).items()
+    _check_frames(things, links)
+    for thing in things:
         found += _solids(thing)
     try:
         return Scene(tuple(found))
     except InvalidInput as error:
         raise whole["world"].invalid(str(error)) from None
+
+
+def _check_frames(things: Sequence[Place], links: Collection[str]) -> None:
+    """Refuse frames that differ or are other links': all stand in the root link's."""
+    frames = [(one, one.get("header", {}).get("frame_id", "")) for one in things]
+    for thing, frame in frames:
+        one = str(frame.value)
+        if frame.value != frames[0][1].value or one.lstrip("/") in links:
+            problem = f"is in the frame {one[:60]!r}, expected that of the root link"
+            raise thing.invalid(problem)
 
 
 def _solids(thing: Place) -> list[Obstacle]:
