@@ -78,22 +78,9 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {
-        "quantity": quantity,
-        "depth": depth,
-        "limit": limit,
-        "percent": percent,
-        "errors": errors,
-        "outcome": outcome,
-        "point": _point,
-        "measured": measured,
-        "survived": survived,
-        "lost": lost,
-        "css_text": _css_text,
-        "term": term,
-        "place": place,
-        "assumption": assumption,
-    }
+    filters = [quantity, depth, limit, percent, errors, outcome, measured, survived,
+               lost, term, place, assumption, point, css_text]  # fmt: skip
+    environment.filters |= {one.__name__: one for one in filters}
     environment.globals |= {
         "asset": _asset,
         "meshcat": _meshcat,
@@ -119,14 +106,14 @@ def _meshcat() -> str:
     return script.read_text(encoding="utf-8").replace("</script", "<\\/script")
 
 
-def _point(point: Point | None) -> str:
+def point(point: Point | None) -> str:
     """A point in mm."""
     if point is None:
         return MISSING
     return ", ".join(f"{value * MM_PER_M:.1f}".replace("-", "−") for value in point)
 
 
-def _css_text(text: str) -> Markup:
+def css_text(text: str) -> Markup:
     """The inside of a CSS string; whatever is not a letter or digit is escaped."""
     signs = (sign if sign.isalnum() else f"\\{ord(sign):x} " for sign in text)
     return Markup("".join(signs))

@@ -218,19 +218,9 @@ def report_data(verification: Verification) -> PageData:
     obstacles = verification.problem.scene.obstacles
     drawn = [obstacles[k] for k in nearest_obstacles(verification, MOST_DRAWN)]
     scene, motion = _drawn(verification, drawn, shown)
-    text = embedded(
-        {
-            "scene": scene,
-            "motion": motion,
-            "closest": [
-                closest_data(verification, row) for row in verification.approaches
-            ],
-            "marks": [
-                asdict(one) for one in failing(verification) if one.moment is not None
-            ],
-            "charts": plots,
-        }
-    )
+    marks = [asdict(one) for one in failing(verification) if one.moment is not None]
+    near = [closest_data(verification, row) for row in verification.approaches]
+    text = embedded(_page(scene, motion, near) | {"marks": marks, "charts": plots})
     triangles = {solid["name"]: solid["count"] for solid in scene["obstacles"]}
     return PageData(text, tuple(plots), shown.complete, triangles)
 
@@ -238,17 +228,8 @@ def report_data(verification: Verification) -> PageData:
 def view_data(problem: PlanningProblem, trajectory: Trajectory) -> str:
     """The data of a 3D view; without a verification nothing is claimed."""
     shown = thinned(trajectory, np.zeros(0, dtype=np.int64))
-    return embedded(
-        {
-            "scene": scene_data(
-                problem, problem.scene.obstacles[:MOST_DRAWN], trajectory
-            ),
-            "motion": motion_data(problem, trajectory, shown),
-            "closest": [],
-            "marks": [],
-            "charts": [],
-        }
-    )
+    scene = scene_data(problem, problem.scene.obstacles[:MOST_DRAWN], trajectory)
+    return embedded(_page(scene, motion_data(problem, trajectory, shown)))
 
 
 def impasse_data(problem: PlanningProblem, place: Impasse) -> str:
@@ -275,15 +256,17 @@ def impasse_data(problem: PlanningProblem, place: Impasse) -> str:
         "otherPoint": None,
     }
     shown = thinned(place.arm, np.zeros(0, dtype=np.int64))
-    return embedded(
-        {
-            "scene": scene_data(problem, drawn, place.arm) | {"pins": pins},
-            "motion": motion_data(problem, place.arm, shown),
-            "closest": [near],
-            "marks": [],
-            "charts": [],
-        }
-    )
+    shown_scene = scene_data(problem, drawn, place.arm) | {"pins": pins}
+    motion = motion_data(problem, place.arm, shown)
+    return embedded(_page(shown_scene, motion, [near]))
+
+
+def _page(
+    scene: dict[str, Any], motion: dict[str, Any], closest: Sequence[Any] = ()
+) -> dict[str, Any]:
+    """What every page has; of nothing judged there are neither marks nor charts."""
+    page = {"scene": scene, "motion": motion, "closest": closest}
+    return page | {"marks": [], "charts": []}
 
 
 def _point(point: FloatArray) -> list[float] | None:
