@@ -42,6 +42,7 @@ from vdsm_pin.verification.records import (
     Check,
     ClosestApproach,
     Counterexample,
+    Pair,
     Verdict,
     Verification,
 )
@@ -143,17 +144,18 @@ def check_row(check: Check, time: float | None = None) -> CheckRow:
     )
 
 
+def _both(pair: Pair) -> dict[str, Any]:
+    """The bodies of a pair; null for what it has not."""
+    return {name: value or None for name, value in asdict(pair).items()}
+
+
 def closest_row(verification: Verification, approach: ClosestApproach) -> ClosestRow:
     """One closest approach as its row."""
     return ClosestRow(
         interval=approach.interval,
         moment=approach.moment,
         time_s=time_at(verification, approach.moment),
-        link=approach.pair.link,
-        body=approach.pair.body or None,
-        obstacle=approach.pair.obstacle or None,
-        other_link=approach.pair.other_link or None,
-        other_body=approach.pair.other_body or None,
+        **_both(approach.pair),
         lower_m=finite(approach.lower),
         upper_m=finite(approach.upper),
         station_m=finite(approach.station),
@@ -170,11 +172,7 @@ def counterexample_row(
     """One counterexample as its row."""
     return CounterexampleRow(
         moment=found.moment,
-        link=found.pair.link,
-        body=found.pair.body or None,
-        obstacle=found.pair.obstacle or None,
-        other_link=found.pair.other_link or None,
-        other_body=found.pair.other_body or None,
+        **_both(found.pair),
         x0_m=float(found.joints[0]),
         x0_error_m=float(found.offsets[0]),
         angles_rad=tuple(found.joints[1:].tolist()),
@@ -237,9 +235,7 @@ def error_box(errors: ErrorBox, n_links: int | None = None) -> ErrorBoxRow:
 def left_out(problem: PlanningProblem) -> tuple[LeftOutRow, ...]:
     """The bodies of an arm, and the obstacles, that are not held apart."""
     rows = ArmPairs(problem).left_out
-    return tuple(
-        LeftOutRow(body=row.body, other=row.other, reason=row.reason) for row in rows
-    )
+    return tuple(LeftOutRow.model_validate(row, from_attributes=True) for row in rows)
 
 
 def left_out_words(rows: Sequence[LeftOutRow]) -> str:
@@ -356,15 +352,6 @@ def _certified_sentence(verification: Verification) -> str:
     )
 
 
-def hashes(record: RunRecord) -> Hashes:
-    """The hashes of a run."""
-    return Hashes(
-        problem_sha256=record.problem_sha256,
-        trajectory_sha256=record.trajectory_sha256,
-        urdf_sha256=record.urdf_sha256,
-    )
-
-
 def _own_facts(verification: Verification) -> dict[str, Any]:
     """What the file says of an arm, or of any other robot."""
     if not isinstance(verification, ArmVerification):
@@ -419,7 +406,7 @@ def verification_file(
         nominal_clear=verification.nominal_clear
         if verification.counterexamples
         else None,
-        hashes=hashes(record),
+        hashes=Hashes.model_validate(record, from_attributes=True),
         versions=versions(),
         machine=machine(),
         tolerances=tolerances(),
@@ -464,7 +451,7 @@ def plan_file(refinement: "Refinement", record: RunRecord) -> PlanFile:
         error_box=error_box(verification.errors, plan.trajectory.n_links),
         coverage=finite(verification.coverage),
         motion=motion_facts(plan.problem, plan.trajectory),
-        hashes=hashes(record),
+        hashes=Hashes.model_validate(record, from_attributes=True),
         versions=versions(),
         command=record.command,
     )
