@@ -60,7 +60,6 @@ from vdsm_pin.verification.verify import verify
 
 if TYPE_CHECKING:  # whoever verifies an arm needs no robots
     from vdsm_pin.robots.cell import Cell
-    from vdsm_pin.verification.certificate_lines import Hashes
 
 TRAJECTORY: Final = "trajectory.csv"
 PLAN: Final = "plan.json"
@@ -351,32 +350,22 @@ def _certify(order: VerifyOrder, verification: Verification, record: RunRecord) 
     # Imported by those who ask for one: its schema takes a while to build.
     from vdsm_pin.verification.certificate_lines import Hashes
 
-    hashes = Hashes(
-        problem=record.problem_sha256,
-        trajectory=record.trajectory_sha256,
-    )
+    hashes = Hashes(record.problem_sha256, record.trajectory_sha256)
     try:
-        _write_certificate(order, order.certificate, verification, hashes)
+        if isinstance(verification, ArmVerification):
+            from vdsm_pin.verification.certificate_writer import write_certificate
+
+            write_certificate(order.certificate, verification, hashes, order.deadline)
+        else:
+            from vdsm_pin.robots.certificate import write_robot_certificate
+            from vdsm_pin.robots.judgement import RobotVerification
+
+            assert isinstance(verification, RobotVerification)
+            more = hashes, order.topic, order.deadline
+            write_robot_certificate(order.certificate, verification, *more)
     except (OutOfTime, CertificateTooLarge, VerificationFailed) as error:
         return str(error)
     return ""
-
-
-def _write_certificate(
-    order: VerifyOrder, path: Path, verification: Verification, hashes: "Hashes"
-) -> None:
-    """The certificate of an arm's motion, or of a robot's."""
-    if isinstance(verification, ArmVerification):
-        from vdsm_pin.verification.certificate_writer import write_certificate
-
-        write_certificate(path, verification, hashes, order.deadline)
-        return
-    from vdsm_pin.robots.certificate import write_robot_certificate
-    from vdsm_pin.robots.judgement import RobotVerification
-
-    assert isinstance(verification, RobotVerification)
-    topic = order.topic
-    write_robot_certificate(path, verification, hashes, topic, order.deadline)
 
 
 def _record(order: VerifyOrder, urdf_sha256: str) -> RunRecord:
