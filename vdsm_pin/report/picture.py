@@ -9,13 +9,14 @@ from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import HalfSpace
 from vdsm_pin.problem.scene import solid_of
+from vdsm_pin.report.html import rendered
 from vdsm_pin.report.moves import start_pose
 from vdsm_pin.report.palette import OBSTACLE, OBSTACLE_EDGE, PATH, link_colours
 from vdsm_pin.report.solids import surface
 from vdsm_pin.report.thinning import MOST_DRAWN, nearest_obstacles
 from vdsm_pin.verification.records import ArmVerification, Verification
 
-_WIDTH, _HEIGHT = 240.0, 160.0
+_WIDTH, _HEIGHT = 240, 160
 _MARGIN: Final = 12.0
 _MOST_POINTS: Final = 150  # of a drawn line
 
@@ -36,58 +37,48 @@ def picture(verification: Verification) -> str:
 
     assert isinstance(verification, RobotVerification)
     links = [_hull(_view(corners)) for corners in placed_corners(verification)]
-    scale, shift = _fitted(np.vstack(links), 1e-3)
-    parts = [
-        f'<polygon points="{_text(scale * link + shift)}" fill="{colour}" '
-        'fill-opacity=".85"/>'
-        for link, colour in zip(links, link_colours(len(links)), strict=True)
-    ]
-    return "".join([*_scene(verification, scale, shift), *parts, "</svg>\n"])
-
-
-def _fitted(everything: FloatArray, least: float) -> tuple[float, FloatArray]:
-    """Scale and shift that fit points into the picture."""
-    low, span = everything.min(axis=0), np.ptp(everything, axis=0)
-    room = np.array([_WIDTH, _HEIGHT]) - 2.0 * _MARGIN
-    scale = float(np.min(room / np.maximum(span, least)))
-    return scale, _MARGIN + (room - scale * span) / 2.0 - scale * low
-
-
-def _scene(verification: Verification, scale: float, shift: FloatArray) -> list[str]:
-    """The head of the picture and its obstacles."""
-    head = f'viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}">'
-    return [
-        f'<svg xmlns="http://www.w3.org/2000/svg" {head}',
-        *(
-            f'<polygon points="{_text(scale * outline + shift)}" fill="{OBSTACLE}" '
-            f'fill-opacity=".7" stroke="{OBSTACLE_EDGE}"/>'
-            for outline in _outlines(verification)
-        ),
-    ]
+    return _drawn(verification, links, np.zeros((0, 2)), 0.0)
 
 
 def _of_arm(verification: ArmVerification) -> str:
     problem, rows = verification.problem, verification.trajectory
-    arm = problem.manipulator
     k = verification.approaches[0].interval if verification.approaches else 0
-    one = slice(k, k + 1)
-    centres = joint_centres(arm, rows.x0[one], rows.alpha[one], rows.theta[one])[0]
+    here = (part[k : k + 1] for part in (rows.x0, rows.alpha, rows.theta))
+    centres = _view(joint_centres(problem.manipulator, *here)[0])
+    links = [centres[i : i + 2] for i in range(problem.manipulator.n_links)]
     corners = np.zeros((0, 3)) if problem.tip_path is None else problem.path.corners
-    seen, path = _view(centres), _view(_thin(corners))
-    scale, shift = _fitted(np.vstack([seen, path]), arm.link_radius)
-    parts = _scene(verification, scale, shift)
-    if len(path):
-        line = _text(scale * path + shift)
-        ink = f'fill="none" stroke="{PATH}" stroke-width="1.5"'
-        parts.append(f'<polyline points="{line}" {ink}/>')
-    width = max(3.0, 2.0 * arm.link_radius * scale)
-    body = scale * seen + shift
-    parts += [
-        f'<polyline points="{_text(body[i : i + 2])}" stroke="{colour}" '
-        f'stroke-width="{width:.1f}" stroke-linecap="round"/>'
-        for i, colour in enumerate(link_colours(arm.n_links))
-    ]
-    return "".join([*parts, "</svg>\n"])
+    path, radius = _view(_thin(corners)), problem.manipulator.link_radius
+    return _drawn(verification, links, path, radius)
+
+
+def _drawn(
+    verification: Verification,
+    links: list[FloatArray],
+    path: FloatArray,
+    radius: float,
+) -> str:
+    """Links as hulls, or as lines of a radius, with path and obstacles; [m]."""
+    everything = np.vstack([*links, path])
+    low, span = everything.min(axis=0), np.ptp(everything, axis=0)
+    room = np.array([_WIDTH, _HEIGHT]) - 2.0 * _MARGIN
+    scale = float(np.min(room / np.maximum(span, radius or 1e-3)))
+    shift = _MARGIN + (room - scale * span) / 2.0 - scale * low
+
+    def text(points: FloatArray) -> str:
+        return " ".join(f"{x:.1f},{y:.1f}" for x, y in scale * points + shift)
+
+    return rendered(
+        "picture.svg.j2",
+        width=_WIDTH,
+        height=_HEIGHT,
+        obstacles=list(map(text, _outlines(verification))),
+        path=text(path),
+        links=list(zip(map(text, links), link_colours(len(links)), strict=True)),
+        thick=max(3.0, 2.0 * radius * scale) if radius else 0.0,
+        obstacle_colour=OBSTACLE,
+        edge_colour=OBSTACLE_EDGE,
+        path_colour=PATH,
+    )
 
 
 def _outlines(verification: Verification) -> list[FloatArray]:
@@ -114,7 +105,3 @@ def _hull(points: FloatArray) -> FloatArray:
 def _thin(points: FloatArray) -> FloatArray:
     chosen = np.linspace(0, len(points) - 1, min(len(points), _MOST_POINTS))
     return points[np.unique(chosen.astype(np.int64))]
-
-
-def _text(points: FloatArray) -> str:
-    return " ".join(f"{x:.1f},{y:.1f}" for x, y in points)

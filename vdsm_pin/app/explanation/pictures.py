@@ -13,6 +13,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import HalfSpace
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.problem.scene import solid_of
+from vdsm_pin.report.html import rendered
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import surface
 
@@ -89,31 +90,11 @@ def cross_picture(moment: Moment, one: Cross, regions: Sequence[DangerRegion]) -
 
 def bars(values: FloatArray, limit: float, letter: str, unit: str) -> str:
     """Values of the joints as bars beside their limit, in the unit said."""
+    names = [name(letter, k + 1) for k in range(len(values))]
+    rows = zip(names, values.tolist(), link_colours(len(values)), strict=True)
     top = 1.1 * max(limit, float(np.abs(values).max()))
-    step, high = 46.0, 150.0
-    width = step * len(values) + 60.0
-    colours = link_colours(len(values))
-    rows = [
-        f'<rect x="{50 + step * k:.0f}" y="{20 + high * (1 - v / top):.1f}" width="30" '
-        f'height="{high * v / top:.1f}" style="fill:{colour}"/>'
-        f'<text x="{65 + step * k:.0f}" y="{high + 38:.0f}" text-anchor="middle">'
-        f"{name(letter, k + 1)}</text>"
-        f'<text class="tick" x="{65 + step * k:.0f}" '
-        f'y="{15 + high * (1 - v / top):.1f}" text-anchor="middle">{v:.1f}</text>'
-        for k, (v, colour) in enumerate(zip(values.tolist(), colours, strict=True))
-    ]
-    line = 20 + high * (1 - limit / top)
-    rows.append(
-        f'<line class="limit" x1="40" x2="{width - 10:.0f}" y1="{line:.1f}" '
-        f'y2="{line:.1f}"/><text class="tick" x="36" y="{line + 4:.1f}" '
-        f'text-anchor="end">{limit:.1f}</text>'
-    )
-    said = f"{letter} of every joint in {unit}"
-    return (
-        f'<svg viewBox="0 0 {width:.0f} {high + 50:.0f}" width="{width:.0f}" '
-        f'height="{high + 50:.0f}" role="img" aria-label="{said}">'
-        f"<title>{said}</title>{''.join(rows)}</svg>"
-    )
+    said = {"letter": letter, "unit": unit}
+    return rendered("bars.svg.j2", bars=list(rows), limit=limit, top=top, **said)
 
 
 def hole_circle(arm: Manipulator, change: FloatArray) -> str:
@@ -123,23 +104,10 @@ def hole_circle(arm: Manipulator, change: FloatArray) -> str:
         arm: The arm.
         change: Cable lengths less those of the straight arm, shape (N, 3); [m].
     """
-    colours = link_colours(arm.n_links)
-    most = float(np.abs(change).max()) or 1.0
-    rows = ['<circle class="rim" cx="170" cy="170" r="105"/>']
-    for (j, k), angle in np.ndenumerate(arm.cables.hole_angles):
-        label = f"{j + 1}{'abc'[k]}"
-        sine, cosine = np.sin(angle), np.cos(angle)
-        x, y = 170.0 + 105.0 * sine, 170.0 - 105.0 * cosine
-        size = 3.0 + 7.0 * abs(change[j, k]) / most
-        style = "paid" if change[j, k] > 0.0 else "drawn"
-        rows.append(
-            f'<circle class="hole {style}" cx="{x:.1f}" cy="{y:.1f}" r="{size:.1f}" '
-            f'style="--own:{colours[j]}"/>'
-            f'<text class="tick" x="{170 + 132 * sine:.1f}" '
-            f'y="{174 - 132 * cosine:.1f}" text-anchor="middle">{label}</text>'
-        )
-    said = "cable holes, seen along the arm; filled: paid out, open: drawn in"
-    return (
-        '<svg viewBox="0 0 340 340" width="340" height="340" role="img" '
-        f'aria-label="{said}"><title>{said}</title>{"".join(rows)}</svg>'
-    )
+    angles, colours = arm.cables.hole_angles, link_colours(arm.n_links)
+    shares = change / (float(np.abs(change).max()) or 1.0)
+    holes = [
+        (f"{j + 1}{'abc'[k]}", np.sin(angle), np.cos(angle), shares[j, k], colours[j])
+        for (j, k), angle in np.ndenumerate(angles)
+    ]
+    return rendered("holes.svg.j2", holes=holes)
