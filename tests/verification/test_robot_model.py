@@ -18,7 +18,7 @@ from vdsm_pin.arm.manipulator import (
 )
 from vdsm_pin.arm.urdf_writer import urdf_text
 from vdsm_pin.errors import InvalidInput, UnknownName, VerificationFailed
-from vdsm_pin.verification.robot_model import load_robot, read_robot
+from vdsm_pin.verification.robot_model import frame_id, load_robot, read_robot
 
 HRM8 = built_in("hrm8")
 AGREEMENT = 1e-12
@@ -141,9 +141,9 @@ def test_hash_is_of_the_document() -> None:
 
 def test_an_unknown_frame_is_no_number() -> None:
     robot = load_robot(HRM8)
-    assert robot.model.frames[robot.frame_id("link3")].name == "link3"
+    assert robot.model.frames[frame_id(robot.model, "link3")].name == "link3"
     with pytest.raises(UnknownName, match=r"unknown frame 'link9'.*tip_mount"):
-        robot.frame_id("link9")
+        frame_id(robot.model, "link9")
 
 
 def test_angles_of_another_arm_are_refused() -> None:

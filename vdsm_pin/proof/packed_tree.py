@@ -129,12 +129,6 @@ def pack_tree(tree: Tree, reach: FloatArray | None = None) -> PackedTree:
     )
 
 
-def straight_motion(q: FloatArray) -> Motion:
-    """Rows (n_rows, n_columns) joined by straight lines."""
-    knots = np.ascontiguousarray(q, dtype=np.float64)
-    return Motion(knots, np.zeros((0, 0, knots.shape[1])))
-
-
 @compiled
 def new_pose(n_frames: int) -> Pose:
     """The world's frame; the others are to be written."""

@@ -39,7 +39,6 @@ _CLEARANCE_HEADER: Final = (
 )
 _CLEARANCE_DECIMALS: Final = (0, 9, WORD, 9, 9, WORD, *6 * (6,), 0, 9)
 _CLEARANCE_ROUNDING: Final = (0, 0, 0, -1, 1, 0, *6 * (0,), 0, 0)
-_FIELDS: Final = fields(LeastClearances)
 _SPOOLED: Final = 12  # numbers of a row before Coal's two
 _DECIMALS: Final = 12  # of metres and radians at the rows
 _CHUNK: Final = 8192  # rows held at one time

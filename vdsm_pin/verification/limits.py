@@ -29,17 +29,6 @@ thousandth of its bulge of the curve."""
 
 
 @dataclass(frozen=True)
-class Extremes:
-    """Largest |alpha|, |theta| and psi [rad], range of x0 [m], over a motion."""
-
-    alpha: float
-    theta: float
-    psi: float
-    x0_min: float
-    x0_max: float
-
-
-@dataclass(frozen=True)
 class _Largest:
     """The largest value of a measure at rows, and a bound of it between them.
 
@@ -144,23 +133,6 @@ def _largest_change(trajectory: Trajectory) -> _Largest:
         edges = np.concatenate([pieces[:, :, 0], pieces[:, -1:, -1]], axis=1)
         found = found.larger(np.ptp(edges, axis=1), k, n_angles=2)
     return replace(found, bound=bound)
-
-
-def extremes(trajectory: Trajectory) -> Extremes:
-    """Bounds of a motion's extreme values; exact where straight lines join rows."""
-    low, high = (_largest(trajectory, _along(sign)).bound for sign in (-1.0, 1.0))
-    return Extremes(
-        alpha=_largest(trajectory, _alpha).bound,
-        theta=_largest(trajectory, _theta).bound,
-        psi=_largest(trajectory, _psi).bound,
-        x0_min=-low,
-        x0_max=high,
-    )
-
-
-def _along(sign: float) -> Measure:
-    """x0, or its negative."""
-    return lambda joints: sign * joints[:, :1]
 
 
 def _alpha(joints: FloatArray) -> FloatArray:

@@ -115,14 +115,6 @@ class RobotModel:
         tip = poses.origins[:, -1] + poses.rotations[:, -1] @ self.p_link_tip
         return np.concatenate([poses.origins, tip[:, None]], axis=1)
 
-    def frame_id(self, name: str) -> int:
-        """Pinocchio's number of a frame; it returns a number for any name.
-
-        Raises:
-            UnknownName: If there is no such frame.
-        """
-        return _frame_id(self.model, name)
-
 
 def load_robot(manipulator: Manipulator) -> RobotModel:
     """Write the arm's URDF, read it back, and check that nothing got lost.
@@ -180,7 +172,7 @@ def read_robot(manipulator: Manipulator, text: str) -> RobotModel:
     T_link_capsule = np.tile(np.eye(4), (radii.size, 1, 1))
     T_link_capsule[:, :3, :3] = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
     T_link_capsule[:, 0, 3] = (starts + ends) / 2.0
-    tip = model.frames[_frame_id(model, "tip")].placement
+    tip = model.frames[frame_id(model, "tip")].placement
     return RobotModel(
         manipulator=manipulator,
         urdf_sha256=sha256_of([text.encode()]),
@@ -192,7 +184,12 @@ def read_robot(manipulator: Manipulator, text: str) -> RobotModel:
     )
 
 
-def _frame_id(model: Any, name: str) -> int:
+def frame_id(model: Any, name: str) -> int:
+    """Pinocchio's number of a frame; it returns a number for any name.
+
+    Raises:
+        UnknownName: If there is no such frame.
+    """
     if not model.existFrame(name):
         known = tuple(frame.name for frame in model.frames)
         raise UnknownName(kind="frame", name=name, known=known)
@@ -217,7 +214,7 @@ def _check_joints(manipulator: Manipulator, model: Any) -> None:
         raise VerificationFailed(message)
     offsets = [0.0, *manipulator.link_lengths]
     yaws = [model.jointPlacements[model.getJointId(name)] for name in angles[::2]]
-    tip = model.frames[_frame_id(model, "tip")].placement
+    tip = model.frames[frame_id(model, "tip")].placement
     for i, placement in enumerate([*yaws, tip]):
         if list(placement.translation) != [offsets[i], 0.0, 0.0]:
             message = (
