@@ -315,6 +315,17 @@ class Manipulator:
         return (*links, TOOL) if self.tool else tuple(links)
 
     @property
+    def rods(self) -> tuple[tuple[int, BodySolid], ...]:
+        """Links and tool in the frames of their links, each with its link, from 1."""
+        axis, found = np.array([1.0, 0.0, 0.0]), []
+        for k, name in enumerate(self.axis_names):
+            start, end = (float(x) for x in self.axis_spans[k])
+            size = (end - start) / 2.0, float(self.axis_radii[k])
+            rod = Capsule(name, (start + end) / 2.0 * axis, axis, *size)
+            found.append((min(k + 1, self.n_links), rod))
+        return tuple(found)
+
+    @property
     def least_radius(self) -> float:
         """Within it every place along the arm's axis has matter; [m]."""
         return float(self.axis_radii.min())

@@ -9,7 +9,6 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.arm.tree import RAIL, arm_tree, link_frame
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
-from vdsm_pin.geometry.solids import Capsule, Solid
 from vdsm_pin.io.arm_builder import ArmBuilder
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.problem_schema import OtherModel
@@ -53,10 +52,9 @@ class OtherArms:
             arm = ArmBuilder(*known, (*at, "manipulator")).build(model.manipulator)
             motion = self._motion(model, arm, at)
             carrier = _carrier(arm, motion, self._pose(model))
-            found += [
-                Moving(replace(solid, name=f"{model.name}: {solid.name}"), carrier, k)
-                for k, solid in _solids(arm)
-            ]
+            for link, solid in (*arm.rods, *arm.carried):
+                named = replace(solid, name=f"{model.name}: {solid.name}")
+                found.append(Moving(named, carrier, link_frame(link)))
         return tuple(found)
 
     def _motion(self, model: OtherModel, arm: Manipulator, at: Location) -> Trajectory:
@@ -90,16 +88,3 @@ def _carrier(arm: Manipulator, motion: Trajectory, pose: FloatArray) -> Carrier:
     joints[RAIL] = replace(joints[RAIL], placement=pose)
     path = Motion(motion.joints, motion.inner, motion.times)
     return Carrier(Tree(tuple(joints)), path)
-
-
-def _solids(arm: Manipulator) -> list[tuple[int, Solid]]:
-    """All that an arm consists of, each with the frame of its tree."""
-    found: list[tuple[int, Solid]] = []
-    axis = np.array([1.0, 0.0, 0.0])
-    for k, name in enumerate(arm.axis_names):
-        start, end = (float(x) for x in arm.axis_spans[k])
-        middle, half = (start + end) / 2.0 * axis, (end - start) / 2.0
-        rod = Capsule(name, middle, axis, half, float(arm.axis_radii[k]))
-        found.append((link_frame(min(k + 1, arm.n_links)), rod))
-    found += [(link_frame(link), solid) for link, solid in arm.carried]
-    return found

@@ -12,7 +12,6 @@ import numpy as np
 
 from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.solids import Capsule
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Moving, solid_of
 from vdsm_pin.problem.trajectory import Trajectory
@@ -92,19 +91,13 @@ def _arm(
     centres = joint_centres(arm, rows.x0, rows.alpha, rows.theta)
     turns = link_frames(rows.alpha, rows.theta)
     colours = [*link_colours(arm.n_links), _DARK]
-    axes = zip(arm.axis_spans, arm.axis_radii, arm.axis_names, strict=True)
-    parts: list[tuple[int, str, Surface, str]] = []
-    for k, ((start, end), radius, name) in enumerate(axes):
-        middle = np.array([(start + end) / 2.0, 0.0, 0.0])
-        axis, half = np.array([1.0, 0.0, 0.0]), float(end - start) / 2.0
-        rod = Capsule(name, middle, axis, half, float(radius))
-        link = min(k + 1, arm.n_links)
-        parts.append((link, name, surface(rod, 1.0, FINE), colours[k]))
-    parts += [(k, s.name, surface(s, 1.0, FINE), _DARK) for k, s in arm.carried]
+    parts = [(one, colours[k]) for k, one in enumerate(arm.rods)]
+    parts += [(one, _DARK) for one in arm.carried]
     still = np.broadcast_to(np.eye(3), (rows.n_samples, 3, 3))
     nodes = []
-    for link, name, skin, colour in parts:
-        node = file.node(name=name, mesh=file.mesh(name, skin, colour))
+    for (link, solid), colour in parts:
+        mesh = file.mesh(solid.name, surface(solid, 1.0, FINE), colour)
+        node = file.node(name=solid.name, mesh=mesh)
         turn = turns[:, link - 1] if link else still
         file.move(node, clock, centres[:, max(0, link - 1)], turn)
         nodes.append(node)
