@@ -1,12 +1,12 @@
-"""Small plane drawings as SVG: equal scales, axes in millimetres, no dependency."""
+"""Small plane drawings as SVG: equal scales, axes in millimetres."""
 
-import html
 import math
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.report.html import rendered
 from vdsm_pin.units import MM_PER_M
 
 WIDTH: Final = 560.0
@@ -32,29 +32,20 @@ class Canvas:
         room = WIDTH - 2.0 * MARGIN, MOST_HEIGHT - 2.0 * MARGIN
         self._scale = float(min(room / span))
         self._size = self._scale * span + 2.0 * MARGIN
-        self._parts: list[str] = []
+        self._parts: list[dict[str, str]] = []
         self._axes(low - pad, high + pad, (across, up))
 
     def line(
         self, points: FloatArray, style: str, colour: str = "", width: float = 1.4
     ) -> None:
         """A polyline of shape (n, 2), in one of the page's styles; [m]."""
-        ink = f' style="stroke:{colour}"' if colour else ""
-        self._parts.append(
-            f'<polyline class="{style}" points="{self._text(points)}"{ink} '
-            f'stroke-width="{width:g}"/>'
-        )
+        points_text, thick = self._text(points), f"{width:g}"
+        self._put("line", style, points=points_text, colour=colour, width=thick)
 
     def area(self, outline: FloatArray, style: str) -> None:
         """An outline of shape (n, 2), as far as it lies inside the drawing; [m]."""
-        width, height = self._size - 2.0 * MARGIN
-        size = f'width="{width:.1f}" height="{height:.1f}"'
-        view = f"{MARGIN:g} {MARGIN:g} {width:.1f} {height:.1f}"
-        self._parts.append(
-            f'<svg x="{MARGIN:g}" y="{MARGIN:g}" {size} viewBox="{view}" '
-            'style="overflow:hidden">'
-            f'<polygon class="{style}" points="{self._text(outline)}"/></svg>'
-        )
+        width, height = (f"{size:.1f}" for size in self._size - 2.0 * MARGIN)
+        self._put("area", style, points=self._text(outline), width=width, height=height)
 
     def dot(
         self,
@@ -72,26 +63,25 @@ class Canvas:
             beside: Where it stands; to the left of a negative number it ends; [px].
         """
         x, y = self._place(point)
-        self._parts.append(
-            f'<circle class="{style}" cx="{x:.1f}" cy="{y:.1f}" r="3.6"/>'
-        )
+        self._put("dot", style, x=f"{x:.1f}", y=f"{y:.1f}")
         if label:
             dx, dy = beside
-            anchor = "start" if dx > 0.0 else "end"
-            self._parts.append(
-                f'<text x="{x + dx:.1f}" y="{y + dy:.1f}" text-anchor="{anchor}">'
-                f"{html.escape(label)}</text>"
-            )
+            self._word(x + dx, y + dy, "start" if dx > 0.0 else "end", label)
 
     def svg(self, title: str) -> str:
         """The drawing; the title is read out where it cannot be seen."""
-        width, height = self._size
-        said = html.escape(title)
-        return (
-            f'<svg viewBox="0 0 {width:.0f} {height:.0f}" role="img" '
-            f'aria-label="{said}" width="{width:.0f}" height="{height:.0f}">'
-            f"<title>{said}</title>{''.join(self._parts)}</svg>"
-        )
+        width, height = (f"{size:.0f}" for size in self._size)
+        size = {"width": width, "height": height, "margin": f"{MARGIN:g}"}
+        return rendered("canvas.svg.j2", title=title, parts=self._parts, **size)
+
+    def _put(self, kind: str, style: str, **values: str) -> None:
+        self._parts.append({"kind": kind, "style": style, **values})
+
+    def _word(
+        self, x: float, y: float, anchor: str, text: str, style: str = ""
+    ) -> None:
+        places = {"x": f"{x:.1f}", "y": f"{y:.1f}"}
+        self._put("word", style, anchor=anchor, text=text, **places)
 
     def _axes(self, low: FloatArray, high: FloatArray, names: tuple[str, str]) -> None:
         step = round_step(float(np.max(high - low)) / TICKS)
@@ -102,19 +92,12 @@ class Canvas:
                 ends[:, axis] = k * step
                 self.line(ends, "grid", width=0.6)
                 x, y = self._place(ends[0])
-                at = (x, y + 14) if axis == 0 else (x - 6, y + 4)
-                anchor = ("middle", "end")[axis]
-                self._parts.append(
-                    f'<text class="tick" x="{at[0]:.1f}" y="{at[1]:.1f}" '
-                    f'text-anchor="{anchor}">{k * step * MM_PER_M:.0f}</text>'
-                )
+                at = (x, y + 14, "middle") if axis == 0 else (x - 6, y + 4, "end")
+                self._word(*at, f"{k * step * MM_PER_M:.0f}", "tick")
             far = [[high[0], low[1]], [low[0], high[1]]][axis]
             x, y = self._place(np.array(far))
             shift, anchor = [(30.0, "end"), (-10.0, "start")][axis]
-            self._parts.append(
-                f'<text x="{x:.1f}" y="{y + shift:.1f}" text-anchor="{anchor}">'
-                f"{html.escape(name)} [mm]</text>"
-            )
+            self._word(x, y + shift, anchor, f"{name} [mm]")
 
     def _place(self, point: FloatArray) -> tuple[float, float]:
         x, y = self._scale * (point - self._low) + MARGIN
