@@ -65,19 +65,13 @@ def piece_support(
         point[2] = c[2] + shift * a[2] - turn * qz
         middle = nx * c[0] + ny * c[1] + nz * c[2]
         return float(middle + shift * along - pieces.radius[p] * across)
-    best = np.inf
-    at = pieces.first_point[p]
-    for k in range(pieces.first_point[p], pieces.first_point[p + 1]):
-        q = pieces.points[k]
-        value = nx * q[0] + ny * q[1] + nz * q[2]
+    corners = pieces.points[pieces.first_point[p] : pieces.first_point[p + 1]]
+    best, at = np.inf, 0
+    for k in range(corners.shape[0]):
+        value = nx * corners[k, 0] + ny * corners[k, 1] + nz * corners[k, 2]
         if value < best:
-            best = value
-            at = k
-    point[0], point[1], point[2] = (
-        pieces.points[at, 0],
-        pieces.points[at, 1],
-        pieces.points[at, 2],
-    )
+            best, at = value, k
+    point[0], point[1], point[2] = corners[at, 0], corners[at, 1], corners[at, 2]
     return best
 
 

@@ -105,7 +105,7 @@ class _Table:
             self.radius.append(piece.radius)
             self.n_points.append(len(piece.points))
             self.points.append(piece.points)
-            self.centres.append(piece.points.mean(axis=0)[None])
+            self.centres.append(np.add.reduce(piece.points)[None] / len(piece.points))
             return
         self.flat[len(self.kind)] = piece
         self.n_points.append(0)

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import apart, borrowed, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.kernels import NORMAL, UPPER
 from vdsm_pin.geometry.obstacles import obstacle_bracket
@@ -81,6 +81,7 @@ class BroadPhase(NamedTuple):
 def new_broad_phase(task: Task, n_obstacles: int) -> BroadPhase:
     """Nothing settled yet; the first obstacles of the packed scene are looked at."""
     apart()
+    task = borrowed(task)
     pieces, pairs, ways = task.pieces, task.pairs, task.ways
     n_bodies, n_pairs = task.bodies.frame.size, pairs.rough.shape[0]
     n, shape = n_obstacles, (n_bodies, n_obstacles)

@@ -43,7 +43,7 @@ class Runs(NamedTuple):
         lower: Lower bounds, shape (BLOCK,); [m].
         upper: Upper bounds, at the nearer of the two rows, shape (BLOCK,); [m].
         at_rows: Core distances at the rows, shape (BLOCK + 1,); [m].
-        growth: What errors add to n.corner, shape (corners, BLOCK); [m].
+        growth: What errors add to n.corner, shape (corners, <= BLOCK); [m].
         axis: Axis of the disc in the partner's frame, shape (3, BLOCK + 1); [-].
         own: The witness on a body that is no segment, shape (3, BLOCK + 1); [m].
         toward: n in the world's frame, shape (3, BLOCK + 1); [-].
@@ -82,13 +82,18 @@ class Demand(NamedTuple):
 
 
 @compiled
-def new_runs(corners: int) -> Runs:
-    """Fresh working space; where errors add nothing `growth` is to be 0."""
+def new_runs(corners: int, block: int) -> Runs:
+    """Fresh working space; where errors add nothing `growth` is to be 0.
+
+    Args:
+        corners: Most corners of a body.
+        block: Most intervals whose rows are filled at once, BLOCK at most.
+    """
     return Runs(
         np.zeros(BLOCK),
         np.zeros(BLOCK),
         np.zeros(BLOCK + 1),
-        np.zeros((corners, BLOCK)),
+        np.zeros((corners, block)),
         np.zeros((3, BLOCK + 1)),
         np.zeros((3, BLOCK + 1)),
         np.zeros((3, BLOCK + 1)),

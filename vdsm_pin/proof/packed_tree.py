@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.compiled import apart, compiled
+from vdsm_pin.compiled import apart, borrowed, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.proof.tree import Joint, Kind, Tree
 
@@ -231,12 +231,18 @@ def _move_joint(tree: PackedTree, q: FloatArray, joint: int, pose: Pose) -> None
 @compiled
 def place_rows(tree: PackedTree, q: FloatArray) -> FloatArray:
     """All frames at rows of q (n_rows, n_columns), (n_rows, n_frames, 4, 4)."""
+    tree = borrowed(tree)
     n = tree.parent.size + 1
     pose, out = new_pose(n), np.zeros((q.shape[0], n, 4, 4))
     for row in range(q.shape[0]):
         place_tree(tree, q[row], pose)
-        out[row, :, :3, :3], out[row, :, :3, 3] = pose.frames, pose.origins
-        out[row, :, 3, 3] = 1.0
+        for frame in range(n):
+            placed = out[row, frame]
+            for c in range(3):
+                for d in range(3):
+                    placed[c, d] = pose.frames[frame, c, d]
+                placed[c, 3] = pose.origins[frame, c]
+            placed[3, 3] = 1.0
     return out
 
 

@@ -93,12 +93,12 @@ class _PlaceTable:
         self._known: dict[tuple[int, bytes, float], int] = {}
         self._blocks: dict[int, IntArray] = {}
         self._local: dict[tuple[int, int], int] = {}
-        self._frames: list[int] = []
+        self._frames: list[IntArray] = [np.zeros(0, np.int64)]
         self._at: list[FloatArray] = [np.zeros((0, 3))]
         self._lever: list[FloatArray] = [np.zeros(0)]
         self._points: list[IntArray] = [np.zeros(0, np.int64)]
         self._seen_on: list[IntArray] = [np.zeros(0, np.int64)]
-        self._n_seen = 0
+        self._n_points = self._n_seen = 0
 
     def places(self, bodies: Bodies, body: int, rest: int) -> IntArray:
         """Where the corners of a body are seen from a frame.
@@ -159,23 +159,24 @@ class _PlaceTable:
 
     def _add(self, frame: int, at: FloatArray, lever: FloatArray) -> IntArray:
         """Numbers of new points of a frame."""
-        first = len(self._frames)
-        self._frames += [frame] * len(at)
+        first = self._n_points
+        self._frames.append(np.full(len(at), frame))
         self._at.append(at)
         self._lever.append(lever)
-        return np.arange(first, len(self._frames))
+        self._n_points += len(at)
+        return np.arange(first, self._n_points)
 
     def packed(self) -> Places:
         """All places, those in the world first."""
-        n = len(self._frames)
-        frames = dict.fromkeys(self._frames)
-        way_of = {frame: self.ways.number(WORLD, frame) for frame in frames}
-        ways = [way_of[frame] for frame in self._frames]
+        n = self._n_points
+        frames, which = np.unique(np.concatenate(self._frames), return_inverse=True)
+        ways = [self.ways.number(WORLD, frame) for frame in frames.tolist()]
+        ways_of = np.array(ways, dtype=np.int64)[which]
         points = np.concatenate([np.arange(n), *self._points])
         return Places(
             n_points=n,
             point=points,
-            way=np.concatenate([np.array(ways, dtype=np.int64), *self._seen_on]),
+            way=np.concatenate([ways_of, *self._seen_on]),
             at=np.concatenate(self._at)[points],
             lever=np.concatenate(self._lever)[points],
         )

@@ -69,7 +69,8 @@ class _Plan:
     """How pairs of bodies are asked: each as some of a convex part and a partner.
 
     Args:
-        bodies: Those at rest in the world first, then the others, then parts.
+        bodies: Those at rest in the world first, then the others, then parts of bodies
+            with several.
         pairs: Of parts and partners.
         owner: The pair that each stands for, shape (n,).
         swapped: Whether its first body is the partner, shape (n,).
@@ -116,8 +117,10 @@ def _planned(bodies: Sequence[Body], pairs: PairTable) -> _Plan:
         if bounded[one] and bounded[other]:
             swapped = _mover(bodies[one], bodies[other])
         mover, partner = (other, one) if swapped else (one, other)
-        if mover not in parts:
-            body, first = bodies[mover], len(all_bodies)
+        body, first = bodies[mover], len(all_bodies)
+        if mover not in parts and len(body.pieces) == 1:
+            parts[mover] = range(place[mover], place[mover] + 1)
+        elif mover not in parts:
             parts[mover] = range(first, first + len(body.pieces))
             all_bodies += [Body(body.frame, (p,), body.name) for p in body.pieces]
             number += [mover] * len(body.pieces)

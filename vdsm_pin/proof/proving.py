@@ -58,7 +58,7 @@ def new_results(
         profile=np.full((SIDES, columns, n_bins), np.inf),
         stride=stride,
         limit=np.full(2, np.inf),
-        candidates=room_for(budget.candidates),
+        candidates=room_for(min(budget.candidates, n_pairs * n_intervals)),
         overflow=np.full(2, np.inf),
         tally=np.zeros(TALLY, np.int64),
         dense=dense_rows(0, n_pairs),
@@ -127,8 +127,7 @@ class Proving:
             if in_time:
                 self._narrow(group)
         best = self.results.best
-        order = np.lexsort((best[:, TIME], best[:, AT_UPPER]))
-        place_best(self.task, self.motion, self.work.ends, best, order)
+        place_best(self.task, self.motion, self.work.ends, best)
         return in_time
 
     def _own_up(self) -> None:
@@ -142,8 +141,8 @@ class Proving:
 
     def _merge_far(self) -> None:
         """Bring what the broad phase settled to the results of the pairs."""
-        for body in range(len(self.broad.number)):
-            self._merge_far_of(body)
+        for body in np.flatnonzero(self.broad.settled.any(axis=1)):
+            self._merge_far_of(int(body))
 
     def _merge_far_of(self, body: int) -> None:
         """The same of one body; of all at once it would take much memory."""

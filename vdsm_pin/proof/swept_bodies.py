@@ -216,18 +216,18 @@ def load_body(task: Task, mover: Mover, ends: Ends, loaded: Body, h: float) -> N
 @compiled
 def _load_corners(mover: Mover, pose: Pose, points: FloatArray) -> None:
     """The corners of a body in the frame of its partner, the first rows of points."""
-    place = np.zeros((4, 3))
-    x, y, z, shift = place[0], place[1], place[2], place[3]
+    f, o, at = pose.frames[mover.frame], pose.origins[mover.frame], mover.corners
+    r, base = pose.frames[mover.rest], pose.origins[mover.rest]
     for c in range(3):
-        f = pose.frames[mover.frame, c]
-        x[c], y[c], z[c], shift[c] = f[0], f[1], f[2], pose.origins[mover.frame, c]
-    for axis in (x, y, z):
-        turn_back(pose, mover.rest, axis)
-    local_point(pose, mover.rest, shift)
-    for k in range(mover.corners.shape[0]):
-        at = mover.corners[k]
-        for c in range(3):
-            points[k, c] = shift[c] + (x[c] * at[0] + y[c] * at[1] + z[c] * at[2])
+        x, y, z, shift = f[c, 0], f[c, 1], f[c, 2], o[c]
+        if mover.rest != WORLD:
+            u, v, w = r[0, c], r[1, c], r[2, c]
+            x = u * f[0, 0] + v * f[1, 0] + w * f[2, 0]
+            y = u * f[0, 1] + v * f[1, 1] + w * f[2, 1]
+            z = u * f[0, 2] + v * f[1, 2] + w * f[2, 2]
+            shift = u * (o[0] - base[0]) + v * (o[1] - base[1]) + w * (o[2] - base[2])
+        for k in range(at.shape[0]):
+            points[k, c] = shift + (x * at[k, 0] + y * at[k, 1] + z * at[k, 2])
 
 
 @compiled

@@ -4,7 +4,7 @@ from math import sqrt
 
 import numpy as np
 
-from vdsm_pin.compiled import compiled
+from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.proof.layouts import AT_UPPER, OWN, TIME, UP
 from vdsm_pin.proof.packed_tree import (
@@ -14,6 +14,7 @@ from vdsm_pin.proof.packed_tree import (
     interpolate,
     new_pose,
     place_tree,
+    place_two,
 )
 from vdsm_pin.proof.swept_bodies import Ends, place_point
 from vdsm_pin.proof.terms import Mover, Task, mover_of
@@ -71,9 +72,7 @@ def witness_at(
 
 
 @compiled
-def place_best(
-    task: Task, motion: Motion, ends: Ends, best: FloatArray, order: IntArray
-) -> None:
+def place_best(task: Task, motion: Motion, ends: Ends, best: FloatArray) -> None:
     """Put the witnesses of all pairs on the surfaces, in the world's frame.
 
     Args:
@@ -81,18 +80,16 @@ def place_best(
         motion: Rows of joint values.
         ends: Working space.
         best: Best rows with core points; witnesses on return.
-        order: The pairs, those of one instant together, shape (n_pairs,).
     """
-    at, when, places = -1, -1.0, np.zeros((2, 3))
-    for pair in order:
-        row = best[pair]
+    task, motion, ends = borrowed(task), borrowed(motion), borrowed(ends)
+    places = np.zeros((2, 3))
+    for pair in range(best.shape[0]):
+        row, mover = best[pair], mover_of(task, pair)
         if not row[UP] < np.inf:
             continue
-        if at != int(row[AT_UPPER]) or when != row[TIME]:
-            at, when = int(row[AT_UPPER]), row[TIME]
-            interpolate(motion, at, when, ends.q)
-            place_tree(task.tree, ends.q, ends.start)
-        mover = mover_of(task, pair)
+        interpolate(motion, int(row[AT_UPPER]), row[TIME], ends.q)
+        frames = mover.rest, mover.frame
+        place_two(task.tree, ends.q, frames, ends.bends.steps, ends.start)
         witness_at(mover, ends.start, row[OWN:], places[0], places[1])
         row[OWN:] = places.ravel()
 
@@ -113,6 +110,7 @@ def place_points(
     Returns:
         Shape (n, 3); [m].
     """
+    tree, motion = borrowed(tree), borrowed(motion)
     pose, out = new_pose(tree.parent.size + 1), np.zeros((rows.size, 3))
     for k in range(rows.size):
         place_tree(tree, motion.knots[rows[k]], pose)

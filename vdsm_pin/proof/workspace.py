@@ -65,7 +65,7 @@ def new_workspace(
     forget(planes)
     return Workspace(
         new_rows(n_joints + 1, n_ways, task.places.way.size, block),
-        new_runs(corners),
+        new_runs(corners, block),
         planes,
         new_ends(n_joints + 1, n_ways, n_columns),
         new_space(int((task.tree.kind == REVOLUTE).sum()), corners),

@@ -148,7 +148,7 @@ def _climb(slacks: tuple[Slack, Slack], start: FloatArray) -> tuple[float, Float
             elif along_ridge:
                 at, found = where, [slack(where) for slack in slacks]
             both = found[0][1] + found[1][1]
-            size = float(np.linalg.norm(both))
+            size = float(both @ both) ** 0.5
             level = abs(found[0][0] - found[1][0]) <= step
             if along_ridge and level and size > 0.0:
                 way = both / size
@@ -168,11 +168,12 @@ def _slack(piece: Piece) -> Slack | None:
     if planes is None:
         return None
     normals, offsets = planes
+    inward = -normals
 
     def in_hull(x: FloatArray) -> tuple[float, FloatArray]:
         rooms = offsets - normals @ x
-        k = int(np.argmin(rooms))
-        return float(rooms[k]) + piece.radius, -normals[k]
+        k = int(rooms.argmin())
+        return float(rooms[k]) + piece.radius, inward[k]
 
     return in_hull
 
