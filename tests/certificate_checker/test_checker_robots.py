@@ -191,8 +191,9 @@ def assert_read_alike(files: RobotFiles, rng: Rng) -> None:
     rows = rng.uniform(-2.0, 2.0, (3, len(robot.joints)))
     with ctx.workprec(128):
         mine = [joints.tree.pose([arb(x) for x in row]) for row in rows.tolist()]
-    for name, poses in robot.poses(rows).items():
-        for pose, frames in zip(poses, mine, strict=True):
+    placed = robot.poses(rows)
+    for name, frame in robot.frames.items():
+        for pose, frames in zip(placed[:, frame], mine, strict=True):
             origin, turned = frames[joints.frames[name]]
             found = np.array([[*map(float, row)] for row in turned.tolist()])
             place = [*map(float, origin.entries())]
