@@ -6,14 +6,19 @@ import numpy as np
 import pytest
 
 from tests.robots.test_robots import write
+from vdsm_pin.certificate_checker import Outcome, check_certificate
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.repair.robot import repair_robot
 from vdsm_pin.robots.cell import Cell, read_cell
+from vdsm_pin.robots.certificate import write_robot_certificate
 from vdsm_pin.robots.judgement import OBSTACLES, verify_robot
+from vdsm_pin.robots.trajectory_files import read_path
+from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.records import Verdict
 
 URDF = """<robot name="two"><link name="base"/>
@@ -126,6 +131,39 @@ def test_errors_of_a_robot_beside_what_moves_are_covered(tmp_path: Path) -> None
     }
     assert all(lows[link] <= least for link, least in enumerate(worst, start=1))
     assert min(lows.values()) >= worst.min() - 0.02
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_certificates_beside_what_moves(seed: int, tmp_path: Path) -> None:
+    rng = np.random.default_rng(seed)
+    rows, knots = rng.uniform(-1.0, 1.0, (3, 2)), rng.uniform(-1.0, 1.0, (3, 3))
+    knots[:, 2] += 0.4  # the ball keeps above the arm
+    moves = np.array([0.1, 0.8, 1.7])
+    body = [
+        f"{a!r},{b!r},{t!r}" for (a, b), t in zip(rows.tolist(), (0, 1, 2), strict=True)
+    ]
+    file = write(tmp_path, "t.csv", "\n".join(["shoulder_rad,elbow_rad,time_s", *body]))
+    cell = cell_with(tmp_path, moves, knots)
+    if seed % 2:
+        cell = cell.under(ErrorBox.typed(joint_deg=0.3, base_mm=1.0))
+    found = verify_robot(cell, read_path(file, cell.robot))
+    assert found.verdict is Verdict.CERTIFIED
+    proof, problem = tmp_path / "c", tmp_path / "cell.yaml"
+
+    def outcome() -> Outcome:
+        source = read_cell(problem).source
+        assert source is not None
+        hashes = Hashes(source.sha256, sha256_of_file(file))
+        write_robot_certificate(proof, found, hashes)
+        return check_certificate(proof, problem, file)
+
+    assert outcome().accepted
+    # The same planes beside a ball that comes through the tip, or in another time.
+    tip = 0.5 * np.array([np.cos(rows[1, 0]), np.sin(rows[1, 0]), 0.0])
+    cell_with(tmp_path, moves, np.vstack([knots[:1], tip[None], knots[2:]]))
+    assert not outcome().accepted
+    cell_with(tmp_path, moves - 0.6, knots)
+    assert not outcome().accepted
 
 
 def test_what_is_not_done_beside_what_moves_is_said(tmp_path: Path) -> None:

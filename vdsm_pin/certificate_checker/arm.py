@@ -13,7 +13,7 @@ import numpy as np
 
 from vdsm_pin.certificate_checker.balls import belongs, claim, column
 from vdsm_pin.certificate_checker.errors import grown
-from vdsm_pin.certificate_checker.motion import Branch, Path
+from vdsm_pin.certificate_checker.motion import Branch, Path, beside
 from vdsm_pin.certificate_checker.rows import Rows
 from vdsm_pin.certificate_checker.solids import Body, Mesh, Pair, Solid, solid
 from vdsm_pin.certificate_checker.tree import (
@@ -22,12 +22,10 @@ from vdsm_pin.certificate_checker.tree import (
     Joint,
     Tree,
     frame_of,
-    hung,
 )
 from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory
-from vdsm_pin.problem import scene
 
 
 def arm_joints(lengths: list[float], angles: list[float], base: Any) -> list[Joint]:
@@ -89,22 +87,9 @@ class Arm:
         self.grown = grown(stated, problem.errors, least, self.solids)
         joints = arm_joints(self.lengths, stated["joints_rad"], stated["base"])
         rates = [x for x in (rows.rates, rows.changes) if x is not None]
-        own, first = Branch(rows.joints, rows.times, rates=rates), dict[Any, int]()
-        self.own, branches = (Tree(joints), Path(own)), [own]
-        columns, joints = len(joints), [*joints]
-        for carrier in problem.scene.carriers:
-            path, first[carrier] = carrier.path, len(joints)
-            joints += hung(carrier.tree.joints, len(joints), columns)
-            columns += path.knots.shape[1]
-            inner = path.inner if path.inner.size else None
-            branches.append(Branch(path.knots, path.times, inner))
-        timed = len(branches) == 1 or rows.times is not None
-        claim(timed, "rows beside what moves have no times")
-        self.tree, self.path = Tree(joints), Path(*branches)
-        self.frames = [
-            first[one.carrier] + one.frame if isinstance(one, scene.Moving) else 0
-            for one in problem.scene.obstacles
-        ]
+        own = Branch(rows.joints, rows.times, rates=rates)
+        self.own = Tree(joints), Path(own)
+        self.tree, self.path, self.frames = beside(own, joints, problem.scene)
         self._cover(dict(header["pieces"]), header["joined"])
         self.pairs = [*self._pairs()]
         self.rows = Rows(self, rows)

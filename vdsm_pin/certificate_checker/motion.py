@@ -13,8 +13,9 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from flint import arb, arb_mat
 
-from vdsm_pin.certificate_checker.balls import UP, Ball
-from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Pose, Tree
+from vdsm_pin.certificate_checker.balls import UP, Ball, claim
+from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Pose, Tree, hung
+from vdsm_pin.problem.scene import Moving, Scene
 
 Points: TypeAlias = Sequence[Ball]  # the control points of a column of q
 
@@ -60,6 +61,7 @@ class Branch:
         self, knots: Any, times: Any, inner: Any = None, rates: Sequence[Any] = ()
     ) -> None:
         self.knots, self.inner, self.rates = knots, inner, rates
+        self.timed = times is not None
         self.times = np.arange(float(len(knots))) if times is None else times
         self.degree = 1 if inner is None else 1 + inner.shape[1]
         if rates and len(knots) > 1:
@@ -117,6 +119,31 @@ class Path:
         ends = self.times[k], self.times[min(k + 1, len(self.times) - 1)]
         found = [points for one in self.branches for points in one.between(*ends)]
         return [raised(points, self.degree) for points in found]
+
+
+def beside(own: Branch, joints: Sequence[Joint], around: Scene) -> Any:
+    """The tree of joints and of what carries obstacles, its path, obstacles' frames.
+
+    Args:
+        own: How the joints move.
+        joints: They come first, and so do their columns of q.
+        around: The obstacles.
+    """
+    timed = own.timed or not around.moving
+    claim(timed, "rows beside what moves have no times")
+    branches, first, joints = [own], dict[Any, int](), [*joints]
+    columns = own.knots.shape[1]
+    for carrier in around.carriers:
+        path, first[carrier] = carrier.path, len(joints)
+        joints += hung(carrier.tree.joints, len(joints), columns)
+        columns += path.knots.shape[1]
+        inner = path.inner if path.inner.size else None
+        branches.append(Branch(path.knots, path.times, inner))
+    frames = [
+        first[one.carrier] + one.frame if isinstance(one, Moving) else 0
+        for one in around.obstacles
+    ]
+    return Tree(joints), Path(*branches), frames
 
 
 class Sweep(NamedTuple):

@@ -1,4 +1,4 @@
-"""Any robot among obstacles at rest as the checker takes it, from its own files.
+"""Any robot among obstacles as the checker takes it, from its own files.
 
 The URDF is read here once more; joint 0 is fixed and holds the root link.
 """
@@ -15,7 +15,14 @@ from flint import arb, arb_mat
 from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.certificate_checker.balls import SLACK, Ball, belongs, claim
 from vdsm_pin.certificate_checker.errors import grown
-from vdsm_pin.certificate_checker.motion import Branch, Path, Points, derivative, part
+from vdsm_pin.certificate_checker.motion import (
+    Branch,
+    Path,
+    Points,
+    beside,
+    derivative,
+    part,
+)
 from vdsm_pin.certificate_checker.solids import (
     CUBE,
     Body,
@@ -27,7 +34,7 @@ from vdsm_pin.certificate_checker.solids import (
     named_parts,
     solid,
 )
-from vdsm_pin.certificate_checker.tree import FIXED, SLIDES, TURNS, Joint, Pose, Tree
+from vdsm_pin.certificate_checker.tree import FIXED, SLIDES, TURNS, Joint, Pose
 from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -111,7 +118,6 @@ class Joints:
             own = numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"))
             frame = self._hang(parent, name, kind, placed(joint), own)
             self.frames[end(joint, "child")] = frame
-        self.tree = Tree(self.joints)
 
     def _own(self, name: str, kind: str, limits: Limits) -> None:
         """Of a joint that follows none: columns of its own, or values that stay."""
@@ -202,8 +208,11 @@ class Robot:
         belongs(header, "errors links topic", *hashes)
         srdf = Srdf(self.files.srdf, document) if self.files.srdf else None
         self.joints = Joints(self.files, document, srdf)
-        self.tree, self.place = self.joints.tree, "header"
-        self._path(header, trajectory)
+        self.place, joints = "header", self.joints.joints
+        self.scene = file.scene(float(sum(joint.lever for joint in joints)) or 1.0)
+        own = self._branch(header, trajectory)
+        self.own = Path(own)
+        self.tree, self.path, self.rests = beside(own, joints, self.scene)
         self.notes = [self.files.solids.words, f"{header['interpolation']} pieces"]
         self.pairs = [*self._pairs(file, header, document, srdf)]
 
@@ -213,7 +222,7 @@ class Robot:
         claim(found, f"mesh {name!r} is not found")
         return found
 
-    def _path(self, header: Mapping[str, Any], trajectory: File) -> None:
+    def _branch(self, header: Mapping[str, Any], trajectory: File) -> Branch:
         joints = self.joints
         motion = read_motion(trajectory, joints.moved, header["topic"], joints.values)
         times, rates = motion.times, [motion.rates, motion.changes]
@@ -224,17 +233,14 @@ class Robot:
         joined = {1: "linear", 3: "cubic", 5: "quintic"}[branch.degree]
         told = f"interpolation is {header['interpolation']}, the file's is {joined}"
         claim(header["interpolation"] == joined, told)
-        self.path = Path(branch)
+        return branch
 
     def _pairs(
         self, file: CellFile, header: Any, document: ET.Element, srdf: Srdf | None
     ) -> Iterator[Pair]:
         """What the problem holds apart, in order."""
-        size = float(sum(joint.lever for joint in self.tree.joints)) or 1.0
-        scene = file.scene(size)
-        claim(not scene.moving, "robots beside what moves are not checked yet")
-        things = [solid(one) for one in scene.obstacles]
-        asked, stated = file.errors(scene), header["errors"]
+        things = [solid(one) for one in self.scene.obstacles]
+        asked, stated = file.errors(self.scene), header["errors"]
         off = grown(stated, asked, self.joints.least_errors(asked), things)
         self.joints.err(stated)
         named, told = {one.name: one for one in things}, header["links"]
@@ -247,10 +253,11 @@ class Robot:
                 links[link.attrib["name"]] = parts
         claim(set(told) <= set(links), "links without solids are told of")
         (required, own), frames = file.required, self.joints.frames
-        outer = product(zip(things, off, strict=True), links.items())
-        for (thing, lost), (name, parts) in outer:
+        outer = product(zip(things, self.rests, off, strict=True), links.items())
+        for around, (name, parts) in outer:
             for each in parts:
-                yield Pair(Body(frames[name], each), thing, 0, required, lost)
+                thing, rest, lost = around
+                yield Pair(Body(frames[name], each), thing, rest, required, lost)
         left = srdf.disabled() if srdf else {}
         every = [*combinations(links, 2)]
         apart = [both for both in every if self._held(*both, left, srdf)]
@@ -325,11 +332,11 @@ class Robot:
         for pair in self.pairs:
             if isinstance(pair.solid, Mesh):
                 pair.solid.check_outside(first[pair.rest], [pair.inner(first)])
-        for k in range(self.path.size):
+        for k in range(self.own.size):
             self.place, step = f"interval {k}", arb(0)
             if self.timed:
-                step = arb(self.path.times[k + 1]) - arb(self.path.times[k])
-            columns = self.path.controls(k)
+                step = arb(self.own.times[k + 1]) - arb(self.own.times[k])
+            columns = self.own.controls(k)
             for joint, points in zip(self.joints.moved, columns, strict=True):
                 told = f"joint {joint.name!r} leaves its limits"
                 claim(within(points, joint.lower, joint.upper), told)

@@ -217,15 +217,6 @@ def _pack_pairs(
     return table.ways.packed(), places, packed
 
 
-def _branches(tree: Tree) -> IntArray:
-    """The first frame on the way to each frame from the world, shape (n_frames,)."""
-    branch = np.arange(tree.n_frames)
-    for number, joint in enumerate(tree.joints):
-        if joint.parent != WORLD:
-            branch[number + 1] = branch[joint.parent]
-    return branch
-
-
 def pack_task(
     tree: Tree,
     bodies: Sequence[Body],
@@ -260,7 +251,7 @@ def pack_task(
         one, other = pairs.one[same[0]], pairs.other[same[0]]
         message = f"bodies {one} and {other} ride on one frame: they cannot part"
         raise ValueError(message)
-    branch, n = _branches(tree), pairs.one.size
+    branch, n = tree.branches, pairs.one.size
     apart = branch[frames[pairs.one]] != branch[frames[pairs.other]]
     group = np.where(apart, OBSTACLES, LINKS)
     column, none = np.where(apart, columns[pairs.other], -1), np.zeros(n, np.int64)

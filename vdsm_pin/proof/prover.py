@@ -86,19 +86,26 @@ class _Plan:
     n_obstacles: int
 
 
-def _mover(one: Body, other: Body) -> bool:
-    """Whether the second of two bounded bodies moves past the first, not reversed."""
+def _mover(one: Body, other: Body, apart: bool) -> bool:
+    """Whether the second of two bounded bodies moves past the first, not reversed.
+
+    Args:
+        one: The first.
+        other: The second.
+        apart: Whether they are of two branches of the tree.
+    """
     if WORLD in (one.frame, other.frame):
         return one.frame == WORLD
-    return len(other.pieces) < len(one.pieces)
+    return apart or len(other.pieces) < len(one.pieces)
 
 
-def _planned(bodies: Sequence[Body], pairs: PairTable) -> _Plan:
+def _planned(tree: Tree, bodies: Sequence[Body], pairs: PairTable) -> _Plan:
     """Which side of each pair moves, and its convex parts.
 
     Raises:
         ValueError: If both have a half-space.
     """
+    branches = tree.branches[[body.frame for body in bodies]].tolist()
     order = sorted(range(len(bodies)), key=lambda k: bodies[k].frame != WORLD)
     place = {number: k for k, number in enumerate(order)}
     all_bodies, number = [bodies[k] for k in order], list(order)
@@ -115,7 +122,8 @@ def _planned(bodies: Sequence[Body], pairs: PairTable) -> _Plan:
             raise ValueError(message)
         swapped = not bounded[one]
         if bounded[one] and bounded[other]:
-            swapped = _mover(bodies[one], bodies[other])
+            apart = branches[one] != branches[other]
+            swapped = _mover(bodies[one], bodies[other], apart)
         mover, partner = (other, one) if swapped else (one, other)
         body, first = bodies[mover], len(all_bodies)
         if mover not in parts and len(body.pieces) == 1:
@@ -162,8 +170,8 @@ def start_proof(
     columns: IntArray | None = None,
 ) -> tuple[Proving, _Plan]:
     """Everything ready, nothing judged; arguments as for `prove`."""
-    budget, plan = budget or Budget(), _planned(bodies, pairs)
     _check(tree, bodies, path)
+    budget, plan = budget or Budget(), _planned(tree, bodies, pairs)
     rough = with_rough(plan.bodies, plan.pairs)
     number, every = plan.number[rough.original], rough.bodies
     pieces = pack_pieces([body.pieces for body in every])

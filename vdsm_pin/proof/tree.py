@@ -141,6 +141,15 @@ class Tree:
         """Length of a row of q."""
         return len({j.column for j in self.joints if j.column is not None})
 
+    @property
+    def branches(self) -> IntArray:
+        """The first frame on the way to each frame from the world, (n_frames,)."""
+        branch = np.arange(self.n_frames)
+        for number, joint in enumerate(self.joints):
+            if joint.parent:
+                branch[number + 1] = branch[joint.parent]
+        return branch
+
     def joined(self, other: "Tree") -> "Tree":
         """One tree of both: the other's frames and columns count on after these."""
         moved = tuple(

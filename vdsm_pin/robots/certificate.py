@@ -1,7 +1,7 @@
 """The certificate of a robot's motion: what stands above the lines of its proof."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -13,7 +13,7 @@ from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.scene import Scene, solid_of
 from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.prover import start_proof
@@ -37,9 +37,9 @@ from vdsm_pin.verification.certificate_lines import (
     write_lines,
 )
 from vdsm_pin.verification.certificate_writer import errors_beside, pieces_of_obstacles
+from vdsm_pin.verification.moving import path_beside
 
 DEGREES: Final[Mapping[int, Joined]] = {1: "linear", 3: "cubic", 5: "quintic"}
-MOVING: Final = "beside obstacles that move none is written"
 UNCLEAR: Final = "the inside of {!r} has gaps, and then none is written"
 EDGES: Final[Mapping[int, tuple[int, ...]]] = {1: (), 2: (1,), 8: (1, 2, 4)}
 """By the number of a primitive's corners those at the ends of the first one's edges."""
@@ -63,29 +63,33 @@ def write_robot_certificate(
 
     Raises:
         OutOfTime: If the time is over.
-        VerificationFailed: If the motion is not certified, an obstacle moves, or a mesh
-            has no certain inside: there is nothing to write.
+        VerificationFailed: If the motion is not certified, or a mesh has no certain
+            inside: there is nothing to write.
         InvalidFile: If the file cannot be written.
     """
     check_certified(verification)
     _check_scene(verification.problem.scene)
     cell, motion = verification.problem, verification.trajectory
     table, budget = PairTable.of(cell.pairs), Budget(until=deadline.end)
-    tree, bodies, errors = cell.robot.tree, cell.bodies, verification.errors
+    bodies, errors = cell.bodies, verification.errors
+    whole, _ = path_beside(motion, cell.scene)
     box = proof_box(cell.robot, cell.scene, errors)
-    proving, plan = start_proof(tree, bodies, motion, table, box, budget)
-    pieces = proving.task.pieces
+    proving, plan = start_proof(cell.tree, bodies, whole, table, box, budget)
+    pieces, n_links = proving.task.pieces, len(cell.robot.bodies)
+    # Where each body as it was given stands among those that were packed.
+    places = np.argsort(plan.number[: len(bodies)], kind="stable").tolist()
+    obstacles = zip(places[n_links:], cell.scene.obstacles, strict=True)
     header = RobotHeaderLine(
         **hashes.told(),
         interpolation=DEGREES[motion.degree],
         pairs=_pairs(plan.bodies[len(bodies) :], plan.bodies, plan.pairs),
-        pieces=pieces_of_obstacles(cell.scene.obstacles, pieces),
+        pieces=pieces_of_obstacles(obstacles, pieces),
         errors=_errors(cell, errors),
-        links=_links(cell, pieces),
+        links=_links(cell, places[:n_links], pieces),
         topic=topic,
     )
-    whole = np.zeros(len(pieces.root), np.int64)
-    proof = Recorded(proving.task, proving.motion, whole)
+    none = np.zeros(len(pieces.root), np.int64)
+    proof = Recorded(proving.task, proving.motion, none)
     write_lines(path, header, proof, deadline)
 
 
@@ -93,11 +97,9 @@ def _check_scene(scene: Scene) -> None:
     """Refuse obstacles of which no certificate tells.
 
     Raises:
-        VerificationFailed: If one moves, or is a mesh that has gaps or is not closed.
+        VerificationFailed: If one is a mesh that has gaps or is not closed.
     """
-    if scene.moving:
-        raise VerificationFailed(MOVING)
-    for mesh in scene.obstacles:
+    for mesh in map(solid_of, scene.obstacles):
         if isinstance(mesh, Mesh) and not mesh.is_surface:
             surface = mesh.closed_mesh
             if not surface.closed or surface.gap:
@@ -130,10 +132,12 @@ def _pairs(parts: list[Body], bodies: list[Body], pairs: PairTable) -> list[Pair
     return [(names[one], names[other]) for one, other in both]
 
 
-def _links(cell: Cell, pieces: PackedPieces) -> dict[str, LinkPieces]:
+def _links(
+    cell: Cell, places: Sequence[int], pieces: PackedPieces
+) -> dict[str, LinkPieces]:
     """Of each link that is not as its URDF says what it is made of."""
     found = {}
-    for k, body in enumerate(cell.robot.bodies, start=len(cell.scene.obstacles)):
+    for k, body in zip(places, cell.robot.bodies, strict=True):
         order = pieces.order[pieces.first_piece[k] : pieces.first_piece[k + 1]]
         sorted_ = bool((np.diff(order) != 1).any())
         covers = () if cell.robot.solids == HULLS else cell.robot.covers.get(body.name)

@@ -104,7 +104,7 @@ def _pairs(problem: PlanningProblem) -> list[Pair]:
 
 def _pieces(problem: PlanningProblem, pieces: PackedPieces) -> dict[str, list[Any]]:
     """As of obstacles; of a mesh on a link the triangles under each hull."""
-    result = pieces_of_obstacles(problem.scene.obstacles, pieces)
+    result = pieces_of_obstacles(enumerate(problem.scene.obstacles), pieces)
     for body in problem.manipulator.bodies:
         if isinstance(body.solid, Prism) and len(body.solid.convex_sections) > 1:
             result[body.name] = _triangles(body.solid)
@@ -114,7 +114,7 @@ def _pieces(problem: PlanningProblem, pieces: PackedPieces) -> dict[str, list[An
 
 
 def pieces_of_obstacles(
-    obstacles: Iterable[Obstacle], pieces: PackedPieces
+    obstacles: Iterable[tuple[int, Obstacle]], pieces: PackedPieces
 ) -> dict[str, list[Any]]:
     """The pieces of cut prisms and of meshes in the order in which planes count them.
 
@@ -122,11 +122,12 @@ def pieces_of_obstacles(
     triangles for a mesh that was sorted.
 
     Args:
-        obstacles: The solids.
-        pieces: Theirs come first.
+        obstacles: The solids, each with its number among those that were packed.
+        pieces: Theirs, among others.
     """
     result: dict[str, list[Any]] = {}
-    for k, obstacle in enumerate(map(solid_of, obstacles)):
+    for k, one in obstacles:
+        obstacle = solid_of(one)
         order = pieces.order[pieces.first_piece[k] : pieces.first_piece[k + 1]]
         if isinstance(obstacle, Prism) and len(order) > 1:
             triangles = _triangles(obstacle)
