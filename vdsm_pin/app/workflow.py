@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Final
 from pydantic import ValidationError
 
 from vdsm_pin.errors import (
-    CertificateTooLarge,
     Infeasible,
     InvalidFile,
     OutOfTime,
@@ -363,7 +362,7 @@ def _certify(order: VerifyOrder, verification: Verification, record: RunRecord) 
             assert isinstance(verification, RobotVerification)
             more = hashes, order.topic, order.deadline
             write_robot_certificate(order.certificate, verification, *more)
-    except (OutOfTime, CertificateTooLarge, VerificationFailed) as error:
+    except (OutOfTime, VerificationFailed) as error:
         return str(error)
     return ""
 

@@ -28,6 +28,7 @@ from vdsm_pin.report.words import (
     MISSING,
     OUTCOMES,
     TIME_LIMIT,
+    counted,
     depth,
     errors,
     limit,
@@ -79,7 +80,7 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     filters = [quantity, depth, limit, percent, errors, outcome, measured, survived,
-               lost, term, place, assumption, point, css_text]  # fmt: skip
+               lost, counted, term, place, assumption, point, css_text]  # fmt: skip
     environment.filters |= {one.__name__: one for one in filters}
     environment.globals |= {
         "asset": _asset,

@@ -193,6 +193,15 @@ def errors(box: "ErrorBoxRow") -> str:
     return ", ".join(parts)
 
 
+def counted(count: int, word: str) -> str:
+    """A number of things in words.
+
+    >>> counted(1, "link"), counted(2, "link")
+    ('1 link', '2 links')
+    """
+    return f"{count} {word}" if count == 1 else f"{count} {word}s"
+
+
 def limit(value: float | None, unit: str) -> str:
     """A check's limit, or that it only reports."""
     return "no limit asked" if value is None else quantity(value, unit)
