@@ -9,6 +9,7 @@ import pytest
 from tests.robots.test_robots import mutated, write
 from vdsm_pin.errors import InvalidFile, VdsmError
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Sphere
+from vdsm_pin.robots import mjcf_size
 from vdsm_pin.robots.scene_files import read_scene
 
 OLD = """(noname)+
@@ -142,7 +143,8 @@ def test_worlds_stand_where_mujoco_has_them(tmp_path: Path) -> None:
             WORLD.replace('"sphere" size="0.1"', '"ellipsoid" size="1 1 1"'),
             "is a ellipsoid, expected plane",
         ),
-        (WORLD[:200], "is refused by mujoco"),
+        (WORLD[:200], "is not XML"),
+        (WORLD.replace("box", "bax"), "is refused by mujoco"),
     ):
         with pytest.raises(InvalidFile, match=expected):
             read_scene(write(tmp_path, "world.xml", text), 1.0)
@@ -156,11 +158,56 @@ def test_a_geom_that_collides_by_a_pair_is_there(tmp_path: Path) -> None:
     assert "picture" in names
 
 
+BALL_OFTEN = '<geom type="sphere" size="0.1"/>'
+
+
+def replicated(content: str, *counts: object) -> str:
+    for count in counts:
+        content = f'<replicate count="{count}" offset="0.001 0 0">{content}</replicate>'
+    return content
+
+
+@pytest.mark.parametrize(
+    ("content", "elements"),
+    [
+        (replicated(BALL_OFTEN, 49), 100),
+        (replicated(BALL_OFTEN, 7, 5), 77),
+        (replicated('<body><include file="part.xml"/></body>', 7), 58),
+        ('<composite type="cable" count="4 4 3"/>', 50),
+        (replicated('<attach model="part"/>', 10), 74),
+    ],
+)
+def test_what_a_world_repeats_is_counted_before_it_is_made(
+    content: str, elements: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Counted by hand: an element as often as it and what it stands in stand there."""
+    part = f"<mujocoinclude>{replicated(BALL_OFTEN, 2)}</mujocoinclude>"
+    write(tmp_path, "part.xml", part)
+    asset = '<asset><model name="part" file="part.xml"/></asset>'
+    head = asset if "attach" in content else ""
+    text = f"<mujoco>{head}<worldbody>{content}</worldbody></mujoco>"
+    file = write(tmp_path, "world.xml", text)
+    monkeypatch.setattr(mjcf_size, "MOST", elements)
+    mjcf_size.check_size(file)
+    monkeypatch.setattr(mjcf_size, "MOST", elements - 1)
+    with pytest.raises(InvalidFile, match=f"has {elements} elements"):
+        mjcf_size.check_size(file)
+
+
+def test_a_world_of_hundreds_of_millions_is_refused_at_once(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    for count in ("1e8", "100000000", "1e999"):
+        text = replicated(BALL_OFTEN, count)
+        world = f"<mujoco><worldbody>{text}</worldbody></mujoco>"
+        with pytest.raises(InvalidFile, match="expected at most 50000"):
+            read_scene(write(tmp_path, "world.xml", world), 1.0)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "expected"),
     [
         (b"w\xff.xml", WORLD.encode(), "has a name that is not UTF-8 text"),
-        (b"w.xml", WORLD.encode().replace(b"crate", b"\xff"), "is refused by mujoco"),
+        (b"w.xml", WORLD.encode().replace(b"crate", b"\xff"), "is not XML"),
     ],
 )
 def test_names_that_are_no_text_are_refused(

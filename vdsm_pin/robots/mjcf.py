@@ -10,14 +10,15 @@ from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Sphere
 from vdsm_pin.io.source import check_is_file
 from vdsm_pin.problem.scene import Obstacle, Scene
+from vdsm_pin.robots.mjcf_size import check_size
 
 
 def read_mjcf(file: Path) -> Scene:
     """The geoms of a world that collide, where they stand.
 
     Raises:
-        InvalidFile: If mujoco refuses the file, a geom rides on a joint, or is of
-            another type than plane, sphere, capsule, cylinder and box.
+        InvalidFile: If it is too large or mujoco refuses it, a geom rides on a joint,
+            or is of another type than plane, sphere, capsule, cylinder and box.
     """
     if find_spec("mujoco") is None:
         problem = "MJCF needs mujoco: pip install 'vdsm-pin[mjcf]'"
@@ -26,6 +27,7 @@ def read_mjcf(file: Path) -> Scene:
     if not _is_text(str(file)):
         problem = "has a name that is not UTF-8 text, which mujoco does not open"
         raise InvalidFile(file=file, problem=problem)
+    check_size(file)
     try:
         return Scene(tuple(_solids(file)))
     except InvalidFile:

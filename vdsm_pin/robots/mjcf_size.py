@@ -1,0 +1,76 @@
+"""How much a world of MuJoCo (MJCF) has, before mujoco makes all of it."""
+
+import math
+import xml.etree.ElementTree as ET
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.io.source import read_bytes
+
+MAX_BYTES: Final = 64 << 20
+"""Largest file that is read; [bytes]."""
+
+MOST: Final = 50_000
+"""Elements of a world, each as often as it is repeated."""
+
+REPEATED: Final = ("replicate", "composite", "flexcomp")
+"""Elements whose `count` says how often what is in them stands there."""
+
+
+def check_size(file: Path) -> None:
+    """Refuse a world with more elements than are read.
+
+    Raises:
+        InvalidFile: If it has more, or is no XML.
+    """
+    count = _elements(file, file.parent, set())
+    if not count <= MOST:
+        problem = (
+            f"has {count:.6g} elements, each counted as often as `replicate` and the "
+            f"like repeat it, expected at most {MOST}"
+        )
+        raise InvalidFile(file=file, problem=problem)
+
+
+def _elements(file: Path, folder: Path, seen: set[Path]) -> float:
+    """Elements of a file and of all that it includes or attaches.
+
+    Args:
+        file: The file.
+        folder: Of the world, from where files are named.
+        seen: Files that were counted; mujoco includes none twice.
+    """
+    if file in seen or not file.is_file():  # which mujoco tells
+        return 0.0
+    seen.add(file)
+    try:
+        root = ET.fromstring(read_bytes(file, limit=MAX_BYTES))
+    except ET.ParseError as error:
+        raise InvalidFile(file=file, problem=f"is not XML: {error}") from None
+
+    def named(element: ET.Element) -> float:
+        return _elements(folder / element.get("file", ""), folder, seen)
+
+    models = sum(map(named, root.iter("model")))
+    total, left = 0.0, [(root, 1.0)]
+    while left:
+        element, times = left.pop()
+        times *= _count(element)
+        total += times
+        if element.tag == "include":
+            total += times * named(element)
+        elif element.tag == "attach":
+            total += times * models
+        left += [(child, times) for child in element]
+    return total
+
+
+def _count(element: ET.Element) -> float:
+    """How often what is in an element stands there; 1 where that cannot be read."""
+    if element.tag in REPEATED:
+        with suppress(ValueError):
+            counts = map(float, element.get("count", "1").split())
+            return math.prod(max(1.0, count) for count in counts)
+    return 1.0
