@@ -70,7 +70,11 @@ GROUPS: Final = (
             "vdsm_pin/geometry/mesh_*.py",
             "vdsm_pin/geometry/winding.py",
         ),
-        ("tests/verification", "tests/geometry/test_closed_meshes.py"),
+        (
+            "tests/verification",
+            "tests/geometry/test_closed_meshes.py",
+            "tests/geometry/test_winding.py",
+        ),
     ),
     Group(
         "slopes",

@@ -1,5 +1,7 @@
 """The cable round trip passes what cables can drive and refuses what they cannot."""
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
@@ -69,3 +71,29 @@ def test_both_sides_of_the_tolerance(
     check = check_cables(problem_for(HRM8), trajectory_of(still, still))
     assert (check.verdict is Verdict.CERTIFIED) == passes
     assert (check.moment, check.where) == (3.0, "theta6")
+
+
+def test_the_worst_of_all_rows_is_named_wherever_it_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Oracle: the largest of the errors that a solver is given."""
+    rng, still = np.random.default_rng(2), np.zeros((11, 8))
+    monkeypatch.setattr(cable_check, "CHUNK", 3)
+    for _ in range(30):
+        errors = rng.normal(0.0, 1e-7, (2, 11, 8))
+        asked = iter(range(0, 11, 3))
+
+        def off(
+            *_: object, errors: np.ndarray = errors, asked: Iterator[int] = asked
+        ) -> np.ndarray:
+            first = next(asked)
+            return errors[:, first : first + 3]
+
+        monkeypatch.setattr(cable_check, "angles_from_cables", off)
+        check = check_cables(problem_for(HRM8), trajectory_of(still, still))
+        kind, row, joint = np.unravel_index(np.abs(errors).argmax(), errors.shape)
+        assert check.worst == np.abs(errors).max()
+        assert (check.moment, check.where) == (
+            row,
+            f"{['alpha', 'theta'][kind]}{joint + 1}",
+        )

@@ -18,8 +18,10 @@ from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification import coal_bodies as coal_side
 from vdsm_pin.verification import coal_distances as measuring
 from vdsm_pin.verification.coal_bodies import (
+    LARGEST,
     CoalBody,
     coal_bodies,
     distance_request,
@@ -241,3 +243,27 @@ def test_flat_prisms_and_many_corners_are_measured() -> None:
         else:
             assert found < 1e-7
     assert apart > 150
+
+
+NEAR = np.array([1.0, 2.0, 3.0])
+
+
+@pytest.mark.parametrize(
+    ("distance", "stored", "away", "usable"),
+    [
+        (0.5, 0.5, 0.5, True),
+        (0.5, 0.5000001, 0.5, False),  # two answers
+        (0.5, 0.5, 0.51, False),  # a witness farther or nearer than it says
+        (0.5, 0.5, 0.49, False),
+        (-0.5, -0.5, 0.1, True),  # of what overlaps the sign alone is a result
+        (-0.5, -0.4, 0.5, False),
+        (0.0, 0.0, 0.1, True),
+        *((far, far, 0.5, False) for far in (LARGEST, -LARGEST, np.inf, np.nan)),
+        (LARGEST, 0.5, 0.5, False),
+    ],
+)
+def test_an_answer_of_coal_is_used_where_all_it_says_agrees(
+    distance: float, stored: float, away: float, usable: bool
+) -> None:
+    far = NEAR + np.array([0.0, away, 0.0])
+    assert coal_side._usable(distance, stored, NEAR, far) is usable

@@ -94,6 +94,27 @@ def test_no_error_brings_a_far_obstacle_too_near(seed: int) -> None:
         assert clearance(centres).min() > problem.required_clearance
 
 
+def test_what_is_within_reach_follows_the_formula() -> None:
+    """Required + 2 E (sum of k L_k + N r) + base + obstacles + turn of the base."""
+    rng, links = np.random.default_rng(5), ARM.link_lengths
+    problem = cloud(0, 200)
+    for _ in range(20):
+        box = ErrorBox(
+            joint=rng.uniform(0, 0.02), base=rng.uniform(0, 0.02),
+            obstacle=rng.uniform(0, 0.02), base_turn=rng.choice([0.0, 0.01]),
+        )  # fmt: skip
+        lever = 2.0 * sum((k + 1) * links[k] + ARM.most_radius for k in range(8))
+        moved = box.joint * lever + box.base + box.obstacle
+        far = np.abs(ARM.base_range).max() + ARM.total_length + ARM.most_radius
+        moved += box.base_turn * (far + moved)
+        bound = problem.required_clearance + moved + robust.SPARE
+        least = bound + rng.uniform(-1e-3, 1e-3, 200)
+        least[:3] = np.nan, -np.inf, np.inf
+        kept = robust.within_reach(problem, least, box).scene.names
+        names = np.array(problem.scene.names)
+        assert kept == tuple(names[~(least > bound)])
+
+
 def test_sinks_hear_of_near_obstacles_what_they_hear_of_all() -> None:
     problem, motion = cloud(1), swaying()
     everything: list[ClearanceChunk] = []

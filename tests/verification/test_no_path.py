@@ -79,6 +79,9 @@ def test_a_clear_joint_move_is_certified_and_one_through_a_ball_is_not() -> None
     clear = verify(task, motion, robot)
     assert clear.verdict is Verdict.CERTIFIED
     assert not [name for name in names(clear.checks) if "path" in name]
+    assert [key for key, _ in clear.summary()] == [
+        *("problem", "verdict", "proved clearance", "waypoints")
+    ]
     ball = replace(BALL, centre=posture(motion, 4).tip - np.array([0.4, 0.0, 0.0]))
     through = verify(replace(task, scene=Scene((ball,))), motion, robot)
     assert through.verdict is Verdict.REFUTED

@@ -1,6 +1,7 @@
 """Oracle: the proof over the whole motion; motions drawn from the error box."""
 
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -17,7 +18,12 @@ from vdsm_pin.proof.layouts import SLICES
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.robust import LARGEST, STRETCH, largest_joint_error
+from vdsm_pin.verification.robust import (
+    LARGEST,
+    STRETCH,
+    largest_joint_error,
+    sturdiest,
+)
 from vdsm_pin.verification.yes_or_no import YesOrNoProof, is_certified
 
 ARM = built_in("hrm8")
@@ -81,6 +87,18 @@ def test_the_whole_proof_certifies_what_is_survived(seed: int) -> None:
         proof = prove_clearance(problem, rows, replace(besides, joint=joint))
         assert proof.counts[:, CERTIFIED].all()
         assert proof.counts.sum() == proof.counts[:, CERTIFIED].sum()
+
+
+def test_the_sturdiest_is_found_wherever_it_stands() -> None:
+    problem = asked(BALL)
+    rows = [replace(swaying(20), alpha=swaying(20).alpha * k) for k in (1.0, 0.5, 2.0)]
+    survived = [largest_joint_error(problem, one, ErrorBox()) for one in rows]
+    best = int(np.argmax(survived))
+    for order in permutations(range(3)):
+        found = sturdiest(problem, [rows[k] for k in order])
+        assert found == (order.index(best), survived[best])
+    twice = [rows[k] for k in (best, best)]
+    assert sturdiest(problem, twice) == (0, survived[best])
 
 
 def test_no_motion_of_the_box_comes_too_near() -> None:

@@ -83,6 +83,10 @@ def test_a_limit_that_is_over_judges_no_clearance(tmp_path: Path) -> None:
     assert len(late) == 4  # joint centres, Coal twice, cables
     assert all(row.verdict is Verdict.UNDECIDED and row.count == 0 for row in late)
     assert np.isnan(found.joint_error)
+    said = dict(found.summary())
+    assert (said["verdict"], said["waypoints"]) == (found.verdict.value, "400")
+    assert "drawn" in said
+    assert all(row.name in said for row in late)
     assert [what.split(":")[0] for what in found.not_done] == [
         "search for counterexamples",
         "clearance.csv from interval 0 on",

@@ -1,0 +1,97 @@
+"""What a plane proves, and which pairs and lines there must be."""
+
+from itertools import product
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from flint import arb
+from oracles.certificate_cases import SHAPES, random_case
+from oracles.certificate_oracle import sealed
+
+from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.certificate_checker.arm import Arm
+from vdsm_pin.certificate_checker.balls import UP, Rejected
+from vdsm_pin.certificate_checker.claims import Plane, clearances
+from vdsm_pin.certificate_checker.motion import Interval, Slices
+from vdsm_pin.certificate_checker.solids import Body, Pair, Solid
+from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Tree
+
+
+def test_a_plane_proves_what_the_formula_of_the_docs_says() -> None:
+    """Support less reach, radii, what errors shift and what rounding may lose."""
+    rng = np.random.default_rng(6)
+    for _ in range(50):
+        turn, slide, bent, shift, lost = rng.uniform(0, 0.02, 5)
+        joints = [
+            Joint(0, SLIDES, (0, 0, 1), np.eye(4), (0, 1.0, 0.0), (0.0, slide, 0.0)),
+            Joint(1, TURNS, (0, 0, 1), np.eye(4), (1, 1.0, 0.0), (turn, 0.0, bent)),
+        ]
+        tree = Tree(joints)
+        interval = Interval(tree, [[arb(0), arb(0.1)], [arb(0), arb(shift)]])
+        slices = Slices(tree, [(interval, 0.0, 1.0)])
+        radius, grown = rng.uniform(0.01, 0.1, 2)
+        body = Body(2, Solid("ball", [[[0.5, 0.0, 0.0]]], radius=radius))
+        points = np.array([0.0, 2.0, 0.0]) + rng.uniform(-0.5, 0.5, (3, 4, 3))
+        rest = Solid("rest", points, origin=[4.0, 0.0, 0.0], radius=grown)
+        pair, long = Pair(body, rest, 0, 0.0, lost), rng.uniform(0.1, 9.0)
+        first, last = sorted(rng.choice(4, 2, replace=False))
+        n = np.array([rng.uniform(-0.3, 0.3), 1.0, rng.uniform(-0.3, 0.3)])
+        plane = Plane("", slices_of(interval), first, last, tuple(long * n), 0.0)
+        (found,) = clearances(pair, [plane], slices)
+        n /= np.linalg.norm(n)
+        (reached,), (size,) = slices.reach(body, 0, np.zeros(1, np.int64), n[None])
+        support = (points[first:last] @ n).min() - grown
+        away = radius + lost + slide * UP
+        most = size + np.abs(points).max() + 4.0 + grown + away
+        expected = support - reached - away
+        rounding = (64 + 8 * 2) * 2.0**-53 * most
+        assert found == pytest.approx(expected - rounding, rel=0, abs=0.1 * rounding)
+
+
+def slices_of(interval: Interval) -> tuple[Interval, float, float]:
+    return interval, 0.0, 1.0
+
+
+@pytest.mark.parametrize("length", [0.0, 1e-101, 1e101, np.inf, np.nan])
+def test_a_direction_that_is_none_is_refused(length: float) -> None:
+    tree = Tree([Joint(0, TURNS, (0, 0, 1), np.eye(4), (0, 1.0, 0.0), (0.0, 0.0, 0.0))])
+    interval = Interval(tree, [[arb(0), arb(0)]])
+    pair = Pair(
+        Body(1, Solid("a", [[[0.0, 0.0, 0.0]]])),
+        Solid("b", [[[0, 1.0, 0]]]),
+        0,
+        0.0,
+        0.0,
+    )
+    plane = Plane("", slices_of(interval), 0, 1, (0.0, length, 0.0), 0.0)
+    with pytest.raises(Rejected, match="a direction has no length"):
+        clearances(pair, [plane], Slices(tree, [slices_of(interval)]))
+
+
+def test_names_are_ignored_in_either_order_with_all_their_parts() -> None:
+    names = ["link 1", "tool", "plate", "plate part 2", "wall", "wall part 1"]
+    for a, b, one, other in product(names, repeat=4):
+        arm = SimpleNamespace(
+            arm=SimpleNamespace(
+                bodies=[SimpleNamespace(name="plate")], ignore_pairs=[(a, b)]
+            )
+        )
+
+        def meant(said: str, name: str) -> bool:
+            return said == name or (said, name) == ("plate", "plate part 2")
+
+        expected = (meant(a, one) and meant(b, other)) or (
+            meant(b, one) and meant(a, other)
+        )
+        assert Arm._ignored(arm, one, other) is expected  # type: ignore[arg-type]
+
+
+def test_a_certificate_without_an_interval_is_refused(tmp_path: Path) -> None:
+    case = random_case(np.random.default_rng(0), tmp_path, [SHAPES[0]])
+    for kept in range(1, len(case.lines)):
+        case.certificate.write_bytes(sealed(case.lines[:kept]))
+        outcome = check_certificate(case.certificate, case.problem, case.trajectory)
+        assert f"interval {kept - 1} is missing" in outcome.reason
+        assert outcome.n_intervals == kept - 1
