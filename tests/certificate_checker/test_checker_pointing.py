@@ -12,6 +12,9 @@ from oracles.certificate_oracle import sealed, sha256
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.certificate_checker.balls import norm
+from vdsm_pin.certificate_checker.path import Drawing
+from vdsm_pin.certificate_checker.rows import PARTS
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -24,25 +27,35 @@ from vdsm_pin.verification.verify import verify
 
 ARM = built_in("hrm8")
 NO_ERRORS = ErrorBox()
+STEADY = 0.02
+"""Turn of a joint from row to row; [rad]."""
 
 
 class Looking:
     """A random motion all of which draws, its last link near to where it shall look."""
 
-    def __init__(self, folder: Path, seed: int, smooth: bool = False) -> None:
+    def __init__(
+        self, folder: Path, seed: int, smooth: bool = False, steady: bool = False
+    ) -> None:
+        """Steady is a motion of a straight arm whose joint 1 alone turns, evenly."""
         rng, rows = np.random.default_rng(seed), 5
         self.problem, self.rows = folder / "p.yaml", folder / "t.csv"
         self.certificate = folder / "c"
         turns = rng.uniform(-1.0, 1.0, (2, rows, ARM.n_links))
         angles = rng.uniform(-0.2, 0.2, (2, 1, ARM.n_links)) + 0.002 * turns.cumsum(1)
         x0 = 0.002 * rng.uniform(0.0, 1.0, rows).cumsum()
+        rates = 1e-4 * rng.normal(size=(rows, 1 + 2 * ARM.n_links))
+        if steady:
+            angles, x0, rates = 0.0 * angles, 0.0 * x0, 0.0 * rates
+            angles[0, :, 0] = STEADY * np.arange(rows)
+            rates[:, 1] = STEADY
         centres = joint_centres(ARM, x0, *angles)
         self.tips = centres[:, -1]
         gaps = np.linalg.norm(np.diff(self.tips, axis=0), axis=1)
         on, more = np.ones(rows, dtype=np.bool_), {}
         if smooth:
             more["times"] = np.arange(rows) * 1.0
-            more["rates"] = 1e-4 * rng.normal(size=(rows, 1 + 2 * ARM.n_links))
+            more["rates"] = rates
         stations = np.append(0.0, gaps.cumsum())
         write_trajectory(self.rows, Trajectory(on, stations, x0, *angles, **more))
         axes = centres[:, -1] - centres[:, -2]
@@ -133,3 +146,28 @@ def test_a_cone_is_proved_under_the_errors(
         good = cone > worst + 0.05 or not felt
         assert (case.reason() == "") is good
         assert good or "within the errors" in case.reason()
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_between_rows_the_tip_leaves_its_chord_by_what_is_reckoned(
+    smooth: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of joint 1 turning evenly a circle, whose height over a chord is known."""
+    case = Looking(tmp_path, 0, smooth, steady=True)
+    case.ask(30.0, "direction")
+    case.look()
+    kept, bends = Drawing.draw, []
+
+    def draw(self: Drawing, *taken: Any) -> None:
+        bends.append((float(norm(taken[2][1] - taken[2][0])), float(taken[3])))
+        kept(self, *taken)
+
+    monkeypatch.setattr(Drawing, "draw", draw)
+    assert case.reason() == ""
+    parts = PARTS if smooth else 1
+    assert len(bends) == 4 * parts
+    length, turn = float(ARM.total_length), STEADY / parts
+    for chord, bend in bends:
+        assert chord == pytest.approx(2.0 * length * np.sin(turn / 2.0), rel=1e-6)
+        height = length * (1.0 - np.cos(turn / 2.0))
+        assert height <= bend <= 1.01 * height
