@@ -196,6 +196,7 @@ def tried(
             stop.set()
             for worker in workers:
                 worker.join()
+            tasks.cancel_join_thread()  # what is left in it is read by nobody
 
 
 def noticed_before(path: Path | None) -> set[str]:

@@ -1,6 +1,7 @@
 """Where the last link looks: proved again between rows, and wrong looks refused."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +68,7 @@ class Looking:
             "directions": (axes + aside).tolist(),
         }
 
-    def ask(self, cone: float, kind: str) -> None:
+    def ask(self, cone: float, kind: str, obstacles: Sequence[Any] = ()) -> None:
         """Write the problem file."""
         points = self.tips.tolist()
         path = {"points": points, "spacing": 1.0, "required_coverage": 0.0}
@@ -81,7 +82,7 @@ class Looking:
         }
         path["pointing"] = {"cone_deg": cone, kind: self.aims[kind]}
         data = {"vdsm_problem": 1, "length_unit": "m", "manipulator": "hrm8"}
-        data |= {"obstacles": [], "required_clearance": 0.0, "tip_path": path}
+        data |= {"obstacles": [*obstacles], "required_clearance": 0.0, "tip_path": path}
         self.problem.write_text(json.dumps(data))
 
     def look(self, errors: ErrorBox = NO_ERRORS) -> float:
@@ -171,3 +172,20 @@ def test_between_rows_the_tip_leaves_its_chord_by_what_is_reckoned(
         assert chord == pytest.approx(2.0 * length * np.sin(turn / 2.0), rel=1e-6)
         height = length * (1.0 - np.cos(turn / 2.0))
         assert height <= bend <= 1.01 * height
+
+
+@pytest.mark.parametrize("kind", ["target", "direction"])
+def test_what_moves_far_away_turns_no_look(kind: str, tmp_path: Path) -> None:
+    """Errors of the arm's joints count, and no joints of what obstacles move on."""
+    case, box = Looking(tmp_path, 4, smooth=True), ErrorBox(joint=1e-3)
+    case.ask(30.0, kind)
+    worst = case.look(box)
+    way = {"times_s": [0, 9], "positions": [[0, 0, 0], [0, 0, 1]]}
+    ball = {"name": "ball", "shape": "sphere", "center": [0, 8, 0], "radius": 0.1}
+    ball["motion"] = way | {"rpy_deg": [[0, 0, 0], [0, 0, 9]]}
+    case.ask(30.0, kind, [ball])
+    assert case.look(box) == pytest.approx(worst, abs=1e-9)
+    for cone, good in ((1.02 * worst + 0.06, True), (0.98 * worst - 0.06, False)):
+        case.ask(cone, kind, [ball])
+        case.forge()
+        assert (case.reason() == "") is good

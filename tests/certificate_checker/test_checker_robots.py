@@ -8,6 +8,7 @@ import copy
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,8 @@ from oracles.certificate_mutations import change_number, changes
 from oracles.random_robots import MESH, random_urdf
 from oracles.robot_certificates import BASES, CELL, VIRTUAL, Made, cell, text
 
-from vdsm_pin.certificate_checker.balls import SLACK
-from vdsm_pin.certificate_checker.robot import Joints, within
+from vdsm_pin.certificate_checker.balls import SLACK, Rejected
+from vdsm_pin.certificate_checker.robot import Joints, Robot, within
 from vdsm_pin.cli import main
 from vdsm_pin.robots.cell import robot_of
 from vdsm_pin.robots.files import RobotFiles
@@ -102,6 +103,43 @@ def test_a_forged_certificate_of_other_files_is_refused(
     outcome = made.check(lines)
     assert not outcome.accepted
     assert any(word in outcome.reason for word in reason.split("|")), outcome.reason
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+def test_motions_of_few_rows_are_accepted_and_held_to_their_rates(
+    tmp_path: Path, rows: int
+) -> None:
+    """A single row has no rates; of two there is one interval with some."""
+    made = Made(tmp_path, "fixed", 1)
+    made.rows = made.rows[: rows + 1]
+    lines = made.certified()
+    WRONG["rates"][0](made)
+    outcome = made.check(lines)
+    assert outcome.accepted is (rows == 1)
+    assert rows == 1 or "the limit of its rates" in outcome.reason
+
+
+@pytest.mark.parametrize(("cover", "parts", "most"), [("hull", 9, 1), ("parts", 3, 3)])
+def test_a_mesh_is_covered_by_as_many_hulls_as_are_asked_for(
+    cover: str, parts: int, most: int
+) -> None:
+    corners = np.random.default_rng(1).uniform(-1.0, 1.0, (6, 3, 3))
+    asked = SimpleNamespace(files=SimpleNamespace(
+        solids=SimpleNamespace(cover=cover, parts=parts)
+    ))  # fmt: skip
+
+    def covered(over: list[int] | None) -> list[Any]:
+        return [*Robot._covered(asked, "l", corners, over)]  # type: ignore[arg-type]
+
+    (whole,) = covered(None)
+    assert len(whole.points) == 1
+    numbers = [0] * 6, [2] * 6, [3] * 6, [-1] * 6, [0, 1] * 3, [0, 1, 2] * 2, [0] * 5
+    for over in numbers:
+        if len(over) == 6 and {*over} <= {*range(most)}:
+            assert len(covered(over)) == len({*over})
+            continue
+        with pytest.raises(Rejected, match=f"a hull of at most {most} over each"):
+            covered(over)
 
 
 def lines_of(what: str, lines: list[Any]) -> None:
