@@ -106,8 +106,19 @@ def normals(rng: np.random.Generator, n: int) -> FloatArray:
 
 
 @pytest.mark.parametrize("degree", DEGREES)
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(4))
 def test_no_motion_of_the_box_leaves_the_body(degree: int, seed: int) -> None:
+    check_motions(degree, seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("degree", DEGREES)
+@pytest.mark.parametrize("seed", range(4, 40))
+def test_no_motion_of_many_more_boxes_leaves_the_body(degree: int, seed: int) -> None:
+    check_motions(degree, seed)
+
+
+def check_motions(degree: int, seed: int) -> None:
     rng = np.random.default_rng([degree, seed])
     for _ in range(20):
         case = random_case(rng, degree)
