@@ -1,0 +1,116 @@
+"""Limits over random motions; oracle: thousands of moments of each."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vdsm_pin.arm.kinematics import link_angles
+from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification import limits
+from vdsm_pin.verification.limits import check_limits, extremes
+from vdsm_pin.verification.records import Check, Verdict
+
+BOX, CONE, RAIL, STEP = 0.3, 0.38, 0.2, 0.35
+ARM = replace(
+    built_in("hrm8"), max_joint_angle=BOX, max_link_angle=CONE, base_range=(-RAIL, RAIL)
+)
+TIP = np.array([ARM.total_length, 0.0, 0.0])
+PROBLEM = PlanningProblem(
+    "p", ARM, Scene(), DesiredPath(TIP, TIP[None]), 0.0, np.eye(4), max_row_change=STEP
+)
+
+
+def random_motion(rng: np.random.Generator, degree: int) -> Trajectory:
+    n, links = int(rng.integers(1, 9)), ARM.n_links
+    size = rng.uniform(0.3, 1.1)
+    angles, x0 = size * BOX * rng.uniform(-1, 1, (2, n, links)), rng.uniform(-1, 1, n)
+    more = {}
+    if degree > 1:
+        more["times"] = np.cumsum(rng.uniform(0.5, 2.0, n))
+        more["rates"] = 0.1 * rng.normal(size=(n, 1 + 2 * links))
+    if degree > 3:
+        more["changes"] = 0.1 * rng.normal(size=(n, 1 + 2 * links))
+    off = np.zeros(n)
+    return Trajectory(off.astype(bool), off, size * RAIL * x0, *angles, **more)
+
+
+def dense(motion: Trajectory, per_row: int = 400) -> tuple[np.ndarray, np.ndarray]:
+    last = motion.n_samples - 1
+    moments = np.linspace(0.0, last, last * per_row + 1)
+    return moments, np.asarray(motion.joints_at(moments))
+
+
+def assert_judged(
+    row: Check, value: np.ndarray, limit: float, tolerance: float, exact: bool
+) -> None:
+    """A row about a value over moments, shape (n_moments, n); its joint and moment."""
+    most = float(value.max())
+    if most > limit + tolerance:
+        assert row.verdict is Verdict.REFUTED
+        assert row.worst == pytest.approx(most, rel=0.02, abs=1e-9)
+    elif exact or most < limit - 2e-3:
+        assert row.verdict is Verdict.CERTIFIED
+        assert most - 1e-12 <= row.worst <= most + (1e-12 if exact else 2e-3)
+
+
+@pytest.mark.parametrize("degree", [1, 3, 5])
+def test_every_limit_is_judged_by_what_the_motion_does(
+    degree: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(limits, "CHUNK", 96)  # three intervals at once
+    rng, exact = np.random.default_rng(degree), degree == 1
+    verdicts: set[tuple[str, Verdict]] = set()
+    for _ in range(60):
+        motion = random_motion(rng, degree)
+        moments, joints = dense(motion)
+        alpha, theta = np.abs(joints[:, 1::2]), np.abs(joints[:, 2::2])
+        psi = link_angles(joints[:, 1::2], joints[:, 2::2])
+        rows = check_limits(PROBLEM, motion)
+        assert len(rows) == (5 if motion.n_samples > 1 else 4)
+        for row, value, limit in zip(rows, (alpha, theta, psi), (BOX, BOX, CONE)):  # noqa: B905
+            assert_judged(row, value, limit, TOLERANCES.joint_limit, exact)
+            assert (row.limit, row.count) == (limit, motion.alpha.size)
+            if exact:
+                at, joint = np.unravel_index(value.argmax(), value.shape)
+                name = (
+                    row.name.split()[-4] if "psi" in row.name else row.name.split()[0]
+                )
+                assert (row.where, row.moment) == (f"{name}{joint + 1}", moments[at])
+        x0 = joints[:, 0]
+        assert_judged_rail(rows[3], x0, exact)
+        if motion.n_samples > 1:
+            parts = joints[:-1, 1:].reshape(
+                motion.n_samples - 1, -1, joints.shape[1] - 1
+            )
+            ends = joints[400::400, None, 1:]
+            change = np.ptp(np.concatenate([parts, ends], axis=1), axis=1)
+            assert_judged(rows[4], change, STEP, TOLERANCES.joint_limit, exact)
+            k, column = np.unravel_index(change.argmax(), change.shape)
+            if exact:
+                named = f"joint {column // 2 + 1}"
+                assert (rows[4].where, rows[4].moment) == (named, k)
+        found = extremes(motion)
+        pairs = [(found.alpha, alpha.max()), (found.theta, theta.max()),
+                 (found.psi, psi.max()), (found.x0_max, x0.max()),
+                 (-found.x0_min, -x0.min())]  # fmt: skip
+        for bound, seen in pairs:
+            assert seen - 1e-12 <= bound <= seen + (1e-12 if exact else 2e-3)
+        verdicts |= {(row.name, row.verdict) for row in rows}
+    assert len({key for key in verdicts if key[1] is not Verdict.UNDECIDED}) >= 9
+
+
+def assert_judged_rail(row: Check, x0: np.ndarray, exact: bool) -> None:
+    below, above = -RAIL - x0.min(), x0.max() - RAIL
+    most = max(below, above)
+    if most > TOLERANCES.base_limit:
+        assert row.verdict is Verdict.REFUTED
+    elif exact or most < -2e-3:
+        assert row.verdict is Verdict.CERTIFIED
+    if exact or abs(below - above) > 0.01:
+        at, limit = (x0.min(), -RAIL) if below > above else (x0.max(), RAIL)
+        assert (row.worst, row.limit) == (pytest.approx(at, abs=2e-3), limit)
