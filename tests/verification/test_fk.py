@@ -91,3 +91,29 @@ def test_planned_centres_are_held_against_pinocchio() -> None:
                     centres=centres[CHUNK : CHUNK + 9])  # fmt: skip
     row = next(check for check in judged.checks if check.name == fk.PLANNED)
     assert row.verdict is Verdict.REFUTED
+
+
+def test_the_worst_centre_is_named_wherever_it_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Oracle: the errors put into the centres that were planned."""
+    rng = np.random.default_rng(9)
+    monkeypatch.setattr(fk, "CHUNK", 3)
+    robot, zero = load_robot(HRM8), np.zeros(11)
+    angles = rng.uniform(-0.2, 0.2, (2, 11, HRM8.n_links))
+    motion = Trajectory(zero.astype(bool), zero, zero, *angles)
+    honest = joint_centres(HRM8, zero, *angles)
+    for size, verdict in ((1e-10, Verdict.CERTIFIED), (1e-6, Verdict.REFUTED)):
+        for _ in range(10):
+            off = size * rng.uniform(0.1, 0.9, honest.shape[:2])
+            row, joint = rng.integers(0, 11), rng.integers(0, HRM8.n_links + 1)
+            off[row, joint] = size
+            wrong = honest + off[:, :, None] * np.array([0.6, 0.0, -0.8])
+            check = fk.check_planned(robot, motion, wrong)
+            assert (check.verdict, check.moment) == (verdict, row)
+            assert check.where == f"joint centre O{joint + 1}"
+            assert check.worst == pytest.approx(size, abs=2e-15, rel=1e-5)
+            assert check.count == 11 * (HRM8.n_links + 1)
+    honest[5, 2, 1] = np.nan
+    check = fk.check_planned(robot, motion, honest)
+    assert (check.verdict, check.moment, check.worst) == (Verdict.REFUTED, 5, np.inf)
