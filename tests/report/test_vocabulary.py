@@ -71,7 +71,7 @@ def test_every_length_and_angle_says_its_unit(name: str) -> None:
 def test_the_words_in_the_docs_are_the_keys_of_the_files(tmp_path: Path) -> None:
     judged = made_up.verification(n=3)
     path = tmp_path / "clearance.csv"
-    with closing(ClearanceCsv(path, judged.problem, judged.pairs)) as clearance:
+    with closing(ClearanceCsv(path, judged.problem, len(judged.pairs))) as clearance:
         clearance.write(judged)
     write_link_angles(tmp_path / "link_angles.csv", judged)
     write_cables(tmp_path / "cables.csv", judged.problem, judged.trajectory)

@@ -54,7 +54,7 @@ from vdsm_pin.verification.coal_distances import reach_of
 from vdsm_pin.verification.moving import untimed
 from vdsm_pin.verification.records import ArmVerification, Verdict, Verification
 from vdsm_pin.verification.robot_model import RobotModel, load_robot
-from vdsm_pin.verification.task import all_pairs
+from vdsm_pin.verification.task import ArmPairs
 from vdsm_pin.verification.verify import verify
 
 if TYPE_CHECKING:  # whoever verifies an arm needs no robots
@@ -277,8 +277,7 @@ def _judge_arm(
 ) -> tuple[str, Verification]:
     """The SHA-256 of the arm's URDF and the judgement; its tables stand aside."""
     reach = math.inf if order.all_pairs else reach_of(problem)
-    # No name for all pairs: of many obstacles they would take much memory.
-    table = ClearanceCsv(aside / CLEARANCE, problem, all_pairs(problem), reach)
+    table = ClearanceCsv(aside / CLEARANCE, problem, ArmPairs(problem).size, reach)
     with closing(table) as clearance:
         verification = verify(
             problem,
@@ -310,7 +309,7 @@ def _judge_robot(
     verification = verify_robot(cell, motion, order.deadline)
     verification = replace(verification, notes=notes)
     step("writing the results")
-    table = ClearanceCsv(aside / CLEARANCE, cell, verification.pairs)
+    table = ClearanceCsv(aside / CLEARANCE, cell, len(verification.pairs))
     with closing(table) as clearance:
         clearance.write(verification)
     return sha256(cell.robot.text.encode()).hexdigest(), verification

@@ -53,7 +53,7 @@ class ClearanceCsv:
     Args:
         path: The file.
         problem: For the frame of the witness points.
-        pairs: Every pair, as chunks number them.
+        n_pairs: Of how many pairs; their names are told last.
         reach: Rows are written of intervals over which a pair is not proved farther
             apart; inf for all; [m].
     """
@@ -62,19 +62,12 @@ class ClearanceCsv:
         self,
         path: Path,
         problem: Problem,
-        pairs: Sequence[Pair],
+        n_pairs: int,
         reach: float = math.inf,
     ) -> None:
         pose = problem.T_world_base
         self._rotation, self._shift = pose[:3, :3].T, pose[:3, 3]
-        partners = [
-            f"{quoted(pair.body or str(pair.link))},{quoted(pair.obstacle)},"
-            f"{quoted(pair.other_body or str(pair.other_link or ''))}"
-            for pair in pairs
-        ]
-        self._form = Form(_CLEARANCE_DECIMALS, _CLEARANCE_ROUNDING,
-                          (*_VERDICTS, *partners))  # fmt: skip
-        self._reach, self._written = reach, np.zeros(len(pairs), dtype=np.bool_)
+        self._reach, self._written = reach, np.zeros(n_pairs, dtype=np.bool_)
         self._path = path
         self._file = tempfile.TemporaryFile(dir=path.parent)
 
@@ -104,20 +97,21 @@ class ClearanceCsv:
         A waypoint belongs to the interval that it begins, the last one to the last.
 
         Args:
-            verification: Its least clearances, and what Coal measured.
+            verification: Its pairs and least clearances, and what Coal measured.
         """
         n_pairs, coal = self._written.size, verification.coal or NOTHING_MEASURED
         last = max(verification.trajectory.n_samples - 2, 0)
         keys = np.minimum(coal.waypoint, last) * n_pairs + coal.pair
         near, far = CoalIndex(coal, keys), CoalIndex(coal, coal.pair)
+        form = _clearance_form(verification.pairs)
         with self._path.open("wb") as file:
             file.write(_CLEARANCE_HEADER.encode())
             for rows in self._waiting():
                 numbers = rows[:, [0, 2]].astype(np.int64)
                 keys = numbers[:, 0] * n_pairs + numbers[:, 1] - len(_VERDICTS)
-                file.write(self._form.rows(np.hstack([rows, near.at(keys)])))
+                file.write(form.rows(np.hstack([rows, near.at(keys)])))
             for pairs, rows in self._rest(verification.least):
-                file.write(self._form.rows(np.hstack([rows, far.at(pairs)])))
+                file.write(form.rows(np.hstack([rows, far.at(pairs)])))
 
     def _waiting(self) -> Iterator[FloatArray]:
         """The rows that wait aside, in parts."""
@@ -155,6 +149,17 @@ class ClearanceCsv:
             for point in (rows.link_point, rows.other_point)
         ]
         return np.column_stack([*columns, *points]).astype(np.float64)
+
+
+def _clearance_form(pairs: Sequence[Pair]) -> Form:
+    """How rows of clearance.csv are written, whose words are verdicts and pairs."""
+    partners = (
+        f"{quoted(pair.body or str(pair.link))},{quoted(pair.obstacle)},"
+        f"{quoted(pair.other_body or str(pair.other_link or ''))}"
+        for pair in pairs
+    )
+    words = (*_VERDICTS, *partners)
+    return Form(_CLEARANCE_DECIMALS, _CLEARANCE_ROUNDING, words)
 
 
 def write_link_angles(path: Path, verification: ArmVerification) -> None:
