@@ -11,6 +11,7 @@ from vdsm_pin.arm.manipulator import (
     built_in,
     paper_hole_angles,
 )
+from vdsm_pin.errors import InconsistentCables
 from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
@@ -97,3 +98,21 @@ def test_the_worst_of_all_rows_is_named_wherever_it_is(
             row,
             f"{['alpha', 'theta'][kind]}{joint + 1}",
         )
+
+
+def test_the_row_whose_cables_determine_no_angles_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    honest, calls = cable_check.angles_from_cables, iter(range(4))
+
+    def fails_at_7(arm: Manipulator, lengths: np.ndarray) -> object:
+        if next(calls) == 2:
+            raise InconsistentCables(waypoint=1, link=3, residual=1.0, tolerance=0.0)
+        return honest(arm, lengths)
+
+    monkeypatch.setattr(cable_check, "CHUNK", 3)
+    monkeypatch.setattr(cable_check, "angles_from_cables", fails_at_7)
+    still = np.zeros((11, 8))
+    check = check_cables(problem_for(HRM8), trajectory_of(still, still))
+    assert (check.verdict, check.where) == (Verdict.REFUTED, "joint 3")
+    assert (check.moment, check.worst) == (7.0, np.inf)
