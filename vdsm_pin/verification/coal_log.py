@@ -33,8 +33,9 @@ class CoalLog:
     ) -> None:
         self.pairs, self.approaches = tuple(pairs), tuple(approaches)
         self.around = tuple(around)
-        names = np.array([pair.obstacle for pair in pairs])
-        self._surfaces = np.flatnonzero(np.isin(names, around))
+        # An array of names would be as wide as the longest, for every pair.
+        of_surface = (k for k, pair in enumerate(pairs) if pair.obstacle in self.around)
+        self._surfaces = np.fromiter(of_surface, np.int64)
         self._parts: list[tuple[IntArray, IntArray, FloatArray]] = []
 
     def keep(self, waypoint: IntArray, pair: IntArray, distance: FloatArray) -> None:

@@ -126,6 +126,8 @@ def _without_far(
     """The problem without the obstacles of more clearance than a bound."""
     near = np.flatnonzero(~(clearances > bound))
     obstacles = problem.scene.obstacles
+    if near.size == len(obstacles):
+        return problem  # with what it keeps packed
     return replace(problem, scene=Scene(tuple(obstacles[k] for k in near)))
 
 
@@ -234,8 +236,7 @@ def refuted_joint_error(
             return problem
         return within_reach(problem, clearances, errors.with_joint(joint))
 
-    proof = YesOrNoProof(near(above), trajectory, deadline)
-    lost = _first_lost(partial(_holds, proof, errors, joint=above), proof.n_intervals)
+    lost = _first_gap(near(above), trajectory, errors.with_joint(above), deadline)
     if lost is None:
         return nan
     weakest = trajectory.part(max(0, lost - AROUND), lost + AROUND + 2)
@@ -245,6 +246,17 @@ def refuted_joint_error(
         if found:
             return min(found)
     return nan
+
+
+def _first_gap(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    errors: ErrorBox,
+    deadline: Deadline,
+) -> int | None:
+    """As `_first_lost`, of a proof that takes its memory with it."""
+    proof = YesOrNoProof(problem, trajectory, deadline)
+    return _first_lost(partial(proof.holds, errors), proof.n_intervals)
 
 
 def _first_lost(holds: Callable[[int, int], bool], end: int) -> int | None:
