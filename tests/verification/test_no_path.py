@@ -47,7 +47,7 @@ def test_without_start_and_goal_nothing_is_asked_of_the_tip() -> None:
     report = check_tip(asked(), swing())
     assert report.checks == ()
     assert np.isnan(report.coverage)
-    assert report.undrawn.shape == (0, 2)
+    assert (report.deviation, report.undrawn.shape) == (0.0, (0, 2))
 
 
 def test_start_and_goal_are_met_to_the_micrometre_at_their_own_rows() -> None:
