@@ -16,7 +16,13 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.report import html
 from vdsm_pin.report.facts import batch_row, verification_file
 from vdsm_pin.report.files import BatchRow
-from vdsm_pin.report.html import message_page, view_page, write_index, write_report
+from vdsm_pin.report.html import (
+    message_page,
+    point,
+    view_page,
+    write_index,
+    write_report,
+)
 from vdsm_pin.verification.records import Verdict, Verification
 
 
@@ -170,3 +176,8 @@ def test_plots_run_over_time_where_the_motion_has_times(tmp_path: Path) -> None:
     assert option not in report(tmp_path, judged)
     rows = replace(judged.trajectory, times=np.linspace(3.0, 5.0, 40))
     assert option in report(tmp_path, replace(judged, trajectory=rows))
+
+
+def test_a_point_on_an_axis_has_no_negative_zero() -> None:
+    assert point((-1e-9, 0.1, -0.02)) == "0.0, 100.0, −20.0"
+    assert point(None) == "not available"

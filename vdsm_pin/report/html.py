@@ -111,7 +111,8 @@ def point(point: Point | None) -> str:
     """A point in mm."""
     if point is None:
         return MISSING
-    return ", ".join(f"{value * MM_PER_M:.1f}".replace("-", "−") for value in point)
+    rounded = (round(value * MM_PER_M, 1) + 0.0 for value in point)  # -0 is 0
+    return ", ".join(f"{value:.1f}".replace("-", "−") for value in rounded)
 
 
 def css_text(text: str) -> Markup:
