@@ -12,7 +12,7 @@ from vdsm_pin.cli.options import (
     family,
     grouped,
 )
-from vdsm_pin.cli.robot import RobotOptions, Topic
+from vdsm_pin.cli.robot import ProblemOrNone, RobotOptions, Topic
 from vdsm_pin.cli.verify import read_source
 from vdsm_pin.time_limit import Deadline, enforced
 
@@ -33,13 +33,7 @@ def repair(
     trajectory: Trajectory,
     out: OutFolder,
     *,
-    problem: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="PROBLEM",
-            help="A built-in name or a problem file; none with --urdf.",
-        ),
-    ] = None,
+    problem: ProblemOrNone = None,
     robot: RobotOptions,
     topic: Topic = None,
     pin: Annotated[

@@ -12,6 +12,12 @@ if TYPE_CHECKING:
     from vdsm_pin.robots.cell import Cell
 
 
+ProblemOrNone = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="PROBLEM", help="A built-in name or a problem file; none with --urdf."
+    ),
+]
 Urdf = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="A robot of any kind, in place of a problem."),

@@ -20,7 +20,7 @@ from vdsm_pin.cli.options import (
     family,
     grouped,
 )
-from vdsm_pin.cli.robot import RobotOptions, Topic, refuse_beside
+from vdsm_pin.cli.robot import ProblemOrNone, RobotOptions, Topic, refuse_beside
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.time_limit import Deadline, enforced
 
@@ -63,13 +63,7 @@ def verify(
     trajectory: Trajectory,
     out: OutFolder,
     *,
-    problem: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="PROBLEM",
-            help="A built-in name or a problem file; none with --urdf.",
-        ),
-    ] = None,
+    problem: ProblemOrNone = None,
     errors: ErrorOptions,
     slide_error_mm: SlideErrors = "0",
     certificate: Annotated[

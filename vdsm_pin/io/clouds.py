@@ -14,7 +14,7 @@ import numpy as np
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.meshes.ply import read_ply_points
-from vdsm_pin.io.meshes.raw import MeshStream, doubles
+from vdsm_pin.io.meshes.raw import MeshStream, check_ending, doubles
 from vdsm_pin.io.pcd import read_pcd
 from vdsm_pin.io.source import Digest, opened
 
@@ -59,11 +59,7 @@ def read_cloud(path: Path, digest: Digest) -> RawCloud:
         InvalidFile: If the file cannot be read, is of another kind, is damaged, has no
             point or too many, or one that is infinite.
     """
-    kind = path.suffix.lower()
-    if kind not in _READERS:
-        *most, last = _READERS
-        problem = f"has the ending {kind!r}, expected {', '.join(most)} or {last}"
-        raise InvalidFile(file=path, problem=problem)
+    kind = check_ending(path, _READERS)
     with opened(path, limit=MAX_BYTES, digest=digest) as file:
         stream = MeshStream(path, file.size, file.content)
         points = _READERS[kind](stream)

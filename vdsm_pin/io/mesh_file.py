@@ -16,7 +16,7 @@ from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.io.meshes.obj import read_obj
 from vdsm_pin.io.meshes.ply import read_ply
-from vdsm_pin.io.meshes.raw import MeshStream, RawMesh
+from vdsm_pin.io.meshes.raw import MeshStream, RawMesh, check_ending
 from vdsm_pin.io.meshes.stl import read_stl
 from vdsm_pin.io.source import Digest, opened
 
@@ -55,11 +55,7 @@ def read_mesh(path: Path, digest: Digest | None = None) -> RawMesh:
         InvalidFile: If the file cannot be read, is of another kind, is damaged, has no
             triangle, or has a coordinate that is not finite.
     """
-    kind = path.suffix.lower()
-    if kind not in _READERS:
-        *most, last = _READERS
-        problem = f"has the ending {kind!r}, expected {', '.join(most)} or {last}"
-        raise InvalidFile(file=path, problem=problem)
+    kind = check_ending(path, _READERS)
     digest = hashlib.sha256() if digest is None else digest
     with opened(path, limit=MAX_MESH_BYTES, digest=digest) as file:
         raw = _READERS[kind](MeshStream(path, file.size, file.content))

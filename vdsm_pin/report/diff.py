@@ -27,8 +27,6 @@ _ORDER: Final = (
 THRESHOLD: Final = "a change that the digits shown do not show is none"
 """Told with every comparison."""
 
-_RANK: Final = {word: rank for rank, word in enumerate(_ORDER)}
-
 
 @dataclass(frozen=True)
 class Change:
@@ -45,21 +43,13 @@ class Change:
     worse: bool
 
 
-@dataclass(frozen=True)
-class _Measure:
-    """A number of a row, its unit, and whether more of it is better."""
-
-    field: str
-    unit: str
-    more_is_better: bool
-
-
 _MEASURES: Final = (
-    _Measure("min_clearance_lower_m", "m", True),
-    _Measure("coverage", "share", True),
-    _Measure("max_joint_error_rad", "rad", True),
-    _Measure("changed_angles_mean_on_path", "-", False),
+    ("min_clearance_lower_m", "m", 1.0),
+    ("coverage", "share", 1.0),
+    ("max_joint_error_rad", "rad", 1.0),
+    ("changed_angles_mean_on_path", "-", -1.0),
 )
+"""Numbers of a row, their units, and the sign of a change that is better."""
 
 
 def compare_folders(old: Path, new: Path) -> tuple[Change, ...]:
@@ -103,32 +93,27 @@ def diff_lines(changes: Sequence[Change]) -> list[str]:
 
 def _compare(name: str, old: BatchRow, new: BatchRow) -> list[Change]:
     if old.outcome != new.outcome:
-        worse = _RANK[new.outcome] < _RANK[old.outcome]
+        worse = _ORDER.index(new.outcome) < _ORDER.index(old.outcome)
         newly = "newly refuted: " if new.outcome == "refuted" else ""
         what = f"{newly}{old.outcome} → {new.outcome} ({new.reason})"
         return [Change(name, what, worse)]
-    changes = []
-    for measure in _MEASURES:
-        change = _measured(name, measure, old, new)
-        if change is not None:
-            changes.append(change)
-    return changes
+    changes = (_measured(name, *measure, old, new) for measure in _MEASURES)
+    return [change for change in changes if change is not None]
 
 
 def _measured(
-    name: str, measure: _Measure, old: BatchRow, new: BatchRow
+    name: str, field: str, unit: str, better: float, old: BatchRow, new: BatchRow
 ) -> Change | None:
-    first, second = getattr(old, measure.field), getattr(new, measure.field)
+    first, second = getattr(old, field), getattr(new, field)
     if first is None and second is None:
         return None
-    was, now = (quantity(value, measure.unit) for value in (first, second))
-    what = f"{term(measure.field)} {was} → {now}"
+    was, now = quantity(first, unit), quantity(second, unit)
+    what = f"{term(field)} {was} → {now}"
     if first is None or second is None:
         return Change(name, what, second is None)
-    gain = second - first if measure.more_is_better else first - second
-    if was == now or abs(gain) <= TOLERANCES.result_change:
+    if was == now or abs(second - first) <= TOLERANCES.result_change:
         return None
-    return Change(name, what, gain < 0.0)
+    return Change(name, what, better * (second - first) < 0.0)
 
 
 def _rows(folder: Path) -> dict[str, BatchRow]:

@@ -4,7 +4,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.problem.scene import Moving, Obstacle
 from vdsm_pin.report.charts import packed
 from vdsm_pin.verification.records import Motion
@@ -61,10 +61,15 @@ def told_moments(obstacle: Moving, trajectory: Motion) -> FloatArray:
     parts = np.ceil(steps / _TURN).clip(1, max(1, _MOST // len(steps))).astype(int)
     if path.degree > 1:
         parts = np.maximum(parts, 8)
+    whole = subdivided(knots, parts)
+    return np.asarray(np.interp(whole, times, np.arange(float(len(times)))))
+
+
+def subdivided(knots: FloatArray, parts: IntArray) -> FloatArray:
+    """Rising knots, shape (n,), and what cuts each gap into so many equal parts."""
     pairs = zip(knots[:-1], knots[1:], parts, strict=True)
     told = [np.linspace(a, b, n, endpoint=False) for a, b, n in pairs]
-    whole = np.concatenate([*told, knots[-1:]])
-    return np.asarray(np.interp(whole, times, np.arange(float(len(times)))))
+    return np.concatenate([*told, knots[-1:]])
 
 
 def quaternion(turn: FloatArray) -> FloatArray:

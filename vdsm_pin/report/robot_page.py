@@ -14,7 +14,7 @@ from vdsm_pin.geometry.solids import Capsule, Cylinder, Sphere
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.report.charts import packed, series
-from vdsm_pin.report.moves import quaternion
+from vdsm_pin.report.moves import quaternion, subdivided
 from vdsm_pin.report.palette import link_colours
 from vdsm_pin.report.solids import FINE, Surface, joined, surface
 from vdsm_pin.report.thinning import Thinned
@@ -98,9 +98,7 @@ def _moments(path: Path, shown: Thinned) -> FloatArray:
     most = max(1, _MOST // len(ways))
     least = 1 if path.degree == 1 else min(_SMOOTH, most)
     parts = np.ceil(ways / _STEP).clip(least, most).astype(int)
-    pairs = zip(rows[:-1], rows[1:], parts, strict=True)
-    told = [np.linspace(a, b, n, endpoint=False) for a, b, n in pairs]
-    return np.concatenate([*told, rows[-1:]])
+    return subdivided(rows, parts)
 
 
 def _middles(bodies: Sequence[Body]) -> list[FloatArray]:
