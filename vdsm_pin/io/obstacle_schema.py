@@ -6,10 +6,12 @@ from pydantic import Discriminator, Field, Tag
 
 from vdsm_pin.io.schema_types import (
     FileModel,
+    FileName,
     Name,
     Number,
     Positive,
     Range,
+    Size,
     Vector,
     text_or_not,
 )
@@ -57,9 +59,7 @@ class BoxModel(_Named):
 
     shape: Literal["box"]
     center: Vector = Field(description="[length_unit]")
-    size: Annotated[list[Positive], Field(min_length=3, max_length=3)] = Field(
-        description="Edge lengths [length_unit]."
-    )
+    size: Size = Field(description="Edge lengths [length_unit].")
     rpy_deg: Vector = Field(
         default=[0.0, 0.0, 0.0], description="Roll, pitch, yaw, R = Rz Ry Rx [deg]."
     )
@@ -92,9 +92,7 @@ class HalfSpaceModel(_Named):
 class FromFileModel(_Named):
     """What stands in a file of its own, and where it goes."""
 
-    file: Annotated[str, Field(min_length=1, max_length=4096)] = Field(
-        description="Path, relative to this file."
-    )
+    file: FileName = Field(description="Path, relative to this file.")
     length_unit: Literal["mm", "m"] | None = Field(
         default=None,
         description="Unit of that file. Default: what it states itself; else that of "
@@ -143,7 +141,7 @@ class VoxelsModel(FromFileModel):
     """Occupied cells: their centres, or a NPY array of true and false."""
 
     shape: Literal["voxels"]
-    size: Annotated[list[Positive], Field(min_length=3, max_length=3)] = Field(
+    size: Size = Field(
         description="Edge lengths of a cell [length_unit]; the first cell of an array "
         "begins at its origin."
     )

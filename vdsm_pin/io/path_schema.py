@@ -5,7 +5,7 @@ from typing import Annotated, Any, Final, TypeAlias
 
 from pydantic import Discriminator, Field, Tag
 
-from vdsm_pin.io.schema_types import FileModel, Vector
+from vdsm_pin.io.schema_types import FileModel, FileName, Vector
 
 
 class ArcModel(FileModel):
@@ -49,7 +49,7 @@ class SplinePart(FileModel):
 class FilePart(FileModel):
     """The rows of a CSV file as points."""
 
-    file: Annotated[str, Field(min_length=1, max_length=4096)] = Field(
+    file: FileName = Field(
         description="Path, relative to this file; columns x, y, z [length_unit]."
     )
 

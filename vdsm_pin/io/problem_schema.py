@@ -14,6 +14,7 @@ from vdsm_pin.io.motion_schema import MovableModel
 from vdsm_pin.io.path_schema import PathPart
 from vdsm_pin.io.schema_types import (
     FileModel,
+    FileName,
     Name,
     NotNegative,
     Number,
@@ -35,8 +36,6 @@ Retreat: TypeAlias = Annotated[
     Discriminator(text_or_not),
 ]
 """A length, or the word home."""
-
-Pair: TypeAlias = Annotated[list[Number], Field(min_length=2, max_length=2)]
 
 Lengths: TypeAlias = Annotated[
     list[Positive], Field(min_length=2, max_length=MAX_LINKS)
@@ -198,7 +197,7 @@ class OtherModel(FileModel):
         description="Where its rail is, in the frame of this file. Default: at the "
         "origin.",
     )
-    trajectory: Annotated[str, Field(min_length=1, max_length=4096)] = Field(
+    trajectory: FileName = Field(
         description="Its trajectory, a CSV with a column time_s, relative to this file."
     )
 
@@ -322,7 +321,7 @@ class RatiosModel(FileModel):
     values: Annotated[list[Number], Field(max_length=MAX_LINKS)] | None = Field(
         default=None, description="k_2 to k_N in P_i = k_i T, with the tip's T [-]."
     )
-    scaling_centre: Pair | None = Field(
+    scaling_centre: Range | None = Field(
         default=None,
         description="y and z in the base's frame over which `joint` stays while the "
         "path is drawn; joints after it are scaled about it [length_unit].",

@@ -27,6 +27,8 @@ Positive: TypeAlias = Annotated[
 NotNegative: TypeAlias = Annotated[float, Field(ge=0.0, le=LARGEST)]
 Vector: TypeAlias = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Range: TypeAlias = Annotated[list[Number], Field(min_length=2, max_length=2)]
+Size: TypeAlias = Annotated[list[Positive], Field(min_length=3, max_length=3)]
+FileName: TypeAlias = Annotated[str, Field(min_length=1, max_length=4096)]
 
 _UNSEEN: Final = (
     r"\x00-\x1f\x7f-\x9f\xad\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u206f\ufeff"
