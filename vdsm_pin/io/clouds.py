@@ -88,8 +88,7 @@ def _npy(stream: MeshStream) -> FloatArray:
         problem = f"is no array of numbers: {str(error)[:120].splitlines()[0]}"
         raise stream.invalid(problem) from None
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiub":
-        problem = "is no array of numbers"
-        raise stream.invalid(problem)
+        raise stream.invalid(problem="is no array of numbers")
     if array.ndim == 3:
         if not ((array == 0) | (array == 1)).all():
             problem = "has values besides 0 and 1, expected one of them for each cell"

@@ -62,8 +62,7 @@ def _header(stream: MeshStream) -> _Header:
         said[words[0]] = words[1:]
         if words[0] == "DATA":
             return _understood(stream, said, number)
-    problem = "is no PCD file: no line DATA in its header"
-    raise stream.invalid(problem)
+    raise stream.invalid(problem="is no PCD file: no line DATA in its header")
 
 
 def _understood(stream: MeshStream, said: dict[str, list[str]], lines: int) -> _Header:
@@ -91,8 +90,7 @@ def _understood(stream: MeshStream, said: dict[str, list[str]], lines: int) -> _
         raise stream.invalid(problem)
     stream.check_room(int(points[0]))
     if not int(points[0]):
-        problem = "has no point"
-        raise stream.invalid(problem)
+        raise stream.invalid(problem="has no point")
     fields = [
         (f"{name}" if name in "xyz" else f"{name} {k}", f"<{_KINDS[t]}{s}", (int(c),))
         for k, (name, t, s, c) in enumerate(
@@ -145,8 +143,7 @@ def _unpacked(stream: MeshStream, header: _Header, data: bytes) -> bytes:
         raise _cut_short(stream, header)
     found = _from_lzf(data[8 : 8 + packed], wanted)
     if len(found) != wanted:
-        problem = "has compressed data that is damaged"
-        raise stream.invalid(problem)
+        raise stream.invalid(problem="has compressed data that is damaged")
     return found
 
 

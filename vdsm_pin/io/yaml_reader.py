@@ -157,11 +157,9 @@ class _Builder:
             elif isinstance(event, yaml.CollectionEndEvent):
                 depth -= 1
             if depth > MAX_DEPTH:
-                problem = f"nests deeper than {MAX_DEPTH} levels"
-                raise self._invalid(event, problem)
+                raise self._invalid(event, f"nests deeper than {MAX_DEPTH} levels")
             if count > MAX_VALUES:
-                problem = f"holds more than {MAX_VALUES} values"
-                raise self._invalid(event, problem)
+                raise self._invalid(event, f"holds more than {MAX_VALUES} values")
             yield event
 
     def _value(self, event: yaml.Event, at: Location) -> Data:
@@ -188,8 +186,7 @@ class _Builder:
                 raise self._invalid(key, "a key is not plain text")
             name = str(key.value).translate(self.stand_ins)
             if name in data:
-                problem = f"the key {name!r} appears twice"
-                raise self._invalid(key, problem)
+                raise self._invalid(key, f"the key {name!r} appears twice")
             self.lines[(*at, name)] = _line(key)
             data[name] = self._value(next(self.events), (*at, name))
         return data

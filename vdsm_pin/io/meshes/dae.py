@@ -40,8 +40,7 @@ def read_dae(stream: MeshStream) -> RawMesh:
         raise stream.invalid(problem)
     content = stream.content.read()
     if b"<!DOCTYPE" in content:  # whose entities may grow without end
-        problem = "has a DOCTYPE, expected plain XML"
-        raise stream.invalid(problem)
+        raise stream.invalid(problem="has a DOCTYPE, expected plain XML")
     try:
         root = ElementTree.fromstring(content)
     except (ElementTree.ParseError, ValueError, LookupError) as error:
@@ -100,8 +99,7 @@ class _Reader:
     def _walk(self, node: _Element, pose: FloatArray, depth: int) -> None:
         self._n_nodes += 1
         if depth > 100 or self._n_nodes > MAX_NODES:
-            problem = f"has nodes 100 deep or more than {MAX_NODES}"
-            raise self._invalid(problem)
+            raise self._invalid(problem=f"has nodes 100 deep or more than {MAX_NODES}")
         for child in node:
             tag = _tag(child)
             if tag in _MOVES:
@@ -130,8 +128,7 @@ class _Reader:
         parts = []
         for mesh in geometry:
             if _tag(mesh) in _OTHERS:
-                problem = f"has a <{_tag(mesh)}>, which is not read"
-                raise self._invalid(problem)
+                raise self._invalid(problem=f"has a <{_tag(mesh)}>, which is not read")
             for faces in mesh:
                 if _tag(faces) in _LINES:
                     what = "lines and points left out"
@@ -185,16 +182,14 @@ class _Reader:
             if one.get("semantic") == "VERTEX":
                 offset, vertices = place, self._vertices(self._named(one, "source"))
         if not 0 <= offset < stride <= 64:
-            problem = f"<{_tag(faces)}> names no vertices"
-            raise self._invalid(problem)
+            raise self._invalid(problem=f"<{_tag(faces)}> names no vertices")
         return offset, stride, vertices
 
     def _vertices(self, element: _Element) -> FloatArray:
         for one in _children(element, "input"):
             if one.get("semantic") == "POSITION":
                 return self._source(self._named(one, "source"))
-        problem = "has <vertices> without POSITION"
-        raise self._invalid(problem)
+        raise self._invalid(problem="has <vertices> without POSITION")
 
     def _source(self, source: _Element) -> FloatArray:
         """Points of a source, shape (n, 3)."""
@@ -216,8 +211,7 @@ class _Reader:
                     raise self._invalid(problem)
                 rows = values[start : start + count * stride].reshape(count, stride)
                 return rows[:, :3]
-        problem = "has a source without accessor"
-        raise self._invalid(problem)
+        raise self._invalid(problem="has a source without accessor")
 
     def _named(self, element: _Element, key: str) -> _Element:
         """What an element points to in this file."""

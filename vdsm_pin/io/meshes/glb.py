@@ -123,8 +123,7 @@ def read_glb(stream: MeshStream) -> RawMesh:
     """
     text, data = _chunks(stream)
     if len(text) > _MOST_JSON:
-        problem = f"has more than {_MOST_JSON >> 20} MiB of JSON"
-        raise stream.invalid(problem)
+        raise stream.invalid(problem=f"has more than {_MOST_JSON >> 20} MiB of JSON")
     try:
         document = _Document.model_validate(json.loads(text))
     except ValidationError as error:
@@ -147,19 +146,16 @@ def _chunks(stream: MeshStream) -> tuple[bytes, bytes]:
     content = stream.content.read()
     magic, version, length = content[:4], *_words(content, 4)
     if magic != b"glTF" or version != 2 or length > len(content):
-        problem = "is no GLB file of version 2, or cut short"
-        raise stream.invalid(problem)
+        raise stream.invalid(problem="is no GLB file of version 2, or cut short")
     offset, found = 12, dict[int, bytes]()
     while offset + 8 <= length:
         size, kind = _words(content, offset)
         if offset + 8 + size > length:
-            problem = f"a chunk promises {size} bytes, fewer follow"
-            raise stream.invalid(problem)
+            raise stream.invalid(problem=f"a chunk promises {size} bytes, fewer follow")
         found.setdefault(kind, content[offset + 8 : offset + 8 + size])
         offset += 8 + size
     if 0x4E4F534A not in found:
-        problem = "has no JSON chunk"
-        raise stream.invalid(problem)
+        raise stream.invalid(problem="has no JSON chunk")
     return found[0x4E4F534A], found.get(0x004E4942, b"")
 
 
@@ -224,8 +220,7 @@ class _Reader:
         mesh = self._at("meshes", node.mesh)
         if node.skin is not None or any(node.weights or mesh.weights):
             bent = f"node {number} is bent by a skin or by morph targets"
-            problem = f"{bent}; export it as it stands"
-            raise self._stream.invalid(problem)
+            raise self._stream.invalid(problem=f"{bent}; export it as it stands")
         if node.mesh not in self._parts:
             made = (self._part(one) for one in mesh.primitives)
             self._parts[node.mesh] = [part for part in made if part is not None]
@@ -261,8 +256,7 @@ class _Reader:
             problem = f"accessors[{number}] is sparse or no {shape}, which is not read"
             raise self._stream.invalid(problem)
         if accessor.bufferView is None:
-            problem = f"accessors[{number}] has no data"
-            raise self._stream.invalid(problem)
+            raise self._stream.invalid(problem=f"accessors[{number}] has no data")
         view: _View = self._at("bufferViews", accessor.bufferView)
         if view.buffer != 0 or self._at("buffers", 0).uri or view.extensions:
             problem = "has data in another file or compressed, which is not read"

@@ -72,14 +72,12 @@ def read_ply(stream: MeshStream) -> RawMesh:
     """
     header = _header(stream)
     if "tristrips" in header.elements:
-        problem = "has triangle strips, expected faces"
-        raise stream.invalid(problem)
+        raise stream.invalid(problem="has triangle strips, expected faces")
     read = _elements(stream, header)
     face = read.get("face", {})
     corners = face.get("vertex_indices") or face.get("vertex_index")
     if corners is None:
-        problem = "has no vertex_indices of its faces"
-        raise stream.invalid(problem)
+        raise stream.invalid(problem="has no vertex_indices of its faces")
     return _mesh(stream, _vertices(stream, read), corners)
 
 
@@ -100,11 +98,9 @@ def _vertices(stream: MeshStream, read: dict[str, _Columns]) -> FloatArray:
     axes = [read.get("vertex", {}).get(axis) for axis in "xyz"]
     columns = [axis.values for axis in axes if axis is not None]
     if len(columns) != 3:
-        problem = "has no x, y, z of its vertices"
-        raise stream.invalid(problem)
+        raise stream.invalid(problem="has no x, y, z of its vertices")
     if len({len(column) for column in columns}) != 1:
-        problem = "has lists where x, y and z are meant"
-        raise stream.invalid(problem)
+        raise stream.invalid(problem="has lists where x, y and z are meant")
     return np.column_stack(columns)
 
 
@@ -162,8 +158,7 @@ def _header(stream: MeshStream) -> _Header:
             case _:
                 problem = f"is no header of a PLY file: {raw.strip()[:60]!r}"
                 raise stream.invalid(problem, line=number)
-    problem = f"has a header of more than {_MOST_LINES} lines"
-    raise stream.invalid(problem)
+    raise stream.invalid(problem=f"has a header of more than {_MOST_LINES} lines")
 
 
 def _text(stream: MeshStream, header: _Header) -> dict[str, _Columns]:
@@ -177,8 +172,7 @@ def _text(stream: MeshStream, header: _Header) -> dict[str, _Columns]:
             number, words = next(lines, (0, []))
             if not words:
                 promised = f"promises {element.count} of {element.name!r}, has {i}"
-                problem = f"is cut short: its header {promised}"
-                raise stream.invalid(problem)
+                raise stream.invalid(problem=f"is cut short: its header {promised}")
             for k, one in enumerate(_split(stream, element, words, number)):
                 values[k].extend(stream.numbers(one, len(one), number))
                 sizes[k].append(len(one))

@@ -94,8 +94,7 @@ class MeshStream:
         try:
             line = text.readline(MAX_LINE)
             if line.startswith(_UTF_16):
-                problem = "is UTF-16 text, expected UTF-8 or ASCII"
-                raise self.invalid(problem)
+                raise self.invalid(problem="is UTF-16 text, expected UTF-8 or ASCII")
             number, line = 1, line.removeprefix(_BOM)
             while line:
                 if len(line) == MAX_LINE and line[-1] != "\n":

@@ -29,8 +29,7 @@ def read_stl(stream: MeshStream) -> RawMesh:
     """
     head = stream.content.peek(_START)[:_START]
     if head[2:12].replace(b"\0", b"").lower() == b"solid":
-        problem = "is UTF-16 text, expected UTF-8 or ASCII"
-        raise stream.invalid(problem)
+        raise stream.invalid(problem="is UTF-16 text, expected UTF-8 or ASCII")
     count = int.from_bytes(head[_HEADER:], "little")
     is_whole = len(head) == _START
     if is_whole and (head[-1] == 0 or count in _UNKNOWN):
@@ -89,8 +88,7 @@ def _text(stream: MeshStream) -> RawMesh:
             problem = f"the facet has {found} corners, expected 3"
             raise stream.invalid(problem, line=number)
     if last != "endsolid" or len(numbers) % 9:
-        problem = "is truncated: it does not end in endsolid"
-        raise stream.invalid(problem)
+        raise stream.invalid(problem="is truncated: it does not end in endsolid")
     stream.check_count(len(numbers) // 9)
     corners = np.array(numbers, dtype=np.float64).reshape(-1, 3, 3)
     return _mesh(stream, corners, ())
