@@ -31,6 +31,9 @@ DENSITIES: Final = ("0.01", "0.005", "1 deg", "1 mm")
 DENSE: Final = 2000
 """Samples that look for what is wrong in a certified plan."""
 
+RUNS: Final = 3
+"""Of a verification, the quickest of which counts."""
+
 AGREED: Final = 1e-6
 """Contact within which no verdict is asked; [m]."""
 
@@ -61,7 +64,7 @@ class Judged:
     Args:
         plan: The plan.
         verdict: By the proof, of all clearances.
-        milliseconds: Processor time of the whole verification; [ms].
+        milliseconds: Processor time of the whole verification, the least of some; [ms].
         caught: Which densities of samples meet a collision.
         depth: The deepest that samples each 1 mm and the witness find; [m].
         fault: Where judges contradict each other; empty where not.
@@ -90,10 +93,12 @@ def judge(plan: Plan, sampled: Sampled, robot: Robot, scene: Scene) -> Judged:
     rows = np.array(plan.waypoints)
     motion = Motion(rows)
     verify_robot(Cell(robot, scene), Motion(rows[:1]))  # compiled, nothing kept
-    begin = time.process_time()
-    cell = Cell(robot, scene)
-    found = verify_robot(cell, motion)
-    spent = 1e3 * (time.process_time() - begin)
+    spent = inf
+    for _ in range(RUNS):
+        begin = time.process_time()
+        cell = Cell(robot, scene)
+        found = verify_robot(cell, motion)
+        spent = min(spent, 1e3 * (time.process_time() - begin))
     about = [one.verdict for one in found.checks if one.name in (OBSTACLES, LINKS)]
     verdict = combine(tuple(about))
     extent = np.linalg.norm(np.ptp(sampled.limits, axis=0))

@@ -45,7 +45,7 @@ def document(judged: Sequence[Judged], unplanned: Sequence[Problem]) -> str:
         "made with. Missed: plans that collide and in which samples of that density "
         "(part of the space's extent, the fastest joint, the fastest frame) meet no "
         "collision. Deepest: by Coal. Times: processor time of a whole verification, "
-        "Pinocchio and Coal included. Repaired: of what collides. "
+        "Pinocchio and Coal included, the least of three. Repaired: of what collides. "
         "`python -m benchmarks.foreign_plans.run`.",
         table,
         f"Verdicts that Coal contradicts: {len(faults)}. Problems and resolutions "
