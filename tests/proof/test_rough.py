@@ -1,5 +1,6 @@
 """Oracles: the same proof without rough versions, distances at sampled times."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,21 +16,26 @@ from vdsm_pin.robots.hulls import FEW_CORNERS, few_corners
 from vdsm_pin.tolerances import TOLERANCES
 
 
-def shrunk(body: Body, share: float, told: float = 1.0) -> Body:
-    """The body, its one hull also known by one that is smaller by a share.
+def shrunk(body: Body, shares: Sequence[float], told: float = 1.0) -> Body:
+    """The body, its one hull also known by some that are smaller by shares.
 
     Args:
         body: The body.
-        share: How much smaller; [-].
+        shares: How much smaller; [-].
         told: Part of what is missed that is told; [-].
     """
     piece = body.pieces[0]
     if len(body.pieces) > 1 or not isinstance(piece, Hull) or len(piece.points) < 2:
         return body
     away = piece.points - piece.points.mean(axis=0)
-    missed = share * np.linalg.norm(away, axis=1).max() + TOLERANCES.arithmetic
-    few = FewCorners(piece.points - share * away, told * missed)
-    return replace(body, pieces=(replace(piece, few=(few,)),))
+    far = np.linalg.norm(away, axis=1).max()
+    few = tuple(
+        FewCorners(
+            piece.points - share * away, told * share * far + TOLERANCES.arithmetic
+        )
+        for share in shares
+    )
+    return replace(body, pieces=(replace(piece, few=few),))
 
 
 @pytest.mark.parametrize("degree", [1, 3, 5])
@@ -40,7 +46,8 @@ def test_rough_versions_change_no_verdict(degree: int, seed: int) -> None:
     for _ in range(5):
         query = make_query(rng, degree, int(rng.integers(1, 21)))
         share = float(10.0 ** rng.uniform(-4, -0.5))
-        bodies = [shrunk(body, share) for body in query.bodies]
+        shares = [(share,), (share, 0.2 * share)][int(rng.integers(2))]
+        bodies = [shrunk(body, shares) for body in query.bodies]
         off = float(10.0 ** rng.uniform(-8, -3))
         for required in (query.nearest + off, query.nearest - off):
             pairs = [Pair(0, 1, required)]
@@ -58,7 +65,7 @@ def test_bodies_that_miss_more_than_is_told_are_found_out() -> None:
     rng, wrong = np.random.default_rng(4), 0
     for _ in range(60):
         query = make_query(rng, 1, int(rng.integers(1, 6)))
-        bodies = [shrunk(body, 0.3, told=0.01) for body in query.bodies]
+        bodies = [shrunk(body, (0.3,), told=0.01) for body in query.bodies]
         pairs = [Pair(0, 1, query.nearest + 1e-4)]
         verdict = prove(query.tree, bodies, query.path, pairs).verdict[0]
         wrong += verdict == CERTIFIED
@@ -72,7 +79,7 @@ def test_where_errors_turn_all_corners_are_asked() -> None:
         query = make_query(rng, 1, 3)
         n = len(query.tree.joints)
         box = ErrorBox(np.full(n, 0.01), np.zeros(n), np.zeros(n))
-        bodies = [shrunk(body, 0.3, told=0.01) for body in query.bodies]
+        bodies = [shrunk(body, (0.3,), told=0.01) for body in query.bodies]
         args = query.path, [Pair(0, 1, 0.0)], box
         rough = prove(query.tree, bodies, *args)
         exact = prove(query.tree, query.bodies, *args)
