@@ -21,6 +21,7 @@ from oracles.robot_certificates import BASES, CELL, VIRTUAL, Made, cell, text
 
 from vdsm_pin.certificate_checker.balls import SLACK, Rejected
 from vdsm_pin.certificate_checker.robot import Joints, Robot, within
+from vdsm_pin.certificate_checker.tree import Tree
 from vdsm_pin.cli import main
 from vdsm_pin.robots.cell import robot_of
 from vdsm_pin.robots.files import RobotFiles
@@ -227,8 +228,9 @@ def assert_read_alike(files: RobotFiles, rng: Rng) -> None:
     joints = Joints(files, document, srdf)
     assert joints.moved == list(robot.joints)
     rows = rng.uniform(-2.0, 2.0, (3, len(robot.joints)))
+    tree = Tree(joints.joints)
     with ctx.workprec(128):
-        mine = [joints.tree.pose([arb(x) for x in row]) for row in rows.tolist()]
+        mine = [tree.pose([arb(x) for x in row]) for row in rows.tolist()]
     placed = robot.poses(rows)
     for name, frame in robot.frames.items():
         for pose, frames in zip(placed[:, frame], mine, strict=True):
