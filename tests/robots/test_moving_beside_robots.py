@@ -1,5 +1,6 @@
 """Obstacles that move beside a robot: spheres against sampled closed forms."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -164,6 +165,27 @@ def test_certificates_beside_what_moves(seed: int, tmp_path: Path) -> None:
     assert not outcome().accepted
     cell_with(tmp_path, moves - 0.6, knots)
     assert not outcome().accepted
+
+
+def test_a_counterexample_beside_what_moves_is_told_in_rows(tmp_path: Path) -> None:
+    rows, times = np.array([[0.0, 0.0], [0.5, 0.0], [0.6, 0.2]]), np.arange(3.0)
+    moves, knots = np.array([0.5, 1.7]), np.array([[0.0, 1.5, 0.0], [0.5, 1.1, 0.0]])
+    near = cell_with(tmp_path, moves, knots)
+    motion = Motion(rows, times=times)
+    least = verify_robot(near, motion).least
+    asked = replace(near, required_clearance=float(least.lower.min()) - 0.01)
+    result = verify_robot(asked.under(ErrorBox.typed(joint_deg=3.0)), motion)
+    (lost,) = result.counterexamples
+    assert result.verdict is Verdict.REFUTED
+    assert result.nominal_clear
+    assert len(lost.joints) == 2
+    time = np.array([lost.moment])  # rows are a second apart
+    nominal = along(times, rows, time)[0]
+    np.testing.assert_allclose(lost.joints - lost.offsets, nominal, atol=1e-12)
+    assert (np.abs(lost.offsets) <= np.radians(3.0)).all()
+    gap = gaps(lost.joints[None], along(moves, knots, time))[0, lost.pair.link - 1]
+    assert gap == pytest.approx(lost.clearance, abs=1e-6)
+    assert gap < asked.required_clearance
 
 
 def test_what_is_not_done_beside_what_moves_is_said(tmp_path: Path) -> None:

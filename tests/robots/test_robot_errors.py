@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import coal
@@ -24,6 +25,7 @@ from vdsm_pin.robots.errors import proof_box
 from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.urdf import read_robot
+from vdsm_pin.verification.records import Verdict
 
 URDF = """<robot name="two">
   <link name="base"><collision><origin xyz="0.3 0 0"/>
@@ -125,14 +127,32 @@ class Sampler:
                 found[name, other] = distance(mine, theirs)
         return found
 
-    def _obstacles(self, rng: np.random.Generator, corner: bool) -> Iterator[tuple]:
+    def gap_at(self, q: FloatArray, link: str, other: str) -> float:
+        """Distance at values of the joints, nothing else off; [m]."""
+        value, data = np.array([*q, 0.1 - 0.5 * q[0]]), self.model.createData()
+        geometry = self.links.createData()
+        pin.updateGeometryPlacements(self.model, data, self.links, geometry, value)
+        (mine,) = (
+            (one.geometry, pose)
+            for one, pose in zip(self.links.geometryObjects, geometry.oMg, strict=True)
+            if self.model.frames[one.parentFrame].name == link
+        )
+        still = self._obstacles(np.random.default_rng(0), corner=False, size=0.0)
+        return distance(mine, dict(still)[other])
+
+    def _obstacles(
+        self, rng: np.random.Generator, corner: bool, size: float = 1.0
+    ) -> Iterator[tuple]:
+        """Size: how much of their errors counts."""
         ball, block, floor = self.scene.obstacles
-        pose = moved(np.eye(3), ball.centre, (0.003, 0.0), rng, corner)
+        pose = moved(np.eye(3), ball.centre, (size * 0.003, 0.0), rng, corner)
         yield "ball", (coal.Sphere(ball.radius), pose)
-        error = 0.002, np.radians(2.0)
+        error = size * 0.002, size * np.radians(2.0)
         pose = moved(block.rotation, block.centre, error, rng, corner)
         yield "block", (coal.Box(*(2.0 * block.half_size)), pose)
-        up = np.array([0.0, 0.0, 0.002 * (1.0 if corner else rng.uniform(-1.0, 1.0))])
+        up = np.array(
+            [0.0, 0.0, size * 0.002 * (1.0 if corner else rng.uniform(-1.0, 1.0))]
+        )
         pose = pin.SE3(np.eye(3), up)
         yield "floor", (coal.Halfspace(0.0, 0.0, 1.0, floor.point[2]), pose)
 
@@ -191,6 +211,32 @@ def test_each_error_alone_is_covered(robot: Robot) -> None:
     assert lower(obstacle=0.02) == pytest.approx(0.18, abs=1e-6)
     assert lower(joint=0.1, slide=0.1) == pytest.approx(0.2, abs=1e-6)
     assert 0.19 > lower(base_turn=0.05) > 0.16  # an arm of 0.3 m, corners at 0.7 m
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_just_beyond_what_is_proved_is_refuted(robot: Robot, seed: int) -> None:
+    """By a configuration within the errors, where Coal measures what is told."""
+    cell, path = random_cell(robot, np.random.default_rng(seed))
+    errors = ErrorBox.typed(joint_deg=1.5, slide_mm=6.0, base_mm=4.0)
+    cell, size = replace(cell, errors=errors), [np.radians(1.5), 0.006]
+    proved = verify_robot(cell, path).least
+    asked = max(0.0, float(proved.lower[:12].min())) + 0.008
+    found = verify_robot(replace(cell, required_clearance=asked), path)
+    assert found.verdict is Verdict.REFUTED
+    if not found.counterexamples:  # the nominal motion itself is too near
+        exact = verify_robot(replace(cell, errors=ErrorBox()), path).least
+        assert exact.upper[:12].min() < asked
+        return
+    (one,) = found.counterexamples
+    assert found.nominal_clear
+    assert (np.abs(one.offsets) <= size).all()
+    moment = np.array([one.interval]), np.array([one.share])
+    np.testing.assert_allclose(
+        one.joints - one.offsets, path.within(*moment)[0], atol=1e-12
+    )
+    gap = Sampler(cell).gap_at(one.joints, one.pair.own, one.pair.obstacle)
+    assert gap - 0.004 == pytest.approx(one.clearance, abs=2e-6)
+    assert one.clearance < asked
 
 
 def test_mimic_joints_err_by_their_ratio(robot: Robot) -> None:

@@ -35,7 +35,7 @@ robot: {urdf: r.urdf}
 base: {position: [1, 2, 3]}
 required_clearance: 0.01
 obstacles:
-  - {name: post, shape: sphere, center: [1.32, 2.4, 3.0], radius: 0.1}
+  - {name: post, shape: sphere, center: CENTRE, radius: 0.1}
 """
 
 
@@ -43,16 +43,23 @@ def unpacked(text: str, kind: str = "<f4") -> FloatArray:
     return np.frombuffer(base64.b64decode(text), kind)
 
 
-@pytest.fixture
-def out(tmp_path: Path) -> Path:
+def judged(
+    tmp_path: Path, status: int, more: str = "", centre: str = "[1.32, 2.4, 3.0]"
+) -> Path:
+    """The folder of results of a problem to which more is added."""
     (tmp_path / "r.urdf").write_text(URDF)
-    (tmp_path / "p.yaml").write_text(PROBLEM)
+    (tmp_path / "p.yaml").write_text(PROBLEM.replace("CENTRE", centre) + more)
     (tmp_path / "t.csv").write_text("turn_rad,lift_m\n-0.5,0\n1.5,0.1\n2,0\n")
     asked = ["verify", str(tmp_path / "p.yaml"), "--trajectory"]
     asked += [str(tmp_path / "t.csv"), "--out", str(tmp_path / "out")]
     ended = CliRunner().invoke(app, asked, obj="vdsm verify")
-    assert ended.exit_code == 1, ended.output
+    assert ended.exit_code == status, ended.output
     return tmp_path / "out"
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    return judged(tmp_path, 1)
 
 
 def page_data(page: str) -> dict[str, Any]:
@@ -139,3 +146,28 @@ def test_hull_triangles_are_closed_and_face_outwards() -> None:
         assert size > 0.0
         assert volume is None or size == pytest.approx(volume, rel=1e-9)
     assert hull_triangles(np.zeros((4, 3))) is None
+
+
+def test_a_counterexample_is_told_by_joint_and_drawn_as_a_ghost(
+    tmp_path: Path,
+) -> None:
+    """The arm ends 162 mm before the post, and 20 degrees more lead into it."""
+    out = judged(tmp_path, 1, "errors: {joint_deg: 20}\n", "[0.49, 2.25, 3.11]")
+    told = json.loads((out / "verification.json").read_text())
+    (lost,) = told["counterexamples"]
+    assert (lost["body"], lost["obstacle"], lost["moment"]) == ("tool", "post", 2.0)
+    assert lost["clearance_m"] < 0.01
+    turn, lift = lost["joints"]
+    assert (turn["name"], turn["error_m"], lift["name"]) == ("turn", None, "lift")
+    assert turn["error_rad"] == pytest.approx(np.radians(20.0))
+    assert (lift["error_rad"], lift["error_m"], lost["x0_m"]) == (None, 0.0, None)
+    assert told["nominal_clear"]
+    data = page_data((out / "report.html").read_text())
+    (ghost,) = data["scene"]["ghosts"]
+    assert ghost["moment"] == lost["moment"]
+    assert ghost["words"][0].endswith("tool comes too near post")
+    robot = read_robot(tmp_path / "r.urdf")
+    q = np.array([[turn["value_rad"], lift["value_m"]]])
+    tool = robot.poses(q)[0, robot.frames["tool"]] @ [0.0, 0.0, -0.1, 1.0]
+    np.testing.assert_allclose(ghost["centres"][2], tool[:3], atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(ghost["turns"], axis=1), 1.0)

@@ -24,10 +24,10 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.arm_counterexamples import find_counterexamples
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_bodies import coal_bodies, distance_request, measure
 from vdsm_pin.verification.coal_distances import capsule_transforms
-from vdsm_pin.verification.counterexample import find_counterexamples
 from vdsm_pin.verification.records import ClearanceChunk
 from vdsm_pin.verification.robot_model import RobotModel, load_robot
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error

@@ -18,8 +18,8 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.verification.arm_counterexamples import find_counterexamples
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.counterexample import find_counterexamples
 from vdsm_pin.verification.records import Counterexample, Verdict
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error

@@ -125,6 +125,15 @@ class Path:
         found[at_end] = self.knots[intervals[at_end] + 1]
         return found
 
+    def split(self, moments: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Intervals of moments in knots, (m,), and their shares of them, 0 to 1."""
+        intervals = np.minimum(moments.astype(np.int64), self.n_intervals - 1)
+        return intervals, moments - intervals
+
+    def at_moments(self, moments: FloatArray) -> FloatArray:
+        """Rows of q at moments in knots, shape (m,): (m, n_columns)."""
+        return self.within(*self.split(moments))
+
     def packed(self) -> Motion:
         """The same for compiled code."""
         return Motion(self.knots, self.inner)

@@ -173,16 +173,30 @@ def counterexample_row(
     return CounterexampleRow(
         moment=found.moment,
         **_both(found.pair),
-        x0_m=float(found.joints[0]),
-        x0_error_m=float(found.offsets[0]),
-        angles_rad=tuple(found.joints[1:].tolist()),
-        angle_errors_rad=tuple(found.offsets[1:].tolist()),
         clearance_m=found.clearance,
         required_m=found.required,
         link_point_m=in_file_frame(verification, found.link_point),
         other_point_m=in_file_frame(verification, found.other_point),
         deeper=found.deeper,
+        **_configuration(verification, found),
     )
+
+
+def _configuration(verification: Verification, found: Counterexample) -> dict[str, Any]:
+    """The joints of a counterexample: numbered of an arm, by name of another robot."""
+    joints, errors = found.joints.tolist(), found.offsets.tolist()
+    if not isinstance(verification, ArmVerification):
+        from vdsm_pin.report.robot_facts import erring_joints
+        from vdsm_pin.robots.judgement import RobotVerification
+
+        assert isinstance(verification, RobotVerification)
+        return {"joints": erring_joints(verification.problem.robot, joints, errors)}
+    return {
+        "x0_m": joints[0],
+        "x0_error_m": errors[0],
+        "angles_rad": tuple(joints[1:]),
+        "angle_errors_rad": tuple(errors[1:]),
+    }
 
 
 @dataclass(frozen=True)
@@ -370,10 +384,6 @@ def _own_facts(verification: Verification) -> dict[str, Any]:
         "undrawn_m": tuple((float(a), float(b)) for a, b in verification.undrawn),
         "error_box": error_box(verification.errors, rows.n_links),
         "left_out": left_out(problem),
-        "counterexamples": tuple(
-            counterexample_row(verification, found)
-            for found in verification.counterexamples
-        ),
         "motion": motion_facts(problem, rows),
     }
 
@@ -403,6 +413,10 @@ def verification_file(
         refuted_joint_error_rad=finite(verification.refuted_joint_error),
         time_limit_s=finite(verification.time_limit),
         not_done=verification.not_done,
+        counterexamples=tuple(
+            counterexample_row(verification, found)
+            for found in verification.counterexamples
+        ),
         nominal_clear=verification.nominal_clear
         if verification.counterexamples
         else None,

@@ -195,6 +195,24 @@ class ErrorBoxRow(FileModel):
     )
 
 
+class ErringJointRow(FileModel):
+    """A joint of a robot in a counterexample."""
+
+    name: str = Field(description="as in the URDF")
+    value_rad: FiniteFloat | None = Field(
+        default=None, description="then, the error included; null of one that slides"
+    )
+    error_rad: FiniteFloat | None = Field(
+        default=None, description="of it, the same throughout the motion"
+    )
+    value_m: FiniteFloat | None = Field(
+        default=None, description="then, the error included; null of one that turns"
+    )
+    error_m: FiniteFloat | None = Field(
+        default=None, description="of it, the same throughout the motion"
+    )
+
+
 class CounterexampleRow(FileModel):
     """A motion within the error box that misses a required clearance."""
 
@@ -204,13 +222,21 @@ class CounterexampleRow(FileModel):
     obstacle: str | None = Field(description="its name; null in a pair of links")
     other_link: int | None = Field(description="null unless a pair of links")
     other_body: str | None = Field(description="as body, of the other link")
-    x0_m: FiniteFloat = Field(description="base position then, its error included")
-    x0_error_m: FiniteFloat = Field(description="of it, off the nominal one")
+    x0_m: FiniteFloat | None = Field(
+        default=None, description="base position then, its error included; of an arm"
+    )
+    x0_error_m: FiniteFloat | None = Field(
+        default=None, description="of it, off the nominal one; of an arm"
+    )
     angles_rad: tuple[FiniteFloat, ...] = Field(
-        description="alpha1, theta1, alpha2, .. then, their errors included"
+        default=(), description="alpha1, theta1, alpha2, .. then, with their errors"
     )
     angle_errors_rad: tuple[FiniteFloat, ...] = Field(
-        description="of them, off the nominal ones, the same throughout the motion"
+        default=(),
+        description="of them, off the nominal ones, the same throughout the motion",
+    )
+    joints: tuple[ErringJointRow, ...] = Field(
+        default=(), description="of any other robot, in place of these"
     )
     clearance_m: FiniteFloat = Field(
         description="proved upper bound, the obstacle's displacement taken off"

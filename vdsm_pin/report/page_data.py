@@ -157,17 +157,28 @@ def closest_data(
     }
 
 
-def ghost_data(verification: ArmVerification, found: Counterexample) -> dict[str, Any]:
-    """The arm of a counterexample, errors applied; base frame, [m]."""
-    joints, arm = found.joints, verification.problem.manipulator
-    centres = joint_centres(arm, joints[:1], joints[None, 1::2], joints[None, 2::2])[0]
+def ghost_data(verification: Verification, found: Counterexample) -> dict[str, Any]:
+    """What stands at a counterexample, errors applied; base frame, [m]."""
     pair = f"{found.pair.own} comes too near {found.pair.label}"
     words = [f"transparent: with joint errors within the error box {pair}"]
     if verification.errors.base > 0.0 or verification.errors.obstacle > 0.0:
         words.append("errors of base and obstacles are not drawn")
     if verification.nominal_clear:
         words.append("the nominal motion is clear")
-    return {"moment": found.moment, "centres": centres.tolist(), "words": words}
+    return {"moment": found.moment, "words": words, **_stance(verification, found)}
+
+
+def _stance(verification: Verification, found: Counterexample) -> dict[str, Any]:
+    joints = found.joints
+    if not isinstance(verification, ArmVerification):
+        from vdsm_pin.report.robot_page import robot_stance
+        from vdsm_pin.robots.judgement import RobotVerification
+
+        assert isinstance(verification, RobotVerification)
+        return robot_stance(verification.problem.robot, joints)
+    columns = joints[:1], joints[None, 1::2], joints[None, 2::2]
+    centres = joint_centres(verification.problem.manipulator, *columns)[0]
+    return {"centres": centres.tolist()}
 
 
 @dataclass(frozen=True)
@@ -191,20 +202,20 @@ def _drawn(
     verification: Verification, obstacles: Sequence[Obstacle], shown: Thinned
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """The scene and the motion of an arm, or of any other robot."""
-    rows = verification.trajectory
+    rows, lost = verification.trajectory, verification.counterexamples
+    ghosts = {"ghosts": [ghost_data(verification, one) for one in lost]}
     if isinstance(verification, ArmVerification):
-        problem, lost = verification.problem, verification.counterexamples
+        problem = verification.problem
         scene = scene_data(problem, obstacles, verification.trajectory)
-        scene["ghosts"] = [ghost_data(verification, one) for one in lost]
-        return scene, motion_data(problem, verification.trajectory, shown)
+        return scene | ghosts, motion_data(problem, verification.trajectory, shown)
     from vdsm_pin.report.robot_page import robot_links, robot_motion
     from vdsm_pin.robots.judgement import RobotVerification
 
     assert isinstance(verification, RobotVerification)
     links = robot_links(verification)
     extent = 20.0 * links["radius"]
-    scene = {**obstacle_data(verification.problem, obstacles, rows, extent), **links}
-    return scene, row_data(rows, shown) | robot_motion(verification, shown)
+    scene = obstacle_data(verification.problem, obstacles, rows, extent) | links
+    return scene | ghosts, row_data(rows, shown) | robot_motion(verification, shown)
 
 
 def report_data(verification: Verification) -> PageData:

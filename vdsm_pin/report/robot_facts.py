@@ -5,11 +5,11 @@ from typing import Any, Final
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.report.facts import error_box, finite
-from vdsm_pin.report.files import JointRow, LeftOutRow, RobotFacts
+from vdsm_pin.report.files import ErringJointRow, JointRow, LeftOutRow, RobotFacts
 from vdsm_pin.report.inputs import file_notes
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification
-from vdsm_pin.robots.model import RobotJoint
+from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.verification.inside import mesh_notes
 
 _PIECES: Final = {1: "linear", 3: "cubic", 5: "quintic"}
@@ -33,7 +33,6 @@ def robot_facts(verification: RobotVerification) -> dict[str, Any]:
             LeftOutRow(body=pair.one, other=pair.other, reason=pair.reason)
             for pair in cell.robot.left_out
         ),
-        "counterexamples": (),
         "motion": _motion(cell, path),
     }
 
@@ -62,3 +61,15 @@ def _joint(joint: RobotJoint, values: FloatArray) -> JointRow:
     if joint.turns:
         return JointRow(name=joint.name, range_rad=reached, limits_rad=limits)
     return JointRow(name=joint.name, range_m=reached, limits_m=limits)
+
+
+def erring_joints(
+    robot: Robot, values: list[float], errors: list[float]
+) -> tuple[ErringJointRow, ...]:
+    """The joints of a counterexample and what they are off by; [rad], [m]."""
+    return tuple(
+        ErringJointRow(name=joint.name, value_rad=value, error_rad=error)
+        if joint.turns
+        else ErringJointRow(name=joint.name, value_m=value, error_m=error)
+        for joint, value, error in zip(robot.joints, values, errors, strict=True)
+    )

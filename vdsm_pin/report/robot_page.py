@@ -20,6 +20,7 @@ from vdsm_pin.report.solids import FINE, Surface, joined, surface
 from vdsm_pin.report.thinning import Thinned
 from vdsm_pin.robots.hulls import hull_triangles
 from vdsm_pin.robots.judgement import RobotVerification
+from vdsm_pin.robots.model import Robot
 from vdsm_pin.units import MM_PER_M
 
 _STEP: Final = np.deg2rad(4.0)
@@ -60,20 +61,30 @@ def robot_motion(verification: RobotVerification, shown: Thinned) -> dict[str, A
     """Where the links are at moments, near enough to go straight in between."""
     cell, path = verification.problem, verification.trajectory
     moments = _moments(path, shown)
-    intervals = np.minimum(moments.astype(np.int64), path.n_intervals - 1)
-    poses = cell.robot.tree.poses(path.within(intervals, moments - intervals))
-    bodies = cell.robot.bodies
-    places, turns = [], []
-    for body, middle in zip(bodies, _middles(bodies), strict=True):
-        of_link = poses[:, body.frame]
-        places.append(of_link[:, :3, :3] @ middle + of_link[:, :3, 3])
-        turns.append([quaternion(pose[:3, :3]) for pose in of_link])
+    places, turns = _stances(cell.robot, path.at_moments(moments))
     return {
         "moments": packed(moments, "<f8"),
-        "links": len(bodies),
+        "links": len(cell.robot.bodies),
         "places": packed(places),
         "turns": packed(turns),
     }
+
+
+def robot_stance(robot: Robot, q: FloatArray) -> dict[str, Any]:
+    """Where the links are at values of the joints, shape (n_joints,)."""
+    places, turns = _stances(robot, q[None])
+    return {"centres": places[:, 0].tolist(), "turns": turns[:, 0].tolist()}
+
+
+def _stances(robot: Robot, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Middles of the links and their turns at rows of q, (n_links, n_rows, 3 and 4)."""
+    poses = robot.poses(q)
+    places, turns = [], []
+    for body, middle in zip(robot.bodies, _middles(robot.bodies), strict=True):
+        of_link = poses[:, body.frame]
+        places.append(of_link[:, :3, :3] @ middle + of_link[:, :3, 3])
+        turns.append([quaternion(pose[:3, :3]) for pose in of_link])
+    return np.array(places), np.array(turns)
 
 
 def placed_corners(verification: RobotVerification) -> list[FloatArray]:

@@ -1,19 +1,26 @@
 """The judgement of a robot's trajectory: every check, one row each."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from math import inf, nan
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.errors import OutOfTime, VdsmError
-from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.winding import Side
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import Proof, prove
-from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
+from vdsm_pin.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.robots.cell import Cell
-from vdsm_pin.robots.contacts import common_ball
+from vdsm_pin.robots.clearances import (
+    MEETING,
+    least_clearances,
+    named_pairs,
+    told,
+)
+from vdsm_pin.robots.counterexamples import robot_counterexamples, told_all
 from vdsm_pin.robots.errors import proof_box
 from vdsm_pin.robots.inside import by_mesh, enclosed, enclosed_profile, locate_links
 from vdsm_pin.robots.model import Robot
@@ -22,12 +29,14 @@ from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.clearance import profile_of
+from vdsm_pin.verification.clearance_check import refuted_by
 from vdsm_pin.verification.inside import LINKS as INSIDE
 from vdsm_pin.verification.inside import check_inside
 from vdsm_pin.verification.moving import Knots, path_beside
 from vdsm_pin.verification.records import (
     Check,
     ClosestApproach,
+    Counterexample,
     LeastClearances,
     Pair,
     Verdict,
@@ -42,16 +51,8 @@ COAL: Final = "distances by Coal against the proved brackets"
 POSE_ERROR: Final = 1e-9
 """Where Pinocchio and the tree must agree; [m] or, of rotations, [-]."""
 
-MEETING: Final = 2.0 * TOLERANCES.bracket_gap
-"""Bodies that come so near may meet; [m]."""
-
-BESIDE: Final = (0.0, 0.01, -0.01, 0.05, -0.05)
-"""Where a ball in both is looked for, beside the moment at which bodies meet; [-]."""
-
 COMPARED: Final = 1000
 """Most waypoints at which poses are compared, spread evenly."""
-
-POINTS: Final = ("link_point", "other_point")
 
 CLOSEST: Final = 10
 """Pairs listed as the closest approaches."""
@@ -84,17 +85,21 @@ def verify_robot(
     whole, knots = path_beside(path, cell.scene)
     proof = prove(cell.tree, cell.bodies, whole, cell.pairs, box, budget, columns)
     located = locate_links(cell, whole, box, budget)
-    named, least = _named(cell), _met(cell, whole, _least(cell, proof))
+    named, least = named_pairs(cell), least_clearances(cell, whole, proof)
     coal, measured = _coal(cell, whole, proof, knots)
-    least = _told(enclosed(least, located), knots)
+    least = enclosed(least, located)
     profile = profile_of(proof.profile, proof.stride, knots, len(robot.bodies))
     late = "" if proof.in_time else f": {OutOfTime(deadline.limit)}"
+    lost, not_done = _lost(cell, whole, proof, least, deadline)
+    lost, least = told_all(lost, knots), told(least, knots)
+    outside = all(one.where.side is Side.OUTSIDE for one in located.values())
+    clear = bool(lost) and outside and _is_clear(cell, whole, deadline)
     checks = [
         _poses(robot, path),
         *_limits(robot, path),
         *rate_checks(robot.joints, path),
         *check_inside(by_mesh(cell, located), INSIDE),
-        *_clearances(cell, named, least, late),
+        *_refuted(_clearances(cell, named, least, late), lost, clear),
         coal,
     ]
     return RobotVerification(
@@ -106,74 +111,41 @@ def verify_robot(
         approaches=_closest(named, least, measured),
         profile=enclosed_profile(profile, cell, located),
         least=least,
+        counterexamples=lost,
+        nominal_clear=clear,
+        not_done=not_done,
         time_limit=deadline.limit,
     )
 
 
-def _named(cell: Cell) -> tuple[Pair, ...]:
-    """The pairs by the names of their bodies, a link first."""
-    n, found = len(cell.robot.bodies), []
-    for pair in cell.pairs:
-        one, other = cell.bodies[pair.one].name, cell.bodies[pair.other].name
-        if pair.one >= n:
-            found.append(Pair(link=pair.other + 1, obstacle=one, body=other))
-        else:
-            found.append(
-                Pair(
-                    link=pair.one + 1,
-                    other_link=pair.other + 1,
-                    body=one,
-                    other_body=other,
-                )
-            )
-    return tuple(found)
+def _lost(
+    cell: Cell, path: Path, proof: Proof, least: LeastClearances, deadline: Deadline
+) -> tuple[tuple[Counterexample, ...], tuple[str, ...]]:
+    """Counterexamples of what errors leave undecided, and what was not done in time."""
+    pairs, weakest = named_pairs(cell), proof.lower_interval
+    try:
+        return robot_counterexamples(cell, path, pairs, least, weakest, deadline), ()
+    except OutOfTime as error:
+        return (), (f"search for counterexamples: {error}",)
 
 
-def _least(cell: Cell, proof: Proof) -> LeastClearances:
-    """The least clearances, the witness on the link first."""
-    outer = np.array([pair.one >= len(cell.robot.bodies) for pair in cell.pairs], bool)
-    points = proof.points.copy()
-    points[outer] = points[outer, ::-1]
-    return LeastClearances(
-        interval=proof.interval,
-        time=proof.share,
-        lower=proof.lower,
-        upper=proof.upper,
-        verdict=proof.verdict,
-        link_point=frozen(points[:, 0]),
-        other_point=frozen(points[:, 1]),
-    )
+def _is_clear(cell: Cell, path: Path, deadline: Deadline) -> bool:
+    """Whether the motion is proved clear of everything, without errors."""
+    budget = Budget(until=deadline.end)
+    return prove(cell.tree, cell.bodies, path, cell.pairs, budget=budget).is_certified
 
 
-def _told(least: LeastClearances, knots: Knots) -> LeastClearances:
-    """The same, its moments in intervals of the robot's own path."""
-    if knots.are_rows:
-        return least
-    time = knots.share(least.interval, least.time)
-    return replace(least, interval=knots.interval(least.interval), time=time)
-
-
-def _met(cell: Cell, path: Path, least: LeastClearances) -> LeastClearances:
-    """The same, refuted and so deep where a ball is proved to lie in both bodies."""
-    near = (least.verdict != CERTIFIED) & (least.upper <= MEETING)
-    changed = {one.name: getattr(least, one.name).copy() for one in fields(least)}
-    for k in np.flatnonzero(near):
-        moment = least.interval[k] + least.time[k]
-        middle = 0.5 * (least.link_point[k] + least.other_point[k])
-        moments = np.clip(moment + np.array(BESIDE), 0.0, path.n_intervals)
-        intervals = np.minimum(moments.astype(np.int64), path.n_intervals - 1)
-        shares = moments - intervals
-        poses = cell.poses(path.within(intervals, shares))
-        for at, pose in enumerate(poses):
-            bodies = cell.coal.pieces(cell.pairs[k], pose)
-            radius, centre = common_ball(*bodies, middle)
-            if radius > 0.0:
-                found = intervals[at], shares[at], -radius, REFUTED, centre, centre
-                names = "interval", "time", "upper", "verdict", *POINTS
-                for name, value in zip(names, found, strict=True):
-                    changed[name][k] = value
-                break
-    return LeastClearances(**changed)
+def _refuted(
+    rows: list[Check], lost: tuple[Counterexample, ...], clear: bool
+) -> list[Check]:
+    """The rows of clearances, refuted where counterexamples decide."""
+    decided = {OBSTACLES if one.pair.obstacle else LINKS: one for one in lost}
+    return [
+        refuted_by(row, decided[row.name], nominal=clear)
+        if row.name in decided
+        else row
+        for row in rows
+    ]
 
 
 def _closest(

@@ -54,7 +54,9 @@ def check_clearance(
             for contact in contacts:
                 if bool(contact.pair.obstacle) == bool(of_obstacles[mine][0]):
                     row = _first(row, contact)
-            rows.append(_refuted(row, against[0], nominal) if against else row)
+            if against:
+                row = refuted_by(row, against[0], nominal=nominal)
+            rows.append(row)
     said = "".join(f"; {name!r} as a surface only" for name in surfaces(problem))
     if said:
         rows[0] = replace(rows[0], where=rows[0].where + said)
@@ -120,7 +122,7 @@ def _told(moment: float, time: float) -> str:
     return text if isnan(time) else f"{text} ({time:.4f} s)"
 
 
-def _refuted(row: Check, found: Counterexample, nominal: bool) -> Check:
+def refuted_by(row: Check, found: Counterexample, *, nominal: bool) -> Check:
     """The row of an undecided proof that a counterexample decides."""
     pair = f"{found.pair.own} and {found.pair.label}"
     clear = "; the nominal motion is clear" if nominal else ""

@@ -7,30 +7,24 @@ distance. What it finds is judged like any motion of one row, so that nothing is
 without two witness points.
 """
 
-from dataclasses import dataclass, replace
-from typing import Final
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final, TypeAlias
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import Scene
-from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, TIME
+from vdsm_pin.proof.bodies import Body, PairTable
+from vdsm_pin.proof.bodies import Pair as ProofPair
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.prover import prove, start_proof
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED
-from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.proof.tree import Tree
+from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
-from vdsm_pin.verification.moving import whole_rows
 from vdsm_pin.verification.pair_slopes import pair_slopes
-from vdsm_pin.verification.records import (
-    ClearanceChunk,
-    Counterexample,
-    Pair,
-    is_deepest,
-)
-from vdsm_pin.verification.task import all_pairs, ball_of, make_task
+from vdsm_pin.verification.records import Counterexample, Pair, is_deepest
 
 PAIRS: Final = 8
 """Pairs looked at, those of the least lower bounds first."""
@@ -65,73 +59,89 @@ class Moment:
     share: float
 
 
+CommonBall: TypeAlias = Callable[[FloatArray, FloatArray], tuple[float, FloatArray]]
+"""Of a row of all columns and a point: a ball in both bodies near it, radius 0 if none
+is found, and its centre; [m]."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """Whether two bodies of a tree come too near within an error box.
+
+    Args:
+        pair: Their names.
+        tree: The joints.
+        bodies: Those two, in the order of their names.
+        required: Their least clearance; [m].
+        rows: Rows of all columns at moments in waypoints, (m,) to (m, n_columns).
+        sizes: Largest errors of the columns, shape (n_columns,); [m], [rad].
+        grown: By how much the partner may come nearer besides; turns of base or
+            obstacle are left out: what is found holds without them; [m].
+        n_joints: Columns that are told; others are of what moves beside.
+        ball: Radius of what the first body is grown by, as deep as is measured; [m].
+        common_ball: Proves that bodies meet of which no depth is measured; None where
+            that is not needed.
+    """
+
+    pair: Pair
+    tree: Tree
+    bodies: tuple[Body, Body]
+    required: float
+    rows: Callable[[FloatArray], FloatArray]
+    sizes: FloatArray
+    grown: float
+    n_joints: int
+    ball: float = 0.0
+    common_ball: CommonBall | None = None
+
+
+def grown_by(errors: ErrorBox, pair: Pair) -> float:
+    """By how much errors that do not turn bring a partner nearer; [m]."""
+    if not pair.obstacle:
+        return 0.0
+    return errors.of_obstacle(pair.obstacle).shift + errors.base
+
+
 class Search:
     """Looks for counterexamples of one pair.
 
     Args:
-        problem: Arm, scene, required clearances.
-        trajectory: The motion.
-        pair: The pair.
+        asked: The pair and the errors.
     """
 
-    def __init__(
-        self, problem: PlanningProblem, trajectory: Trajectory, pair: Pair
-    ) -> None:
-        mine = [o for o in problem.scene.obstacles if o.name == pair.obstacle]
-        self.problem = replace(problem, scene=Scene(tuple(mine)))
-        self.pair, self.trajectory = pair, trajectory
-        self.required = problem.required_self_clearance
-        if pair.obstacle:
-            self.required = problem.required_clearance
-        self.task = make_task(self.problem, ErrorBox())
-        self.number = all_pairs(self.problem).index(pair)
+    def __init__(self, asked: Question) -> None:
+        self.asked, self.limit = asked, asked.required + asked.grown
+        path = Path(asked.rows(np.zeros(1)))
+        table = PairTable.of([ProofPair(0, 1, self.limit)])
+        self.task = start_proof(asked.tree, asked.bodies, path, table)[0].task
 
-    def find(
-        self, errors: ErrorBox, moments: tuple[Moment, ...]
-    ) -> Counterexample | None:
+    def find(self, moments: tuple[Moment, ...]) -> Counterexample | None:
         """A configuration within the box that misses the required clearance.
 
         Args:
-            errors: The box.
             moments: Where to start.
 
         Returns:
             One whose witness points prove it; None where none was found.
         """
-        return self._judged(errors, *self._nearest(errors, moments))
+        return self._judged(*self._nearest(moments))
 
-    def smallest(
-        self, errors: ErrorBox, moments: tuple[Moment, ...]
-    ) -> Counterexample | None:
-        """The same with joint offsets as small as the required clearance allows."""
-        moment, offset = self._nearest(errors, moments)
-        nominal, joints = self._joints(moment), np.arange(offset.size) > 0
-        low, high, limit = 0.0, 1.0, self.required + self._grown(errors)
+    def smallest(self, moments: tuple[Moment, ...]) -> Counterexample | None:
+        """The same with offsets as small as the required clearance allows."""
+        moment, offset = self._nearest(moments)
+        nominal, low, high = self._joints(moment), 0.0, 1.0
         for _ in range(2):
             parts = np.linspace(low, high, PARTS)
-            tried = np.where(joints, parts[:, None] * offset, offset)
-            near = np.flatnonzero(self._gaps(nominal + tried) < limit)
+            gaps = self._gaps(nominal + parts[:, None] * offset)
+            near = np.flatnonzero(gaps < self.limit)
             if not near.size:
                 return None
             low, high = parts[max(near[0] - 1, 0)], parts[near[0]]
-        return self._judged(errors, moment, np.where(joints, high * offset, offset))
+        return self._judged(moment, high * offset)
 
-    def _grown(self, errors: ErrorBox) -> float:
-        """By how much the partner may come nearer: surface and base shift; [m]."""
-        if not self.pair.obstacle:
-            return 0.0
-        # A turn of base or obstacle is left out: what is found holds without it.
-        still = errors.of_obstacle(self.pair.obstacle).shift
-        return still + errors.base
-
-    def _nearest(
-        self, errors: ErrorBox, moments: tuple[Moment, ...]
-    ) -> tuple[Moment, FloatArray]:
+    def _nearest(self, moments: tuple[Moment, ...]) -> tuple[Moment, FloatArray]:
         """The nearest configuration found within the box: moment and offsets."""
-        angles = errors.angles(self.problem.manipulator.n_links)
-        corners = self._first_corners()
-        scale = np.zeros(corners.shape[1])  # 0 of what carries obstacles
-        scale[1 : 1 + angles.size] = INSIDE * angles.reshape(-1)
+        corners, scale = self._first_corners(), INSIDE * self.asked.sizes
         at = [(moment, corner) for moment in moments for corner in corners]
         q = np.array([self._joints(moment) for moment, _ in at])
         moved = self._walk(q, np.array([corner for _, corner in at]) * scale, scale)
@@ -141,21 +151,14 @@ class Search:
 
     def _joints(self, moment: Moment) -> FloatArray:
         """Nominal values of all columns, shape (n_columns,)."""
-        return np.asarray(self._between(moment.interval, np.array([moment.share]))[0])
-
-    def _between(self, interval: int, shares: FloatArray) -> FloatArray:
-        """The same at shares (m,) of an interval, shape (m, n_columns)."""
-        # The last row begins no interval.
-        last = max(0, self.trajectory.n_samples - 2)
-        moments = np.minimum(interval, last) + shares
-        return whole_rows(self.problem, self.trajectory, moments)
+        return np.asarray(
+            self.asked.rows(np.array([moment.interval + moment.share]))[0]
+        )
 
     def _first_corners(self) -> FloatArray:
-        """Corners to start from: none, and every alpha or theta to one side."""
-        corners = np.zeros((5, self.task.tree.column.max() + 1))
-        corners[1, 1::2], corners[2, 1::2] = 1.0, -1.0
-        corners[3, 2::2], corners[4, 2::2] = 1.0, -1.0
-        return corners
+        """Corners to start from: none, and every second joint to one side."""
+        odd = np.arange(len(self.asked.sizes)) % 2
+        return np.array([0.0 * odd, odd, -odd, 1 - odd, odd - 1])
 
     def _gaps(self, q: FloatArray) -> FloatArray:
         """Clearance of the pair at rows (m, n_columns) of q, shape (m,); [m]."""
@@ -163,7 +166,11 @@ class Search:
 
     def _slopes(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The same, and how it changes with every joint, shape (m, n_columns)."""
-        return pair_slopes(self.task, self.number, np.ascontiguousarray(q))
+        q, parts = np.ascontiguousarray(q), range(self.task.pairs.body.size)
+        found = (pair_slopes(self.task, part, q) for part in parts)
+        gaps, slopes = map(np.stack, zip(*found, strict=True))
+        nearest = np.argmin(gaps, axis=0), np.arange(len(q))
+        return gaps[nearest], slopes[nearest]
 
     def _walk(
         self, q: FloatArray, offsets: FloatArray, scale: FloatArray
@@ -187,100 +194,83 @@ class Search:
         step, share = float(SHARES[1]) / GRID, moment.share
         for _ in range(GRIDS):
             shares = (share + step * AROUND).clip(0.0, 1.0)
-            gaps = self._gaps(self._between(moment.interval, shares) + offset)
+            gaps = self._gaps(self.asked.rows(moment.interval + shares) + offset)
             share, step = float(shares[np.argmin(gaps)]), step / GRID
         return Moment(moment.interval, share), offset
 
-    def _judged(
-        self, errors: ErrorBox, moment: Moment, offset: FloatArray
-    ) -> Counterexample | None:
+    def _judged(self, moment: Moment, offset: FloatArray) -> Counterexample | None:
         """What the clearance proof says of one configuration."""
-        nominal, grown = self._joints(moment), self._grown(errors)
-        width = 1 + 2 * self.problem.manipulator.n_links
-        q, offset = (nominal + offset)[:width], offset[:width]
-        problem = replace(
-            self.problem,
-            required_clearance=self.problem.required_clearance + grown,
-        )
-        when = np.array([moment.interval + moment.share])
-        row = Trajectory(
-            np.zeros(1, bool),
-            np.zeros(1),
-            q[:1],
-            q[None, 1::2],
-            q[None, 2::2],
-            times=self.trajectory.times_at(when),
-        )
-        chunks: list[ClearanceChunk] = []
-        proof = prove_clearance(problem, row, ErrorBox(), [chunks.append])
-        column = proof.pairs.index(self.pair)
-        if chunks[0].verdict[0, column] != REFUTED:
+        asked, q = self.asked, self._joints(moment) + offset
+        pair = ProofPair(0, 1, self.limit)
+        proof = prove(asked.tree, asked.bodies, Path(q[None]), [pair])
+        upper, points = float(proof.upper[0]), proof.points[0]
+        refuted = proof.verdict[0] == REFUTED
+        if asked.common_ball and not refuted and upper <= self.limit:
+            radius, centre = asked.common_ball(q, points.mean(axis=0))
+            upper, points, refuted = -radius, np.array([centre, centre]), radius > 0.0
+        if not refuted:
             return None
-        upper = float(chunks[0].upper[0, column])
         return Counterexample(
             interval=moment.interval,
             share=moment.share,
-            pair=self.pair,
-            joints=frozen(q),
-            offsets=frozen(offset),
-            clearance=upper - grown,
-            required=self.required,
-            link_point=frozen(chunks[0].link_point[0, column]),
-            other_point=frozen(chunks[0].other_point[0, column]),
-            deeper=is_deepest(
-                upper,
-                ball_of(self.problem, self.pair),
-            ),
+            pair=asked.pair,
+            joints=frozen(q[: asked.n_joints]),
+            offsets=frozen(offset[: asked.n_joints] + 0.0),  # no -0
+            clearance=upper - asked.grown,
+            required=asked.required,
+            link_point=frozen(points[0]),
+            other_point=frozen(points[1]),
+            deeper=is_deepest(upper, asked.ball),
         )
 
 
-def moments_of(row: FloatArray) -> tuple[Moment, ...]:
-    """Where a pair comes nearest: along the interval of its least lower bound.
+def moments_of(nearest: Moment, weakest: int) -> tuple[Moment, ...]:
+    """Where a search starts: the least upper bound, and along an interval.
 
     Args:
-        row: The pair's, as `proof.layouts` lays out a best one.
+        nearest: When the pair comes nearest, as far as is known.
+        weakest: Its interval of the least lower bound.
     """
-    spread = tuple(Moment(int(row[AT_LOWER]), float(share)) for share in SHARES)
-    return (Moment(int(row[AT_UPPER]), float(row[TIME])), *spread)
+    return (nearest, *(Moment(weakest, float(share)) for share in SHARES))
 
 
-def find_counterexamples(
-    problem: PlanningProblem,
-    trajectory: Trajectory,
-    errors: ErrorBox,
-    proof: ClearanceProof,
-    deadline: Deadline = NO_LIMIT,
-) -> tuple[Counterexample, ...]:
-    """Motions within the error box that miss what the proof left undecided.
+@dataclass(frozen=True)
+class Undecided:
+    """What a proof for an error box says of the pairs of a motion.
 
     Args:
-        problem: Arm, scene, required clearances.
-        trajectory: The nominal motion.
-        errors: The box.
-        proof: The proof for it.
-        deadline: When to give up.
-
-    Returns:
-        One against obstacles and one between links, at most; none where the nominal
-        motion itself is refuted.
-
-    Raises:
-        OutOfTime: If the time is over.
+        pairs: All of them.
+        verdict: CERTIFIED, REFUTED or UNDECIDED, shape (n_pairs,).
+        lower: Least proved clearances, shape (n_pairs,); [m].
+        question: Of the pair of a number.
+        moments: Where to start with it.
     """
-    if errors == ErrorBox():
-        return ()
-    groups = [bool(pair.obstacle) for pair in proof.pairs]
-    found = []
-    for group in (True, False):
-        mine = np.array(groups, dtype=bool) == group
-        if proof.counts[mine, REFUTED].any():
-            continue
-        among = np.flatnonzero(mine & (proof.counts[:, UNDECIDED] > 0))
-        for k in among[np.argsort(proof.best[among, LOW], kind="stable")][:PAIRS]:
-            deadline.check()
-            search = Search(problem, trajectory, proof.pairs[k])
-            one = search.find(errors, moments_of(proof.best[k]))
-            if one:
-                found.append(one)
-                break
-    return tuple(found)
+
+    pairs: Sequence[Pair]
+    verdict: IntArray
+    lower: FloatArray
+    question: Callable[[int], Question]
+    moments: Callable[[int], tuple[Moment, ...]]
+
+    def counterexamples(self, deadline: Deadline) -> tuple[Counterexample, ...]:
+        """Motions within the box that miss what the proof left undecided.
+
+        Returns:
+            One against obstacles and one between links, at most; none where the nominal
+            motion itself is refuted.
+
+        Raises:
+            OutOfTime: If the time is over.
+        """
+        outer = np.array([bool(pair.obstacle) for pair in self.pairs], dtype=bool)
+        found = []
+        for mine in (outer, ~outer):
+            if (self.verdict[mine] == REFUTED).any():
+                continue
+            among = np.flatnonzero(mine & (self.verdict == UNDECIDED))
+            for k in among[np.argsort(self.lower[among], kind="stable")][:PAIRS]:
+                deadline.check()
+                if one := Search(self.question(k)).find(self.moments(k)):
+                    found.append(one)
+                    break
+        return tuple(found)

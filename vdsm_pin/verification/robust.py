@@ -24,7 +24,8 @@ from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.proof.terms import UNDECIDED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.counterexample import Search, moments_of
+from vdsm_pin.verification.arm_counterexamples import arm_question, of_best
+from vdsm_pin.verification.counterexample import Search
 from vdsm_pin.verification.proving import prove_problem
 from vdsm_pin.verification.task import all_pairs, obstacle_growth
 from vdsm_pin.verification.yes_or_no import YesOrNoProof, is_certified
@@ -293,6 +294,6 @@ def _smallest(
     searches = []
     for k in nearest:
         deadline.check()
-        search = Search(problem, trajectory, pairs[k])
-        searches.append(search.smallest(errors, moments_of(best[k])))
+        search = Search(arm_question(problem, trajectory, pairs[k], errors))
+        searches.append(search.smallest(of_best(best[k])))
     return [float(np.abs(found.offsets[1:]).max()) for found in searches if found]

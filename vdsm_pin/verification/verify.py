@@ -26,6 +26,7 @@ from vdsm_pin.verification import (
     fk,
     pointing,
 )
+from vdsm_pin.verification.arm_counterexamples import find_counterexamples
 from vdsm_pin.verification.clearance import (
     ClearanceProof,
     least_clearances,
@@ -34,7 +35,6 @@ from vdsm_pin.verification.clearance import (
 from vdsm_pin.verification.clearance_check import check_clearance
 from vdsm_pin.verification.coal_distances import reach_of
 from vdsm_pin.verification.coal_log import CoalLog
-from vdsm_pin.verification.counterexample import find_counterexamples
 from vdsm_pin.verification.enclosed import (
     EnclosedSink,
     enclosed_approaches,

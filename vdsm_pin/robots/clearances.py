@@ -1,0 +1,96 @@
+"""The least clearance of every pair of a cell, and a ball in both where they meet."""
+
+from dataclasses import fields, replace
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import frozen
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.prover import Proof
+from vdsm_pin.proof.terms import CERTIFIED, REFUTED
+from vdsm_pin.robots.cell import Cell
+from vdsm_pin.robots.contacts import common_ball
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.moving import Knots
+from vdsm_pin.verification.records import LeastClearances, Pair
+
+MEETING: Final = 2.0 * TOLERANCES.bracket_gap
+"""Bodies that come so near may meet; [m]."""
+
+BESIDE: Final = (0.0, 0.01, -0.01, 0.05, -0.05)
+"""Where a ball in both is looked for, beside the moment at which bodies meet; [-]."""
+
+POINTS: Final = ("link_point", "other_point")
+
+
+def named_pairs(cell: Cell) -> tuple[Pair, ...]:
+    """The pairs by the names of their bodies, a link first."""
+    n, found = len(cell.robot.bodies), []
+    for pair in cell.pairs:
+        one, other = cell.bodies[pair.one].name, cell.bodies[pair.other].name
+        if pair.one >= n:
+            found.append(Pair(link=pair.other + 1, obstacle=one, body=other))
+        else:
+            found.append(
+                Pair(
+                    link=pair.one + 1,
+                    other_link=pair.other + 1,
+                    body=one,
+                    other_body=other,
+                )
+            )
+    return tuple(found)
+
+
+def least_clearances(cell: Cell, path: Path, proof: Proof) -> LeastClearances:
+    """What a proof says of every pair, the witness on the link first.
+
+    Where a ball is proved to lie in both bodies they are refuted, and so deep.
+    """
+    return _met(cell, path, _least(cell, proof))
+
+
+def _least(cell: Cell, proof: Proof) -> LeastClearances:
+    outer = np.array([pair.one >= len(cell.robot.bodies) for pair in cell.pairs], bool)
+    points = proof.points.copy()
+    points[outer] = points[outer, ::-1]
+    return LeastClearances(
+        interval=proof.interval,
+        time=proof.share,
+        lower=proof.lower,
+        upper=proof.upper,
+        verdict=proof.verdict,
+        link_point=frozen(points[:, 0]),
+        other_point=frozen(points[:, 1]),
+    )
+
+
+def _met(cell: Cell, path: Path, least: LeastClearances) -> LeastClearances:
+    """The same, with the balls in both bodies that are found."""
+    near = (least.verdict != CERTIFIED) & (least.upper <= MEETING)
+    changed = {one.name: getattr(least, one.name).copy() for one in fields(least)}
+    for k in np.flatnonzero(near):
+        moment = least.interval[k] + least.time[k]
+        middle = 0.5 * (least.link_point[k] + least.other_point[k])
+        moments = np.clip(moment + np.array(BESIDE), 0.0, path.n_intervals)
+        intervals, shares = path.split(moments)
+        poses = cell.poses(path.within(intervals, shares))
+        for at, pose in enumerate(poses):
+            bodies = cell.coal.pieces(cell.pairs[k], pose)
+            radius, centre = common_ball(*bodies, middle)
+            if radius > 0.0:
+                found = intervals[at], shares[at], -radius, REFUTED, centre, centre
+                names = "interval", "time", "upper", "verdict", *POINTS
+                for name, value in zip(names, found, strict=True):
+                    changed[name][k] = value
+                break
+    return LeastClearances(**changed)
+
+
+def told(least: LeastClearances, knots: Knots) -> LeastClearances:
+    """The same, its moments in intervals of the robot's own path."""
+    if knots.are_rows:
+        return least
+    time = knots.share(least.interval, least.time)
+    return replace(least, interval=knots.interval(least.interval), time=time)

@@ -1,0 +1,100 @@
+"""What the proof for an error box leaves undecided of an arm, as the search asks it."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from vdsm_pin.arm.bodies import arm_bodies
+from vdsm_pin.arm.tree import arm_tree, link_frame
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.proof.bodies import Body
+from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, TIME
+from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.verification.clearance import ClearanceProof
+from vdsm_pin.verification.counterexample import (
+    Moment,
+    Question,
+    Undecided,
+    grown_by,
+    moments_of,
+)
+from vdsm_pin.verification.moving import frames_beside, tree_beside, whole_rows
+from vdsm_pin.verification.records import Counterexample, Pair
+from vdsm_pin.verification.task import ball_of
+
+
+def arm_question(
+    problem: PlanningProblem, trajectory: Trajectory, pair: Pair, errors: ErrorBox
+) -> Question:
+    """What is asked of a pair of an arm."""
+    mine = tuple(o for o in problem.scene.obstacles if o.name == pair.obstacle)
+    problem, arm = replace(problem, scene=Scene(mine)), problem.manipulator
+    own, required = arm_tree(arm), problem.required_self_clearance
+    tree = tree_beside(own, problem.scene)
+    bodies = {
+        body.name: Body(link_frame(body.link), (body.piece,), body.name)
+        for body in arm_bodies(arm)
+    }
+    if pair.obstacle:
+        required = problem.required_clearance
+        (frame,) = frames_beside(own, problem.scene)
+        bodies[pair.label] = Body(frame, mine[0].pieces, pair.label)
+    sizes, angles = np.zeros(tree.n_columns), errors.angles(arm.n_links)
+    sizes[1 : 1 + angles.size] = angles.reshape(-1)
+    return Question(
+        pair=pair,
+        tree=tree,
+        bodies=(bodies[pair.own], bodies[pair.label]),
+        required=required,
+        rows=partial(whole_rows, problem, trajectory),
+        sizes=sizes,
+        grown=grown_by(errors, pair),
+        n_joints=1 + angles.size,
+        ball=ball_of(problem, pair),
+    )
+
+
+def of_best(row: FloatArray) -> tuple[Moment, ...]:
+    """Where the search of a pair starts, by its best row (`proof.layouts`)."""
+    return moments_of(Moment(int(row[AT_UPPER]), float(row[TIME])), int(row[AT_LOWER]))
+
+
+def find_counterexamples(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    errors: ErrorBox,
+    proof: ClearanceProof,
+    deadline: Deadline = NO_LIMIT,
+) -> tuple[Counterexample, ...]:
+    """Motions within the box that miss what the proof left undecided.
+
+    Args:
+        problem: Arm, scene, required clearances.
+        trajectory: The nominal motion.
+        errors: The box.
+        proof: The proof for it.
+        deadline: When to give up.
+
+    Returns:
+        One against obstacles and one between links, at most; none where the nominal
+        motion itself is refuted.
+
+    Raises:
+        OutOfTime: If the time is over.
+    """
+    if errors == ErrorBox():
+        return ()
+    lost, left = (proof.counts[:, k] > 0 for k in (REFUTED, UNDECIDED))
+    return Undecided(
+        pairs=proof.pairs,
+        verdict=np.select([lost, left], [REFUTED, UNDECIDED], CERTIFIED),
+        lower=proof.best[:, LOW],
+        question=lambda k: arm_question(problem, trajectory, proof.pairs[k], errors),
+        moments=lambda k: of_best(proof.best[k]),
+    ).counterexamples(deadline)
