@@ -131,7 +131,7 @@ def test_larger_errors_than_certified_are_refused(tmp_path: Path) -> None:
         made.texts["all.urdf"], made.cell["errors"] = urdf, ERRORS
         change(made)
         made.write()
-        source = read_cell_file(made.files[0]).source(meshes)
+        source = read_cell_file(made.files[0]).source(meshes, ())
         lines[0]["problem_sha256"] = source.sha256
         outcome = made.check(lines, fits=False)
         assert not outcome.accepted, what

@@ -108,7 +108,7 @@ class Joints:
                 self._own(name, kind, limits)
         self.joints = [Joint(0, FIXED, X, still, (None, 1.0, 0.0))]
         waiting, links = [*self.elements.values()], document.findall("link")
-        (root,) = {x.get("name") for x in links} - {end(j, "child") for j in waiting}
+        (root,) = {x.attrib["name"] for x in links} - {end(j, "child") for j in waiting}
         self.frames = {root: self._hang(1, base.name, base.kind, still) if base else 1}
         while waiting:
             joint = next(j for j in waiting if end(j, "parent") in self.frames)
@@ -177,8 +177,7 @@ class Joints:
         self.joints[0].err(0.0, *stated["base"])
         for joint in self.joints:
             if joint.column is not None:
-                error = values[self.moved[joint.column].name]
-                joint.err(joint.gain * error, 0.0, 0.0)
+                joint.err(joint.gain * values[self.moved[joint.column].name], 0.0, 0.0)
 
 
 class Robot:
@@ -204,12 +203,14 @@ class Robot:
         document = ET.fromstring(text)
         named = document.findall("link/collision/geometry/mesh")
         meshes = tuple(dict.fromkeys(map(self._mesh, named)))
-        hashes = file.source(meshes).sha256, sha256_of_file(trajectory)
-        belongs(header, "errors links topic", *hashes)
         srdf = Srdf(self.files.srdf, document) if self.files.srdf else None
         self.joints = Joints(self.files, document, srdf)
         self.place, joints = "header", self.joints.joints
-        self.scene = file.scene(float(sum(joint.lever for joint in joints)) or 1.0)
+        size = float(sum(joint.lever for joint in joints)) or 1.0
+        others = {name for name, frame in self.joints.frames.items() if frame != 1}
+        self.scene, of_obstacles = file.scene(size, others)
+        source = file.source(meshes, of_obstacles).sha256
+        belongs(header, "errors links topic", source, sha256_of_file(trajectory))
         own = self._branch(header, trajectory)
         self.own = Path(own)
         self.tree, self.path, self.rests = beside(own, joints, self.scene)
@@ -254,10 +255,9 @@ class Robot:
         claim(set(told) <= set(links), "links without solids are told of")
         (required, own), frames = file.required, self.joints.frames
         outer = product(zip(things, self.rests, off, strict=True), links.items())
-        for around, (name, parts) in outer:
+        for (thing, at, lost), (name, parts) in outer:
             for each in parts:
-                thing, rest, lost = around
-                yield Pair(Body(frames[name], each), thing, rest, required, lost)
+                yield Pair(Body(frames[name], each), thing, at, required, lost)
         left = srdf.disabled() if srdf else {}
         every = [*combinations(links, 2)]
         apart = [both for both in every if self._held(*both, left, srdf)]

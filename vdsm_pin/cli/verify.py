@@ -102,7 +102,6 @@ def verify(
     robot, or --urdf) the first three.
     """
     of_arm: dict[str, object] = {
-        "--certificate": certificate,
         "--pdf": pdf,
         "--all-pairs": all_pairs,
         "--interpolation": interpolation != "auto",
@@ -114,8 +113,11 @@ def verify(
     from vdsm_pin.report.run_record import now
 
     with enforced(deadline, grace=0.0):
+        source = read_source(problem, box, robot, of_arm, topic)
+        if certificate is not None and robot.urdf is not None:
+            source = _stated(source, robot, certificate, trajectory)
         order = VerifyOrder(
-            source=read_source(problem, box, robot, of_arm, topic),
+            source=source,
             trajectory=trajectory,
             folder=out,
             command=context.obj,
@@ -142,11 +144,6 @@ def read_source(
     Raises:
         InvalidInput: If a file is bad, or an option has no meaning for it.
     """
-    if of_robot.urdf is not None and of_arm.get("--certificate"):
-        message = (
-            "--certificate needs a problem file with `robot` beside it, not --urdf"
-        )
-        raise InvalidInput(message)
     if of_robot.urdf is not None:
         refuse_beside("--urdf", {"PROBLEM": problem, **of_arm})
         return of_robot.cell(None).under(errors)
@@ -163,8 +160,19 @@ def read_source(
     else:
         refuse_beside("an arm", {"--topic": topic})
         return arm
-    refuse_beside("a robot", {k: v for k, v in of_arm.items() if k != "--certificate"})
+    refuse_beside("a robot", of_arm)
     return of_robot.cell(path).under(errors)
+
+
+def _stated(
+    source: "ProblemFile | Cell", robot: RobotOptions, certificate: Path, motion: Path
+) -> "Cell":
+    """What options ask, from the problem file that their certificate is about."""
+    from vdsm_pin.robots.cell import Cell
+
+    assert isinstance(source, Cell)  # of a URDF
+    beside = certificate.with_name(f"{certificate.name}.yaml")
+    return robot.stated(source, beside, motion)
 
 
 def _passes(order: "VerifyOrder", said: Said) -> bool:
@@ -180,6 +188,8 @@ def _passes(order: "VerifyOrder", said: Said) -> bool:
         none = verified.no_certificate
         what = f"none: {none}" if none else str(order.certificate)
         written.append(("certificate", what))
+        if not none and order.read.path.name == f"{order.certificate.name}.yaml":
+            written.append(("its problem file", str(order.read.path)))
     if order.pdf is not None:
         written.append(("report on paper", str(order.pdf)))
     if said.as_json:

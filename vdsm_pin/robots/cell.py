@@ -152,8 +152,7 @@ def cell_of(
     if scene is None:
         source = source_of(named, ())
         return Cell(robot, Scene(), required, required_self, source=source)
-    links = [name for name, frame in robot.frames.items() if frame != BASE]
-    solids, of_files = read_scene_with_files(scene, _size(robot), links)
+    solids, of_files = read_scene_with_files(scene, _size(robot), _others(robot))
     source = source_of((*named, scene), of_files)
     return Cell(robot, solids, required, required_self, source=source)
 
@@ -170,7 +169,7 @@ def read_cell(path: Path) -> Cell:
     pose = np.eye(4)
     pose[:3, :3] = file.frame.rotation
     pose[:3, 3] = file.frame.metres(file.model.base.position)
-    scene = file.scene(_size(robot))
+    scene, of_obstacles = file.scene(_size(robot), _others(robot))
     cell = Cell(
         robot=robot,
         scene=scene,
@@ -178,7 +177,7 @@ def read_cell(path: Path) -> Cell:
         required_self_clearance=required_self,
         stated_name=file.model.name or "",
         T_world_base=frozen(pose),
-        source=file.source(robot.meshes),
+        source=file.source(robot.meshes, of_obstacles),
     )
     try:
         return cell.under(file.errors(scene))
@@ -222,6 +221,11 @@ def locks(words: tuple[str, ...]) -> dict[str, float]:
             message = f"--lock is {word!r}, expected JOINT=VALUE in radians or metres"
             raise InvalidInput(message)
     return found
+
+
+def _others(robot: Robot) -> list[str]:
+    """Names of the links besides those that stand as the root link does."""
+    return [name for name, frame in robot.frames.items() if frame != BASE]
 
 
 def _size(robot: Robot) -> float:

@@ -3,7 +3,7 @@
 Nothing of geometry is worked out here; whoever reads a robot by itself begins here.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
@@ -29,7 +29,10 @@ from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.problem.scene import Scene
-from vdsm_pin.robots.scene_files import MAX_BYTES, SceneModel
+from vdsm_pin.robots.scene_files import MAX_BYTES, SceneModel, read_scene_with_files
+
+Named: TypeAlias = tuple[tuple[str, Path], ...]
+"""Names of obstacles that have a file of their own, with it."""
 
 MeshCover: TypeAlias = Literal["hull", "parts", "primitives"]
 
@@ -191,6 +194,11 @@ class CellModel(SceneModel):
         description="Where the root link is. Default: at the origin.",
     )
     obstacles: list[MovableModel] = Field(default=[], description="Solids to avoid.")
+    scene: str | None = Field(
+        default=None,
+        description="File of more obstacles, in the frame of the root link: YAML with "
+        "obstacles, a PlanningScene of MoveIt, or a world in MJCF.",
+    )
     required_clearance: NotNegative = Field(
         description="Between the surfaces of links and obstacles [length_unit]."
     )
@@ -236,18 +244,28 @@ class CellFile:
         asked = self.model.required_clearance, self.model.required_self_clearance
         return float(self.frame.metres(asked[0])), float(self.frame.metres(asked[1]))
 
-    def scene(self, robot_size: float) -> Scene:
-        """The obstacles in the robot's base frame.
+    def scene(self, robot_size: float, links: Collection[str]) -> tuple[Scene, Named]:
+        """The obstacles in the robot's base frame, and those with files of their own.
 
         Args:
             robot_size: For judging the size of a mesh; [m].
+            links: Of the robot, besides the root link.
 
         Raises:
             InvalidFile: If one breaks its contract, or is of a kind that is not judged.
         """
-        more = self.path.parent, self.frame, robot_size, sha256()
-        builder = ObstacleBuilder(self.document, *more)
-        return Scene(builder.build_all(self.model.obstacles, ("obstacles",)))
+        folder, frame = self.path.parent, self.frame
+        builder = ObstacleBuilder(self.document, folder, frame, robot_size, sha256())
+        own = builder.build_all(self.model.obstacles, ("obstacles",))
+        named = files_of_obstacles(self.model.obstacles, folder)
+        if self.model.scene is None:
+            return Scene(own), named
+        file = folder / self.model.scene
+        more, files = read_scene_with_files(file, robot_size, links)
+        try:
+            return Scene((*own, *more.obstacles)), (*named, *files)
+        except InvalidInput as error:
+            raise self.document.invalid(("scene",), str(error)) from None
 
     def errors(self, scene: Scene) -> ErrorBox:
         """The errors under which every clearance is asked for.
@@ -257,10 +275,11 @@ class CellFile:
         """
         return build_errors(self.model.errors, self.frame, scene, self.document)
 
-    def source(self, meshes: tuple[Path, ...]) -> ProblemSource:
-        """All files that it is read from, those of links' meshes too."""
-        named = files_of_obstacles(self.model.obstacles, self.path.parent)
-        return source_of((self.path, *self.robot.files, *meshes), named)
+    def source(self, meshes: tuple[Path, ...], of_obstacles: Named) -> ProblemSource:
+        """All files that it is read from, those of links and obstacles too."""
+        scene = filter(None, [self.model.scene])
+        named = (*meshes, *(self.path.parent / file for file in scene))
+        return source_of((self.path, *self.robot.files, *named), of_obstacles)
 
 
 def read_cell_file(path: Path) -> CellFile:
@@ -276,9 +295,7 @@ def read_cell_file(path: Path) -> CellFile:
         raise first_error(error, document, CellModel) from None
 
 
-def source_of(
-    files: tuple[Path, ...], of_obstacles: tuple[tuple[str, Path], ...]
-) -> ProblemSource:
+def source_of(files: tuple[Path, ...], of_obstacles: Named) -> ProblemSource:
     """The files that a cell was read from, the robot or the problem first."""
     read, digest = (*files, *(file for _, file in of_obstacles)), sha256()
     for file in read:
