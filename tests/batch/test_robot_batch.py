@@ -1,6 +1,7 @@
 """Given motions of robots and arms in a batch: rows, pages, JUnit, resumed."""
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from math import radians
 from pathlib import Path
 
@@ -86,6 +87,14 @@ def test_the_problem_beside_the_motions_is_no_motion(
     assert (row.folder, row.outcome) == ("cell-clear", "certified")
     said = capsys.readouterr().out
     assert "smallest proved clearance" in said and "not available" not in said
+
+
+def test_endings_may_be_large(folder: Path) -> None:
+    for path in (folder / "plans").iterdir():
+        path.rename(path.with_suffix(".CSV"))
+    (folder / "cell.yaml").rename(folder / "cell.YML")
+    rows = run_batch(replace(asked(folder), problems=(str(folder),)))
+    assert {row.folder for row in rows} == {"cell-clear", "cell-other", "cell-through"}
 
 
 def test_what_changed_is_done_again(folder: Path) -> None:

@@ -193,22 +193,24 @@ def test_limits_are_checked_at_and_between_waypoints(
     found = verify_robot(Cell(robot, scene), past)
     refuted = [c.name for c in found.checks if c.verdict is Verdict.REFUTED]
     assert refuted == ["joint 'slide' in its limits"]
-    message = {
-        "joint_names": ["slide", "turn"],
-        "points": [
-            {"positions": [0.39, 0], "velocities": [1, 0], "time_from_start": 0},
-            {
-                "positions": [0.39, 1],
-                "velocities": [-1, 0],
-                "time_from_start": {"sec": 1, "nanosec": 0},
-            },
-        ],
-    }
-    smooth = read_path(write(tmp_path, "t.json", json.dumps(message)), robot)
-    assert smooth.degree == 3
-    assert smooth.knots.tolist() == [[0.0, 0.39], [1.0, 0.39]]
-    found = verify_robot(Cell(robot, scene), smooth)
-    assert found.verdict is not Verdict.CERTIFIED
+    # From 0.39 back to it at a speed of v the slide goes v / 4 farther, the control
+    # points v / 3; its limit is 0.4.
+    for speed, verdict in ((0.036, "certified"), (0.044, "refuted"), (1.0, "refuted")):
+        ends = [([0.39, 0], speed, 0), ([0.39, 1], -speed, 1)]
+        points = [
+            {"positions": q, "velocities": [v, 0], "time_from_start": t}
+            for q, v, t in ends
+        ]
+        message = {"joint_names": ["slide", "turn"], "points": points}
+        smooth = read_path(write(tmp_path, "t.json", json.dumps(message)), robot)
+        assert smooth.degree == 3
+        assert smooth.knots.tolist() == [[0.0, 0.39], [1.0, 0.39]]
+        checks = verify_robot(Cell(robot, scene), smooth).checks
+        (limit,) = (c for c in checks if c.name == "joint 'slide' in its limits")
+        assert limit.verdict.value == verdict
+        if verdict == "refuted":
+            assert limit.moment == 0.5
+            assert limit.worst == pytest.approx(0.39 + speed / 4)
 
 
 def test_planning_scenes_are_read_as_they_stand(tmp_path: Path) -> None:

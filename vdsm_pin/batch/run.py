@@ -30,6 +30,7 @@ from vdsm_pin.batch.task import (
 )
 from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
 from vdsm_pin.io.atomic import atomic_path, remove_parts, write_text
+from vdsm_pin.io.bags import is_bag
 from vdsm_pin.io.problem_file import built_in_names
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.report.browser import find_browser
@@ -53,7 +54,8 @@ _LOCK: Final = ".lock"
 GIVEN: Final = "given"
 """What a row has for a strategy where the motion was given."""
 
-MOTIONS: Final = ".csv", ".yaml", ".yml", ".json", ".bag", ".mcap"
+PROBLEMS: Final = ".yaml", ".yml"
+MOTIONS: Final = ".csv", *PROBLEMS, ".json", ".bag", ".db3", ".mcap"
 """Endings of trajectories."""
 
 OWN: Final = SUMMARY, RUNNING, COLUMNS, JUNIT, INDEX, SECONDS, _ASIDE, _LOCK
@@ -158,7 +160,7 @@ def expanded(problems: tuple[str, ...]) -> tuple[str, ...]:
         if not Path(name).is_dir() or name in built_in_names():
             found.add(name)
             continue
-        inside = [p for p in Path(name).iterdir() if p.suffix in (".yaml", ".yml")]
+        inside = [p for p in Path(name).iterdir() if p.suffix.lower() in PROBLEMS]
         if not inside:
             raise InvalidFile(file=name, problem="holds no .yaml file")
         found.update(str(path) for path in inside)
@@ -249,7 +251,7 @@ def _motions(names: tuple[str, ...], problems: Set[Path]) -> tuple[str, ...]:
             found.add(name)
             continue
         beside = [p for p in Path(name).iterdir() if p.resolve() not in problems]
-        inside = [p for p in beside if p.suffix in MOTIONS]
+        inside = [p for p in beside if p.suffix.lower() in MOTIONS or is_bag(p)]
         if not inside:
             problem = f"holds no trajectory; expected {', '.join(MOTIONS)}"
             raise InvalidFile(file=name, problem=problem)

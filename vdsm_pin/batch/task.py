@@ -301,7 +301,7 @@ def folder_names(
 
 def _plain_name(problem: str) -> str:
     path = Path(problem)
-    stem = path.stem if path.suffix in (".yaml", ".yml") else problem.strip("/")
+    stem = path.stem if path.suffix.lower() in (".yaml", ".yml") else problem.strip("/")
     if stem == NEW and path.parent.name:  # as vdsm new makes them: FOLDER/problem.yaml
         stem = path.parent.name
     kept = "".join(c if c.isalnum() or c in "-_." else "-" for c in stem).strip(".-")

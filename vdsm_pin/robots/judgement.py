@@ -23,8 +23,8 @@ from vdsm_pin.robots.clearances import (
 from vdsm_pin.robots.counterexamples import robot_counterexamples, told_all
 from vdsm_pin.robots.errors import proof_box
 from vdsm_pin.robots.inside import by_mesh, enclosed, enclosed_profile, locate_links
-from vdsm_pin.robots.model import Robot
-from vdsm_pin.robots.rates import rate_checks
+from vdsm_pin.robots.model import Robot, RobotJoint
+from vdsm_pin.robots.rates import largest_of, rate_checks
 from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
@@ -191,36 +191,43 @@ def _poses(robot: Robot, path: Path) -> Check:
 
 
 def _limits(robot: Robot, path: Path) -> list[Check]:
-    """A row for each joint with limits; the control points hold what lies between."""
-    checks = []
-    slack = TOLERANCES.arithmetic
-    for k, joint in enumerate(robot.joints):
-        if not np.isfinite([joint.lower, joint.upper]).all():
-            continue
-        past = np.maximum(
-            path.knots[:, k] - joint.upper, joint.lower - path.knots[:, k]
-        )
-        between = path.controls[..., k]
-        all_past = np.maximum(between - joint.upper, joint.lower - between)
-        row = int(np.argmax(past))
-        verdict = Verdict.CERTIFIED
-        if not (past <= slack).all():
-            verdict = Verdict.REFUTED
-        elif not (all_past <= slack).all():
-            verdict = Verdict.UNDECIDED
-        upper = path.knots[row, k] - joint.upper >= joint.lower - path.knots[row, k]
-        checks.append(
-            Check(
-                LIMITS.format(name=joint.name),
-                verdict,
-                len(past),
-                float(path.knots[row, k]),
-                joint.upper if upper else joint.lower,
-                "rad" if joint.turns else "m",
-                moment=float(row),
-            )
-        )
-    return checks
+    """A row for each joint with limits."""
+    return [
+        _limit(joint, path, k)
+        for k, joint in enumerate(robot.joints)
+        if np.isfinite([joint.lower, joint.upper]).all()
+    ]
+
+
+def _limit(joint: RobotJoint, path: Path, k: int) -> Check:
+    """Of the joint of column k; control points hold what lies between waypoints."""
+    slack, knots, between = (
+        TOLERANCES.arithmetic,
+        path.knots[:, k],
+        path.controls[..., k],
+    )
+    past = np.maximum(knots - joint.upper, joint.lower - knots)
+    row = int(np.argmax(past))
+    verdict, value, moment = Verdict.CERTIFIED, float(knots[row]), float(row)
+    if not (past <= slack).all():
+        verdict = Verdict.REFUTED
+    elif between.size:
+        middle, room = 0.5 * (joint.lower + joint.upper), joint.upper - joint.lower
+        verdict, _, found = largest_of(between - middle, 0.5 * room + slack)
+        if verdict is not Verdict.CERTIFIED:
+            number = min(int(found), path.n_intervals - 1)
+            there = path.within(np.array([number]), np.array([found - number]))
+            value, moment = float(there[0, k]), found
+    upper = value - joint.upper >= joint.lower - value
+    return Check(
+        LIMITS.format(name=joint.name),
+        verdict,
+        len(past),
+        value,
+        joint.upper if upper else joint.lower,
+        "rad" if joint.turns else "m",
+        moment=moment,
+    )
 
 
 def _clearances(

@@ -42,7 +42,7 @@ def rate_checks(joints: tuple[RobotJoint, ...], path: Path) -> list[Check]:
                 none = Verdict.UNDECIDED, path.n_intervals, nan
                 checks.append(Check(name, *none, float(limits[k]), unit, where))
                 continue
-            verdict, value, moment = _largest(controls[:, :, k], float(limits[k]))
+            verdict, value, moment = largest_of(controls[:, :, k], float(limits[k]))
             count, limit = path.n_intervals, float(limits[k])
             checks.append(
                 Check(name, verdict, count, value, limit, unit, moment=moment)
@@ -50,8 +50,16 @@ def rate_checks(joints: tuple[RobotJoint, ...], path: Path) -> list[Check]:
     return checks
 
 
-def _largest(controls: FloatArray, limit: float) -> tuple[Verdict, float, float]:
-    """Whether polynomials (m, n) keep within a limit, the value that decides, when."""
+def largest_of(controls: FloatArray, limit: float) -> tuple[Verdict, float, float]:
+    """Whether polynomials (m, n) keep within a limit, the value that decides, when.
+
+    Args:
+        controls: Their control points.
+        limit: Of their magnitudes.
+
+    Returns:
+        Verdict, the largest magnitude seen or proved, and its moment, NaN where none.
+    """
     most = limit * (1.0 + TOLERANCES.arithmetic)
     number = np.arange(len(controls))
     start, width, bound = np.zeros(len(controls)), 1.0, 0.0
