@@ -336,3 +336,24 @@ def test_names_with_signs_of_csv_are_read_back(tmp_path: Path) -> None:
     given = replace(motion(0), names=tuple(joint.name for joint in robot.joints))
     file = write(tmp_path, "t.csv", csv_text(given, robot))
     np.testing.assert_array_equal(read_motion(file, robot.joints).q, given.q)
+
+
+def test_a_folder_of_a_ros_2_bag_is_verified_and_checked(
+    tmp_path: Path, robot: Robot
+) -> None:
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    types = pytest.importorskip("rosbags.typesys")
+    store, bag = types.get_typestore(types.Stores.ROS2_HUMBLE), tmp_path / "bag"
+    message = store.serialize_cdr(bags._typed(store, motion(0)), bags.PLANS[0])
+    with rosbag2.Writer(bag, version=9) as writer:
+        topic = writer.add_connection(bags.TOPIC, bags.PLANS[0], typestore=store)
+        writer.write(topic, 0, message)
+    free = CELL.replace("149", "0").replace("robot:", "length_unit: mm\nrobot:")
+    cell, proof = write(tmp_path, "cell.yaml", free), tmp_path / "proof"
+    asked = "--trajectory", bag, "--out", tmp_path / "out", "--certificate", proof
+    assert run("verify", cell, *asked) == 0
+    assert run("check-certificate", proof, cell, bag) == 0
+    (bag / "metadata.yaml").write_bytes((bag / "metadata.yaml").read_bytes() + b"\n")
+    assert run("check-certificate", proof, cell, bag) == 1
+    (bag / "metadata.yaml").unlink()
+    assert run("check-certificate", proof, cell, bag) == 2

@@ -139,7 +139,7 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
         InvalidFile: If one of the files is not what its format says.
     """
     check_is_file(certificate)
-    check_is_file(trajectory)
+    check_is_file(trajectory / "metadata.yaml" if trajectory.is_dir() else trajectory)
     run, reason = _Run(problem, trajectory), ""
     with ctx.workprec(PRECISION), np.errstate(all="ignore"):
         try:

@@ -210,9 +210,14 @@ def _unpacked(path: Path) -> Iterator[IO[bytes]]:
 
 
 def sha256_of_file(path: Path) -> str:
-    """SHA-256 of a file's bytes, read in blocks, in hexadecimal."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    """SHA-256 of a file's bytes, or of those in a bag's folder, in hexadecimal."""
+    inside = sorted(path.iterdir()) if path.is_dir() else [path]
+    digest = hashlib.sha256()
+    for one in inside:
+        with one.open("rb") as file:
+            while block := file.read(BLOCK):
+                digest.update(block)
+    return digest.hexdigest()
 
 
 def sha256_of(parts: Iterable[bytes]) -> str:
