@@ -22,6 +22,7 @@ from vdsm_pin.robots.scene_files import read_scene
 from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.robots.urdf import read_robot
+from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.records import Verdict
 
 URDF = """<robot name="two">
@@ -100,6 +101,14 @@ def test_the_least_clearance_is_the_closed_form(tmp_path: Path, robot: Robot) ->
     np.testing.assert_allclose(
         np.linalg.norm(near.link_point - near.other_point), near.upper, atol=1e-6
     )
+
+
+def test_what_is_not_judged_in_time_is_undecided(tmp_path: Path, robot: Robot) -> None:
+    """Also where no pair was looked at, so that Coal has nothing to measure."""
+    scene = read_scene(write(tmp_path, "s.yaml", SCENE), 1.0)
+    path = read_path(write(tmp_path, "t.csv", ROWS), robot)
+    found = verify_robot(Cell(robot, scene), path, Deadline.after(0.0))
+    assert found.verdict is Verdict.UNDECIDED
 
 
 def test_the_profile_is_the_least_of_each_link_and_obstacle(

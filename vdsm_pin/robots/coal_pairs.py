@@ -45,7 +45,7 @@ class CoalPairs:
         """
         import coal
 
-        sides = np.array([self._sides(pair) for pair in pairs]).reshape(-1, 2)
+        sides = np.array([self._sides(p) for p in pairs], np.int64).reshape(-1, 2)
         frames = np.array([body.frame for body in self._bodies])[sides]
         rows, request = np.arange(len(pairs)), distance_request()
         mine, rest = (poses[rows, frames[:, k], :3] for k in range(2))
