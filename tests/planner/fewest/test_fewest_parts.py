@@ -1,5 +1,5 @@
 import itertools
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.growth import Grown, Population
 from vdsm_pin.planner.fewest.inner_capsules import blocked_by, cores_of
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.planner.fewest.motion import Corners, Intervals, dense_rows
 from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Pricing, build_roadmap
 from vdsm_pin.planner.fewest.roadmap_kernels import pose_shapes
@@ -387,3 +387,23 @@ def test_a_closed_path_may_be_begun_at_any_of_its_rows(
         )
         assert other.corner[[0, -1]].all()
         assert other.corner.sum() - rows.corner.sum() in (0, 1)
+
+
+def test_rows_crowd_where_a_stretched_arm_is_drawn_back() -> None:
+    """The base at rest, angles go with the root of the way: few rows will do."""
+    arm = replace(ARM, base_range=(0.0, 0.0))
+    tips = np.array([[arm.total_length, 0.0, 0.0], [0.97 * arm.total_length, 0.1, 0.0]])
+    bent = np.tile([1.0, 0.1, 0.0], (arm.n_links, 1))
+    bent[1::2, 1] *= -1.0
+    links = np.stack([np.tile([1.0, 0.0, 0.0], (arm.n_links, 1)), bent])
+    corners = Corners(
+        tips, links / np.linalg.norm(links, axis=2, keepdims=True), np.zeros(2),
+        np.zeros(1, dtype=np.bool_), np.full((1, 2), -1),
+    )  # fmt: skip
+    turn, stray = np.deg2rad(4.9), 3e-4
+    rows = dense_rows(arm, corners, 0.01, turn, stray)
+    alpha, theta = joint_angles(arm, rows.centres)
+    steps = np.abs(np.diff(np.concatenate([alpha, theta], axis=1), axis=0))
+    assert steps.max() <= turn
+    assert len(rows.share) < 1000
+    assert np.diff(rows.share).max() > 20.0 * np.diff(rows.share).min()

@@ -255,34 +255,61 @@ def dense_rows(
         NoPlanFound: If no number of rows is enough, as where a joint angle jumps.
     """
     travel = np.linalg.norm(np.diff(corners.tips, axis=0), axis=1)
-    counts = np.maximum(1, count_of(travel / spacing))
+    asked = counts = np.maximum(1, count_of(travel / spacing))
     most = MOST_MORE * int(counts.sum()) + SOME_MORE
-    excess, rows = (
-        np.full(len(counts), np.inf),
-        Rows(counts[:0], travel[:0], travel[:0]),
-    )
+    excess = np.full(len(counts), np.inf)
     for _ in range(ROUNDS):
         if counts.sum() > most:
             break
         rows = rows_at(manipulator, corners, *spread(counts))
-        alpha, theta = joint_angles(manipulator, rows.centres)
-        step, _ = row_steps(manipulator, alpha, theta)
-        strays = _stray(manipulator, corners, rows, alpha, theta)
-        # Straying falls with the square of the distance of the rows.
-        bow = np.sqrt(strays.max(axis=1) / stray)
-        tip = np.sqrt(strays[:, -1] / TOLERANCES.planned_stray)
-        bow = np.where(corners.drawn[rows.interval[:-1]], np.maximum(bow, tip), bow)
         excess = np.zeros(len(counts))
-        np.maximum.at(excess, rows.interval[:-1], np.maximum(step / turn, bow))
+        each = _excess(manipulator, corners, rows, turn, stray)
+        np.maximum.at(excess, rows.interval[:-1], each)
         if (excess <= 1.0).all():
             return rows
         more = np.ceil(counts * excess * 1.05).astype(np.int64)
         counts = np.where(excess > 1.0, np.maximum(more, counts + 1), counts)
+    # Near a stretched arm angles go with the root of the way: rows crowd at its end.
+    rows = rows_at(manipulator, corners, *spread(np.where(excess > 1.0, asked, counts)))
+    for _ in range(ROUNDS):
+        each = _excess(manipulator, corners, rows, turn, stray)
+        if (each <= 1.0).all():
+            return rows
+        parts = np.ceil(np.maximum(each, 1.0) ** 2).astype(np.int64)
+        if parts.sum() > most:
+            break
+        rows = rows_at(manipulator, corners, *_cut(rows, parts))
     message = (
-        f"with {len(rows.interval)} rows {int((excess > 1.0).sum())} stretches still "
-        f"turn or stray {excess.max():.2f} times as far as a row may"
+        f"with {len(rows.interval)} rows {int((each > 1.0).sum())} steps still turn or "
+        f"stray {each.max():.2f} times as far as a row may"
     )
     raise NoPlanFound(message)
+
+
+def _cut(rows: Rows, parts: IntArray) -> tuple[IntArray, FloatArray]:
+    """Places of rows with each step cut evenly into so many parts, shape (r - 1,)."""
+    ends = np.where(np.diff(rows.interval) > 0, 1.0, rows.share[1:])
+    step = np.repeat(np.arange(len(parts)), parts)
+    number = np.arange(len(step)) - (np.cumsum(parts) - parts)[step]
+    share = rows.share[step] + number / parts[step] * (ends - rows.share[:-1])[step]
+    return (
+        np.append(rows.interval[step], rows.interval[-1]),
+        np.append(share, rows.share[-1]),
+    )
+
+
+def _excess(
+    manipulator: Manipulator, corners: Corners, rows: Rows, turn: float, stray: float
+) -> FloatArray:
+    """How many times as far as a row may each step turns or strays, shape (r - 1,)."""
+    alpha, theta = joint_angles(manipulator, rows.centres)
+    step, _ = row_steps(manipulator, alpha, theta)
+    strays = _stray(manipulator, corners, rows, alpha, theta)
+    # Straying falls with the square of the distance of the rows.
+    bow = np.sqrt(strays.max(axis=1) / stray)
+    tip = np.sqrt(strays[:, -1] / TOLERANCES.planned_stray)
+    bow = np.where(corners.drawn[rows.interval[:-1]], np.maximum(bow, tip), bow)
+    return np.asarray(np.maximum(step / turn, bow))
 
 
 def _stray(
