@@ -7,7 +7,11 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem
 
-from benchmarks.hrm2000.curves import Bend, follow_the_leader, tip_curve
+from benchmarks.hrm2000.curves import (
+    Bend,
+    follow_the_leader,
+    tip_curve,
+)
 from benchmarks.hrm2000.solids import Tube
 from benchmarks.hrm2000.sweeps import Sweep, least_bore
 from vdsm_pin.arm.kinematics import joint_centres
@@ -22,7 +26,7 @@ from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.charts import coordinates
 from vdsm_pin.planner.fewest.follow_the_leader import followed, led_along
-from vdsm_pin.planner.fewest.insertion import insert
+from vdsm_pin.planner.fewest.insertion import insert, tip_space
 from vdsm_pin.planner.fewest.insertion_population import Insertion, Layers
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
@@ -211,6 +215,67 @@ def test_ways_avoid_where_an_arm_got_stuck() -> None:
     again.avoid(first[np.abs(first[:, 0] - 1.0).argmin()])
     (other,) = again.routes(goal, 1)
     assert side_of(other) < -0.2
+
+
+def test_ways_end_however_often_one_place_is_to_be_avoided() -> None:
+    """Costs stay such that sums of them can be told apart."""
+    task = two_ways(0.15)
+    space, goal = space_of(task), task.path.points[0]
+    for _ in range(60):
+        space.avoid(goal)
+        space.avoid(task.path.start)
+    (route,) = space.routes(goal, 1)
+    np.testing.assert_array_equal(route[[0, -1]], [task.path.start, goal])
+
+
+def bent_tube(start: float, spare: float, *bends: Bend) -> PlanningProblem:
+    """A tube closed at its end, with room for an arm that follows its middle.
+
+    Args:
+        start: Where on the rail the tip begins; [m].
+        spare: What it is wider than such an arm needs; [m].
+        bends: Of its middle.
+    """
+    curve = tip_curve(bends)
+    end = float(curve.starts[-1]) + 0.1
+    laid = follow_the_leader(ARM, curve, np.linspace(-0.2, end, 120))
+    span = (0.1, end + 0.3)
+    bore = least_bore(Sweep(ARM, laid), curve, span) + spare
+    tube = Tube(curve, span, bore, 0.01, 24, 40, capped=True).mesh("tube")
+    task = problem(tube, points=laid[-1:, -1], start=(start, 0, 0), closed=False)
+    return replace(task, manipulator=replace(ARM, base_range=(start - 4.0, 5.0)))
+
+
+def test_a_way_from_afar_does_not_cut_the_corners_of_its_cells() -> None:
+    """Where large cells end at a wall, their corners may be within its margin."""
+    bends = Bend(0.2, 0.6, 0.7, 0.3), Bend(0.1, 0.6, 0.7, 2.8)
+    task = bent_tube(-9.0, 0.004, *bends)
+    space, ends = space_of(task), np.stack([task.path.start, task.path.points[0]])
+    space.most = 300_000
+    points = space._cells(ends).cheapest(*ends)
+    assert points is not None
+    lines = np.stack([points[:-1], points[1:]], axis=1)
+    assert link_clearance(task)(lines).min() >= space.required
+
+
+def test_the_way_through_a_bent_tube_is_one_that_an_arm_can_follow() -> None:
+    """Its middle is not: links are chords, and bow to the inside of the bends."""
+    bends = [
+        Bend(*row)
+        for row in [
+            (0.22, 0.4, 0.76, 3.64),
+            (0.19, 0.64, 0.79, 5.92),
+            (0.21, 0.35, 0.91, 5.82),
+        ]
+    ]
+    task = bent_tube(-0.2, 0.008, *bends)
+    judge, effort = judge_of(task), Insert(0.02, 10, 1, 2, 0, cells=60_000)
+    space = tip_space(judge, broad_phase(task, link_clearance(task)), effort)
+    (route,) = space.routes(task.path.points[0], 1)
+    start = np.zeros((ARM.n_links + 1, 3))
+    start[:, 0] = ARM.stations - ARM.total_length - 0.2
+    arms = led_along(route, start, ARM.link_lengths)
+    assert link_clearance(task)(arms).min() >= task.required_clearance
 
 
 def test_an_arm_led_along_a_curve_lies_on_it() -> None:

@@ -34,10 +34,13 @@ NARROW: Final = 0.3
 """Room below this part of the body's radius makes a way costly; [-]."""
 DETOUR: Final = 0.01
 """Doubtful cells on ways that cost so much more than the best are halved too; [-]."""
+LONGEST: Final = 2.0
+"""Length of a way, over the arm's, from which on that is no more; [-]."""
 MORE: Final = 5.0
 """How many times more that is at the largest number of cells; [-]."""
 AVOIDED: Final = 30.0
-"""Cost of the cells near a place that ways shall avoid, in their own; [-]."""
+"""Cost of the cells near a place to be avoided, in their own, for each time that it is;
+[-]."""
 AROUND: Final = 3.0
 """How near that is, over the body's radius; [-]."""
 CAP: Final = 0.6
@@ -50,6 +53,12 @@ SIZES: Final = (0.5, 0.2, 0.1)
 """How far away they are, round after round, over the body's radius; [-]."""
 FINER: Final = (0.05, 0.02, 0.01)
 """The same where it is narrow; [-]."""
+CHORDS: Final = 2.0
+"""What a way is worth more for chords with all the room that is worth having; [-]."""
+STEEP: Final = 0.85
+"""Part of the largest link angle that a way may bend by from chord to chord; [-]."""
+STEEP_COST: Final = 4.0
+"""What a way is worse for each part of that angle that it bends more; [-]."""
 BOW: Final = 0.2
 """Part of the room of a narrow place that the way between two points may bow; [-]."""
 
@@ -67,6 +76,7 @@ class _Cells(Octree):
         self.clearance, self.required = space.clearance, space.required
         self.radius, self.most = space.arm.most_radius, space.most
         self.reach = curled_reach(space.arm)
+        self.longest = LONGEST * space.arm.total_length
         self.avoided: list[FloatArray] = []
         super().__init__(corner, side)
 
@@ -93,10 +103,11 @@ class _Cells(Octree):
         clearances = np.where(doubt, clearances + radius, clearances)
         narrow = NARROW * self.radius
         cost = 2.0 * half * (1.0 + (narrow / np.maximum(clearances, CAP * narrow)) ** 2)
-        around = AROUND * self.radius
+        around = AROUND * self.radius + half
+        times = np.zeros(len(half))
         for place in self.avoided:
-            near = np.linalg.norm(centre - place, axis=1) < around + half
-            cost[near & ~doubt] *= AVOIDED
+            times += np.linalg.norm(centre - place, axis=1) < around
+        cost *= np.where(doubt | (times == 0.0), 1.0, AVOIDED * times)
         return np.where(shut, np.inf, cost), doubt
 
     def holders(self, points: FloatArray) -> IntArray:
@@ -119,14 +130,32 @@ class _Cells(Octree):
                 return None
             back = doubt_to(ends[1:], first, neighbours, cost)
             # The more cells there are, the more are halved at once.
-            wide = 1.0 + DETOUR * (1.0 + MORE * self.codes.size / self.most)
-            good = doubt & (there + back <= wide * best + cost)
+            detour = DETOUR * (1.0 + MORE * self.codes.size / self.most)
+            detour *= min(best, self.longest)
+            halved = doubt & (there + back <= best + detour + cost)
             route = self._traced(int(ends[1]), int(ends[0]), there, first, neighbours)
             if not doubt[route].any():
-                return np.vstack([start, self._through(route), goal])
+                points = np.vstack([start, self._through(route), goal])
+                halved = self._blocked(route, points)
+                if not halved.any():
+                    return points
             if self.codes.size > self.most:
                 return None
-            self.split(np.flatnonzero(good))
+            self.split(np.flatnonzero(halved))
+
+    def _blocked(self, route: IntArray, points: FloatArray) -> BoolArray:
+        """Cells to halve, as a way through them is blocked near a corner of theirs.
+
+        Args:
+            route: Cells of the way, shape (k,).
+            points: Where it enters and leaves them, shape (k + 1, 3); [m].
+        """
+        lines = np.stack([points[:-1], points[1:]], axis=1)
+        near = self.clearance(lines)[:, 0] < self.required
+        half = self.side / 2.0 ** (self.levels[route] + 1.0)
+        picked = np.zeros(self.codes.size, dtype=np.bool_)
+        picked[route[near & (half > LEAST * self.radius)]] = True
+        return picked
 
     def _through(self, route: IntArray) -> FloatArray:
         """Centres of the faces that a way passes, shape (k - 1, 3); [m]."""
@@ -325,15 +354,47 @@ class TipSpace:
     def _better(
         self, route: FloatArray, inner: IntArray, shifts: FloatArray
     ) -> FloatArray:
-        """The best of some places for every other point of a way, shape (n, 3)."""
+        """The best of some places for every other point of a way, shape (n, 3).
+
+        An arm that follows a way lays its links as chords on it, which bow to the
+        inside of a bend: a place is the better the more room the chords have that end
+        there, and the less one turns against the other.
+        """
         middle = (route[inner - 1] + route[inner + 1])[:, None] / 2.0
         own, radius = route[inner][:, None], self.arm.most_radius
         tried = np.concatenate([own, (own + middle) / 2.0, middle, own + shifts], 1)
-        spare = self._spare(tried.reshape(-1, 3)).reshape(tried.shape[:2])
+        shape, places = tried.shape[:2], tried.reshape(-1, 3)
+        back, ahead = (
+            np.repeat(ends, shape[1], axis=0) for ends in self._chords(route, inner)
+        )
+        spare = self._spare(places).reshape(shape)
         wide = np.minimum(spare / (NARROW * radius), 1.0)
-        bend = np.linalg.norm(tried - middle, axis=2) / radius
-        score = np.where(spare > 0.0, 2.0 * wide, 10.0 * (wide - 1.0)) - bend
+        score = np.where(spare > 0.0, 2.0 * wide, 10.0 * (wide - 1.0))
+        room = np.minimum(self._spare(places, back), self._spare(places, ahead))
+        room = np.clip(room.reshape(shape) / (NARROW * radius), -1.0, 1.0)
+        turn = angles_between(places - back, ahead - places).reshape(shape)
+        steep = np.maximum(0.0, turn / self.arm.max_link_angle - STEEP)
+        bow = np.linalg.norm(tried - middle, axis=2) / radius
+        score += CHORDS * room - bow - STEEP_COST * steep
         return np.asarray(tried[np.arange(len(inner)), score.argmax(axis=1)])
+
+    def _chords(
+        self, route: FloatArray, inner: IntArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Points of a way a link before and behind others, shape (n, 3) each; [m].
+
+        The link is the longest that passes there on the way.
+        """
+        sides = np.linalg.norm(np.diff(route, axis=0), axis=1)
+        along = np.append(0.0, np.cumsum(sides))
+        back = self.arm.link_lengths[::-1]
+        behind = np.append(0.0, np.cumsum(back)[:-1])
+        at = along[inner]
+        passing = np.searchsorted(behind, along[-1] - at, side="right") - 1
+        link = np.maximum.accumulate(back)[passing]
+        first = np.minimum(np.searchsorted(along, at - link), inner - 1)
+        last = np.clip(np.searchsorted(along, at + link), inner + 1, len(route) - 1)
+        return route[first], route[last]
 
 
 def resampled(route: FloatArray, spacing: float) -> FloatArray:
