@@ -231,7 +231,9 @@ class _Survival:
     ) -> None:
         self._asked, self._deadline = (problem, trajectory, errors), deadline
         # Nothing is refuted by a hull, and nothing survives that may enter it.
-        hulled = replace(problem, scene=with_hulls(problem.scene, hulls))
+        hulled = problem  # with what it keeps packed
+        if hulls:
+            hulled = replace(problem, scene=with_hulls(problem.scene, hulls))
         self._with_hulls = hulled, trajectory, errors
         number = ArmPairs(problem).number
         lower = np.append(proof.best[:, LOW], np.inf)  # -1 is no pair
