@@ -49,15 +49,19 @@ class Body(NamedTuple):
 
 @compiled
 def new_body(n_points: int, n_corners: int, room: int) -> Body:
-    """A body of points in the origin, not grown, with room for so many generators."""
+    """A body of points in the origin, not grown, with room for so many generators.
+
+    Without room for one its corners are never grown.
+    """
     apart()
+    grown = n_corners if room > 0 else 0
     count = np.zeros(2, np.int64)
     count[0], count[1] = n_points, n_corners
     return Body(
         np.zeros((n_points, 3)),
-        np.zeros((n_corners, room, 3)),
-        np.zeros(n_corners, np.int64),
-        np.zeros(n_corners),
+        np.zeros((grown, room, 3)),
+        np.zeros(grown, np.int64),
+        np.zeros(grown),
         np.zeros((2, 4)),
         count,
     )
