@@ -18,6 +18,7 @@ from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_check
 from vdsm_pin.verification import coal_distances as measuring
+from vdsm_pin.verification.approaches import CLOSEST
 from vdsm_pin.verification.coal_bodies import Measured
 from vdsm_pin.verification.coal_check import check_coal_obstacles
 from vdsm_pin.verification.coal_distances import (
@@ -28,7 +29,7 @@ from vdsm_pin.verification.coal_distances import (
 from vdsm_pin.verification.proved_lowers import ProvedLowers
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
-from vdsm_pin.verification.verify import CLOSEST, verify
+from vdsm_pin.verification.verify import verify
 
 HRM8 = built_in("hrm8")
 ROBOT = load_robot(HRM8)

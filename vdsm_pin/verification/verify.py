@@ -1,31 +1,23 @@
 """The judgement of a trajectory: every check, one row each, in a fixed order."""
 
 import math
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from math import nan
-from typing import Final, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.errors import InvalidInput, OutOfTime, UnknownName, VdsmError
-from vdsm_pin.geometry.arrays import FloatArray, frozen
-from vdsm_pin.geometry.winding import Side
+from vdsm_pin.errors import InvalidInput, OutOfTime, UnknownName
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.winding import Location, Side
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import with_hulls
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import step
-from vdsm_pin.proof.layouts import AT_UPPER, LOW, OTHER, OWN, TIME, UP
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.verification import (
-    cable_check,
-    coal_carried,
-    coal_check,
-    fk,
-    pointing,
-)
+from vdsm_pin.verification import cable_check, pointing
+from vdsm_pin.verification.approaches import closest_approaches
 from vdsm_pin.verification.arm_counterexamples import find_counterexamples
 from vdsm_pin.verification.clearance import (
     ClearanceProof,
@@ -37,7 +29,6 @@ from vdsm_pin.verification.coal_distances import reach_of
 from vdsm_pin.verification.coal_log import CoalLog
 from vdsm_pin.verification.enclosed import (
     EnclosedSink,
-    enclosed_approaches,
     enclosed_checks,
     enclosed_least,
     enclosed_profile,
@@ -59,21 +50,16 @@ from vdsm_pin.verification.records import (
     ArmVerification,
     Check,
     ClearanceSink,
-    ClosestApproach,
     Counterexample,
-    Verdict,
-    is_deepest,
 )
 from vdsm_pin.verification.robot_model import RobotModel
-from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
-from vdsm_pin.verification.task import ArmPairs, all_pairs, ball_of
+from vdsm_pin.verification.second_opinions import by_coal, by_pinocchio, guarded
+from vdsm_pin.verification.survival import Survival
+from vdsm_pin.verification.task import all_pairs
 from vdsm_pin.verification.tip import check_tip
 from vdsm_pin.verification.yes_or_no import is_certified
 
 T = TypeVar("T")
-
-CLOSEST: Final = 10
-"""Pairs listed as the closest approaches."""
 
 
 def verify(
@@ -113,79 +99,33 @@ def verify(
     """
     box = problem.errors.widened(errors or ErrorBox())
     _check_input(problem, trajectory, box)
+    asked, besides = _Asked(problem, trajectory, box, deadline), _Besides()
     located = locate_arm(problem, trajectory, box, deadline)
     around = bodies_inside(problem, trajectory, arm_inside(located))
-    kept = LowersSink(problem, trajectory)
-    wanted = [EnclosedSink(sink, problem, around) if around else sink for sink in sinks]
-    noted: TooClose | None = None
-    if sinks or kept.fits:
-        noted = TooClose(all_pairs(problem), max(1, trajectory.n_samples - 1))
-        wanted += [kept.keep, noted]
-    near = reach_of(problem) if reach is None else reach
-    near = math.inf if around else near
-    proof = prove_clearance(
-        problem, trajectory, box, wanted, deadline=deadline, reach=near
-    )
-    besides = _Besides()
-    none: tuple[Counterexample, ...] = ()
-    found = besides.take(
-        "search for counterexamples",
-        lambda: find_counterexamples(problem, trajectory, box, proof, deadline),
-        none,
-    )
-    nominal = bool(found) and besides.take(
-        "proof of the motion without errors",
-        lambda: _is_clear(problem, trajectory, deadline),
-        False,
-    )
-    nowhere: tuple[FirstContact, ...] = ()
-    contacts = besides.take(
-        "first contact",
-        lambda: first_contacts(
-            problem,
-            trajectory,
-            box,
-            proof,
-            deadline,
-            noted if proof.sent == proof.n_intervals else None,
-        ),
-        nowhere,
-    )
+    swept = _swept(asked, around, sinks, reach)
+    proof, met = swept.proof, _met(asked, swept, besides)
     if sinks and proof.sent < proof.n_intervals:
         besides.note(f"clearance.csv from interval {proof.sent} on", deadline)
     tip = check_tip(problem, trajectory)
     near_misses = closest_approaches(problem, trajectory, proof, around)
-    proved, log = kept.proved(proof), CoalLog(proof.pairs, near_misses, tuple(around))
+    log = CoalLog(proof.pairs, near_misses, tuple(around))
     checks = [
-        *_by_pinocchio(robot, problem, trajectory, centres, deadline),
+        *by_pinocchio(robot, problem, trajectory, centres, deadline),
         *check_limits(problem, trajectory),
         *tip.checks,
-        *_guarded(
+        *guarded(
             pointing.NAME,
             lambda: pointing.check_pointing(problem, trajectory, deadline, box),
         ),
         *check_inside(located),
-        *enclosed_checks(
-            check_clearance(problem, proof, found, contacts, deadline, nominal=nominal),
-            problem,
-            around,
-        ),
-        *_by_coal(robot, problem, trajectory, proved, deadline, log),
-        *_guarded(
+        *enclosed_checks(_clearance_rows(asked, proof, met), problem, around),
+        *by_coal(robot, problem, trajectory, swept.lowers, deadline, log),
+        *guarded(
             cable_check.NAME,
             lambda: cable_check.check_cables(problem, trajectory, deadline),
         ),
     ]
-    largest = refuted = nan
-    if joint_error and all(where.side is Side.OUTSIDE for where in located.values()):
-        hulls = unlocated(locate_start(problem, trajectory))
-        survival = _Survival(problem, trajectory, box, proof, deadline, hulls)
-        largest = besides.take("largest joint error", survival.largest, nan)
-        if not np.isnan(largest):
-            name = "joint error that loses the clearance"
-            refuted = besides.take(name, lambda: survival.refuted(largest), nan)
-    elif joint_error:
-        largest = 0.0
+    survived = _survived(asked, proof, located, besides) if joint_error else (nan, nan)
     return ArmVerification(
         problem=problem,
         trajectory=trajectory,
@@ -197,10 +137,10 @@ def verify(
         tip_deviation=tip.deviation,
         coverage=tip.coverage,
         undrawn=tip.undrawn,
-        joint_error=largest,
-        refuted_joint_error=refuted,
-        counterexamples=found,
-        nominal_clear=nominal,
+        joint_error=survived[0],
+        refuted_joint_error=survived[1],
+        counterexamples=met.counterexamples,
+        nominal_clear=met.nominal_clear,
         not_done=tuple(besides.not_done),
         time_limit=deadline.limit,
         least=enclosed_least(least_clearances(proof), proof.pairs, problem, around),
@@ -208,47 +148,21 @@ def verify(
     )
 
 
-def _is_clear(
-    problem: PlanningProblem, trajectory: Trajectory, deadline: Deadline
-) -> bool:
-    """Whether a motion is proved clear of everything, without errors."""
-    located = locate_arm(problem, trajectory, ErrorBox(), deadline)
-    outside = all(where.side is Side.OUTSIDE for where in located.values())
-    return outside and is_certified(problem, trajectory, ErrorBox(), deadline)
+@dataclass(frozen=True)
+class _Asked:
+    """What is judged, and until when.
 
+    Args:
+        problem: What is asked.
+        trajectory: The motion.
+        errors: Every motion within it is meant.
+        deadline: When to give up what is left.
+    """
 
-class _Survival:
-    """The joint error that the clearance survives, from both sides."""
-
-    def __init__(
-        self,
-        problem: PlanningProblem,
-        trajectory: Trajectory,
-        errors: ErrorBox,
-        proof: ClearanceProof,
-        deadline: Deadline,
-        hulls: Collection[str],
-    ) -> None:
-        self._asked, self._deadline = (problem, trajectory, errors), deadline
-        # Nothing is refuted by a hull, and nothing survives that may enter it.
-        hulled = problem  # with what it keeps packed
-        if hulls:
-            hulled = replace(problem, scene=with_hulls(problem.scene, hulls))
-        self._with_hulls = hulled, trajectory, errors
-        number = ArmPairs(problem).number
-        lower = np.append(proof.best[:, LOW], np.inf)  # -1 is no pair
-        self._least = lower[number].min(axis=0)
-        near = np.array([name in hulls for name in problem.scene.names], np.bool_)
-        self._least[near] = -math.inf
-
-    def largest(self) -> float:
-        """The largest that is proved; [rad]."""
-        return largest_joint_error(*self._with_hulls, self._deadline, self._least)
-
-    def refuted(self, largest: float) -> float:
-        """One that is lost, the smallest found; [rad]."""
-        known = self._deadline, self._least
-        return refuted_joint_error(*self._asked, largest, *known)
+    problem: PlanningProblem
+    trajectory: Trajectory
+    errors: ErrorBox
+    deadline: Deadline
 
 
 class _Besides:
@@ -271,45 +185,126 @@ class _Besides:
         self.not_done.append(f"{name}: {OutOfTime(deadline.limit)}")
 
 
-def _by_pinocchio(
-    robot: RobotModel,
-    problem: PlanningProblem,
-    trajectory: Trajectory,
-    centres: FloatArray | None,
-    deadline: Deadline,
-) -> tuple[Check, ...]:
-    """Joint centres against the closed form, and against those planned."""
-    rows = _guarded(fk.NAME, lambda: fk.check_fk(robot, problem, trajectory, deadline))
-    if centres is None:
-        return rows
-    planned = _guarded(
-        fk.PLANNED, lambda: fk.check_planned(robot, trajectory, centres, deadline)
+class _Swept(NamedTuple):
+    """What was proved of the clearance, and what was heard on the way.
+
+    Args:
+        proof: Of every pair.
+        lowers: Its lower bounds in every interval.
+        too_close: Where pairs come too close; None where not all was heard.
+    """
+
+    proof: ClearanceProof
+    lowers: ProvedLowers
+    too_close: TooClose | None
+
+
+def _swept(
+    asked: _Asked,
+    around: Enclosed,
+    sinks: Sequence[ClearanceSink],
+    reach: float | None,
+) -> _Swept:
+    """Prove the clearance; `sinks` and `reach` are those of `verify`."""
+    problem, trajectory = asked.problem, asked.trajectory
+    kept = LowersSink(problem, trajectory)
+    wanted = [EnclosedSink(sink, problem, around) if around else sink for sink in sinks]
+    noted: TooClose | None = None
+    if sinks or kept.fits:
+        noted = TooClose(all_pairs(problem), max(1, trajectory.n_samples - 1))
+        wanted += [kept.keep, noted]
+    near = reach_of(problem) if reach is None else reach
+    near = math.inf if around else near
+    proof = prove_clearance(
+        problem,
+        trajectory,
+        asked.errors,
+        wanted,
+        deadline=asked.deadline,
+        reach=near,
     )
-    return (*rows, *planned)
+    heard = noted if proof.sent == proof.n_intervals else None
+    return _Swept(proof, kept.proved(proof), heard)
 
 
-def _by_coal(
-    robot: RobotModel,
-    problem: PlanningProblem,
-    trajectory: Trajectory,
-    proved: ProvedLowers,
-    deadline: Deadline,
-    log: CoalLog,
+class _Met(NamedTuple):
+    """How bodies come too close.
+
+    Args:
+        counterexamples: Motions within the errors that do.
+        nominal_clear: Whether the motion without errors is proved clear of everything;
+            asked only where there are some.
+        contacts: When pairs do first.
+    """
+
+    counterexamples: tuple[Counterexample, ...]
+    nominal_clear: bool
+    contacts: tuple[FirstContact, ...]
+
+
+def _met(asked: _Asked, swept: _Swept, besides: _Besides) -> _Met:
+    """How bodies come too close, as far as there is time to say."""
+    problem, motion, box = asked.problem, asked.trajectory, asked.errors
+    proof, deadline = swept.proof, asked.deadline
+    none: tuple[Counterexample, ...] = ()
+    found = besides.take(
+        "search for counterexamples",
+        lambda: find_counterexamples(problem, motion, box, proof, deadline),
+        none,
+    )
+    nominal = bool(found) and besides.take(
+        "proof of the motion without errors", lambda: _is_clear(asked), False
+    )
+    nowhere: tuple[FirstContact, ...] = ()
+    contacts = besides.take(
+        "first contact",
+        lambda: first_contacts(problem, motion, box, proof, deadline, swept.too_close),
+        nowhere,
+    )
+    return _Met(found, nominal, contacts)
+
+
+def _clearance_rows(
+    asked: _Asked, proof: ClearanceProof, met: _Met
 ) -> tuple[Check, ...]:
-    """The second opinions on distances."""
-    motion = problem, trajectory
-    checks = {
-        coal_check.OBSTACLES: lambda: coal_check.check_coal_obstacles(
-            robot, *motion, proved, deadline, log
-        ),
-        coal_check.LINKS: lambda: coal_check.check_coal_links(
-            robot, *motion, deadline, log
-        ),
-        coal_carried.CARRIED: lambda: coal_carried.check_coal_carried(
-            robot, *motion, proved, log, deadline
-        ),
-    }
-    return tuple(row for name, run in checks.items() for row in _guarded(name, run))
+    return check_clearance(
+        asked.problem,
+        proof,
+        met.counterexamples,
+        met.contacts,
+        asked.deadline,
+        nominal=met.nominal_clear,
+    )
+
+
+def _survived(
+    asked: _Asked,
+    proof: ClearanceProof,
+    located: Mapping[str, Location],
+    besides: _Besides,
+) -> tuple[float, float]:
+    """The largest joint error that is proved, and the smallest found that is lost.
+
+    NaN where there was no time; nothing is proved of an arm that may be inside a mesh.
+    """
+    problem, motion, deadline = asked.problem, asked.trajectory, asked.deadline
+    if any(where.side is not Side.OUTSIDE for where in located.values()):
+        return 0.0, nan
+    hulls = unlocated(locate_start(problem, motion))
+    survival = Survival(problem, motion, asked.errors, proof, deadline, hulls)
+    largest = besides.take("largest joint error", survival.largest, nan)
+    if np.isnan(largest):
+        return nan, nan
+    name = "joint error that loses the clearance"
+    return largest, besides.take(name, lambda: survival.refuted(largest), nan)
+
+
+def _is_clear(asked: _Asked) -> bool:
+    """Whether a motion is proved clear of everything, without errors."""
+    problem, trajectory, deadline = asked.problem, asked.trajectory, asked.deadline
+    located = locate_arm(problem, trajectory, ErrorBox(), deadline)
+    outside = all(where.side is Side.OUTSIDE for where in located.values())
+    return outside and is_certified(problem, trajectory, ErrorBox(), deadline)
 
 
 def _check_input(
@@ -329,76 +324,3 @@ def _check_input(
         if one.name not in problem.scene.names:
             known = problem.scene.names
             raise UnknownName(kind="obstacle", name=one.name, known=known)
-
-
-def _guarded(
-    name: str, run: Callable[[], Check | tuple[Check, ...]]
-) -> tuple[Check, ...]:
-    """A check's rows; one undecided row where it could not be carried out."""
-    step("%s", name)
-    try:
-        rows = run()
-    except (VdsmError, ArithmeticError) as error:
-        return (Check(name, Verdict.UNDECIDED, 0, nan, nan, "-", f"not done: {error}"),)
-    return rows if isinstance(rows, tuple) else (rows,)
-
-
-def _station(
-    problem: PlanningProblem,
-    trajectory: Trajectory,
-    row: FloatArray,
-    link: int,
-    point: FloatArray,
-) -> float:
-    """Arc length along a link's axis of the place below its witness; [m]."""
-    joints = trajectory.joints_at(row[[AT_UPPER]] + row[TIME])
-    now = joints[:, 0], joints[:, 1::2], joints[:, 2::2]
-    centres = joint_centres(problem.manipulator, *now)[0]
-    length = float(problem.manipulator.link_lengths[link - 1])
-    axis = (centres[link] - centres[link - 1]) / length
-    along = float(axis @ (point - centres[link - 1]))
-    return min(max(along, 0.0), length)
-
-
-def closest_approaches(
-    problem: PlanningProblem,
-    trajectory: Trajectory,
-    proof: ClearanceProof,
-    around: Enclosed | None = None,
-) -> tuple[ClosestApproach, ...]:
-    """The pairs that come nearest, by their upper bounds; obstacles first.
-
-    Links keep near each other all the time, which is rarely news. The lower bound of
-    the nearest is narrowed; another may lie below it by the width of that bracket.
-
-    Args:
-        problem: Arm and scene.
-        trajectory: The motion.
-        proof: Of its distances.
-        around: What begins inside the meshes that the arm is inside of.
-    """
-    around = around or {}
-    rows = list(enclosed_approaches(problem, around))
-    of_links = np.array([not pair.obstacle for pair in proof.pairs])
-    seen = np.flatnonzero(np.isfinite(proof.best[:, UP]))
-    for k in seen[np.lexsort((proof.best[seen, UP], of_links[seen]))][:CLOSEST]:
-        pair, row = proof.pairs[k], proof.best[k]
-        if pair.own in around.get(pair.obstacle, ()):
-            continue
-        points = row[OWN:OTHER], row[OTHER : OTHER + 3]
-        # In a pair of links the sweep moves the second one against the first.
-        mine, theirs = points if pair.obstacle else points[::-1]
-        rows.append(
-            ClosestApproach(
-                interval=int(row[AT_UPPER]),
-                share=float(row[TIME]),
-                pair=pair,
-                lower=float(row[LOW]),
-                upper=float(row[UP]),
-                station=_station(problem, trajectory, row, pair.link, mine),
-                link_point=frozen(mine),
-                other_point=frozen(theirs),
-                deeper=is_deepest(float(row[UP]), ball_of(problem, pair)),
-            )
-        )
-    return tuple(rows[:CLOSEST])
