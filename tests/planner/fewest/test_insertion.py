@@ -25,6 +25,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.charts import coordinates
+from vdsm_pin.planner.fewest.elastic_band import resampled
 from vdsm_pin.planner.fewest.follow_the_leader import followed, led_along
 from vdsm_pin.planner.fewest.insertion import insert, tip_space
 from vdsm_pin.planner.fewest.insertion_population import Insertion, Layers
@@ -34,7 +35,7 @@ from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.fewest.sparsify import sparser
 from vdsm_pin.planner.fewest.strategy import plan_fewest
-from vdsm_pin.planner.fewest.tip_routes import TipSpace, resampled
+from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
@@ -255,7 +256,7 @@ def test_a_way_from_afar_does_not_cut_the_corners_of_its_cells() -> None:
     points = space._cells(ends).cheapest(*ends)
     assert points is not None
     lines = np.stack([points[:-1], points[1:]], axis=1)
-    assert link_clearance(task)(lines).min() >= space.required
+    assert link_clearance(task)(lines).min() >= space.room.required
 
 
 def test_the_way_through_a_bent_tube_is_one_that_an_arm_can_follow() -> None:
