@@ -44,6 +44,21 @@ def test_who_takes_it_for_a_failure_is_interrupted_again() -> None:
     assert len(heard) == 1
 
 
+def test_a_library_that_tells_it_as_an_error_of_its_own_is_not_believed() -> None:
+    with pytest.raises(OutOfTime, match="the time limit of 2 s came first"):
+        with enforced(OVER):
+            try:
+                for_ever()
+            except OutOfTime as error:
+                message = f"Error building a serializer: {error}"
+                raise RuntimeError(message) from error
+    with pytest.raises(RuntimeError, match="an error before"), enforced(NO_LIMIT):
+        message = "an error before"
+        raise RuntimeError(message)
+    with pytest.raises(RuntimeError), enforced(Deadline.after(1e6)):
+        raise RuntimeError
+
+
 def test_work_that_ends_in_time_is_left_alone() -> None:
     before = signal.getsignal(signal.SIGALRM)
     with enforced(Deadline.after(1e6)):

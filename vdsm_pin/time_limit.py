@@ -83,7 +83,11 @@ def enforced(deadline: Deadline, grace: float = GRACE) -> Iterator[None]:
         yield
         return
 
+    rung = False
+
     def ring(*_: object) -> None:
+        nonlocal rung
+        rung = True
         raise OutOfTime(deadline.limit)
 
     before = signal.signal(signal.SIGALRM, ring)
@@ -91,6 +95,11 @@ def enforced(deadline: Deadline, grace: float = GRACE) -> Iterator[None]:
     try:
         signal.setitimer(signal.ITIMER_REAL, max(left, 1e-6), AGAIN)
         yield
+    except Exception as error:
+        if rung and not isinstance(error, OutOfTime):
+            # A library told the interruption as an error of its own.
+            raise OutOfTime(deadline.limit) from error
+        raise
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
