@@ -290,10 +290,14 @@ def test_joints_that_stand_still_are_not_moved(
     found = read_motion(file, robot.joints, values=robot.values)
     assert found.names == ("turn",)
     assert found.notes == ()
-    q[2, 1] += 5e-4
+    q[2, 1] += 5e-7
     file = written(tmp_path, ending, replace(given, q=q), whole)
     found = read_motion(file, robot.joints, values=robot.values)
-    assert found.notes == ("joint 'slide' is up to 0.0005 off where it is judged",)
+    assert found.notes == ("joint 'slide' is up to 5e-07 off where it is judged",)
+    q[2, 1] += 2e-6
+    file = written(tmp_path, ending, replace(given, q=q), whole)
+    with pytest.raises(InvalidFile, match=r"'slide' at .* stands still and is judged"):
+        read_motion(file, robot.joints, values=robot.values)
 
 
 def test_joints_that_follow_agree_with_what_they_follow(
@@ -305,6 +309,9 @@ def test_joints_that_follow_agree_with_what_they_follow(
         file = write(tmp_path, "t.csv", rows)
         if not why:
             assert read_motion(file, robot.joints, values=robot.values).notes == ()
+            near = write(tmp_path, "n.csv", rows.replace("0.3\n", "0.3005\n"))
+            (note,) = read_motion(near, robot.joints, values=robot.values).notes
+            assert note == "joint 'follow' is up to 0.0005 off where it is judged"
             continue
         with pytest.raises(InvalidFile, match=why):
             read_motion(file, robot.joints, values=robot.values)

@@ -27,8 +27,11 @@ if TYPE_CHECKING:  # whoever reads waypoints alone needs no pieces
 MOST_TURNS: Final = 4.0 * np.pi
 """An angle beyond this must be in degrees; [rad]."""
 
+ROUNDED: Final = 1e-6
+"""How far a joint that stands still may be written elsewhere; [rad], [m]."""
+
 NOISE: Final = 1e-3
-"""How far a joint that is judged by others may be measured elsewhere; [rad], [m]."""
+"""How far a joint that mimics another may be measured elsewhere; [rad], [m]."""
 
 
 def read_motion(
@@ -83,17 +86,20 @@ def read_motion(
 def _agree(
     file: File, q: FloatArray, others: Mapping[str, FloatArray], values: Values
 ) -> Iterator[str]:
-    """Notes on joints that are judged by others, near where the file has them.
+    """Notes on joints that mimic others, near where the file has them.
+
+    One that moves though it stands still is refused by more than the rounding of a
+    file: without its lock it is judged as it moves.
 
     Raises:
-        InvalidFile: If one is farther off than what is measured of it may be.
+        InvalidFile: If a joint is elsewhere than it is judged.
     """
     for name, stated in others.items():
         column, ratio, offset = values[name]
         judged = offset + (ratio * q[:, column] if column is not None else 0.0 * stated)
         off = np.abs(stated - judged)
         row = int(np.argmax(off))
-        if not off[row] <= NOISE:
+        if not off[row] <= (ROUNDED if column is None else NOISE):
             why = "stands still" if column is None else "mimics another"
             problem = (
                 f"has joint {name!r} at {stated[row]:.6g} at waypoint {row}, but it "
