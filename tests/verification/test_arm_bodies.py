@@ -39,6 +39,7 @@ from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_bodies import coal_bodies, distance_request, measure
 from vdsm_pin.verification.records import ClearanceChunk, Pair, Verdict
 from vdsm_pin.verification.robot_model import load_robot
+from vdsm_pin.verification.task import ArmPairs
 from vdsm_pin.verification.verify import verify
 
 LENGTHS = np.array([0.5, 0.4, 0.4, 0.45])
@@ -103,6 +104,13 @@ def test_a_tool_is_held_off_the_link_before_its_own() -> None:
     short = arm_with(tool=Tool(0.44, 0.012))
     left = self_pairs(short, arm_bodies(short)).left_out
     assert ("link 3", "tool") in {(row.body, row.other) for row in left}
+
+
+def test_one_pair_is_named_as_among_all() -> None:
+    balls = [solids.Sphere(name, np.array([9.0, 0, 0]), 0.1) for name in ("a", "b")]
+    pairs = ArmPairs(problem_with(arm_with(tool=TOOL), *balls))
+    assert {pair.obstacle for pair in pairs.pairs} == {"a", "b", ""}
+    assert [pairs.pair(k) for k in range(pairs.size)] == [*pairs.pairs]
 
 
 @pytest.mark.parametrize("field", ["radius", "length"])

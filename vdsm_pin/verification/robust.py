@@ -27,7 +27,7 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.arm_counterexamples import arm_question, of_best
 from vdsm_pin.verification.counterexample import Search
 from vdsm_pin.verification.proving import prove_problem
-from vdsm_pin.verification.task import all_pairs, obstacle_growth
+from vdsm_pin.verification.task import ArmPairs, obstacle_growth
 from vdsm_pin.verification.yes_or_no import YesOrNoProof, is_certified
 
 LARGEST: Final = float(np.deg2rad(45.0))
@@ -290,10 +290,9 @@ def _smallest(
     best, counts = proof.best, proof.proving.results.counts
     among = np.flatnonzero(counts[:, UNDECIDED] > 0)
     nearest = among[np.argsort(best[among, LOW], kind="stable")][:SOUGHT]
-    pairs = all_pairs(problem)
-    searches = []
-    for k in nearest:
+    pairs, searches = ArmPairs(problem), []
+    for k in nearest.tolist():
         deadline.check()
-        search = Search(arm_question(problem, trajectory, pairs[k], errors))
+        search = Search(arm_question(problem, trajectory, pairs.pair(k), errors))
         searches.append(search.smallest(of_best(best[k])))
     return [float(np.abs(found.offsets[1:]).max()) for found in searches if found]

@@ -82,16 +82,22 @@ class ArmPairs:
             Pair(own[b][0], names[o], body=own[b][1])
             for b, o in zip(*self.outer.T.tolist(), strict=True)
         ]
-        rows += [
-            Pair(
-                self.bodies[i].link,
-                other_link=self.bodies[k].link,
-                body=self._named(i),
-                other_body=self._named(k),
-            )
-            for i, k in self.between.held.tolist()
-        ]
+        rows += [self.pair(k) for k in range(len(rows), self.size)]
         return tuple(rows)
+
+    def pair(self, number: int) -> Pair:
+        """One of them; of a hundred thousand obstacles all are a million."""
+        if number < len(self.outer):
+            b, o = self.outer[number].tolist()
+            obstacle = self.problem.scene.obstacles[o]
+            return Pair(self.bodies[b].link, obstacle.name, body=self._named(b))
+        i, k = self.between.held[number - len(self.outer)].tolist()
+        return Pair(
+            self.bodies[i].link,
+            other_link=self.bodies[k].link,
+            body=self._named(i),
+            other_body=self._named(k),
+        )
 
     def _named(self, body: int) -> str:
         return "" if body < self.problem.manipulator.n_links else self.bodies[body].name
