@@ -112,13 +112,18 @@ class RobotOptions(NamedTuple):
             refuse_beside("a problem", self.named())
             return read_cell(problem)
         return cell_of(
-            self._files(),
+            self.files(),
             self.scene,
             (self.required_clearance_mm or 0.0) / MM_PER_M,
             (self.required_self_clearance_mm or 0.0) / MM_PER_M,
         )
 
-    def _files(self) -> "RobotFiles":
+    def files(self) -> "RobotFiles":
+        """Those of the robot.
+
+        Raises:
+            InvalidInput: If there is no URDF.
+        """
         from vdsm_pin.robots.cell import locks
         from vdsm_pin.robots.files import RobotFiles, solids_of
 
@@ -134,29 +139,6 @@ class RobotOptions(NamedTuple):
             solids_of(self.bodies, self.parts),
             self.joint_limits,
         )
-
-    def stated(self, cell: "Cell", path: Path, trajectory: Path) -> "Cell":
-        """The same cell, read from a problem file that is written for it.
-
-        Args:
-            cell: What the options ask, errors included.
-            path: Where the file goes.
-            trajectory: What is verified.
-
-        Raises:
-            InvalidInput: If the file cannot be written, or is one that is read.
-        """
-        from vdsm_pin.io.atomic import atomic_path
-        from vdsm_pin.report.folder import check_kept, check_output_file
-        from vdsm_pin.robots.cell import read_cell
-        from vdsm_pin.robots.problem_text import problem_text
-
-        check_output_file(path)
-        check_kept([path], [*cell.files, trajectory])
-        text = problem_text(cell, self._files(), self.scene, path.parent)
-        with atomic_path(path) as temporary:
-            temporary.write_text(text, encoding="utf-8")
-        return read_cell(path).under(cell.errors)
 
     def named(self) -> dict[str, object]:
         """By the names of the command line."""

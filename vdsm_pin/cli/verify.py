@@ -168,11 +168,11 @@ def _stated(
     source: "ProblemFile | Cell", robot: RobotOptions, certificate: Path, motion: Path
 ) -> "Cell":
     """What options ask, from the problem file that their certificate is about."""
+    from vdsm_pin.app.stated_problem import stated_cell
     from vdsm_pin.robots.cell import Cell
 
     assert isinstance(source, Cell)  # of a URDF
-    beside = certificate.with_name(f"{certificate.name}.yaml")
-    return robot.stated(source, beside, motion)
+    return stated_cell(source, robot.files(), robot.scene, certificate, motion)
 
 
 def _passes(order: "VerifyOrder", said: Said) -> bool:
@@ -185,10 +185,12 @@ def _passes(order: "VerifyOrder", said: Said) -> bool:
         verified = verify_to_folder(order)
     written: list[tuple[str, str]] = []
     if order.certificate is not None:
+        from vdsm_pin.app.stated_problem import problem_beside
+
         none = verified.no_certificate
         what = f"none: {none}" if none else str(order.certificate)
         written.append(("certificate", what))
-        if not none and order.read.path.name == f"{order.certificate.name}.yaml":
+        if not none and order.read.path == problem_beside(order.certificate):
             written.append(("its problem file", str(order.read.path)))
     if order.pdf is not None:
         written.append(("report on paper", str(order.pdf)))
