@@ -228,6 +228,22 @@ def _move_joint(tree: PackedTree, q: FloatArray, joint: int, pose: Pose) -> None
     _move_frame(tree, joint, value, pose.origins, pose.frames)
 
 
+class TreePoses:
+    """Where the frames of a tree stand, as the proof has it.
+
+    Args:
+        tree: The joints.
+    """
+
+    def __init__(self, tree: Tree) -> None:
+        self._packed = pack_tree(tree)
+
+    def __call__(self, q: FloatArray) -> FloatArray:
+        """T_world_frame at rows of q (n, n_columns), shape (n, n_frames, 4, 4); [m]."""
+        rows = np.ascontiguousarray(q, dtype=np.float64)
+        return np.asarray(place_rows(self._packed, rows))
+
+
 @compiled
 def place_rows(tree: PackedTree, q: FloatArray) -> FloatArray:
     """All frames at rows of q (n_rows, n_columns), (n_rows, n_frames, 4, 4)."""

@@ -93,7 +93,7 @@ def placed_corners(verification: RobotVerification) -> list[FloatArray]:
     near = verification.approaches[:1]
     interval = np.array([one.interval for one in near] or [0])
     share = np.array([one.share for one in near] or [0.0])
-    poses = cell.robot.tree.poses(path.within(interval, share))[0]
+    poses = cell.robot.poses(path.within(interval, share))[0]
     found = []
     for body in cell.robot.bodies:
         pose = poses[body.frame]

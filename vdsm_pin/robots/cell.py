@@ -14,7 +14,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.bodies import Body, Pair
-from vdsm_pin.proof.packed_tree import PackedTree, pack_tree, place_rows
+from vdsm_pin.proof.packed_tree import TreePoses
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.coal_pairs import CoalPairs
 from vdsm_pin.robots.errors import check_errors
@@ -25,7 +25,7 @@ from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.moving import frames_beside, tree_beside
 
-BASE: Final = 1
+ROOT_FRAME: Final = 1
 """The frame that obstacles stand in: of the root link, where it does not move."""
 
 
@@ -83,14 +83,10 @@ class Cell:
         """The robot's joints first, then those that carry obstacles."""
         return tree_beside(self.robot.tree, self.scene)
 
-    def poses(self, q: FloatArray) -> FloatArray:
-        """T_world_frame at rows of q as the proof has it, (n, n_frames, 4, 4); [m]."""
-        rows = np.ascontiguousarray(q, dtype=np.float64)
-        return np.asarray(place_rows(self._packed, rows))
-
     @cached_property
-    def _packed(self) -> PackedTree:
-        return pack_tree(self.tree)
+    def poses(self) -> TreePoses:
+        """T_world_frame of its frames, a function of rows of q."""
+        return TreePoses(self.tree)
 
     @cached_property
     def bodies(self) -> list[Body]:
@@ -225,7 +221,7 @@ def locks(words: tuple[str, ...]) -> dict[str, float]:
 
 def _others(robot: Robot) -> list[str]:
     """Names of the links besides those that stand as the root link does."""
-    return [name for name, frame in robot.frames.items() if frame != BASE]
+    return [name for name, frame in robot.frames.items() if frame != ROOT_FRAME]
 
 
 def _size(robot: Robot) -> float:

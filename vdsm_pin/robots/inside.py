@@ -55,7 +55,7 @@ def locate_links(
         By the number of their pair.
     """
     solids = [solid_of(one) for one in cell.scene.obstacles]
-    n, poses = len(cell.robot.bodies), cell.tree.poses(path.knots[:1])[0]
+    n, poses = len(cell.robot.bodies), cell.poses(path.knots[:1])[0]
     found = dict[int, Place]()
     for k, pair in enumerate(cell.pairs):
         mesh = solids[pair.one - n] if pair.one >= n else None

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.errors import OutOfTime, VdsmError
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.winding import Side
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
@@ -90,7 +90,7 @@ def verify_robot(
     least = enclosed(least, located)
     profile = profile_of(proof.profile, proof.stride, knots, len(robot.bodies))
     late = "" if proof.in_time else f": {OutOfTime(deadline.limit)}"
-    lost, not_done = _lost(cell, whole, proof, least, deadline)
+    lost, not_done = _lost(cell, whole, named, least, proof.lower_interval, deadline)
     lost, least = told_all(lost, knots), told(least, knots)
     outside = all(one.where.side is Side.OUTSIDE for one in located.values())
     clear = bool(lost) and outside and _is_clear(cell, whole, deadline)
@@ -119,10 +119,14 @@ def verify_robot(
 
 
 def _lost(
-    cell: Cell, path: Path, proof: Proof, least: LeastClearances, deadline: Deadline
+    cell: Cell,
+    path: Path,
+    pairs: tuple[Pair, ...],
+    least: LeastClearances,
+    weakest: IntArray,
+    deadline: Deadline,
 ) -> tuple[tuple[Counterexample, ...], tuple[str, ...]]:
     """Counterexamples of what errors leave undecided, and what was not done in time."""
-    pairs, weakest = named_pairs(cell), proof.lower_interval
     try:
         return robot_counterexamples(cell, path, pairs, least, weakest, deadline), ()
     except OutOfTime as error:
@@ -201,11 +205,8 @@ def _limits(robot: Robot, path: Path) -> list[Check]:
 
 def _limit(joint: RobotJoint, path: Path, k: int) -> Check:
     """Of the joint of column k; control points hold what lies between waypoints."""
-    slack, knots, between = (
-        TOLERANCES.arithmetic,
-        path.knots[:, k],
-        path.controls[..., k],
-    )
+    slack = TOLERANCES.arithmetic
+    knots, between = path.knots[:, k], path.controls[..., k]
     past = np.maximum(knots - joint.upper, joint.lower - knots)
     row = int(np.argmax(past))
     verdict, value, moment = Verdict.CERTIFIED, float(knots[row]), float(row)

@@ -8,10 +8,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.proof.bodies import Body
-from vdsm_pin.proof.packed_tree import PackedTree, pack_tree, place_rows
+from vdsm_pin.proof.packed_tree import TreePoses
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.files import HULLS, Solids
 from vdsm_pin.robots.srdf import Base
@@ -105,11 +105,6 @@ class Robot:
         return {one.name: (one.column, one.ratio, one.offset) for one in joints}
 
     @cached_property
-    def _packed(self) -> PackedTree:
-        """The tree as the proof reads it."""
-        return pack_tree(self.tree)
-
-    def poses(self, q: FloatArray) -> FloatArray:
-        """T_world_frame at rows of q as the proof has it, (n, n_frames, 4, 4); [m]."""
-        rows = np.ascontiguousarray(q, dtype=np.float64)
-        return np.asarray(place_rows(self._packed, rows))
+    def poses(self) -> TreePoses:
+        """T_world_frame of its frames, a function of rows of q."""
+        return TreePoses(self.tree)

@@ -54,6 +54,7 @@ def read_motion(
         InvalidFile: If a joint is missing, there twice or elsewhere than it is judged,
             or a value is no number or in another unit than stated.
     """
+    values = values or {}
     if topic is not None and not is_bag(file):
         problem = f"is no bag, so --topic {topic} has no meaning"
         raise InvalidFile(file=file, problem=problem)
@@ -64,22 +65,22 @@ def read_motion(
         if file.suffix.lower() in ENDINGS:
             whole = read_joint_trajectory(file)
         else:
-            whole = read_csv(file, joints, values or {})
+            whole = read_csv(file, joints, values)
     found = _of_joints(file, whole, joints)
     _check_units(file, found.q, joints)
     others = {
         name: whole.q[:, k]
         for k, name in enumerate(whole.names)
-        if name in (values or {}) and name not in found.names
+        if name in values and name not in found.names
     }
-    known = {*(values or {}), *found.names}
+    known = {*values, *found.names}
     unread = [
         name
         for name in whole.names
         if name not in known and f"{name.rpartition('/')[0]}/theta" not in known
     ]
     notes = [f"joints that are not read: {listed(unread)}"] if unread else []
-    notes += _agree(file, found.q, others, values or {})
+    notes += _agree(file, found.q, others, values)
     return replace(found, notes=(*whole.notes, *notes))
 
 

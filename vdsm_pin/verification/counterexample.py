@@ -166,7 +166,7 @@ class Search:
 
     def _slopes(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The same, and how it changes with every joint, shape (m, n_columns)."""
-        q, parts = np.ascontiguousarray(q), range(self.task.pairs.body.size)
+        q, parts = np.ascontiguousarray(q), range(len(self.task.pairs.rough))
         found = (pair_slopes(self.task, part, q) for part in parts)
         gaps, slopes = map(np.stack, zip(*found, strict=True))
         nearest = np.argmin(gaps, axis=0), np.arange(len(q))
