@@ -254,7 +254,7 @@ def counted() -> Iterator[Counts]:
         return solve(*arguments)
 
     def choosing(*arguments: Any) -> Any:
-        counts.sections += len(arguments[7])
+        counts.sections += len(arguments[1].numbers)
         return best(*arguments)
 
     with (

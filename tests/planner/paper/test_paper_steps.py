@@ -20,7 +20,7 @@ from vdsm_pin.planner.feasibility import (
     straight_reach,
 )
 from vdsm_pin.planner.paper.danger_region import DangerRegion
-from vdsm_pin.planner.paper.joint_paths import slide_joints
+from vdsm_pin.planner.paper.joint_paths import SideRule, slide_joints
 from vdsm_pin.planner.paper.lift import largest_angles, lift
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.scale import scale
@@ -147,8 +147,9 @@ def test_joints_end_outside_the_region_or_in_proportion(kind: str) -> None:
     tip = rng.uniform([0.7, 0.5], [1.2, 1.4], (400, 2))
     tip = tip[~region.contains(tip)]
     up = np.array([0.0, 1.0])
-    for direction in (up, None):
-        planar = slide_joints(HRM8, tip, region, np.zeros(8), 1, direction)
+    for direction in (up, np.zeros(2)):
+        rule = SideRule(region, 1, direction, np.zeros(8))
+        planar = slide_joints(HRM8, tip, rule)
         moved = 0
         for i in range(8, 1, -1):
             reference = HRM8.ratio(i, i + 1) * planar[:, i]
@@ -158,7 +159,7 @@ def test_joints_end_outside_the_region_or_in_proportion(kind: str) -> None:
             gaps = shapely.distance(core, shapely.points(joint[~outside]))
             np.testing.assert_allclose(gaps, 0.2, atol=1e-12)
             shift = joint[~outside] - reference[~outside]
-            if direction is None:
+            if not direction.any():
                 radii = np.linalg.norm(joint, axis=1)
                 np.testing.assert_allclose(radii, np.linalg.norm(reference, axis=1))
             else:
@@ -173,9 +174,9 @@ def test_a_margin_moves_the_joints_of_its_link_alone() -> None:
     region, up = disc(0.7, 0.6, 0.302), np.array([0.0, 1.0])
     tip = np.array([[1.0, 0.6 + np.sqrt(0.302**2 - 0.3**2)]])
     margins = np.zeros(8)
-    before = slide_joints(HRM8, tip, region, margins, 1, up)
+    before = slide_joints(HRM8, tip, SideRule(region, 1, up, margins))
     margins[4] = 0.020
-    after = slide_joints(HRM8, tip, region, margins, 1, up)
+    after = slide_joints(HRM8, tip, SideRule(region, 1, up, margins))
     gaps = np.linalg.norm(after[0, 3:8] - [0.7, 0.6], axis=1)
     # Joints 4 to 8 slide; 4 follows 5 in proportion unless it is inside again.
     np.testing.assert_allclose(gaps[[1, 2]], 0.322, atol=1e-12)
@@ -187,7 +188,8 @@ def test_figure_8_only_deviated_joints_bend() -> None:
     """obs1, tip at A5: P_8..P_4 on the boundary, P_3 and P_2 in proportion (6.2.1)."""
     region = disc(0.7, 0.6, 0.302)
     tip = np.array([[1.0, 0.6 + np.sqrt(0.302**2 - 0.3**2)]])
-    planar = slide_joints(HRM8, tip, region, np.zeros(8), 1, np.array([0.0, 1.0]))
+    rule = SideRule(region, 1, np.array([0.0, 1.0]), np.zeros(8))
+    planar = slide_joints(HRM8, tip, rule)
     centres = lift(HRM8, planar, np.array([3.126]))
     psi = np.rad2deg(link_angles(*joint_angles(HRM8, centres)))[0]
     np.testing.assert_array_equal(psi > 1e-6, [1, 0, 0, 1, 1, 1, 1, 1])

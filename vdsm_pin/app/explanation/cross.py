@@ -8,8 +8,8 @@ import numpy as np
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.paper.danger_region import DangerRegion
+from vdsm_pin.planner.paper.joint_paths import SideRule
 from vdsm_pin.planner.paper.region_kernels import leave_along
-from vdsm_pin.planner.paper.side_rules import SideRule
 
 DIRECTIONS: Final = np.array([[0.0, 1.0], [0.0, -1.0], [1.0, 0.0], [-1.0, 0.0]])
 """From P'_i up, down, to larger and to smaller y."""

@@ -138,7 +138,7 @@ def joints_step(moment: Moment) -> Part:
         return Part(
             title,
             source,
-            _cross_words(found, rule.direction is None),
+            _cross_words(found, not rule.direction.any()),
             (_cross_table(moment, found),),
             tuple(
                 pictures.cross_picture(moment, one, [avoidance.forbidden])

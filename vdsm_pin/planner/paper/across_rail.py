@@ -19,7 +19,12 @@ import shapely
 
 from vdsm_pin.errors import PathBlocked
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.planner.paper.bend_kernels import clear_bends, least_moves
+from vdsm_pin.planner.paper.bend_kernels import (
+    Bends,
+    Passing,
+    clear_bends,
+    least_moves,
+)
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.lift import largest_angles
 from vdsm_pin.planner.paper.project import project
@@ -116,18 +121,9 @@ class AcrossRail:
 
     def _least_move(self, reference: FloatArray, tip_x: FloatArray) -> FloatArray:
         """Smallest move of the bends that clears the region, (n,); [m]."""
-        moves = least_moves(
-            self.region.corners,
-            self._radii,
-            self._pieces,
-            self.axis,
-            self._knots(reference),
-            reference[:, -1],
-            tip_x,
-            self.side * self._farthest(reference),
-            SCAN,
-            HALVINGS,
-        )
+        farthest = self.side * self._farthest(reference)
+        bends = self._arms(reference, tip_x)
+        moves = least_moves(self._passing, bends, farthest, SCAN, HALVINGS)
         if np.isnan(moves).any():
             row = int(np.argmax(np.isnan(moves)))
             tip = np.array([tip_x[row], *reference[row, -1]])
@@ -160,19 +156,16 @@ class AcrossRail:
 
     def clear(self, planar: FloatArray, tip_x: FloatArray) -> BoolArray:
         """Whether the arm of straight pieces stays out of the region, (n,)."""
-        return clear_bends(
-            self.region.corners,
-            self._radii,
-            self._pieces,
-            self.axis,
-            self._knots(planar),
-            planar[:, -1],
-            tip_x,
-        )
+        return clear_bends(self._passing, self._arms(planar, tip_x))
 
-    def _knots(self, planar: FloatArray) -> FloatArray:
-        """The joints that move, shape (n, len(bends), 2); [m]."""
-        return np.ascontiguousarray(planar[:, self._ends[1:-1]])
+    def _arms(self, planar: FloatArray, tip_x: FloatArray) -> Bends:
+        """The arms by the joints that move and their tips."""
+        knots = np.ascontiguousarray(planar[:, self._ends[1:-1]])
+        return Bends(knots, planar[:, -1], tip_x)
+
+    @property
+    def _passing(self) -> Passing:
+        return Passing(self.region.corners, self._radii, self._pieces, self.axis)
 
     @property
     def _ends(self) -> list[int]:

@@ -15,17 +15,12 @@ from vdsm_pin.errors import PathBlocked
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.detours import detour_route, first_station, path_rows
+from vdsm_pin.planner.paper.joint_paths import SideRule, slide_joints
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.region_kernels import core_gaps
 from vdsm_pin.planner.paper.sections import Section, grown_by, planned_gap
 from vdsm_pin.planner.paper.shadow import Shadow
-from vdsm_pin.planner.paper.side_rules import (
-    SideRule,
-    anchors,
-    bends,
-    choose_rule,
-    slid,
-)
+from vdsm_pin.planner.paper.side_rules import anchors, bends, choose_rule
 from vdsm_pin.planner.paper.tip_path import Route
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.units import in_mm
@@ -74,7 +69,7 @@ class AlongRail:
         for side, rule in self.rules.items():
             rows = np.flatnonzero(route.side == side)
             if len(rows):
-                planar[rows] = slid(manipulator, tip[rows], rule)
+                planar[rows] = slide_joints(manipulator, tip[rows], rule)
         return planar
 
     def bends(self, points: FloatArray, side: int) -> FloatArray:

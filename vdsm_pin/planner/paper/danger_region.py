@@ -13,7 +13,12 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen, read_only
-from vdsm_pin.planner.paper.region_kernels import core_distances, core_gaps, sides_of
+from vdsm_pin.planner.paper.region_kernels import (
+    Core,
+    core_distances,
+    core_gaps,
+    sides_of,
+)
 from vdsm_pin.planner.paper.way_kernels import covered, walk_round
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -51,6 +56,11 @@ class DangerRegion:
     def sides(self) -> FloatArray:
         """Straight parts of the boundary, shape (n, 2 ends, 2); [m]."""
         return frozen(sides_of(self.corners, self.radius))
+
+    @property
+    def core(self) -> Core:
+        """The region, as compiled code takes it."""
+        return Core(self.corners, self.radius)
 
     def grown(self, margin: float) -> "DangerRegion":
         """The same region, farther out by a margin; [m]."""

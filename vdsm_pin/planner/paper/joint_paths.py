@@ -1,11 +1,32 @@
 """Step 5: the joints' projected paths round an obstacle (paper, 4.3, Eq. 8-10)."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.paper.danger_region import DangerRegion
-from vdsm_pin.planner.paper.sliding_kernels import slide_chains
+from vdsm_pin.planner.paper.sliding_kernels import Links, slide_chains, slide_of
+
+
+@dataclass(frozen=True)
+class SideRule:
+    """How joints get out of the danger region on one side.
+
+    Args:
+        region: What they slide on, in the plane Y0Z0.
+        side: On which side of the region the arm passes, 1 for the larger polar angle
+            about P_1, -1 for the smaller.
+        direction: The auxiliary lines, a unit vector towards that side, shape (2,);
+            zero for the circles about P_1 through P'_i; [-].
+        margins: How far the region is grown for each link, shape (N,); [m].
+    """
+
+    region: DangerRegion
+    side: int
+    direction: FloatArray
+    margins: FloatArray
 
 
 def chain_ratios(manipulator: Manipulator) -> FloatArray:
@@ -13,13 +34,15 @@ def chain_ratios(manipulator: Manipulator) -> FloatArray:
     return manipulator.stations[:-1] / manipulator.stations[1:]
 
 
+def links_of(manipulator: Manipulator, margins: FloatArray) -> Links:
+    """The arm as compiled code takes it, its cone and box kept by the link angle."""
+    largest = min(manipulator.max_link_angle, manipulator.max_joint_angle)
+    ratios, lengths = chain_ratios(manipulator), manipulator.link_lengths
+    return Links(ratios, lengths, margins, float(np.cos(largest)))
+
+
 def slide_joints(
-    manipulator: Manipulator,
-    tip: FloatArray,
-    region: DangerRegion,
-    margins: FloatArray,
-    side: int,
-    direction: FloatArray | None,
+    manipulator: Manipulator, tip: FloatArray, rule: SideRule
 ) -> FloatArray:
     """Joints in the danger region slide onto its boundary, from the tip to the base.
 
@@ -30,19 +53,13 @@ def slide_joints(
     Args:
         manipulator: The arm with its ratios.
         tip: Projected tip P_{N+1}, shape (n_samples, 2); [m].
-        region: The danger region, in the plane Y0Z0.
-        margins: How far it is grown for each link, shape (N,); [m].
-        side: On which side of the region the arm passes, 1 for the larger polar angle
-            about P_1, -1 for the smaller.
-        direction: The auxiliary lines, a unit vector towards that side, shape (2,); or
-            None for the circles about P_1 through P'_i; [-].
+        rule: The region and how joints get out of it.
 
     Returns:
         P_1..P_{N+1}, shape (n_samples, N + 1, 2); [m].
     """
     planar = np.zeros((len(tip), manipulator.n_links + 1, 2))
     planar[:, -1] = tip
-    line = np.zeros(2) if direction is None else direction
-    ratios = chain_ratios(manipulator)
-    slide_chains(region.corners, region.radius, ratios, margins, side, line, planar)
+    slide = slide_of(rule.region.core, rule.side, rule.direction)
+    slide_chains(slide, links_of(manipulator, rule.margins), planar)
     return planar

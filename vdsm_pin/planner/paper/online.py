@@ -14,10 +14,10 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.paper.across_rail import AcrossRail
 from vdsm_pin.planner.paper.along_rail import AlongRail
 from vdsm_pin.planner.paper.avoidance import Avoidance
+from vdsm_pin.planner.paper.joint_paths import slide_joints
 from vdsm_pin.planner.paper.lift import lift
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.scale import scale
-from vdsm_pin.planner.paper.side_rules import slid
 from vdsm_pin.planner.paper.solve import check_limits
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -90,9 +90,8 @@ class OnlineRule:
         """Steps 2, 3 and 5, shape (1, N + 1, 2); [m]."""
         tip = project(points)
         if isinstance(self._avoidance, AlongRail) and side:
-            return slid(
-                self._arm, np.ascontiguousarray(tip), self._avoidance.rules[side]
-            )
+            rule = self._avoidance.rules[side]
+            return slide_joints(self._arm, np.ascontiguousarray(tip), rule)
         reference = scale(self._arm, tip)
         if isinstance(self._avoidance, AcrossRail):
             return self._avoidance.bent(reference, points[:, 0])

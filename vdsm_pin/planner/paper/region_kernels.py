@@ -6,11 +6,22 @@ Everything is in the projection plane and in metres.
 """
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
+
+
+class Core(NamedTuple):
+    """A region, as compiled code takes it."""
+
+    corners: FloatArray
+    """Shape (n, 2); [m]."""
+
+    radius: float
+    """[m]."""
 
 
 @compiled

@@ -7,21 +7,19 @@ then oblique ones; the region starts as the section grown by body, clearance and
 and is grown on until the links between the joints, not only the joints, keep clear.
 """
 
-from dataclasses import dataclass
 from itertools import product
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.paper.danger_region import DangerRegion
-from vdsm_pin.planner.paper.joint_paths import chain_ratios, slide_joints
+from vdsm_pin.planner.paper.joint_paths import SideRule, links_of, slide_joints
 from vdsm_pin.planner.paper.lift import largest_angles
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.region_kernels import core_gaps
 from vdsm_pin.planner.paper.sliding_kernels import standing
-from vdsm_pin.planner.paper.trial_kernels import best_rule
+from vdsm_pin.planner.paper.trial_kernels import Standing, Trials, Wanted, best_rule
 from vdsm_pin.problem.planning_problem import PlanningProblem
 
 GROWTHS: Final = (0.0, 0.01, 0.02, 0.03, 0.04, 0.06, 0.08, 0.1, 0.12, 0.15)
@@ -39,24 +37,6 @@ CROSS: Final = 2
 
 COARSE: Final = 4
 """Choices are compared on every fourth waypoint, then confirmed on all."""
-
-
-@dataclass(frozen=True)
-class SideRule:
-    """How joints get out of the danger region on one side.
-
-    Args:
-        region: What they slide on.
-        side: 1 or -1.
-        direction: The auxiliary line, a unit vector towards the side, shape (2,); None
-            for circles about P_1; [-].
-        margins: How far the region is grown for each link, shape (N,); [m].
-    """
-
-    region: DangerRegion
-    side: int
-    direction: FloatArray | None
-    margins: FloatArray
 
 
 def choose_rule(
@@ -91,21 +71,17 @@ def choose_rule(
     cores = np.zeros((len(regions), n_corners.max(), 2))
     for core, region in zip(cores, regions, strict=True):
         core[: len(region.corners)] = region.corners
-    chosen = best_rule(
+    wanted = Wanted(
         np.concatenate([np.zeros((0, 2)), *sequences]),
         np.cumsum([0, *map(len, sequences)]),
         COARSE,
-        np.array([np.zeros(2) if line is None else line for line in lines]),
-        cores,
-        n_corners,
-        np.array([region.radius for region in regions]),
-        np.array(numbers),
-        n_cross,
-        side,
-        (chain_ratios(arm), arm.link_lengths, margins, least_cosine(arm)),
-        (forbidden.corners, forbidden.radius),
-        LARGEST_SWING,
     )
+    radii = np.array([region.radius for region in regions])
+    trials = Trials(
+        np.array(lines), cores, n_corners, radii, np.array(numbers), n_cross
+    )
+    able = Standing(links_of(arm, margins), forbidden.core, LARGEST_SWING)
+    chosen = best_rule(wanted, trials, side, able)
     line, number = numbers[chosen]
     return SideRule(regions[number], side, lines[line], margins)
 
@@ -127,7 +103,7 @@ def _regions(
     return regions
 
 
-def _lines(region: DangerRegion, side: int) -> list[FloatArray | None]:
+def _lines(region: DangerRegion, side: int) -> list[FloatArray]:
     """Auxiliary lines as in `SideRule`, in the order in which they are tried."""
     centre = region.centre
     bearing = np.arctan2(centre[1], centre[0])
@@ -136,24 +112,12 @@ def _lines(region: DangerRegion, side: int) -> list[FloatArray | None]:
     lines = [line * (1.0 if line @ across > 0.0 else -1.0) for line in lines]
     turned = bearing + side * np.array(OBLIQUE)
     oblique = [np.array([np.cos(t), np.sin(t)]) for t in turned]
-    return [*lines, *oblique, None]
+    return [*lines, *oblique, np.zeros(2)]
 
 
 def anchors(problem: PlanningProblem) -> FloatArray:
     """What a danger region must leave free: the rail and the start, (2, 2); [m]."""
     return np.stack([np.zeros(2), problem.path.start[1:]])
-
-
-def slid(manipulator: Manipulator, tip: FloatArray, rule: SideRule) -> FloatArray:
-    """Step 5 by one rule: tip (n, 2) to joints (n, N + 1, 2); [m]."""
-    return slide_joints(
-        manipulator, tip, rule.region, rule.margins, rule.side, rule.direction
-    )
-
-
-def least_cosine(manipulator: Manipulator) -> float:
-    """Cosine of the largest link angle that keeps cone and box; [-]."""
-    return float(np.cos(min(manipulator.max_link_angle, manipulator.max_joint_angle)))
 
 
 def bends(
@@ -174,14 +138,7 @@ def bends(
         Shape (n,), infinite where the arm cannot stand; [rad].
     """
     manipulator = problem.manipulator
-    planar = slid(manipulator, project(points), rule)
-    able = standing(
-        planar,
-        manipulator.link_lengths,
-        least_cosine(manipulator),
-        forbidden.corners,
-        forbidden.radius,
-        rule.margins,
-        LARGEST_SWING,
-    )
+    planar = slide_joints(manipulator, project(points), rule)
+    links = links_of(manipulator, rule.margins)
+    able = standing(planar, links, forbidden.core, LARGEST_SWING)
     return np.where(able, largest_angles(planar, manipulator.link_lengths), np.inf)

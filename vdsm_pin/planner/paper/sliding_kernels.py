@@ -1,10 +1,13 @@
 """Compiled Steps 5 and 6: slide the joints of many configurations, and judge them."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.paper.region_kernels import (
+    Core,
     keeps_out,
     leave_along,
     point_to_core,
@@ -13,32 +16,69 @@ from vdsm_pin.planner.paper.region_kernels import (
 )
 
 
+class Links(NamedTuple):
+    """What the steps know of the arm, and how far regions are grown for its links."""
+
+    ratios: FloatArray
+    """k_{i,i+1} for i = 1..N (Eq. 6), shape (N,); [-]."""
+
+    lengths: FloatArray
+    """Shape (N,); [m]."""
+
+    margins: FloatArray
+    """How far regions are grown for each link, shape (N,); [m]."""
+
+    least_cosine: float
+    """Cosine of the largest link angle; [-]."""
+
+
+class Slide(NamedTuple):
+    """How joints get out of a region."""
+
+    core: Core
+    """The region."""
+
+    sides: FloatArray
+    """Straight parts of its boundary, shape (c, 2, 2); [m]."""
+
+    bearing: float
+    """Of the middle of its corners; [rad]."""
+
+    side: int
+    """1 or -1."""
+
+    direction: FloatArray
+    """Auxiliary line, a unit vector, shape (2,); zero for circles about the origin;
+    [-]."""
+
+
 @compiled
-def slide_chain(
-    corners: FloatArray,
-    sides: FloatArray,
-    radius: float,
-    ratios: FloatArray,
-    margins: FloatArray,
-    side: int,
-    direction: FloatArray,
-    bearing: float,
-    chain: FloatArray,
-) -> None:
+def slide_of(core: Core, side: int, direction: FloatArray) -> Slide:
+    """How joints get out of a region on a side, along lines of a direction."""
+    corners = core.corners
+    bearing = np.arctan2(corners[:, 1].mean(), corners[:, 0].mean())
+    return Slide(core, sides_of(corners, core.radius), bearing, side, direction)
+
+
+@compiled
+def slide_chain(slide: Slide, links: Links, chain: FloatArray) -> None:
     """`slide_chains` for one configuration, chain of shape (N + 1, 2)."""
-    ux, uy = direction[0], direction[1]
-    for i in range(ratios.shape[0] - 1, 0, -1):
-        x, y = ratios[i] * chain[i + 1, 0], ratios[i] * chain[i + 1, 1]
+    corners, side = slide.core.corners, slide.side
+    ux, uy = slide.direction[0], slide.direction[1]
+    for i in range(links.ratios.shape[0] - 1, 0, -1):
+        x, y = links.ratios[i] * chain[i + 1, 0], links.ratios[i] * chain[i + 1, 1]
         # Joint i ends link i - 1 and begins link i: the larger margin counts.
-        margin = max(margins[i - 1], margins[i])
-        reach = radius + margin
+        margin = max(links.margins[i - 1], links.margins[i])
+        reach = slide.core.radius + margin
         if point_to_core(corners, x, y) < reach:
-            edge = sides if margin == 0.0 else sides_of(corners, reach)
+            edge = slide.sides if margin == 0.0 else sides_of(corners, reach)
             if ux == 0.0 and uy == 0.0:
                 circle = np.hypot(x, y)
-                turn = reach_along_circle(corners, edge, reach, circle, bearing, side)
-                x = circle * np.cos(bearing + side * turn)
-                y = circle * np.sin(bearing + side * turn)
+                turn = reach_along_circle(
+                    corners, edge, reach, circle, slide.bearing, side
+                )
+                x = circle * np.cos(slide.bearing + side * turn)
+                y = circle * np.sin(slide.bearing + side * turn)
             else:
                 far = leave_along(corners, edge, reach, x, y, ux, uy)
                 x, y = x + far * ux, y + far * uy
@@ -46,98 +86,68 @@ def slide_chain(
 
 
 @compiled
-def slide_chains(
-    corners: FloatArray,
-    radius: float,
-    ratios: FloatArray,
-    margins: FloatArray,
-    side: int,
-    direction: FloatArray,
-    planar: FloatArray,
-) -> None:
+def slide_chains(slide: Slide, links: Links, planar: FloatArray) -> None:
     """Joints from the tip to the base: in proportion, then out of the region.
 
     Args:
-        corners: Of the region, shape (c, 2); [m].
-        radius: Of the region; [m].
-        ratios: k_{i,i+1} for i = 1..N (Eq. 6), shape (N,); [-].
-        margins: How far the region is grown for each link, shape (N,); [m].
-        side: 1 or -1.
-        direction: Auxiliary line, a unit vector, shape (2,); zero for circles about the
-            origin; [-].
+        slide: The region and how the joints get out of it.
+        links: The arm.
         planar: P_1..P_{N+1}, shape (n, N + 1, 2); the tips are given, the rest is set;
             [m].
     """
-    sides = sides_of(corners, radius)
-    bearing = np.arctan2(corners[:, 1].mean(), corners[:, 0].mean())
     for k in range(planar.shape[0]):
-        slide_chain(
-            corners, sides, radius, ratios, margins, side, direction, bearing, planar[k]
-        )
+        slide_chain(slide, links, planar[k])
 
 
 @compiled
 def extent_of(
-    chain: FloatArray,
-    lengths: FloatArray,
-    least_cosine: float,
-    corners: FloatArray,
-    radius: float,
-    margins: FloatArray,
-    links: FloatArray,
+    chain: FloatArray, links: Links, forbidden: Core, directions: FloatArray
 ) -> float:
     """Extent of one configuration along X; -1 where it cannot be taken; [m].
 
     Args:
         chain: P_1..P_{N+1}, shape (N + 1, 2); [m].
-        lengths: Of the links, shape (N,); [m].
-        least_cosine: Cosine of the largest link angle; [-].
-        corners: Of the region the links keep out of, shape (c, 2); [m].
-        radius: Of that region; [m].
-        margins: How far the region is grown for each link, shape (N,); [m].
-        links: Set to the directions of the links, shape (N, 3); [-].
+        links: The arm.
+        forbidden: The region that the links keep out of.
+        directions: Set to those of the links, shape (N, 3); [-].
     """
     extent = 0.0
-    for i in range(lengths.shape[0]):
-        uy = (chain[i + 1, 0] - chain[i, 0]) / lengths[i]
-        uz = (chain[i + 1, 1] - chain[i, 1]) / lengths[i]
+    for i in range(links.lengths.shape[0]):
+        uy = (chain[i + 1, 0] - chain[i, 0]) / links.lengths[i]
+        uz = (chain[i + 1, 1] - chain[i, 1]) / links.lengths[i]
         squared = 1.0 - uy * uy - uz * uz
         if not squared > 0.0:
             return -1.0
-        links[i, 0], links[i, 1], links[i, 2] = np.sqrt(squared), uy, uz
-        cosine = links[0, 0] if i == 0 else (links[i] * links[i - 1]).sum()
-        if not cosine >= least_cosine:
+        here = directions[i]
+        here[0], here[1], here[2] = np.sqrt(squared), uy, uz
+        cosine = here[0] if i == 0 else (here * directions[i - 1]).sum()
+        if not cosine >= links.least_cosine:
             return -1.0
-        a, b = chain[i], chain[i + 1]
-        if not keeps_out(corners, radius + margins[i], a[0], a[1], b[0], b[1]):
+        a, b, radius = chain[i], chain[i + 1], forbidden.radius + links.margins[i]
+        if not keeps_out(forbidden.corners, radius, a[0], a[1], b[0], b[1]):
             return -1.0
-        extent += lengths[i] * links[i, 0]
+        extent += links.lengths[i] * here[0]
     return extent
 
 
 @compiled
 def standing(
-    planar: FloatArray,
-    lengths: FloatArray,
-    least_cosine: float,
-    corners: FloatArray,
-    radius: float,
-    margins: FloatArray,
-    largest_swing: float,
+    planar: FloatArray, links: Links, forbidden: Core, largest_swing: float
 ) -> BoolArray:
     """Which configurations can be taken, neighbours following each other, (n,).
 
-    Arguments as in `extent_of`; `largest_swing` is the largest change of a coordinate
-    of a link's direction from one configuration to the next; [-].
+    Args:
+        planar: P_1..P_{N+1} of each, shape (n, N + 1, 2); [m].
+        links: The arm.
+        forbidden: The region that the links keep out of.
+        largest_swing: Largest change of a coordinate of a link's direction from one
+            configuration to the next; [-].
     """
     able = np.zeros(planar.shape[0], np.bool_)
-    before = np.zeros((lengths.shape[0], 3))
-    here = np.zeros((lengths.shape[0], 3))
+    before = np.zeros((links.lengths.shape[0], 3))
+    here = np.zeros((links.lengths.shape[0], 3))
     for k in range(planar.shape[0]):
-        extent = extent_of(
-            planar[k], lengths, least_cosine, corners, radius, margins, here
-        )
-        able[k] = extent > 0.0
+        able[k] = extent_of(planar[k], links, forbidden, here) > 0.0
         if able[k] and k > 0 and able[k - 1]:
             able[k] = np.abs(here - before).max() <= largest_swing
         before, here = here, before
