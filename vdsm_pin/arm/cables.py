@@ -12,14 +12,14 @@ in which every function is rational.
 """
 
 from collections.abc import Iterator
-from typing import Final, TypeAlias
+from typing import Final
 
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InconsistentCables, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, frozen, read_only
-from vdsm_pin.geometry.cable_kernels import add_spans, solve_joint, take_off
+from vdsm_pin.geometry.cable_kernels import Holes, add_spans, solve_joint, take_off
 from vdsm_pin.tolerances import TOLERANCES
 
 CHUNK: Final = 1024
@@ -28,13 +28,8 @@ CHUNK: Final = 1024
 NEWTON_STEPS: Final = 60
 """Budget of the solver of one joint; 4 steps are usual, 25 were seen to succeed."""
 
-
 STARTS: Final = frozen(np.linspace(-0.8, 0.8, 9))
 """Tangents of half the angles, up to 77 deg, from which the solver starts again."""
-
-
-_Holes: TypeAlias = tuple[float, float, FloatArray, FloatArray]
-"""d, r, and y and z of all holes, (3N,) each, as the compiled code takes them; [m]."""
 
 
 def cable_lengths(
@@ -53,8 +48,7 @@ def cable_lengths(
     """
     n_samples, n_links = alpha.shape
     lengths = np.repeat(_straight_parts(manipulator)[None], n_samples, axis=0)
-    d, r, y, z = _holes(manipulator)
-    add_spans(read_only(alpha), read_only(theta), d, r, y, z, lengths)
+    add_spans(read_only(alpha), read_only(theta), _holes(manipulator), lengths)
     return lengths.reshape(n_samples, n_links, 3)
 
 
@@ -94,7 +88,7 @@ def angles_from_cables(
 
 
 def _peel(
-    holes: _Holes, guesses: FloatArray, left: FloatArray, first_waypoint: int
+    holes: Holes, guesses: FloatArray, left: FloatArray, first_waypoint: int
 ) -> FloatArray:
     """Solve joint by joint; a solved joint's spans come off all cables through it.
 
@@ -110,14 +104,13 @@ def _peel(
     Raises:
         InconsistentCables: If a link's cables contradict each other.
     """
-    d, r, y, z = holes
     half = np.zeros((2, len(guesses), left.shape[1]))
     for i, guess in enumerate(guesses):
         own, beyond = slice(3 * i, 3 * i + 3), slice(3 * i + 3, None)
-        here, spans = (d, r, y[own], z[own]), left[own]
+        here, spans = _some(holes, own), left[own]
         half[:, i] = guess @ spans
         u, v = half[:, i]
-        solve_joint(*here, spans, u, v, NEWTON_STEPS, TOLERANCES.cable_step)
+        solve_joint(here, spans, u, v, NEWTON_STEPS, TOLERANCES.cable_step)
         residual = _residual(here, spans, u, v)
         for k in np.flatnonzero(~(residual <= TOLERANCES.cable_length)):
             u[k], v[k] = _search(here, spans[:, k])
@@ -128,20 +121,24 @@ def _peel(
                     residual=float(residual[k]),
                     tolerance=TOLERANCES.cable_length,
                 )
-        take_off(d, r, y[beyond], z[beyond], u, v, left[beyond])
+        take_off(_some(holes, beyond), u, v, left[beyond])
     return half
 
 
+def _some(holes: Holes, which: slice) -> Holes:
+    return holes._replace(y=holes.y[which], z=holes.z[which])
+
+
 def _residual(
-    holes: _Holes, spans: FloatArray, u: FloatArray, v: FloatArray
+    holes: Holes, spans: FloatArray, u: FloatArray, v: FloatArray
 ) -> FloatArray:
     """Largest error of a joint's three spans, shape (n,); NaN if there is one; [m]."""
     left = spans.copy()
-    take_off(*holes, u, v, left)
+    take_off(holes, u, v, left)
     return np.asarray(np.abs(left).max(axis=0))
 
 
-def _search(holes: _Holes, spans: FloatArray) -> FloatArray:
+def _search(holes: Holes, spans: FloatArray) -> FloatArray:
     """Newton's method from a grid of starts, for the rare joint that needs it.
 
     Near the end of the domain, and with holes close to each other, the residual has
@@ -157,7 +154,7 @@ def _search(holes: _Holes, spans: FloatArray) -> FloatArray:
     """
     u, v = np.stack(np.meshgrid(STARTS, STARTS)).reshape(2, -1)
     many = np.repeat(spans[:, None], u.size, axis=1)
-    solve_joint(*holes, many, u, v, NEWTON_STEPS, 0.0)
+    solve_joint(holes, many, u, v, NEWTON_STEPS, 0.0)
     size = u * u + v * v
     size[~(_residual(holes, many, u, v) <= TOLERANCES.cable_length)] = np.inf
     best = int(np.argmin(size))
@@ -175,11 +172,12 @@ def _straight_parts(manipulator: Manipulator) -> FloatArray:
     return np.repeat(inside, 3)
 
 
-def _holes(manipulator: Manipulator) -> _Holes:
+def _holes(manipulator: Manipulator) -> Holes:
     """Where cables run through the joints."""
     cables = manipulator.cables
     phi, r = cables.hole_angles.ravel(), cables.hole_radius
-    return cables.half_gap, r, read_only(r * np.sin(phi)), read_only(r * np.cos(phi))
+    y, z = r * np.sin(phi), r * np.cos(phi)
+    return Holes(cables.half_gap, r, read_only(y), read_only(z))
 
 
 def _first_guesses(manipulator: Manipulator) -> FloatArray:

@@ -13,6 +13,7 @@ from 0 over what is stored side by side: there the compiler works on several at 
 """
 
 from math import cos, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,29 +21,36 @@ from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
 
 
+class Holes(NamedTuple):
+    """Holes that cables run through."""
+
+    half_gap: float
+    """d; [m]."""
+
+    radius: float
+    """r; [m]."""
+
+    y: FloatArray
+    """Shape (m,); [m]."""
+
+    z: FloatArray
+    """Shape (m,); [m]."""
+
+
 @compiled
 def add_spans(
-    alpha: FloatArray,
-    theta: FloatArray,
-    half_gap: float,
-    radius: float,
-    y: FloatArray,
-    z: FloatArray,
-    lengths: FloatArray,
+    alpha: FloatArray, theta: FloatArray, holes: Holes, lengths: FloatArray
 ) -> None:
     """Add to every cable what it spans in the joints that it runs through.
 
     Args:
         alpha: Yaw angles, shape (n_samples, N); [rad].
         theta: Pitch angles, shape (n_samples, N); [rad].
-        half_gap: d; [m].
-        radius: r; [m].
-        y: Of the holes, shape (3N,); [m].
-        z: Of the holes, shape (3N,); [m].
+        holes: Of all joints, 3N of them.
         lengths: Of the cables, increased, shape (n_samples, 3N); [m].
     """
-    d, bulge = 2.0 * half_gap, 2.0 * radius * radius
-    gap = half_gap * d
+    d, bulge = 2.0 * holes.half_gap, 2.0 * holes.radius * holes.radius
+    gap, y, z = holes.half_gap * d, holes.y, holes.z
     for k in range(alpha.shape[0]):
         for i in range(alpha.shape[1]):
             ca, sa = cos(alpha[k, i]), sin(alpha[k, i])
@@ -59,10 +67,7 @@ def add_spans(
 
 @compiled
 def solve_joint(
-    half_gap: float,
-    radius: float,
-    y: FloatArray,
-    z: FloatArray,
+    holes: Holes,
     spans: FloatArray,
     u: FloatArray,
     v: FloatArray,
@@ -72,18 +77,15 @@ def solve_joint(
     """Gauss-Newton for the two angles of a joint that give its three spans.
 
     Args:
-        half_gap: d; [m].
-        radius: r; [m].
-        y: Of the three holes, shape (3,); [m].
-        z: Of the three holes, shape (3,); [m].
+        holes: The three of the joint.
         spans: Cable lengths inside the joint, shape (3, n_samples); [m].
         u: A guess of tan(alpha / 2), overwritten by the result, (n_samples,); [-].
         v: A guess of tan(theta / 2), overwritten by the result, (n_samples,); [-].
         rounds: Largest number of steps.
         enough: Step after which the next one would be rounding; [-].
     """
-    d, bulge = 2.0 * half_gap, 2.0 * radius * radius
-    gap = half_gap * d
+    d, bulge = 2.0 * holes.half_gap, 2.0 * holes.radius * holes.radius
+    gap, y, z = holes.half_gap * d, holes.y, holes.z
     for _ in range(rounds):
         # An integer, because the order of a sum of floats would forbid vector code.
         moving = 0
@@ -118,28 +120,17 @@ def solve_joint(
 
 
 @compiled
-def take_off(
-    half_gap: float,
-    radius: float,
-    y: FloatArray,
-    z: FloatArray,
-    u: FloatArray,
-    v: FloatArray,
-    left: FloatArray,
-) -> None:
+def take_off(holes: Holes, u: FloatArray, v: FloatArray, left: FloatArray) -> None:
     """Subtract what cables spend in one joint.
 
     Args:
-        half_gap: d; [m].
-        radius: r; [m].
-        y: Of the holes, shape (m,); [m].
-        z: Of the holes, shape (m,); [m].
+        holes: Of the cables, m of them.
         u: tan(alpha / 2) of the joint, shape (n_samples,); [-].
         v: tan(theta / 2) of the joint, shape (n_samples,); [-].
         left: Cable lengths not yet accounted for, shape (m, n_samples), reduced; [m].
     """
-    d, bulge = 2.0 * half_gap, 2.0 * radius * radius
-    gap = half_gap * d
+    d, bulge = 2.0 * holes.half_gap, 2.0 * holes.radius * holes.radius
+    gap, y, z = holes.half_gap * d, holes.y, holes.z
     parts = np.zeros((5, u.size))
     g0, g1, g2, g3, g4 = parts[0], parts[1], parts[2], parts[3], parts[4]
     for k in range(u.size):
