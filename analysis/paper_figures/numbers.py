@@ -12,7 +12,7 @@ from paper_figures.marks import marks
 from paper_figures.runs import SCENES, STRATEGIES, Run, Runs, degrees
 from paper_figures.style import subscript
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.report.facts import motion_facts
+from vdsm_pin.report.motion_facts import motion_facts
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M
 

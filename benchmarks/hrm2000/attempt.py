@@ -18,7 +18,7 @@ from vdsm_pin.planner.time_limit import within_time
 from vdsm_pin.problem.planning_problem import Blocked, PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import plan_and_verify
-from vdsm_pin.report.facts import changed_angles, motion_facts
+from vdsm_pin.report.motion_facts import changed_angles, motion_facts
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.units import in_mm
 from vdsm_pin.verification.link_clearance import link_clearance

@@ -10,8 +10,9 @@ from vdsm_pin.geometry.solids import Box
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.report.facts import min_clearance, reason, verification_file
+from vdsm_pin.report.facts import min_clearance, verification_file
 from vdsm_pin.report.html import write_report
+from vdsm_pin.report.reason import reason
 from vdsm_pin.report.run_record import RunRecord
 from vdsm_pin.verification.records import Verification
 from vdsm_pin.verification.robot_model import load_robot

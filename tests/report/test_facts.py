@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import made_up
 
-from vdsm_pin.report.facts import failing, reason
+from vdsm_pin.report.reason import failing, reason
 from vdsm_pin.verification.records import Check, Verdict
 
 

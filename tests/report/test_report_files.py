@@ -14,12 +14,7 @@ from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import Adjustment, Refinement, Round
-from vdsm_pin.report.facts import (
-    batch_row,
-    motion_facts,
-    plan_file,
-    verification_file,
-)
+from vdsm_pin.report.facts import batch_row, plan_file, verification_file
 from vdsm_pin.report.files import (
     SCHEMA_NAMES,
     BatchRow,
@@ -27,6 +22,7 @@ from vdsm_pin.report.files import (
     VerificationFile,
     schema,
 )
+from vdsm_pin.report.motion_facts import motion_facts
 from vdsm_pin.verification.records import ArmVerification, Check, Pair, Verdict
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.report.facts import changed_angles, min_clearance
+from vdsm_pin.report.facts import min_clearance
+from vdsm_pin.report.motion_facts import changed_angles
 from vdsm_pin.report.palette import link_colours, obstacle_colours
 from vdsm_pin.report.thinning import MOST_PLOTTED, Thinned, nearest_obstacles
 from vdsm_pin.units import MM_PER_M

@@ -15,10 +15,10 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, solid_of
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.charts import charts, packed
-from vdsm_pin.report.facts import failing, finite
 from vdsm_pin.report.impasse import Impasse
 from vdsm_pin.report.moves import moves
 from vdsm_pin.report.palette import link_colours
+from vdsm_pin.report.reason import failing
 from vdsm_pin.report.solids import FINE, Detail, detail, surface
 from vdsm_pin.report.thinning import (
     MOST_DRAWN,
@@ -26,6 +26,7 @@ from vdsm_pin.report.thinning import (
     nearest_obstacles,
     thinned,
 )
+from vdsm_pin.report.words import finite
 from vdsm_pin.verification.records import (
     ArmVerification,
     ClosestApproach,

@@ -46,6 +46,11 @@ TERMS: Final[Mapping[str, str]] = MappingProxyType(
 """What people read for a key of the files: one name on terminal, pages and in diffs."""
 
 
+def finite(value: float) -> float | None:
+    """The value, or None where it is NaN or infinite."""
+    return float(value) if math.isfinite(value) else None
+
+
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """How one outcome is named and marked everywhere.

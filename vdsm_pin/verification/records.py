@@ -3,8 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from math import inf, nan
+from math import inf, isfinite, nan
 from typing import Protocol, TypeAlias
+
+import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.notebook import Summarised, in_percent
@@ -362,6 +364,13 @@ class Verification(Summarised):
         """Proved least clearance from any obstacle, infinite without obstacles; [m]."""
         near = (one.lower for one in self.approaches if one.pair.obstacle)
         return min(near, default=inf)
+
+    def time_at(self, moment: float) -> float | None:
+        """When a moment in waypoints is, where the trajectory tells; [s]."""
+        if not isfinite(moment):
+            return None
+        times = self.trajectory.times_at(np.array([moment]))
+        return None if times is None else float(times[0])
 
     def closest(self, count: int) -> tuple[ClosestApproach, ...]:
         """The nearest approaches, obstacles first, `count` of them at most."""

@@ -1,0 +1,133 @@
+"""The verdict in one sentence, and what it rests on."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Final
+
+from vdsm_pin.planner.records import Plan
+from vdsm_pin.report.files import LeftOutRow
+from vdsm_pin.report.words import depth, finite, percent, place, quantity
+from vdsm_pin.verification.inside import ARM, LINKS, surfaces
+from vdsm_pin.verification.records import ArmVerification, Verdict, Verification
+
+_PASSED: Final = Verdict.CERTIFIED
+
+
+def nearest_to_obstacle(verification: Verification) -> int | None:
+    """Index of the closest approach to an obstacle; None without obstacles."""
+    near = (i for i, row in enumerate(verification.approaches) if row.pair.obstacle)
+    return next(near, None)
+
+
+@dataclass(frozen=True)
+class Failing:
+    """A check that did not pass, and when its worst case happens, in waypoints."""
+
+    name: str
+    verdict: str
+    moment: float | None
+
+
+def failing(verification: Verification) -> tuple[Failing, ...]:
+    """The checks that did not pass: what decides the verdict first."""
+    bad = [check for check in verification.checks if check.verdict is not _PASSED]
+    bad.sort(key=lambda check: check.verdict is not verification.verdict)
+    return tuple(
+        Failing(check.name, check.verdict.value, finite(check.moment)) for check in bad
+    )
+
+
+def reason(verification: Verification) -> str:
+    """The verdict in one sentence."""
+    if verification.verdict is Verdict.CERTIFIED:
+        return _certified_sentence(verification)
+    if isinstance(verification, ArmVerification) and (
+        verification.verdict is Verdict.INCOMPLETE
+    ):
+        return _incomplete_sentence(verification, _left_out(verification))
+    bad = [c for c in verification.checks if c.verdict is verification.verdict]
+    if not bad:
+        return "No check was carried out, so nothing is proved."
+    first = bad[0]
+    found = f"{first.name} is {depth(first.worst, first.deeper, first.unit)}"
+    inside = first.name in (ARM, LINKS)
+    if inside:
+        found = first.where
+    elif math.isnan(first.worst):
+        found = f'there is no evidence for "{first.name}"'
+    elif not math.isnan(first.limit):
+        found += f" against a limit of {quantity(first.limit, first.unit)}"
+    where = "" if inside else first.where
+    at = place(finite(first.moment), where, verification.time_at(first.moment))
+    if at:
+        found += f" ({at})"
+    share = f"{len(bad)} of {len(verification.checks)} checks"
+    first_of = ", the first: " if len(bad) > 1 else ": "
+    if verification.verdict is Verdict.REFUTED:
+        return f"The motion breaks {share}{first_of}{found}."
+    undecided = f"The proof is not complete, {share} undecided{first_of}{found}."
+    return f"{undecided} This counts as not passed."
+
+
+def plan_reason(plan: Plan, verification: ArmVerification) -> str:
+    """The verdict on a plan in one sentence, with what the strategy knows of it."""
+    if verification.verdict is not Verdict.INCOMPLETE or not plan.undrawn:
+        return reason(verification)
+    why = f"the path is not drawn {'; '.join(plan.undrawn)}"
+    return _incomplete_sentence(verification, why)
+
+
+def _incomplete_sentence(verification: ArmVerification, why: str) -> str:
+    drawn = percent(verification.coverage)
+    required = percent(verification.problem.path.required_coverage)
+    return f"incomplete: {drawn} drawn, because {why}; {required} is required"
+
+
+def _left_out(verification: ArmVerification) -> str:
+    """What the motion leaves out of the desired path, in words."""
+    gaps = verification.undrawn
+    if not len(gaps):
+        return "no waypoint draws the desired path"
+    first = " to ".join(quantity(float(station), "m") for station in gaps[0])
+    stretches = "1 stretch, from" if len(gaps) == 1 else f"{len(gaps)} stretches, from"
+    return f"the motion leaves out {stretches} {first} along the path"
+
+
+def _certified_sentence(verification: Verification) -> str:
+    count = len(verification.checks)
+    smallest, drawn, who = verification.min_clearance, "", "robot"
+    if isinstance(verification, ArmVerification):
+        who, drawn = "arm", "; no desired path is asked for"
+        if verification.problem.tip_path is not None:
+            share = percent(verification.coverage)
+            drawn = f"; {share} of the desired path is drawn"
+    if smallest == math.inf:
+        return (
+            f"All {count} checks passed over the whole motion; no obstacle is there"
+            f"{drawn}."
+        )
+    problem = verification.problem
+    required = quantity(problem.required_clearance, "m")
+    box = asdict(verification.errors)
+    errors = ", with any error of the error box," if any(box.values()) else ""
+    return (
+        f"All {count} checks passed; at every instant of the motion{errors} the {who} "
+        f"keeps at least {quantity(smallest, 'm')} from every obstacle, "
+        f"{required} are required{drawn}."
+        + "".join(f" {name!r} is a surface only." for name in surfaces(problem))
+    )
+
+
+def left_out_words(rows: Sequence[LeftOutRow]) -> str:
+    """The same in one sentence, each reason of links next to each other once."""
+    words, joints = [], 0
+    for row in rows:
+        if row.reason.startswith("meet at joint") and row.other.startswith("link"):
+            joints += 1
+        else:
+            words.append(f"{row.body} and {row.other} ({row.reason})")
+    if joints:
+        meet = "links next to each other, which meet at their joint in every pose"
+        words.insert(0, meet)
+    return "; ".join(words)
