@@ -8,9 +8,12 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.report.files import (
+from vdsm_pin.report.files import BatchRow, PlanFile, VerificationFile
+from vdsm_pin.report.inputs import assumed_sizes, assumption, input_notes
+from vdsm_pin.report.motion_facts import motion_facts
+from vdsm_pin.report.reason import nearest_to_obstacle, plan_reason, reason
+from vdsm_pin.report.rows import (
     AdjustmentRow,
-    BatchRow,
     CheckRow,
     ClosestRow,
     CounterexampleRow,
@@ -21,14 +24,9 @@ from vdsm_pin.report.files import (
     MinClearance,
     MotionFacts,
     ObstacleErrorRow,
-    PlanFile,
     Point,
     ToleranceRow,
-    VerificationFile,
 )
-from vdsm_pin.report.inputs import assumed_sizes, assumption, input_notes
-from vdsm_pin.report.motion_facts import motion_facts
-from vdsm_pin.report.reason import nearest_to_obstacle, plan_reason, reason
 from vdsm_pin.report.run_record import RunRecord, machine, versions
 from vdsm_pin.report.words import finite
 from vdsm_pin.tolerances import TOLERANCES, UNITS

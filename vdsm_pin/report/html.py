@@ -16,11 +16,12 @@ from vdsm_pin import __version__, kept
 from vdsm_pin.errors import NoPlanFound, OutOfTime, VdsmError, VerificationFailed
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.report.files import BatchRow, PlanFile, Point, VerificationFile
+from vdsm_pin.report.files import BatchRow, PlanFile, VerificationFile
 from vdsm_pin.report.impasse import impasse_of
 from vdsm_pin.report.inputs import assumption
 from vdsm_pin.report.page_data import impasse_data, report_data, view_data
 from vdsm_pin.report.reason import failing, left_out_words, nearest_to_obstacle
+from vdsm_pin.report.rows import Point
 from vdsm_pin.report.run_record import PlanRun, machine, versions
 from vdsm_pin.report.scene_rows import scene_rows
 from vdsm_pin.report.thinning import MOST_DRAWN

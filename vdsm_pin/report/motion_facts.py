@@ -8,7 +8,7 @@ from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.report.files import MotionFacts
+from vdsm_pin.report.rows import MotionFacts
 from vdsm_pin.tolerances import TOLERANCES
 
 _CHUNK: Final = 65_536  # rows treated at once, so that memory stays bounded

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Final
 
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.report.files import LeftOutRow
+from vdsm_pin.report.rows import LeftOutRow
 from vdsm_pin.report.words import depth, finite, percent, place, quantity
 from vdsm_pin.verification.inside import ARM, LINKS, surfaces
 from vdsm_pin.verification.records import ArmVerification, Verdict, Verification

@@ -5,8 +5,8 @@ from typing import Any, Final
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.report.facts import error_box
-from vdsm_pin.report.files import ErringJointRow, JointRow, LeftOutRow, RobotFacts
 from vdsm_pin.report.inputs import file_notes
+from vdsm_pin.report.rows import ErringJointRow, JointRow, LeftOutRow, RobotFacts
 from vdsm_pin.report.words import finite
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import typer
 
-from vdsm_pin.report.files import CheckRow, PlanFile, VerificationFile
+from vdsm_pin.report.files import PlanFile, VerificationFile
 from vdsm_pin.report.inputs import assumption
+from vdsm_pin.report.rows import CheckRow
 from vdsm_pin.report.words import (
     depth,
     errors,

@@ -15,7 +15,7 @@ TIME_LIMIT: Final = "time-limit"
 """The outcome of what the time limit ended."""
 
 if TYPE_CHECKING:
-    from vdsm_pin.report.files import ErrorBoxRow
+    from vdsm_pin.report.rows import ErrorBoxRow
 
 _SMALLEST_FIXED: Final = 1e-3  # below this, three decimals would print 0.000
 _LARGE: Final = 1e3  # from here on, a tenth is fine enough

@@ -15,8 +15,8 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import LOW
-from vdsm_pin.report.files import FileModel, VerdictWord
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
+from vdsm_pin.report.rows import FileModel, VerdictWord
 from vdsm_pin.report.run_record import versions
 from vdsm_pin.report.words import finite
 from vdsm_pin.simulation.closed_loop import SLACK, Simulation, simulate
