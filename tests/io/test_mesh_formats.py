@@ -177,6 +177,35 @@ def dae(body: str, *, unit: str = "", root: str = "") -> str:
 <scene><instance_visual_scene url="#vs"/></scene></COLLADA>"""
 
 
+@pytest.mark.parametrize(("axis", "noted"), [("Z", 0), ("Y", 1), ("X", 1)])
+def test_a_dae_that_does_not_point_up_along_z_says_so(
+    tmp_path: Path, axis: str, noted: int
+) -> None:
+    """Its axes are kept: what was drawn upright may lie down in the scene."""
+    text = dae(HERE).replace("Z_UP", f"{axis}_UP")
+    mesh = read_mesh(write(tmp_path, "a.dae", text))
+    note = f"its {axis} axis points up; axes are kept as they are"
+    assert mesh.notes == (note,) * noted
+    upright = read_mesh(write(tmp_path, "z.dae", dae(HERE)))
+    np.testing.assert_array_equal(mesh.vertices, upright.vertices)
+
+
+def test_a_dae_that_moves_says_that_it_is_read_at_rest(tmp_path: Path) -> None:
+    moving = "<library_animations><animation id='m'/></library_animations>"
+    text = dae(HERE).replace("<library_nodes>", f"{moving}<library_nodes>")
+    (note,) = read_mesh(write(tmp_path, "a.dae", text)).notes
+    assert note.startswith("its motion is not read")
+
+
+def test_a_dae_names_nothing_that_is_there_twice(tmp_path: Path) -> None:
+    """One of two geometries of one name would be left out silently."""
+    text = dae(HERE)
+    start, end = text.index("<geometry"), text.index("</library_geometries>")
+    twice = text[:end] + text[start:end] + text[end:]
+    with pytest.raises(InvalidFile, match="'#g', which is there 2 times"):
+        read_mesh(write(tmp_path, "a.dae", twice))
+
+
 TRIANGLES = """<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/>
  <input semantic="NORMAL" source="#s" offset="1"/>
  <p>0 0 2 0 1 0 0 1 1 1 3 1 0 2 3 2 2 2 1 3 2 3 3 3</p></triangles>"""

@@ -66,7 +66,9 @@ class _Reader:
 
     def __init__(self, stream: MeshStream, root: _Element) -> None:
         self._stream, self._root = stream, root
-        self._by_id = {e.get("id"): e for e in root.iter() if e.get("id")}
+        self._by_id = dict[str, list[_Element]]()
+        for element in root.iter():
+            self._by_id.setdefault(element.get("id", ""), []).append(element)
         self._parts: dict[str, Part] = {}
         self._placed, self._notes = Placed(stream), dict[str, int]()
         self._bend, self._n_nodes = 0.0, 0
@@ -76,9 +78,16 @@ class _Reader:
         for node in self._roots():
             self._walk(node, np.eye(4), 0)
         notes = [f"{what}: {count}" for what, count in self._notes.items()]
-        if next(self._root.iter(self._root.tag.replace("COLLADA", "animation")), None):
+        if self._first("animation") is not None:
             notes.append("its motion is not read: parts stand where their nodes do")
+        up = self._first("up_axis")
+        if up is not None and (axis := (up.text or "").strip()) in ("X_UP", "Y_UP"):
+            notes.append(f"its {axis[0]} axis points up; axes are kept as they are")
         return self._placed.mesh(self._unit(), bend=self._bend, notes=notes)
+
+    def _first(self, tag: str) -> _Element | None:
+        """The first element of a tag anywhere in the file."""
+        return next((e for e in self._root.iter() if _tag(e) == tag), None)
 
     def _unit(self) -> float:
         """Metres per unit; 1 where the file leaves it out, as COLLADA has it."""
@@ -216,11 +225,11 @@ class _Reader:
     def _named(self, element: _Element, key: str) -> _Element:
         """What an element points to in this file."""
         name = element.get(key, "")
-        found = self._by_id.get(name[1:]) if name.startswith("#") else None
-        if found is None:
-            problem = f"names {name[:60]!r}, which is not in this file"
-            raise self._invalid(problem)
-        return found
+        found = self._by_id.get(name[1:], []) if name[:1] == "#" != name else []
+        if len(found) != 1:
+            place = f"there {len(found)} times" if found else "not in this file"
+            raise self._invalid(problem=f"names {name[:60]!r}, which is {place}")
+        return found[0]
 
     def _floats(self, text: str, count: int | None = None) -> FloatArray:
         return np.array(self._numbers(text, float, count), dtype=np.float64)
