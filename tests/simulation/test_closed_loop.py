@@ -1,6 +1,7 @@
 """The loop follows its plan, recovers from a kick, and says what it cannot do."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,14 @@ import vdsm_pin as vp
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import InvalidInput, VerificationFailed
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.simulation.closed_loop import Simulation, simulate
-from vdsm_pin.simulation.folder import SUMMARY, SimulationOrder, simulate_to_folder
+from vdsm_pin.simulation.folder import (
+    SUMMARY,
+    SimulationOrder,
+    cleared,
+    simulate_to_folder,
+)
 from vdsm_pin.simulation.settings import Controller, Kick, Sensors, Settings, Speed
 from vdsm_pin.simulation.time_law import row_times
 
@@ -95,6 +102,18 @@ def test_a_kick_at_no_joint_is_refused() -> None:
 def test_a_step_at_which_it_diverges_is_told() -> None:
     with pytest.raises(VerificationFailed, match="diverges"):
         run(step_s=0.02)
+
+
+def test_what_is_proved_covers_the_errors_that_the_problem_states() -> None:
+    """Obstacles off by more than the clearance: nothing is certified, whoever asks."""
+    problem, none = read_problem("paper/obs3").problem, ErrorBox()
+    nominal = cleared(problem, bending(), none)
+    assert nominal.verdict == "certified"
+    assert nominal.min_clearance_m is not None
+    off = ErrorBox(obstacle=nominal.min_clearance_m)
+    stated = cleared(replace(problem, errors=off), bending(), none)
+    assert stated == cleared(problem, bending(), off)
+    assert stated.verdict != "certified"
 
 
 def test_a_folder_holds_what_the_verifier_takes(tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ BAND: Final = float(np.deg2rad(0.3))
 
 
 class Cleared(FileModel):
-    """A motion and what is proved of its clearance from obstacles and itself."""
+    """A motion and what is proved of its clearance, the problem's errors included."""
 
     verdict: VerdictWord
     min_clearance_m: float | None = Field(description="proved; null: no obstacle")
@@ -171,7 +171,14 @@ def _mujoco_version() -> str:
 def cleared(
     problem: PlanningProblem, trajectory: Trajectory, errors: ErrorBox
 ) -> Cleared:
-    """What is proved of a motion's clearance over continuous time."""
+    """What is proved of a motion's clearance over continuous time.
+
+    Args:
+        problem: What is asked.
+        trajectory: The motion.
+        errors: Covered besides those that the problem states.
+    """
+    errors = problem.errors.widened(errors)
     proof = prove_clearance(problem, trajectory, errors)
     located = locate_arm(problem, trajectory, errors)
     rows = [*check_clearance(problem, proof, ()), *check_inside(located)]
