@@ -87,7 +87,7 @@ def _panels(found: Simulation) -> tuple[Figure, list[Axes]]:
     """A panel an angle, four in a row."""
     count = found.errors.shape[1]
     n_rows = -(-count // 4)
-    figure = style.sheet(1.22 * n_rows + 0.55)
+    figure = style.sheet(1.22 * n_rows + 0.25)
     panels = []
     for k in range(count):
         low = 0.45 + 1.22 * (n_rows - 1 - k // 4)
