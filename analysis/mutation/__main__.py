@@ -171,7 +171,7 @@ def tried(
     stop = multiprocessing.Event()
     for change in chosen:
         plain = is_compiled(change.module)
-        names = maps[plain].asked(change.module, change.lines, BUDGET)
+        names = maps[plain].asked(change.module, change.lines, asked.budget)
         usual = sum(maps[plain].seconds[name] for name in names)
         tasks.put((change, names, usual, PLAIN if plain else None))
     with tempfile.TemporaryDirectory(prefix="mutants-") as place:
@@ -265,6 +265,7 @@ def main() -> None:
     parser.add_argument("--tests", nargs="*", help="files and folders, not all")
     parser.add_argument("--maps", type=Path, default=MAPS, help="what tests cover")
     parser.add_argument("--minutes", type=float, default=float("inf"), help="no more")
+    parser.add_argument("--budget", type=float, default=BUDGET, help="[s] a change")
     parser.add_argument("--noticed", type=Path, help="what earlier runs noticed")
     parser.add_argument("--save", type=Path)
     asked = parser.parse_args()

@@ -9,7 +9,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from analysis.mutation.changes import changes  # noqa: E402
-from analysis.mutation.coverage_map import Asked, coverage_map  # noqa: E402
+from analysis.mutation.coverage_map import Asked, CoverageMap, coverage_map  # noqa: E402
 
 MODULE = '''"""A module."""
 
@@ -92,6 +92,13 @@ def test_the_map_knows_which_test_runs_a_line(tmp_path: Path) -> None:
     assert seen.asked("module.py", (2,), budget=1.0) == ["test_one.py::test_one"]
     # No test runs line 3: what a module does at import, any test may see.
     assert seen.asked("module.py", (3,), budget=1.0) == ["test_one.py::test_one"]
+
+
+def test_each_file_of_tests_is_asked_before_any_twice() -> None:
+    seconds = {"a::1": 0.1, "a::2": 0.2, "b::1": 0.5, "b::2": 0.6}
+    seen = CoverageMap({"module.py": {1: sorted(seconds)}}, seconds)
+    assert seen.asked("module.py", (1,), 9.0) == ["a::1", "b::1", "a::2", "b::2"]
+    assert seen.asked("module.py", (1,), 0.6) == ["a::1", "b::1"]
 
 
 TRIED = """
