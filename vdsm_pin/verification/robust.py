@@ -231,19 +231,16 @@ def refuted_joint_error(
         OutOfTime: If the time is over.
     """
     above = certified + TOLERANCES.joint_error
-
-    def near(joint: float) -> PlanningProblem:
-        if clearances is None or len(clearances) <= MANY:
-            return problem
-        return within_reach(problem, clearances, errors.with_joint(joint))
-
-    lost = _first_gap(near(above), trajectory, errors.with_joint(above), deadline)
+    if clearances is not None and len(clearances) > MANY:
+        # What loses the clearance of some obstacles loses that of all.
+        problem = within_reach(problem, clearances, errors.with_joint(above))
+    lost = _first_gap(problem, trajectory, errors.with_joint(above), deadline)
     if lost is None:
         return nan
     weakest = trajectory.part(max(0, lost - AROUND), lost + AROUND + 2)
     for factor in FACTORS:
         box = errors.with_joint(factor * above)
-        found = _smallest(near(box.joint), weakest, box, deadline)
+        found = _smallest(problem, weakest, box, deadline)
         if found:
             return min(found)
     return nan
