@@ -159,6 +159,28 @@ def test_copies_of_nothing_are_damage(packed: bytes) -> None:
     assert _from_lzf(packed, 100) == b""
 
 
+@pytest.mark.parametrize(
+    ("frame", "expected"),
+    [
+        ("0 0 0 1.0 0 -0 0", None),
+        ("0 0 0.5 1 0 0 0", "has the VIEWPOINT 0 0 0.5 1 0 0 0, which may place"),
+        ("0 0 0 0.6 0.8 0 0", "has the VIEWPOINT"),
+        ("0 0 0 nan 0 0 0", "has the VIEWPOINT"),
+        ("0 0 0 1", "expected 7 numbers"),
+    ],
+)
+def test_points_that_a_viewpoint_may_move_are_refused(
+    tmp_path: Path, frame: str, expected: str | None
+) -> None:
+    content = pcd("ascii", lines(SINGLE)).replace(b"0 0 0 1 0 0 0", frame.encode())
+    if expected is None:
+        assert read(tmp_path / "a.pcd", content).points.tolist() == SINGLE.tolist()
+        return
+    with pytest.raises(InvalidFile) as caught:
+        read(tmp_path / "a.pcd", content)
+    assert expected in str(caught.value)
+
+
 PCD_KINDS = {
     **{f"I{n}": f"<i{n}" for n in (1, 2, 4, 8)},
     **{f"U{n}": f"<u{n}" for n in (1, 2, 4, 8)},

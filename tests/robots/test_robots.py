@@ -111,6 +111,21 @@ def test_what_is_not_judged_in_time_is_undecided(tmp_path: Path, robot: Robot) -
     assert found.verdict is Verdict.UNDECIDED
 
 
+def test_without_a_pair_to_check_nothing_is_green(tmp_path: Path) -> None:
+    ignored = "".join(
+        f'<disable_collisions link1="{one}" link2="{other}"/>'
+        for one, other in (("base", "arm"), ("arm", "hand"), ("base", "hand"))
+    )
+    srdf = write(tmp_path, "r.srdf", f'<robot name="two">{ignored}</robot>')
+    urdf = write(tmp_path, "two.urdf", URDF)
+    cell = cell_of(RobotFiles(urdf=urdf, srdf=srdf))
+    rows = verify_robot(cell, Motion(np.array([[0.0, 0.0], [1.0, 0.0]])))
+    assert rows.verdict is Verdict.UNDECIDED
+    bad = [row for row in rows.checks if row.verdict is not Verdict.CERTIFIED]
+    assert [(row.name, row.count) for row in bad] == [("clearance between links", 0)]
+    assert bad[0].where.startswith("no pair to check")
+
+
 def test_the_profile_is_the_least_of_each_link_and_obstacle(
     tmp_path: Path, robot: Robot
 ) -> None:

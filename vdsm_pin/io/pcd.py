@@ -13,6 +13,8 @@ from vdsm_pin.io.meshes.raw import MAX_LINE, MeshStream, doubles
 _KINDS: Final = {"F": "f", "I": "i", "U": "u"}
 _SIZES: Final = (1, 2, 4, 8)
 _MOST_LINES: Final = 100
+_FRAME: Final = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+"""The VIEWPOINT of points that are as they stand: no shift, no turn (w x y z)."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,13 @@ def _understood(stream: MeshStream, said: dict[str, list[str]], lines: int) -> _
     if not good or any(names.count(axis) != 1 for axis in "xyz"):
         problem = "has a header that is no PCD's: expected FIELDS with x y z, SIZE, "
         problem += "TYPE, POINTS, DATA ascii, binary or binary_compressed"
+        raise stream.invalid(problem)
+    seen_from = stream.numbers(said.get("VIEWPOINT", list(map(str, _FRAME))), 7, lines)
+    if (*seen_from,) != _FRAME:
+        problem = (
+            f"has the VIEWPOINT {' '.join(said['VIEWPOINT'])}, which may place its "
+        )
+        problem += "points or not; expected points that it does not, and 0 0 0 1 0 0 0"
         raise stream.invalid(problem)
     stream.check_room(int(points[0]))
     if not int(points[0]):

@@ -47,6 +47,7 @@ POSES: Final = "link poses by Pinocchio against the tree's"
 LIMITS: Final = "joint {name!r} in its limits"
 OBSTACLES: Final = "clearance from obstacles"
 LINKS: Final = "clearance between links"
+NO_PAIR: Final = "no pair to check: no obstacle, no two links that are held apart"
 COAL: Final = "distances by Coal against the proved brackets"
 POSE_ERROR: Final = 1e-9
 """Where Pinocchio and the tree must agree; [m] or, of rotations, [-]."""
@@ -100,7 +101,7 @@ def verify_robot(
         *rate_checks(robot.joints, path),
         *check_inside(by_mesh(cell, located), INSIDE),
         *_refuted(_clearances(cell, named, least, late), lost, clear),
-        coal,
+        *([coal] if cell.pairs else []),
     ]
     return RobotVerification(
         problem=cell,
@@ -241,6 +242,10 @@ def _clearances(
         (LINKS, np.flatnonzero(~outer), cell.required_self_clearance),
     ):
         if not mine.size:
+            if not pairs and name == LINKS:
+                rows.append(
+                    Check(name, Verdict.UNDECIDED, 0, nan, needed, "m", NO_PAIR)
+                )
             continue
         lost, left = (least.verdict[mine] == v for v in (REFUTED, UNDECIDED))
         verdict = Verdict.UNDECIDED if left.any() else Verdict.CERTIFIED

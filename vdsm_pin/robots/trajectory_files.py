@@ -178,6 +178,7 @@ def _check_units(file: File, q: FloatArray, joints: Sequence[RobotJoint]) -> Non
             problem = (
                 f"joint {joint.name!r} turns to {most:.4g} rad at waypoint {row}; "
                 "is it in degrees? expected _deg, or radians"
+                + ("" if limits else ", without limits at most two turns either way")
             )
             raise InvalidFile(file=file, problem=problem)
 
