@@ -37,8 +37,10 @@ class CoverageMap:
     seconds: dict[str, float]
 
     def asked(self, module: str, lines: tuple[int, ...], budget: float) -> list[str]:
-        """Tests of lines that take no more than a budget: the quickest of each file,
-        then the second of each, and so on, since tests of one file notice the same.
+        """Tests of lines that take no more than a budget.
+
+        The quickest of each file come first, then the second of each, and so on, since
+        tests of one file notice the same.
 
         Where no test runs any of the lines, all may be asked: what runs at import has
         an effect anywhere.
