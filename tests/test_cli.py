@@ -395,7 +395,9 @@ def bad_inputs(folder: Path, planned: Path) -> dict[str, list[object]]:
             good,
             rows,
         ],
-        "'': is a folder": ["plan", "", "--out", out],
+        "an argument is empty": ["plan", good, "--out", ""],
+        "is a variable not set?": ["plan", good, "--out="],
+        "vdsm: /: is a folder": [*verify, "/"],
     }
 
 

@@ -87,7 +87,11 @@ def test_nothing_that_is_read_is_written_over(
     assert verified(made, tmp_path / "moveit", "--scene", str(scene)) == 2
     assert "moveit.yaml" in capsys.readouterr().err
     assert scene.read_text() == MOVEIT
-    assert not (tmp_path / "out").exists()
+    (tmp_path / "folder").mkdir()
+    before = set(tmp_path.iterdir())
+    for proof in (tmp_path / "folder", tmp_path / "all.urdf", scene):
+        assert verified(made, proof, "--scene", str(scene)) == 2
+        assert set(tmp_path.iterdir()) == before
 
 
 def test_a_problem_names_a_scene_beside_obstacles_of_its_own(tmp_path: Path) -> None:

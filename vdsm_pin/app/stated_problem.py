@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # an arm's certificate needs nothing of robots
 
 def problem_beside(certificate: Path) -> Path:
     """Where it stands."""
-    return certificate.with_name(f"{certificate.name}.yaml")
+    return certificate.parent / f"{certificate.name}.yaml"
 
 
 def stated_cell(
@@ -39,8 +39,9 @@ def stated_cell(
     from vdsm_pin.robots.problem_text import problem_text
 
     path = problem_beside(certificate)
-    check_output_file(path)
-    check_kept([path], [*cell.files, motion])
+    for output in (certificate, path):
+        check_output_file(output)
+    check_kept([certificate, path], [*cell.files, motion])
     text = problem_text(cell, files, scene, path.parent)
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -322,7 +322,7 @@ def _check_outputs(order: VerifyOrder) -> None:
     for file in alone:
         check_output_file(file)
     outputs = [*(order.folder / name for name in JUDGED), *alone]
-    beside = order.trajectory.with_name(PLAN)
+    beside = order.trajectory.parent / PLAN
     check_kept(outputs, [*order.read.files, order.trajectory, beside])
     if order.pdf is not None:
         find_browser()
@@ -330,7 +330,7 @@ def _check_outputs(order: VerifyOrder) -> None:
 
 def planned_by(trajectory: Path) -> PlanFile | None:
     """plan.json beside a trajectory, if it belongs to exactly this trajectory."""
-    beside = trajectory.with_name(PLAN)
+    beside = trajectory.parent / PLAN
     try:
         plan = PlanFile.model_validate_json(beside.read_text(encoding="utf-8"))
     except (OSError, ValidationError, UnicodeDecodeError):

@@ -40,7 +40,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         InvalidFile: If the folder cannot be made or the file not be written.
     """
     final = Path(path)
-    temporary = final.with_name(_part(final, secrets.token_hex(8)))
+    temporary = final.parent / _part(_begin(final), secrets.token_hex(8))
     try:
         check_replaceable(final)
         final.parent.mkdir(parents=True, exist_ok=True)
@@ -58,13 +58,18 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
 
 def remove_parts(path: Path) -> None:
     """Remove what killed processes left of a file that nobody is writing now."""
-    for part in path.parent.glob(_part(Path(glob.escape(path.name)), "?" * 16)):
+    for part in path.parent.glob(_part(glob.escape(_begin(path)), "?" * 16)):
         part.unlink(missing_ok=True)
 
 
-def _part(final: Path, mark: str) -> str:
+def _begin(final: Path) -> str:
+    """The name of a file, as far as another fits behind it: names have 255 bytes."""
+    return os.fsdecode(os.fsencode(final.name)[:80])
+
+
+def _part(begin: str, mark: str) -> str:
     """Name of a file that is being written; marks tell writers apart."""
-    return f".{final.name[:80]}.{mark}.part"
+    return f".{begin}.{mark}.part"
 
 
 def write_text(path: str | Path, text: str) -> None:
