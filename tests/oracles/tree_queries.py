@@ -97,14 +97,30 @@ def wrong_poses(
         off = box.joints[number] * rng.choice([-1.0, 1.0])
         if joint.kind is Kind.FIXED or (joint.kind is Kind.PRISMATIC and not shifting):
             off = 0.0
-        moved = Tree((Joint(0, joint.kind, joint.axis, offset=values[number] + off),))
-        tilt = Tree((Joint(0, Kind.REVOLUTE, unit(rng), offset=box.tilts[number]),))
+        tilt = turn_about(unit(rng), box.tilts[number])
         placed = np.array(joint.placement)
         placed[:3, 3] += shifting * box.shifts[number] * unit(rng)
-        for turn in (tilt, moved):
-            placed = placed @ turn.poses(np.zeros((1, 0)))[0, 1]
+        placed = placed @ tilt @ moved(joint, values[number] + off)
         poses[number + 1] = poses[joint.parent] @ placed
     return poses
+
+
+def turn_about(axis: FloatArray, angle: float) -> FloatArray:
+    """A turn about a unit vector as a rigid motion, by the exponential (Rodrigues)."""
+    x, y, z = axis
+    cross, pose = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]), np.eye(4)
+    pose[:3, :3] += np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    return pose
+
+
+def moved(joint: Joint, value: float) -> FloatArray:
+    """What a joint does at a value [rad] or [m]."""
+    if joint.kind is Kind.REVOLUTE:
+        return turn_about(joint.axis, value)
+    pose = np.eye(4)
+    if joint.kind is Kind.PRISMATIC:
+        pose[:3, 3] = value * np.asarray(joint.axis)
+    return pose
 
 
 # ---- solids and their distance from points -------------------------------------------
