@@ -40,6 +40,11 @@ def run(**changed: object) -> Simulation:
     return simulate(HRM8, bending(), Settings(sensors=CALM).model_copy(update=changed))
 
 
+@pytest.fixture(scope="module")
+def calm() -> Simulation:
+    return run()
+
+
 @pytest.mark.parametrize("rows", [2, 3, 40])
 def test_rates_and_accelerations_keep_their_limits(rows: int) -> None:
     speed = Speed(joint_deg_s=5.0, joint_deg_s2=20.0, tip_m_s=10.0)
@@ -60,31 +65,34 @@ def test_rows_that_do_not_move_take_no_time() -> None:
     assert row_times(HRM8, rest, Speed())[-1] == 0.0
 
 
-def test_the_arm_follows_within_a_tenth_of_a_degree_or_so() -> None:
-    found = run()
-    assert np.rad2deg(found.largest_error) < 0.5
-    settled = found.errors[-10:]
+def test_the_arm_follows_within_a_tenth_of_a_degree_or_so(calm: Simulation) -> None:
+    assert np.rad2deg(calm.largest_error) < 0.5
+    settled = calm.errors[-10:]
     assert np.rad2deg(np.abs(settled).max()) < 0.15
-    assert (found.tensions >= 0.0).all()
+    assert (calm.tensions >= 0.0).all()
 
 
-def test_without_gravity_feed_forward_it_sags() -> None:
+def test_without_gravity_feed_forward_it_sags(calm: Simulation) -> None:
     blind = run(controller=Controller(gravity_feed_forward=False))
-    assert blind.largest_error > 5.0 * run().largest_error
+    assert blind.largest_error > 5.0 * calm.largest_error
 
 
-def test_a_kick_is_felt_at_its_joint_and_recovered_from() -> None:
+def test_a_kick_is_felt_at_its_joint_and_recovered_from(
+    calm: Simulation,
+) -> None:
     kick = Kick(axis="alpha", joint=5, share=0.5, torque_nm=10.0, duration_s=0.2)
-    calm, kicked = run(), run(kicks=(kick,))
+    kicked = run(kicks=(kick,))
     more = np.abs(kicked.errors - calm.errors).max(axis=0)
     assert 2.0 < np.rad2deg(more.max()) < 8.0  # the paper saw about 4 deg
     assert np.argmax(more) in (8, 10, 6)  # alpha5, or its neighbours in the chain
     assert np.rad2deg(np.abs(kicked.errors[-5:]).max()) < 0.3
 
 
-def test_half_the_step_changes_angles_by_less_than_a_hundredth_of_a_degree() -> None:
-    coarse, fine = run(), run(step_s=0.00025)
-    change = np.abs(coarse.executed[:, 1:] - fine.executed[:, 1:]).max()
+def test_half_the_step_changes_angles_by_less_than_a_hundredth_of_a_degree(
+    calm: Simulation,
+) -> None:
+    fine = run(step_s=0.00025)
+    change = np.abs(calm.executed[:, 1:] - fine.executed[:, 1:]).max()
     assert np.rad2deg(change) < 0.01
 
 

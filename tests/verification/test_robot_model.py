@@ -79,13 +79,13 @@ def yourdfpy_centres(
     return np.stack(centres, axis=1)
 
 
-def test_pinocchio_yourdfpy_and_the_closed_form_agree_at_10000_configurations() -> None:
+def test_pinocchio_and_the_closed_form_agree_at_10000_configurations() -> None:
     joints = random_joints(np.random.default_rng(11), HRM8, 10_000)
     ours = joint_centres(HRM8, *joints)
     pinocchio = load_robot(HRM8).joint_centres(*joints)
     np.testing.assert_allclose(pinocchio, ours, rtol=0, atol=AGREEMENT)
-    third = yourdfpy_centres(HRM8, *joints)
-    np.testing.assert_allclose(third, ours, rtol=0, atol=AGREEMENT)
+    third = yourdfpy_centres(HRM8, *(values[:1_000] for values in joints))
+    np.testing.assert_allclose(third, ours[:1_000], rtol=0, atol=AGREEMENT)
 
 
 @pytest.mark.parametrize("n_links", [2, 3, 5, 12, 40])
