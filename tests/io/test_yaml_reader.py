@@ -21,6 +21,7 @@ from vdsm_pin.io.yaml_reader import read_yaml
 
 PLAIN = EVERYTHING.replace("1e3", "1000").replace("1.5e1", "15")
 SIGNS = ("\x85", "\u2028", "\u2029")
+SCHEMA = jsonschema.Draft202012Validator(problem_schema())
 NAMES = (
     "Säule", "оболочка", "外壳 2", "σωλήνας/α: 1", "می\u200cشود", "a/b", "../up",
     "C:\\x",
@@ -81,7 +82,7 @@ def test_names_in_any_alphabet_are_read_and_the_schema_agrees(
     path = write_everything(tmp_path)
     for where in (("name",), ("manipulator", "name"), ("obstacles", 0, "name")):
         text = edited(PLAIN, where, name)
-        jsonschema.validate(yaml.safe_load(text), problem_schema())
+        SCHEMA.validate(yaml.safe_load(text))
         path.write_text(text, encoding="utf-8")
         problem = read_problem(path).problem
         assert name in (problem.name, problem.manipulator.name, *problem.scene.names)
@@ -94,7 +95,7 @@ def test_names_that_hide_something_are_refused_by_schema_and_reader(
     path = write_everything(tmp_path)
     text = edited(PLAIN, ("obstacles", 0, "name"), name)
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(yaml.safe_load(text), problem_schema())
+        SCHEMA.validate(yaml.safe_load(text))
     path.write_text(text, encoding="utf-8")
     with pytest.raises(InvalidFile, match="expected signs that can be seen"):
         read_problem(path)
