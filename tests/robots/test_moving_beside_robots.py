@@ -17,9 +17,10 @@ from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.repair.robot import repair_robot
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.certificate import write_robot_certificate
-from vdsm_pin.robots.judgement import OBSTACLES, verify_robot
+from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.verification.certificate_lines import Hashes
+from vdsm_pin.verification.clearance_check import OBSTACLES
 from vdsm_pin.verification.records import Verdict
 
 URDF = """<robot name="two"><link name="base"/>

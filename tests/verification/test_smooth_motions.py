@@ -294,7 +294,7 @@ def test_parts_of_a_curve_are_the_curve(quintic: bool) -> None:
     moments = np.interp(t, times, np.arange(4.0))
     np.testing.assert_allclose(motion.joints_at(moments), exact, atol=1e-12)
     np.testing.assert_allclose(curve(motion.refined(5), t), exact, atol=1e-12)
-    part = motion.within(1, 0.25, 0.7)
+    part = motion.between(1.25, 1.7)
     assert part.times is not None
     some = np.linspace(*part.times, 50)
     np.testing.assert_allclose(curve(part, some), curve(motion, some), atol=1e-12)

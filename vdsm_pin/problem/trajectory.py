@@ -227,15 +227,18 @@ class Trajectory(Summarised):
             joints, self.on_path[before], self.path_m[before], times
         )
 
-    def within(self, interval: int, low: float, high: float) -> "Trajectory":
-        """A part of one interval as a motion of two rows; its tip draws nothing.
+    def between(self, low: float, high: float) -> "Trajectory":
+        """The motion from one moment to another, both rows or both in one interval.
 
-        Of a single row the row itself.
+        Inside an interval it has two rows, and its tip draws nothing. Of a single row
+        the row itself.
         """
         if self.n_samples == 1:
             return self
-        ends, none = interval + np.array([low, high]), np.zeros(2)
-        return self._through(ends, none.astype(bool), none)
+        if not (low % 1.0 or high % 1.0):
+            return self.part(int(low), int(high) + 1)
+        none = np.zeros(2)
+        return self._through(np.array([low, high]), none.astype(bool), none)
 
     def refined(self, parts: int) -> "Trajectory":
         """The same smooth motion with every piece cut into so many equal ones."""

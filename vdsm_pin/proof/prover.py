@@ -6,7 +6,8 @@ included. If it is REFUTED, two points, one of each body, come nearer at a state
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
@@ -18,11 +19,17 @@ from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, OWN, TIME, UP
 from vdsm_pin.proof.packing import pack_task, with_errors
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.proving import Proving, new_proving
+from vdsm_pin.proof.proving import Proving, dense_rows, new_proving
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.rough import with_rough
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED, WORLD
 from vdsm_pin.proof.tree import Tree
+
+MOST_BRACKETS: Final = 500_000
+"""Brackets of intervals that are held at once."""
+
+RANK: Final = np.array([0, 2, 1])
+"""Of verdicts, the worst last: refuted, before it undecided; its own inverse."""
 
 
 @dataclass(frozen=True)
@@ -241,6 +248,34 @@ def prove(
     proving, plan = start_proof(tree, bodies, path, table, errors, budget, columns)
     in_time = proving.run()
     return _summed(proving.results, plan, table.size, in_time)
+
+
+def prove_intervals(
+    tree: Tree,
+    bodies: Sequence[Body],
+    path: Path,
+    pairs: Sequence[Pair],
+    errors: ErrorBox | None = None,
+    budget: Budget | None = None,
+) -> tuple[IntArray, FloatArray] | None:
+    """What `prove` says of every interval by itself; arguments as there.
+
+    Returns:
+        Verdicts and upper bounds, shape (n_intervals, n_pairs) each; [m]. None where
+        they are more than `MOST_BRACKETS`, or the time ended before.
+    """
+    table = PairTable.of(pairs)
+    proving, plan = start_proof(tree, bodies, path, table, errors, budget)
+    n_intervals, n_parts = path.n_intervals, len(plan.owner)
+    if n_intervals * n_parts > MOST_BRACKETS:
+        return None
+    dense = dense_rows(n_intervals, n_parts)
+    proving = replace(proving, results=proving.results._replace(dense=dense))
+    if not proving.sweep(0, n_intervals):
+        return None
+    first = np.searchsorted(plan.owner, np.arange(table.size))
+    worst = np.maximum.reduceat(RANK[dense.verdict], first, axis=1)
+    return RANK[worst], np.minimum.reduceat(dense.upper, first, axis=1)
 
 
 def _summed(results: Results, plan: _Plan, n: int, in_time: bool) -> Proof:

@@ -89,7 +89,7 @@ def repair_robot(
     origins = Origins.of(path.knots, [0, len(path.knots) - 1], pinned)
     return repaired(
         _Motion(cell, path.knots, origins),
-        lambda motion: verify_robot(cell, Path(motion.q), deadline),
+        lambda motion: verify_robot(cell, Path(motion.q), deadline, contacts=False),
         MARGINS,
         deadline,
         under_errors=cell.errors != ErrorBox(),

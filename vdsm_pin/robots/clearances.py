@@ -1,11 +1,13 @@
 """The least clearance of every pair of a cell, and a ball in both where they meet."""
 
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import frozen
+from vdsm_pin.proof.bodies import Pair as BodyPair
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import Proof
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
@@ -43,16 +45,18 @@ def named_pairs(cell: Cell) -> tuple[Pair, ...]:
     return tuple(found)
 
 
-def least_clearances(cell: Cell, path: Path, proof: Proof) -> LeastClearances:
-    """What a proof says of every pair, the witness on the link first.
+def least_clearances(
+    cell: Cell, pairs: Sequence[BodyPair], path: Path, proof: Proof
+) -> LeastClearances:
+    """What a proof says of some pairs, the witness on the link first.
 
     Where a ball is proved to lie in both bodies they are refuted, and so deep.
     """
-    return _met(cell, path, _least(cell, proof))
+    return _met(cell, pairs, path, _least(cell, pairs, proof))
 
 
-def _least(cell: Cell, proof: Proof) -> LeastClearances:
-    outer = np.array([pair.one >= len(cell.robot.bodies) for pair in cell.pairs], bool)
+def _least(cell: Cell, pairs: Sequence[BodyPair], proof: Proof) -> LeastClearances:
+    outer = np.array([pair.one >= len(cell.robot.bodies) for pair in pairs], bool)
     points = proof.points.copy()
     points[outer] = points[outer, ::-1]
     return LeastClearances(
@@ -66,18 +70,20 @@ def _least(cell: Cell, proof: Proof) -> LeastClearances:
     )
 
 
-def _met(cell: Cell, path: Path, least: LeastClearances) -> LeastClearances:
+def _met(
+    cell: Cell, pairs: Sequence[BodyPair], path: Path, least: LeastClearances
+) -> LeastClearances:
     """The same, with the balls in both bodies that are found."""
     near = (least.verdict != CERTIFIED) & (least.upper <= MEETING)
     changed = {one.name: getattr(least, one.name).copy() for one in fields(least)}
-    for k in np.flatnonzero(near):
+    for k in np.flatnonzero(near).tolist():
         moment = least.interval[k] + least.time[k]
         middle = 0.5 * (least.link_point[k] + least.other_point[k])
         moments = np.clip(moment + np.array(BESIDE), 0.0, path.n_intervals)
         intervals, shares = path.split(moments)
         poses = cell.poses(path.within(intervals, shares))
         for at, pose in enumerate(poses):
-            bodies = cell.coal.pieces(cell.pairs[k], pose)
+            bodies = cell.coal.pieces(pairs[k], pose)
             radius, centre = common_ball(*bodies, middle)
             if radius > 0.0:
                 found = intervals[at], shares[at], -radius, REFUTED, centre, centre

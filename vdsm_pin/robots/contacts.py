@@ -67,6 +67,8 @@ def common_ball(
         for body in (one, other)
     ]
     for both in product(*near):
+        if not _may_meet(both[0][0], both[1][0]):
+            continue
         thick = [(piece, slack) for piece, slack in both if slack is not None]
         if not thick:
             continue
@@ -107,6 +109,15 @@ def _box(piece: Piece) -> tuple[FloatArray, FloatArray]:
     assert isinstance(piece, FlatCylinder)  # a half-space is alone
     reach = piece.half_length + piece.radius
     return piece.centre - reach, piece.centre + reach
+
+
+def _may_meet(one: Piece, other: Piece) -> bool:
+    """Whether the boxes of two pieces meet."""
+    if isinstance(one, HalfSpacePiece) or isinstance(other, HalfSpacePiece):
+        return True
+    (low, high), (least, most) = _box(one), _box(other)
+    grown = sum(piece.radius for piece in (one, other) if isinstance(piece, Hull))
+    return bool((low <= most + grown).all() and (least <= high + grown).all())
 
 
 def _deepest_of(points: FloatArray, slack: Slack) -> tuple[float, FloatArray]:

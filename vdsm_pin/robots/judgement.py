@@ -1,18 +1,18 @@
 """The judgement of a robot's trajectory: every check, one row each."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf, nan
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.errors import OutOfTime, VdsmError
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.errors import VdsmError
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.winding import Side
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import Proof, prove
-from vdsm_pin.proof.terms import REFUTED, UNDECIDED
+from vdsm_pin.proof.terms import REFUTED
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.clearances import (
     MEETING,
@@ -22,14 +22,17 @@ from vdsm_pin.robots.clearances import (
 )
 from vdsm_pin.robots.counterexamples import robot_counterexamples, told_all
 from vdsm_pin.robots.errors import proof_box
+from vdsm_pin.robots.first_contact import robot_contacts
 from vdsm_pin.robots.inside import by_mesh, enclosed, enclosed_profile, locate_links
 from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.robots.rates import largest_of, rate_checks
 from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.besides import Besides
 from vdsm_pin.verification.clearance import profile_of
-from vdsm_pin.verification.clearance_check import refuted_by
+from vdsm_pin.verification.clearance_check import LINKS, Evidence, clearance_checks
+from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import LINKS as INSIDE
 from vdsm_pin.verification.inside import check_inside
 from vdsm_pin.verification.moving import Knots, path_beside
@@ -45,8 +48,6 @@ from vdsm_pin.verification.records import (
 
 POSES: Final = "link poses by Pinocchio against the tree's"
 LIMITS: Final = "joint {name!r} in its limits"
-OBSTACLES: Final = "clearance from obstacles"
-LINKS: Final = "clearance between links"
 NO_PAIR: Final = "no pair to check: no obstacle, no two links that are held apart"
 COAL: Final = "distances by Coal against the proved brackets"
 POSE_ERROR: Final = 1e-9
@@ -77,31 +78,62 @@ class RobotVerification(Verification):
 
 
 def verify_robot(
-    cell: Cell, path: Path, deadline: Deadline = NO_LIMIT
+    cell: Cell, path: Path, deadline: Deadline = NO_LIMIT, *, contacts: bool = True
 ) -> RobotVerification:
-    """The judgement of a motion; what is not judged in time is undecided."""
+    """The judgement of a motion; what is not judged in time is undecided.
+
+    Args:
+        cell: The robot, its obstacles, the clearances asked for.
+        path: The motion.
+        deadline: When to give up what is left.
+        contacts: Whether to look for when bodies first and last come too close.
+    """
     robot = cell.robot
     columns, budget = np.arange(len(cell.bodies)), Budget(until=deadline.end)
     box = proof_box(robot, cell.scene, cell.errors)
     whole, knots = path_beside(path, cell.scene)
     proof = prove(cell.tree, cell.bodies, whole, cell.pairs, box, budget, columns)
     located = locate_links(cell, whole, box, budget)
-    named, least = named_pairs(cell), least_clearances(cell, whole, proof)
+    named = named_pairs(cell)
+    proved = least_clearances(cell, cell.pairs, whole, proof)
     coal, measured = _coal(cell, whole, proof, knots)
-    least = enclosed(least, located)
+    least, besides = enclosed(proved, located), Besides()
     profile = profile_of(proof.profile, proof.stride, knots, len(robot.bodies))
-    late = "" if proof.in_time else f": {OutOfTime(deadline.limit)}"
-    lost, not_done = _lost(cell, whole, named, least, proof.lower_interval, deadline)
+    none: tuple[Counterexample, ...] = ()
+    lost = besides.take(
+        "search for counterexamples",
+        lambda: robot_counterexamples(
+            cell, whole, named, least, proof.lower_interval, deadline
+        ),
+        none,
+    )
+    nowhere: tuple[FirstContact, ...] = ()
+    met = nowhere
+    if contacts:
+        met = besides.take(
+            "first contact",
+            lambda: robot_contacts(cell, path, named, proved, box, deadline),
+            nowhere,
+        )
     lost, least = told_all(lost, knots), told(least, knots)
     outside = all(one.where.side is Side.OUTSIDE for one in located.values())
     clear = bool(lost) and outside and _is_clear(cell, whole, deadline)
+    evidence = Evidence(
+        pairs=named,
+        least=least,
+        counts=np.eye(3, dtype=np.int64)[least.verdict],
+        deepest=lambda k, worst: bool(least.verdict[k] == REFUTED) and worst <= MEETING,
+        counterexamples=lost,
+        nominal=clear,
+        contacts=met,
+    )
     checks = [
         _poses(robot, path),
         *_limits(robot, path),
         *rate_checks(robot.joints, path),
         *check_inside(by_mesh(cell, located), INSIDE),
-        *_refuted(_clearances(cell, named, least, late), lost, clear),
-        *([coal] if cell.pairs else []),
+        *clearance_checks(cell, evidence, None if proof.in_time else deadline),
+        *([coal] if cell.pairs else [_no_pair(cell)]),
     ]
     return RobotVerification(
         problem=cell,
@@ -114,43 +146,21 @@ def verify_robot(
         least=least,
         counterexamples=lost,
         nominal_clear=clear,
-        not_done=not_done,
+        not_done=tuple(besides.not_done),
         time_limit=deadline.limit,
     )
 
 
-def _lost(
-    cell: Cell,
-    path: Path,
-    pairs: tuple[Pair, ...],
-    least: LeastClearances,
-    weakest: IntArray,
-    deadline: Deadline,
-) -> tuple[tuple[Counterexample, ...], tuple[str, ...]]:
-    """Counterexamples of what errors leave undecided, and what was not done in time."""
-    try:
-        return robot_counterexamples(cell, path, pairs, least, weakest, deadline), ()
-    except OutOfTime as error:
-        return (), (f"search for counterexamples: {error}",)
+def _no_pair(cell: Cell) -> Check:
+    """The row of a robot of which nothing is held apart."""
+    needed = cell.required_self_clearance
+    return Check(LINKS, Verdict.UNDECIDED, 0, nan, needed, "m", NO_PAIR)
 
 
 def _is_clear(cell: Cell, path: Path, deadline: Deadline) -> bool:
     """Whether the motion is proved clear of everything, without errors."""
     budget = Budget(until=deadline.end)
     return prove(cell.tree, cell.bodies, path, cell.pairs, budget=budget).is_certified
-
-
-def _refuted(
-    rows: list[Check], lost: tuple[Counterexample, ...], clear: bool
-) -> list[Check]:
-    """The rows of clearances, refuted where counterexamples decide."""
-    decided = {OBSTACLES if one.pair.obstacle else LINKS: one for one in lost}
-    return [
-        refuted_by(row, decided[row.name], nominal=clear)
-        if row.name in decided
-        else row
-        for row in rows
-    ]
 
 
 def _closest(
@@ -230,40 +240,6 @@ def _limit(joint: RobotJoint, path: Path, k: int) -> Check:
         "rad" if joint.turns else "m",
         moment=moment,
     )
-
-
-def _clearances(
-    cell: Cell, pairs: tuple[Pair, ...], least: LeastClearances, late: str
-) -> list[Check]:
-    rows, outer = [], np.array([bool(pair.obstacle) for pair in pairs], bool)
-    moments = least.interval + least.time
-    for name, mine, needed in (
-        (OBSTACLES, np.flatnonzero(outer), cell.required_clearance),
-        (LINKS, np.flatnonzero(~outer), cell.required_self_clearance),
-    ):
-        if not mine.size:
-            if not pairs and name == LINKS:
-                rows.append(
-                    Check(name, Verdict.UNDECIDED, 0, nan, needed, "m", NO_PAIR)
-                )
-            continue
-        lost, left = (least.verdict[mine] == v for v in (REFUTED, UNDECIDED))
-        verdict = Verdict.UNDECIDED if left.any() else Verdict.CERTIFIED
-        # A refuted motion is as bad as its witness, another one as good as its proof.
-        values = least.lower[mine]
-        if lost.any():
-            verdict = Verdict.REFUTED
-            values = np.where(lost, least.upper[mine], np.inf)
-        k = int(mine[np.argmin(values)])
-        where = str(pairs[k])
-        if left.any():
-            where += f"; {int(left.sum())} of {mine.size} pairs undecided{late}"
-        moment = float(moments[k]) if np.isfinite(least.upper[k]) else nan
-        worst = float(values.min())
-        meet = bool(lost.any() and worst <= MEETING)
-        row = Check(name, verdict, mine.size, worst, needed, "m", where, moment)
-        rows.append(replace(row, deeper=meet))
-    return rows
 
 
 def _coal(

@@ -30,6 +30,7 @@ from vdsm_pin.proof.layouts import (
     TIME,
     UP,
 )
+from vdsm_pin.proof.prover import RANK
 from vdsm_pin.proof.proving import dense_rows, room_for
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.terms import (
@@ -119,14 +120,13 @@ def _merged(chunk: ClearanceChunk, knots: Knots, last: int) -> ClearanceChunk:
     at = np.maximum.reduceat(np.where(chunk.upper == least[groups], numbers, 0), begins)
     columns = np.arange(at.shape[1])
     time = [knots.share(inner[a], chunk.time[a, columns]) for a in at]
-    rank = np.array([0, 2, 1])  # refuted, then undecided, then certified
-    worst = np.maximum.reduceat(rank[chunk.verdict], begins)
+    worst = np.maximum.reduceat(RANK[chunk.verdict], begins)
     return replace(
         chunk,
         lower=frozen(np.minimum.reduceat(chunk.lower, begins)),
         upper=frozen(least),
         time=frozen(np.array(time).reshape(at.shape)),
-        verdict=frozen(rank[worst], np.int64),
+        verdict=frozen(RANK[worst], np.int64),
         link_point=frozen(chunk.link_point[at, columns]),
         other_point=frozen(chunk.other_point[at, columns]),
     )

@@ -1,21 +1,56 @@
-"""What the clearance proof comes to: a row for the obstacles and one for the links."""
+"""What a clearance proof comes to: a row for the obstacles and one for the links."""
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from math import isnan, nan
+from typing import Final
 
 import numpy as np
 
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.proof.layouts import AT_UPPER, LOW, TIME, UP
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.verification.clearance import ClearanceProof
+from vdsm_pin.verification.clearance import ClearanceProof, least_clearances
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import surfaces
-from vdsm_pin.verification.records import Check, Counterexample, Verdict, is_deepest
+from vdsm_pin.verification.records import (
+    Check,
+    Counterexample,
+    LeastClearances,
+    Pair,
+    Problem,
+    Verdict,
+    is_deepest,
+)
 from vdsm_pin.verification.task import ball_of
+
+OBSTACLES: Final = "clearance from obstacles"
+LINKS: Final = "clearance between links"
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What is proved of an arm's or a robot's motion within the error box.
+
+    Args:
+        pairs: Every pair.
+        least: Their least clearances.
+        counts: What was judged of each by verdict, shape (n_pairs, 3).
+        deepest: Whether a pair, by its number, is found as deep as is measured.
+        counterexamples: Motions that refute what the proof left undecided.
+        nominal: Whether the motion without errors is proved clear.
+        contacts: Where the clearance is first lost.
+    """
+
+    pairs: tuple[Pair, ...]
+    least: LeastClearances
+    counts: IntArray
+    deepest: Callable[[int, float], bool]
+    counterexamples: tuple[Counterexample, ...]
+    nominal: bool
+    contacts: tuple[FirstContact, ...]
 
 
 def check_clearance(
@@ -27,7 +62,7 @@ def check_clearance(
     *,
     nominal: bool = False,
 ) -> tuple[Check, ...]:
-    """One row for the obstacles, one for the links among themselves.
+    """`clearance_checks` of an arm, which say what a mesh counts as.
 
     Args:
         problem: Required clearances.
@@ -37,62 +72,76 @@ def check_clearance(
         deadline: When the proof had to end.
         nominal: Whether the motion without errors is proved clear.
     """
-    late = f": {OutOfTime(deadline.limit)}" if proof.late else ""
-    of_obstacles = np.array([bool(pair.obstacle) for pair in proof.pairs], dtype=bool)
-    rows = []
-    for mine, name, needed in (
-        (of_obstacles, "clearance from obstacles", problem.required_clearance),
-        (~of_obstacles, "clearance between links", problem.required_self_clearance),
-    ):
-        if mine.any():
-            row = _row(problem, proof, np.flatnonzero(mine), (name, needed, late))
-            against = [
-                found
-                for found in counterexamples
-                if bool(found.pair.obstacle) == bool(of_obstacles[mine][0])
-            ]
-            for contact in contacts:
-                if bool(contact.pair.obstacle) == bool(of_obstacles[mine][0]):
-                    row = _first(row, contact)
-            if against:
-                row = refuted_by(row, against[0], nominal=nominal)
-            rows.append(row)
-    said = "".join(f"; {name!r} as a surface only" for name in surfaces(problem))
-    if said:
+    evidence = Evidence(
+        pairs=proof.pairs,
+        least=least_clearances(proof),
+        counts=proof.counts,
+        deepest=lambda k, worst: is_deepest(worst, ball_of(problem, proof.pairs[k])),
+        counterexamples=counterexamples,
+        nominal=nominal,
+        contacts=contacts,
+    )
+    rows = list(clearance_checks(problem, evidence, deadline if proof.late else None))
+    if said := "".join(f"; {name!r} as a surface only" for name in surfaces(problem)):
         rows[0] = replace(rows[0], where=rows[0].where + said)
     return tuple(rows)
 
 
-def _row(
-    problem: PlanningProblem,
-    proof: ClearanceProof,
-    mine: IntArray,
-    asked: tuple[str, float, str],
-) -> Check:
-    name, needed, late = asked
-    counts = proof.counts[mine].sum(axis=0)
-    verdict = Verdict.CERTIFIED
+def clearance_checks(
+    problem: Problem, evidence: Evidence, late: Deadline | None = None
+) -> tuple[Check, ...]:
+    """One row for the obstacles, one for the links among themselves.
+
+    Args:
+        problem: Required clearances.
+        evidence: What is proved.
+        late: When the proof had to end, where it did not in time.
+    """
+    of_obstacles = np.array([bool(pair.obstacle) for pair in evidence.pairs], bool)
+    rows = []
+    for kind, name, needed in (
+        (True, OBSTACLES, problem.required_clearance),
+        (False, LINKS, problem.required_self_clearance),
+    ):
+        mine = np.flatnonzero(of_obstacles == kind)
+        if not mine.size:
+            continue
+        row = _row(Check(name, Verdict.CERTIFIED, 0, nan, needed, "m"), evidence, mine)
+        if late is not None and row.verdict is Verdict.UNDECIDED:
+            row = replace(row, where=f"{row.where}: {OutOfTime(late.limit)}")
+        for contact in evidence.contacts:
+            if bool(contact.pair.obstacle) == kind:
+                row = _first(row, contact)
+        for found in evidence.counterexamples:
+            if bool(found.pair.obstacle) == kind:
+                row = _refuted_by(row, found, nominal=evidence.nominal)
+        rows.append(row)
+    return tuple(rows)
+
+
+def _row(row: Check, evidence: Evidence, mine: IntArray) -> Check:
+    """A row with what is proved of some pairs."""
+    least, counts = evidence.least, evidence.counts[mine].sum(axis=0)
+    values, verdict = least.lower[mine], Verdict.CERTIFIED
     if counts[REFUTED]:
-        verdict = Verdict.REFUTED
+        # A refuted motion is as bad as its witness, another one as good as its proof.
+        verdict, lost = Verdict.REFUTED, least.verdict[mine] == REFUTED
+        values = np.where(lost, least.upper[mine], np.inf)
     elif counts[UNDECIDED]:
         verdict = Verdict.UNDECIDED
-    # A refuted motion is as bad as its witness, another one as good as its proof.
-    column = UP if verdict is Verdict.REFUTED else LOW
-    pair = int(mine[np.argmin(proof.best[mine, column])])
-    row = proof.best[pair]
-    where = f"{proof.pairs[pair].own} and {proof.pairs[pair].label}"
+    k, worst = int(mine[np.argmin(values)]), float(values.min())
+    where = str(evidence.pairs[k])
     if verdict is Verdict.UNDECIDED:
-        where += f"; {int(counts[UNDECIDED])} of {int(counts.sum())} undecided{late}"
-    return Check(
-        name=name,
+        where += f"; {int(counts[UNDECIDED])} of {int(counts.sum())} undecided"
+    seen = np.isfinite(least.upper[k])
+    return replace(
+        row,
         verdict=verdict,
         count=int(counts.sum()),
-        worst=float(row[column]),
-        limit=needed,
-        unit="m",
+        worst=worst,
         where=where,
-        moment=float(row[AT_UPPER] + row[TIME]) if np.isfinite(row[UP]) else nan,
-        deeper=is_deepest(float(row[column]), ball_of(problem, proof.pairs[pair])),
+        moment=float(least.interval[k] + least.time[k]) if seen else nan,
+        deeper=evidence.deepest(k, worst),
     )
 
 
@@ -105,7 +154,10 @@ def _first(row: Check, contact: FirstContact) -> Check:
     if contact.intervals:
         last = _told(contact.last, contact.last_time)
         runs = "" if contact.stretches == 1 else f" in {contact.stretches} stretches"
-        where += f"; last at waypoint {last}; {contact.intervals} intervals{runs}"
+        many = (
+            "1 interval" if contact.intervals == 1 else f"{contact.intervals} intervals"
+        )
+        where += f"; last at waypoint {last}; {many}{runs}"
     return replace(
         row,
         where=where,
@@ -122,7 +174,7 @@ def _told(moment: float, time: float) -> str:
     return text if isnan(time) else f"{text} ({time:.4f} s)"
 
 
-def refuted_by(row: Check, found: Counterexample, *, nominal: bool) -> Check:
+def _refuted_by(row: Check, found: Counterexample, *, nominal: bool) -> Check:
     """The row of an undecided proof that a counterexample decides."""
     pair = f"{found.pair.own} and {found.pair.label}"
     clear = "; the nominal motion is clear" if nominal else ""

@@ -1,31 +1,34 @@
 """When a motion is too close: a collision's begin, end and intervals, not its depth."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import nan
-from typing import Final
+from typing import Final, Protocol, TypeAlias
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray, IntArray
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.layouts import UP
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
-from vdsm_pin.verification.records import ClearanceChunk, Pair
+from vdsm_pin.verification.clearance import (
+    ClearanceProof,
+    least_clearances,
+    prove_clearance,
+)
+from vdsm_pin.verification.records import ClearanceChunk, Motion, Pair
 from vdsm_pin.verification.task import pack_scene
 
 STRETCH: Final = 64
 """Intervals looked at first; the next stretches are twice as long each."""
 
-HALVINGS: Final = 24
-"""How often the interval of the contact is halved."""
+LEAST_SHARE: Final = 2.0**-24
+"""The interval of a contact is halved down to this; [-]."""
 
 DIGITS: Final = 6
-"""Decimals of a moment, in waypoints; finer than 24 halvings tell."""
+"""Decimals of a moment, in waypoints; coarser than what halving tells."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +57,32 @@ class FirstContact:
     time: float = nan
     last_time: float = nan
 
-    def timed(self, trajectory: Trajectory) -> "FirstContact":
+    def timed(self, trajectory: Motion) -> "FirstContact":
         """The same with the times of its moments, where there are any."""
         times = trajectory.times_at(np.array([self.moment, self.last]))
         if times is None:
             return self
         return replace(self, time=float(times[0]), last_time=float(times[1]))
+
+
+class Judged(Protocol):
+    """What is proved of every pair over some stretch of a motion."""
+
+    @property
+    def verdict(self) -> IntArray:
+        """CERTIFIED, REFUTED or UNDECIDED, shape (n_pairs,)."""
+
+    @property
+    def upper(self) -> FloatArray:
+        """Proved upper bounds, shape (n_pairs,); [m]."""
+
+
+Judge: TypeAlias = Callable[[float, float], Judged]
+"""Proves a stretch between two moments in waypoints: rows, or both in one interval."""
+
+
+Noted: TypeAlias = Mapping[bool, BoolArray]
+"""By whether pairs are of obstacles: if one is too close in each interval, (n,)."""
 
 
 class TooClose:
@@ -83,121 +106,141 @@ class TooClose:
         for noted, columns in zip(self._noted, (~mine, mine), strict=True):
             noted[here] |= refuted[:, columns].any(axis=1)
 
-    def of(self, *, obstacles: bool) -> BoolArray:
-        """Whether each interval is one, shape (n_intervals,)."""
-        return np.asarray(self._noted[int(obstacles)])
+    @property
+    def noted(self) -> Noted:
+        """Whether each interval is one."""
+        return {kind: self._noted[int(kind)] for kind in (False, True)}
 
 
 def first_contacts(
-    problem: PlanningProblem,
-    trajectory: Trajectory,
-    errors: ErrorBox,
-    proof: ClearanceProof,
-    deadline: Deadline = NO_LIMIT,
-    noted: TooClose | None = None,
+    pairs: Sequence[Pair],
+    whole: Judged,
+    motion: Motion,
+    judge: Judge,
+    noted: Noted | None = None,
 ) -> tuple[FirstContact, ...]:
     """Where the clearance is first lost, from obstacles and between links.
 
     Args:
-        problem: Arm, scene, required clearances.
-        trajectory: The motion.
-        errors: The box that `proof` covers.
-        proof: Of the whole motion; what it does not refute has no contact.
-        deadline: When to give up.
+        pairs: Every pair.
+        whole: What is proved of the whole motion; what it does not refute has no
+            contact.
+        motion: The motion.
+        judge: Proves the same of its stretches.
         noted: The intervals that are too close, where the whole motion was noted.
 
     Returns:
         One at most of either kind.
 
     Raises:
-        OutOfTime: If the time is over.
+        OutOfTime: If `judge` says that the time is over.
     """
-    of_obstacles = np.array([bool(pair.obstacle) for pair in proof.pairs], dtype=bool)
-    search = _Search(problem, trajectory, errors, deadline)
+    of_obstacles = np.array([bool(pair.obstacle) for pair in pairs], dtype=bool)
     contacts = []
     for mine, kind in ((of_obstacles, True), (~of_obstacles, False)):
-        found = search.first(mine) if proof.counts[mine, REFUTED].any() else None
+        if not (whole.verdict[mine] == REFUTED).any():
+            continue
+        search = _Search(pairs, motion, judge, mine)
+        found = search.first()
         if found is not None and noted is not None:
-            found = search.with_end(found, mine, noted.of(obstacles=kind))
-        contacts += [] if found is None else [found.timed(trajectory)]
+            found = search.with_end(found, noted[kind])
+        contacts += [] if found is None else [found.timed(motion)]
     return tuple(contacts)
 
 
+def arm_contacts(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    errors: ErrorBox,
+    proof: ClearanceProof,
+    deadline: Deadline = NO_LIMIT,
+    noted: Noted | None = None,
+) -> tuple[FirstContact, ...]:
+    """Those of an arm's motion, of which the whole is proved already.
+
+    Raises:
+        OutOfTime: If the time is over.
+    """
+    pieces = pack_scene(problem)
+
+    def judge(low: float, high: float) -> Judged:
+        deadline.check()
+        rows = trajectory.between(low, high)
+        found = prove_clearance(problem, rows, errors, (), pieces, deadline)
+        return least_clearances(found)
+
+    whole = least_clearances(proof)
+    return first_contacts(proof.pairs, whole, trajectory, judge, noted)
+
+
 class _Search:
-    """Proofs of stretches of one motion."""
+    """Proofs of stretches of one motion, of the pairs of one kind."""
 
     def __init__(
-        self,
-        problem: PlanningProblem,
-        trajectory: Trajectory,
-        errors: ErrorBox,
-        deadline: Deadline,
+        self, pairs: Sequence[Pair], motion: Motion, judge: Judge, mine: BoolArray
     ) -> None:
-        self.problem, self.trajectory = problem, trajectory
-        self.errors, self.deadline = errors, deadline
-        self.pieces = pack_scene(problem)
+        self.pairs, self.motion = pairs, motion
+        self.judge, self.mine = judge, mine
+        self.clear = True
 
-    def first(self, mine: BoolArray) -> FirstContact | None:
-        """Of some pairs the first that is refuted, and when; None if none is."""
-        n_intervals = max(1, self.trajectory.n_samples - 1)
-        first, last, clear = 0, min(STRETCH, n_intervals), True
-        while not self._refuted(self._rows(first, last), mine):
+    def first(self) -> FirstContact | None:
+        """The first pair that is refuted, and when; None if none is."""
+        n_intervals = max(1, self.motion.n_samples - 1)
+        first, last = 0, min(STRETCH, n_intervals)
+        while (pair := self._refuted(first, last)) is None:
             if last == n_intervals:
                 return None
-            clear &= self._clear
             first, last = last, min(3 * last - 2 * first, n_intervals)
         while last - first > 1:
             middle = (first + last) // 2
-            if self._refuted(self._rows(first, middle), mine):
+            if self._refuted(first, middle):
                 last = middle
             else:
-                clear &= self._clear
                 first = middle
-        self._refuted(self._rows(first, last), mine)
-        pair, low, high = self._pair, 0.0, 1.0
-        for _ in range(HALVINGS):
-            share = (low + high) / 2.0
-            if self._refuted(self.trajectory.within(first, low, share), mine):
-                pair, high = self._pair, share
+        pair = self._refuted(first, last) or pair
+        if at_once := self._refuted(0, 0) if first == 0 else None:
+            return FirstContact(at_once, 0.0, self.clear)
+        low, high = float(first), float(last)
+        while high - low > LEAST_SHARE:
+            now = (low + high) / 2.0
+            if not self._can_halve(low, now, high):
+                break
+            if sooner := self._refuted(low, now):
+                pair, high = sooner, now
             else:
-                clear &= self._clear
-                low = share
-        moment = round(first + high, DIGITS) if self.trajectory.n_samples > 1 else 0.0
-        return FirstContact(pair, moment, clear)
+                low = now
+        return FirstContact(pair, round(high, DIGITS), self.clear)
 
-    def with_end(
-        self, found: FirstContact, mine: BoolArray, noted: BoolArray
-    ) -> FirstContact:
+    def with_end(self, found: FirstContact, noted: BoolArray) -> FirstContact:
         """The contact with its end, and the intervals it is in."""
-        intervals = np.flatnonzero(noted)
-        if not intervals.size or self.trajectory.n_samples == 1:
+        intervals, rows = np.flatnonzero(noted), self.motion.n_samples
+        if not intervals.size or rows == 1:
             return replace(found, last=found.moment, intervals=1, stretches=1)
-        last, low, high = int(intervals[-1]), 0.0, 1.0
-        for _ in range(HALVINGS):
-            share = (low + high) / 2.0
-            if self._refuted(self.trajectory.within(last, share, 1.0), mine):
-                low = share
-            else:
-                high = share
+        end = float(intervals[-1]) + 1.0
+        to_the_end = end == rows - 1 and self._refuted(end, end)
+        low, high = (end if to_the_end else end - 1.0), end
+        while high - low > LEAST_SHARE:
+            now = (low + high) / 2.0
+            if not self._can_halve(low, now, high):
+                break
+            low, high = (now, high) if self._refuted(now, end) else (low, now)
         return replace(
             found,
-            last=round(last + low, DIGITS),
+            last=round(low, DIGITS),
             intervals=intervals.size,
             stretches=1 + int((np.diff(intervals) > 1).sum()),
         )
 
-    def _refuted(self, rows: Trajectory, mine: BoolArray) -> bool:
-        """Whether some pair is refuted; keeps which, and whether all are proved."""
-        self.deadline.check()
-        proof = prove_clearance(
-            self.problem, rows, self.errors, (), self.pieces, self.deadline
-        )
-        counts: IntArray = np.where(mine[:, None], proof.counts, 0)
-        self._clear = bool(counts.sum() == counts[:, CERTIFIED].sum())
-        worst = np.where(counts[:, REFUTED] > 0, proof.best[:, UP], np.inf)
-        self._pair = proof.pairs[int(np.argmin(worst))]
-        return bool(counts[:, REFUTED].any())
+    def _can_halve(self, *moments: float) -> bool:
+        """Whether moments are at different times, where there are times."""
+        times = self.motion.times_at(np.array(moments))
+        return times is None or bool((np.diff(times) > 0.0).all())
 
-    def _rows(self, first: int, last: int) -> Trajectory:
-        """The intervals from `first` to below `last`."""
-        return self.trajectory.part(first, last + 1)
+    def _refuted(self, low: float, high: float) -> Pair | None:
+        """The worst pair that is refuted in a stretch; None notes if all are proved."""
+        found = self.judge(low, high)
+        refuted = self.mine & (found.verdict == REFUTED)
+        if not refuted.any():
+            self.clear &= bool((found.verdict[self.mine] == CERTIFIED).all())
+            return None
+        return self.pairs[int(np.argmin(np.where(refuted, found.upper, np.inf)))]

@@ -1,7 +1,7 @@
 """What a verification returns: verdicts, rows of evidence, brackets."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
 from math import inf, isfinite, nan
 from typing import Protocol, TypeAlias
@@ -241,6 +241,12 @@ class LeastClearances:
     verdict: IntArray
     link_point: FloatArray
     other_point: FloatArray
+
+    def of(self, pairs: IntArray) -> "LeastClearances":
+        """Those of some pairs, by their numbers."""
+        return LeastClearances(
+            *(getattr(self, one.name)[pairs] for one in fields(self))
+        )
 
 
 ClearanceSink: TypeAlias = Callable[[ClearanceChunk], None]

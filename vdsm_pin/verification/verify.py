@@ -1,24 +1,24 @@
 """The judgement of a trajectory: every check, one row each, in a fixed order."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidInput, OutOfTime, UnknownName
+from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.winding import Location, Side
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.progress import step
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification import cable_check, pointing
 from vdsm_pin.verification.approaches import closest_approaches
 from vdsm_pin.verification.arm_counterexamples import find_counterexamples
+from vdsm_pin.verification.besides import Besides
 from vdsm_pin.verification.clearance import (
     ClearanceProof,
     least_clearances,
@@ -33,7 +33,12 @@ from vdsm_pin.verification.enclosed import (
     enclosed_least,
     enclosed_profile,
 )
-from vdsm_pin.verification.first_contact import FirstContact, TooClose, first_contacts
+from vdsm_pin.verification.first_contact import (
+    FirstContact,
+    Noted,
+    TooClose,
+    arm_contacts,
+)
 from vdsm_pin.verification.inside import (
     Enclosed,
     arm_inside,
@@ -58,8 +63,6 @@ from vdsm_pin.verification.survival import Survival
 from vdsm_pin.verification.task import all_pairs
 from vdsm_pin.verification.tip import check_tip
 from vdsm_pin.verification.yes_or_no import is_certified
-
-T = TypeVar("T")
 
 
 def verify(
@@ -99,7 +102,7 @@ def verify(
     """
     box = problem.errors.widened(errors or ErrorBox())
     _check_input(problem, trajectory, box)
-    asked, besides = _Asked(problem, trajectory, box, deadline), _Besides()
+    asked, besides = _Asked(problem, trajectory, box, deadline), Besides()
     located = locate_arm(problem, trajectory, box, deadline)
     around = bodies_inside(problem, trajectory, arm_inside(located))
     swept = _swept(asked, around, sinks, reach)
@@ -165,26 +168,6 @@ class _Asked:
     deadline: Deadline
 
 
-class _Besides:
-    """What is wanted besides the checks, as far as the time allows it."""
-
-    def __init__(self) -> None:
-        self.not_done: list[str] = []
-
-    def take(self, name: str, run: Callable[[], T], otherwise: T) -> T:
-        """A result, and a note where there is none in time."""
-        step("%s", name)
-        try:
-            return run()
-        except OutOfTime as error:
-            self.not_done.append(f"{name}: {error}")
-            return otherwise
-
-    def note(self, name: str, deadline: Deadline) -> None:
-        """Say that something is missing."""
-        self.not_done.append(f"{name}: {OutOfTime(deadline.limit)}")
-
-
 class _Swept(NamedTuple):
     """What was proved of the clearance, and what was heard on the way.
 
@@ -196,7 +179,7 @@ class _Swept(NamedTuple):
 
     proof: ClearanceProof
     lowers: ProvedLowers
-    too_close: TooClose | None
+    too_close: Noted | None
 
 
 def _swept(
@@ -223,7 +206,9 @@ def _swept(
         deadline=asked.deadline,
         reach=near,
     )
-    heard = noted if proof.sent == proof.n_intervals else None
+    heard = None
+    if noted is not None and proof.sent == proof.n_intervals:
+        heard = noted.noted
     return _Swept(proof, kept.proved(proof), heard)
 
 
@@ -242,7 +227,7 @@ class _Met(NamedTuple):
     contacts: tuple[FirstContact, ...]
 
 
-def _met(asked: _Asked, swept: _Swept, besides: _Besides) -> _Met:
+def _met(asked: _Asked, swept: _Swept, besides: Besides) -> _Met:
     """How bodies come too close, as far as there is time to say."""
     problem, motion, box = asked.problem, asked.trajectory, asked.errors
     proof, deadline = swept.proof, asked.deadline
@@ -258,7 +243,7 @@ def _met(asked: _Asked, swept: _Swept, besides: _Besides) -> _Met:
     nowhere: tuple[FirstContact, ...] = ()
     contacts = besides.take(
         "first contact",
-        lambda: first_contacts(problem, motion, box, proof, deadline, swept.too_close),
+        lambda: arm_contacts(problem, motion, box, proof, deadline, swept.too_close),
         nowhere,
     )
     return _Met(found, nominal, contacts)
@@ -281,7 +266,7 @@ def _survived(
     asked: _Asked,
     proof: ClearanceProof,
     located: Mapping[str, Location],
-    besides: _Besides,
+    besides: Besides,
 ) -> tuple[float, float]:
     """The largest joint error that is proved, and the smallest found that is lost.
 
