@@ -3,16 +3,13 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-import shapely
 from scenes_for_fewest import problem
 
 from vdsm_pin.arm.kinematics import joint_angles, link_angles
 from vdsm_pin.arm.manipulator import built_in
-from vdsm_pin.geometry.arrays import rotation_from_rpy
-from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Prism, Sphere
+from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Sphere
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.growth import Grown, Population
-from vdsm_pin.planner.fewest.inner_capsules import blocked_by, cores_of
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, dense_rows
 from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along
@@ -23,7 +20,6 @@ from vdsm_pin.planner.fewest.shapes import Shapes, one_knee_shapes
 from vdsm_pin.planner.fewest.vary import vary
 from vdsm_pin.planner.impossible.bounds import prove_tips
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance
 
@@ -97,81 +93,6 @@ def test_bounds_from_boxes_never_exceed_the_clearance_and_are_exact_when_near() 
     assert 0.1 < near.mean() < 0.9
     enough = near & (truth >= task.required_clearance)
     np.testing.assert_allclose(bound[enough], truth[enough], atol=1e-8)
-    # Most of what is blocked is known without a distance.
-    assert np.isneginf(bound[~apart]).mean() > 0.5
-
-
-def outside(obstacle: Obstacle, points: np.ndarray) -> float:
-    """How far the farthest point is out of a solid, in some measure; [m]."""
-    if isinstance(obstacle, Box):
-        local = (points - obstacle.centre) @ obstacle.rotation
-        return float((np.abs(local) - obstacle.half_size).max())
-    if isinstance(obstacle, Prism):
-        local = (points - obstacle.origin) @ obstacle.rotation
-        section = shapely.Polygon(obstacle.polygon).convex_hull
-        low, high = obstacle.span
-        aside = shapely.distance(section, shapely.points(local[:, :2])).max()
-        return max(
-            float(aside), float(np.maximum(low - local, local - high)[:, 2].max())
-        )
-    local = points - obstacle.centre
-    if isinstance(obstacle, Sphere):
-        return float(np.linalg.norm(local, axis=1).max() - obstacle.radius)
-    along = local @ obstacle.axis
-    if isinstance(obstacle, Cylinder):
-        aside = np.linalg.norm(local - along[:, None] * obstacle.axis, axis=1)
-        ends = np.abs(along) - obstacle.half_length
-        return float(max((aside - obstacle.radius).max(), ends.max()))
-    half = obstacle.half_length
-    along = np.maximum(-half, np.minimum(half, along))
-    gap = np.linalg.norm(local - along[:, None] * obstacle.axis, axis=1)
-    return float(gap.max() - obstacle.radius)
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_cores_lie_inside_their_obstacles(seed: int) -> None:
-    """A core's capsule, shrunk by rounding, holds points of the solid alone."""
-    rng = np.random.default_rng(seed)
-    rotation = rotation_from_rpy(rng.uniform(-3, 3, 3))
-    axis = rng.normal(size=3)
-    axis /= np.linalg.norm(axis)
-    angles = np.sort(rng.uniform(0, 2 * np.pi, 7))
-    section = rng.uniform(0.1, 0.5) * np.column_stack([np.cos(angles), np.sin(angles)])
-    obstacles = (
-        Box("box", rng.normal(size=3), rotation, rng.uniform(0.01, 0.5, 3)),
-        Prism("prism", rng.normal(size=3), rotation, section, (-0.3, 0.8)),
-        Cylinder("long", rng.normal(size=3), axis, 1.0, 0.2),
-        Cylinder("flat", rng.normal(size=3), axis, 0.1, 0.4),
-        Capsule("capsule", rng.normal(size=3), axis, 0.7, 0.1),
-        Sphere("ball", rng.normal(size=3), 0.3),
-    )
-    together = cores_of(obstacles)
-    for obstacle, same in zip(obstacles, together, strict=True):
-        (core,) = cores_of((obstacle,))
-        np.testing.assert_allclose(same, core, rtol=0, atol=1e-15)
-        away = rng.normal(size=(300, 3))
-        away *= core[6] * (1.0 - 1e-9) / np.linalg.norm(away, axis=1)[:, None]
-        share = rng.uniform(0, 1, (300, 1))
-        points = core[:3] + share * (core[3:6] - core[:3]) + away
-        assert outside(obstacle, points) <= 1e-9, obstacle.name
-
-
-def test_a_segment_is_blocked_by_a_core_on_the_right_side_of_the_limit() -> None:
-    rng = np.random.default_rng(5)
-    cores = np.column_stack([rng.normal(size=(50, 6)), rng.uniform(0, 0.2, 50)])
-    ends = rng.normal(size=(50, 2, 3))
-    for core, end in zip(cores, ends, strict=True):
-        capsule = Capsule("c", (core[:3] + core[3:6]) / 2.0, *_axis(core), core[6])
-        gap = link_clearance(problem(capsule))(end[None])[0, 0] + ARM.link_radius
-        if gap > 1e-6:
-            assert blocked_by(core[None], end[None], gap + 1e-7)[0]
-            assert not blocked_by(core[None], end[None], gap - 1e-7)[0]
-
-
-def _axis(core: np.ndarray) -> tuple[np.ndarray, float]:
-    side = core[3:6] - core[:3]
-    length = float(np.linalg.norm(side))
-    return side / length, length / 2.0
 
 
 def test_bent_arms_are_tried_only_near_where_the_straight_one_does_not_do() -> None:

@@ -270,7 +270,8 @@ def test_the_way_through_a_bent_tube_is_one_that_an_arm_can_follow() -> None:
         ]
     ]
     task = bent_tube(-0.2, 0.008, *bends)
-    judge, effort = judge_of(task), Insert(0.02, 10, 1, 2, 0, cells=60_000)
+    effort = Insert(population=10, routes=1, returns=2, seed=0, cells=60_000)
+    judge = judge_of(task)
     space = tip_space(judge, broad_phase(task, link_clearance(task)), effort)
     (route,) = space.routes(task.path.points[0], 1)
     start = np.zeros((ARM.n_links + 1, 3))
@@ -355,7 +356,7 @@ def test_a_path_behind_a_pipe_is_drawn_in_visits_that_come_home() -> None:
     )
     judge, rows = judge_of(task), path_rows(task.path)
     closed = np.zeros(len(rows.tips), dtype=np.bool_)
-    effort = Insert(step=0.02, population=24, routes=2, returns=3, seed=0)
+    effort = Insert(population=24, routes=2, returns=3, seed=0)
     found = insert(judge, space_of(task), rows, closed, effort).found
     assert found is not None
     # Late, one visit is enough, but not none.
@@ -401,9 +402,7 @@ def test_between_directions_the_arm_moves_steadily(
 def test_knees_are_taken_away_and_the_motion_stays_clear() -> None:
     task = two_windows(0.09)
     judge, rows = judge_of(task), path_rows(task.path)
-    effort = Insert(
-        step=0.02, population=10, routes=1, returns=2, seed=0, directed=True
-    )
+    effort = Insert(population=10, routes=1, returns=2, seed=0, directed=True)
     closed = np.zeros(len(rows.tips), dtype=np.bool_)
     found = insert(judge, space_of(task), rows, closed, effort).found
     assert found is not None

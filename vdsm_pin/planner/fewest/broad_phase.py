@@ -1,9 +1,9 @@
 """A clearance function that leaves alone what is obviously far away.
 
 Most links are far from most obstacles. Axis-parallel boxes round the obstacles and
-round a few stretches of each link give a lower bound of the clearance at once, capsules
-inside the obstacles tell of links that are too near, and the distance from a mesh is
-known but for rounding. The function passed in is asked only where they leave a doubt.
+round a few stretches of each link give a lower bound of the clearance at once, and the
+distance from a mesh is known but for rounding. The function passed in is asked only
+where they leave a doubt.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,6 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hulls, Piece
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.solids import Mesh
-from vdsm_pin.planner.fewest.inner_capsules import blocked_by, cores_of
 from vdsm_pin.planner.fewest.mesh_distance import STEP, Surfaces, surfaces_of
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.time_limit import deadline_of
@@ -46,7 +45,6 @@ class BroadPhase:
         clearance: The clearance function.
         boxes: Low and high corners of boxes that cover the obstacles, (b, 2, 3); [m].
         planes: Outward normals and offsets of the half-spaces, shape (p, 4).
-        cores: Capsules inside the obstacles, shape (c, 7); [m].
         surfaces: The meshes, which have no boxes.
         radius: Radius of the links; [m].
         floor: Clearance below which -inf will do; where that is -inf, all bounds from
@@ -58,7 +56,6 @@ class BroadPhase:
     clearance: LinkClearance
     boxes: FloatArray
     planes: FloatArray
-    cores: FloatArray
     surfaces: Surfaces
     radius: float
     floor: float
@@ -82,8 +79,7 @@ class BroadPhase:
         np.minimum(clearances, mesh, out=clearances)
         asked = np.flatnonzero(near)
         if asked.size:
-            blocked = blocked_by(self.cores, ends[asked], self.floor + self.radius)
-            blocked |= mesh[asked] < self.floor - STEP
+            blocked = mesh[asked] < self.floor - STEP
             clearances[asked[blocked]] = -np.inf
             asked = asked[~blocked]
             clearances[asked] = self.clearance(ends[asked])[:, 0]
@@ -109,7 +105,6 @@ def broad_phase(problem: PlanningProblem, clearance: LinkClearance) -> BroadPhas
         clearance,
         np.concatenate([np.zeros((0, 2, 3)), *covers]),
         np.array(flat).reshape(-1, 4),
-        cores_of(solid),
         surfaces_of(obstacles),
         problem.manipulator.most_radius,
         problem.required_clearance - TOLERANCES.planned_clearance,

@@ -18,7 +18,7 @@ from vdsm_pin.planner.fewest.grown_nodes import fill
 from vdsm_pin.planner.fewest.insertion import insert, tip_space
 from vdsm_pin.planner.fewest.joint_error import link_margins
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.levels import FULL, SEED, Effort, Insert, Level
+from vdsm_pin.planner.fewest.levels import FULL, SEED, Effort, Insert, Search
 from vdsm_pin.planner.fewest.roadmap import (
     CostWeights,
     Roadmap,
@@ -45,6 +45,11 @@ from vdsm_pin.tolerances import TOLERANCES
 
 SPREAD: Final = 0.381966
 """Part of a closed path by which places to enter it are apart (golden section); [-]."""
+
+STEP: Final = 0.08
+"""Lattice step of the directions of shapes; [-]."""
+PLACES: Final = 8
+"""Largest number of joints at which a knee is tried."""
 
 LOG: Final = logging.getLogger(__name__)
 
@@ -125,13 +130,11 @@ def explore(
     # The way out of a start that is bent more than is liked must be allowed.
     bent = largest_start_angle(problem) + TOLERANCES.joint_limit
     least_ease = min(1.0, bent / link_limit(problem))
-    unreached, kept = False, link_margins(problem.manipulator, weights.joint_error)
+    kept = link_margins(problem.manipulator, weights.joint_error)
     stuck: NoWayOut | None = None
     inserted: Stuck | None = None
     spaces: dict[tuple[float, float, int], TipSpace] = {}
     for level in effort.levels:
-        if unreached and isinstance(level, Level) and level.back == 0.0:
-            continue
         ease = max(level.ease, least_ease)
         worth = problem.required_clearance + margin
         worth += (level.slack + weights.clearance) * length
@@ -148,13 +151,11 @@ def explore(
                     spaces[key] = tip_space(judge, clearance, level)
                 now = _inserted(now, spaces[key], level, soon)
                 inserted = now.stuck
-            else:
+            elif isinstance(level, Search):
                 found = _look(judge, level, rows, proof, weights)
-                unreached |= level.ease == 1.0 and _unreached(found)
                 now = Outcome(judge, found, rows, proof, inserted)
         except NoWayOut as error:
             stuck = error
-            unreached |= level.ease == 1.0
         LOG.debug("%s: %.4f m missing", level, now.missing)
         if now.missing < best.missing:
             best = now
@@ -232,14 +233,14 @@ def _proofs(
 
 
 def _look(
-    judge: Judge, level: Level, rows: PathRows, proof: TipProof, weights: CostWeights
+    judge: Judge, level: Search, rows: PathRows, proof: TipProof, weights: CostWeights
 ) -> Searched | None:
     """One level: a roadmap, a search, and growth where it falls short."""
     problem = judge.problem
     arm = problem.manipulator
     length = arm.total_length
     coarse, back = level.coarse * length, level.back * length
-    shapes = one_knee_shapes(arm, judge.limit, level.step, level.places)
+    shapes = one_knee_shapes(arm, judge.limit, STEP, PLACES)
     route = tip_route(problem, rows, proof.closed, coarse, back)
     roadmap = build_roadmap(
         problem, judge.rough, judge.pricing(weights), route, shapes, level.around
@@ -265,10 +266,8 @@ def _look(
     return found
 
 
-def _unreached(found: Searched | None) -> bool:
+def _unreached(found: Searched) -> bool:
     """Whether there are nodes in the stretches not drawn that no way leads to."""
-    if found is None:
-        return True
     roadmap = found.roadmap
     for k in found.skipped:
         if roadmap.route.closed[k]:

@@ -4,44 +4,57 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Level:
     """How finely to look.
 
     Args:
-        step: Lattice step of the directions; [-].
-        coarse: Distance of the tips over the arm's length; [-].
-        places: Largest number of joints at which a knee is tried.
+        ease: Part of the largest link angle that may be used; [-].
+        fine: Whether tips and rows come closer together, with hardly any slack.
+    """
+
+    ease: float = 1.0
+    fine: bool = False
+
+    @property
+    def slack(self) -> float:
+        """Clearance kept for what happens between two rows, over the arm's length."""
+        return 9.6e-6 if self.fine else 9.6e-5
+
+    @property
+    def finest(self) -> float:
+        """Way of the body between two looks at the clearance, over the arm's length."""
+        return 1.6e-4 if self.fine else 6.4e-4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Search(Level):
+    """How thoroughly to look for a motion in a roadmap of sparse shapes.
+
+    Args:
         rounds: Sequences to try.
         back: How far tips are tried behind the path, over the arm's length; [-].
         grow: Rounds of growing shapes into what is not drawn.
-        slack: Clearance kept for what happens between two rows, over the arm's
-            length; [-].
-        finest: Way of the body between two looks at the clearance, over the arm's
-            length; [-].
-        ease: Part of the largest link angle that may be used; [-].
         around: Bent arms are tried up to this many tips from where the straight arm
             does not do; None for everywhere.
     """
 
-    step: float
-    coarse: float
-    places: int
     rounds: int
     back: float
     grow: int
-    slack: float = 9.6e-5
-    finest: float = 6.4e-4
-    ease: float = 1.0
     around: int | None = None
 
+    @property
+    def coarse(self) -> float:
+        """Distance of the tips over the arm's length; [-]."""
+        return 0.013 if self.fine else 0.026
 
-@dataclass(frozen=True)
-class Insert:
+
+@dataclass(frozen=True, kw_only=True)
+class Insert(Level):
     """How thoroughly to look for a motion in through the openings.
 
     Args:
-        step: Distance of the tips over the arm's length; [-].
         population: Arms that live on at a tip.
         routes: Largest number of ways of the tip tried from the start to one place.
         returns: Times a population that is stuck goes back, each time twice as far.
@@ -49,72 +62,45 @@ class Insert:
         cells: Cells at which the search for a way of the tip ends.
         directed: Whether arms are described by the directions of their links, which may
             lean backwards then, and not by their projections.
-        slack: Clearance kept for what happens between two rows, over the arm's
-            length; [-].
-        finest: Way of the body between two looks at the clearance, over the arm's
-            length; [-].
-        ease: Part of the largest link angle that may be used; [-].
     """
 
-    step: float
     population: int
     routes: int
     returns: int
     seed: int
     cells: int = 300_000
     directed: bool = False
-    slack: float = 9.6e-5
-    finest: float = 6.4e-4
-    ease: float = 1.0
+
+    @property
+    def step(self) -> float:
+        """Distance of the tips over the arm's length; [-]."""
+        return 0.01 if self.fine else 0.02
 
 
 SEED: Final = 0
 """Seed of the growth of shapes; the same problem gives the same plan."""
 
-THOROUGH: Final[tuple[Level | Insert, ...]] = (
-    Level(
-        step=0.08, coarse=0.026, places=8, rounds=20, back=0.0, grow=1,
-        ease=0.79, around=4,
-    ),
-    Level(step=0.08, coarse=0.026, places=8, rounds=40, back=0.0, grow=2, around=4),
-    Level(step=0.08, coarse=0.013, places=8, rounds=40, back=0.0, grow=3, around=4),
-    Level(step=0.08, coarse=0.0065, places=8, rounds=40, back=0.0, grow=4, around=8),
-    Level(step=0.08, coarse=0.026, places=8, rounds=40, back=1.0, grow=2),
-    Insert(step=0.02, population=10, routes=1, returns=2, seed=0, cells=60_000),
-    Insert(
-        step=0.02, population=10, routes=2, returns=3, seed=0, cells=60_000,
-        directed=True,
-    ),
-    Insert(step=0.02, population=30, routes=2, returns=4, seed=1),
-    Insert(step=0.02, population=30, routes=3, returns=4, seed=1, directed=True),
-    Level(step=0.08, coarse=0.013, places=8, rounds=40, back=1.0, grow=3),
-    Level(
-        step=0.05, coarse=0.013, places=10, rounds=60, back=1.0, grow=3,
-        slack=9.6e-6, finest=1.6e-4,
-    ),
-    Insert(step=0.02, population=60, routes=4, returns=5, seed=2),
-    Insert(step=0.02, population=60, routes=4, returns=5, seed=2, directed=True),
-    Insert(
-        step=0.01, population=120, routes=6, returns=6, seed=3,
-        slack=9.6e-6, finest=1.6e-4,
-    ),
-    Insert(
-        step=0.01, population=120, routes=6, returns=6, seed=3,
-        slack=9.6e-6, finest=1.6e-4,
-        directed=True,
-    ),
-)  # fmt: skip
-
-
+THOROUGH: Final[tuple[Level, ...]] = (
+    Search(rounds=20, back=0.0, grow=1, ease=0.79, around=4),
+    Search(rounds=40, back=0.0, grow=2, around=4),
+    Search(rounds=40, back=1.0, grow=2),
+    Insert(population=10, routes=1, returns=2, seed=0, cells=60_000),
+    Insert(population=10, routes=2, returns=3, seed=0, cells=60_000, directed=True),
+    Insert(population=30, routes=2, returns=4, seed=1),
+    Insert(population=30, routes=3, returns=4, seed=1, directed=True),
+    Search(rounds=60, back=1.0, grow=3, fine=True),
+    Insert(population=60, routes=4, returns=5, seed=2),
+    Insert(population=60, routes=4, returns=5, seed=2, directed=True),
+    Insert(population=120, routes=6, returns=6, seed=3, fine=True),
+    Insert(population=120, routes=6, returns=6, seed=3, fine=True, directed=True),
+)
 """Each is for what the ones before leave undrawn.
 
 The first keeps link angles to a part of the limit, 33.6 of the 42.5 deg of hrm8, since
-who bends less has more in hand; the second allows all of it. Then the tips come closer
-together, twice and four times; then there are tips behind and beside the path too.
-Where the path is confined, the arm is inserted: with as many knees as it takes. Then
-tips come closer together once more, and the last roadmap has finer directions and rows,
-and hardly any slack. At the end the arm is inserted with more and more arms tried. The
-numbers were found by trial on the paper's problems and HRM-1000.
+who bends less has more in hand; the second allows all of it; then there are tips behind
+and beside the path too. Where the path is confined, the arm is inserted: with as many
+knees as it takes, and with more and more arms tried. The last ones of both kinds are
+fine. The numbers were found by trial on the paper's problems and HRM-2000.
 """
 
 
@@ -128,7 +114,7 @@ class Effort:
             cannot be done.
     """
 
-    levels: tuple[Level | Insert, ...]
+    levels: tuple[Level, ...]
     proves: bool
 
 
@@ -142,7 +128,7 @@ def pointed(effort: Effort) -> Effort:
 
     Directions say where it looks. Roadmaps are tried first; shapes are not grown.
     """
-    roadmaps = [replace(one, grow=0) for one in THOROUGH[:2] if isinstance(one, Level)]
+    roadmaps = [replace(one, grow=0) for one in THOROUGH[:2] if isinstance(one, Search)]
     inserts = [one for one in THOROUGH if isinstance(one, Insert) and one.directed]
     return replace(effort, levels=(*roadmaps, *inserts))
 
