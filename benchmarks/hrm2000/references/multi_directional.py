@@ -17,6 +17,8 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.robot_model import RobotModel
 
 STEP = 0.05  # m
+ROWS = 10
+"""Rows for each step of the tip, so that no joint turns too far in one."""
 NODES = 4_000
 GREED = 0.2
 """Share of branches grown towards the goal."""
@@ -78,6 +80,9 @@ def follow(
     arm, goal = Arm(problem, robot, clearance), wanted(problem)
     first = int(np.argmax(goal.drawn))
     way = tree_way(arm, goal.tips[first], np.random.default_rng(0))
+    places = np.arange(ROWS * (len(way) - 1) + 1) / ROWS
+    steps = range(len(way))
+    way = np.column_stack([np.interp(places, steps, column) for column in way.T])
     off = np.full(len(way) - 1, goal.stations[first])
     whole = Wanted(
         np.vstack([way[:-1], goal.tips[first:]]),
