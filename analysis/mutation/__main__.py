@@ -59,7 +59,11 @@ GROUPS: Final = (
     Group(
         "readers",
         ("vdsm_pin/io/**/*.py",),
-        ("tests/io", "tests/verification/test_other_arms.py"),
+        (
+            "tests/io",
+            "tests/verification/test_other_arms.py",
+            "tests/robots/test_trajectories.py",
+        ),
     ),
     Group(
         "verification",

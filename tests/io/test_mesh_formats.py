@@ -218,10 +218,12 @@ def test_dae_is_the_scene_that_pycollada_finds_in_it(tmp_path: Path, seed: int) 
     rng = np.random.default_rng(seed)
 
     def node(depth: int) -> str:
+        axis, by, size = rng.normal(size=(3, 3))
+        axis /= np.linalg.norm(axis)
         moves = [
-            f"<translate>{rng.uniform():.3f} 1 2</translate>",
-            f"<rotate>0.6 0 0.8 {rng.uniform(-400, 400):.2f}</rotate>",
-            f"<scale>{rng.uniform(0.5, 2):.3f} 1 -1</scale>",
+            f"<translate>{by[0]:.3f} {by[1]:.3f} {by[2]:.3f}</translate>",
+            f"<rotate>{' '.join(map(str, axis))} {rng.uniform(-400, 400):.2f}</rotate>",
+            f"<scale>{size[0]:.3f} {size[1]:.3f} {size[2]:.3f}</scale>",
             f"<matrix>{' '.join(f'{x:.6f}' for x in pose(rng).ravel())}</matrix>",
         ]
         picked = [moves[i] for i in rng.permutation(4)[: int(rng.integers(0, 5))]]

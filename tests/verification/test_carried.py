@@ -106,6 +106,31 @@ def test_a_camera_too_large_by_a_tenth_of_a_millimetre_is_refuted(
     assert near.coal == pytest.approx(near.upper, abs=1e-5)
 
 
+def test_coal_measures_every_approach_of_all_that_the_arm_has(tmp_path: Path) -> None:
+    """Links, tool, body and feed, to what stands, what moves and to one another."""
+    moving = BALL | {"name": "door", "center": [0, 0, 0]}
+    moving["motion"] = {"times_s": [0, 2], "positions": [[1.6, 0, 0], [1.5, 0, 0.1]]}
+    post = BALL | {"center": [1.45, 0.14, 0.0]}
+    rack = BALL | {"name": "rack", "center": [-0.3, 0.15, 0.0]}
+    feed, tool = {"length": 0.3, "radius": 0.04}, {"length": 0.1, "radius": 0.01}
+    arm = {"bodies": [CAMERA], "feed": feed, "tool": tool}
+    rng, seen = np.random.default_rng(2), set()
+    for obstacles in 6 * [[post, rack, moving], []]:
+        problem = read_problem(problem_in(tmp_path, arm, obstacles)).problem
+        q, none = rng.uniform(-1.5, 1.5, (3, 7)) * [0.03, *6 * [1]], np.zeros(3)
+        motion = Trajectory(
+            none > 0, none, q[:, 0], q[:, 1::2], q[:, 2::2], times=[0, 1, 2]
+        )
+        found = verify(problem, motion, load_robot(problem.manipulator))
+        for near in found.approaches:
+            pair = near.pair
+            seen.add((pair.body, pair.obstacle or f"own {pair.other_body}".strip()))
+            assert near.lower - 1e-5 <= near.coal <= near.upper + 1e-5, near
+    for body in ("", "tool", "camera"):
+        assert {(body, "post"), (body, "door")} <= seen
+    assert {("", "rack"), ("feed", "rack"), ("", "own")} <= seen
+
+
 def test_forged_certificates_are_rejected(tmp_path: Path) -> None:
     rows = motion_in(tmp_path, sliding())
     feed = {"length": 0.3, "radius": 0.04}

@@ -59,6 +59,8 @@ def checked(
     found = find_counterexamples(problem, rows, box, proof)
     for one in found:
         k, q = one.interval, rows.joints
+        assert 0 <= k <= max(0, len(q) - 2)
+        assert 0.0 <= one.share <= 1.0
         nominal = q[k] + one.share * (q[min(k + 1, len(q) - 1)] - q[k])
         off = np.abs(one.joints - nominal)
         assert off[0] == 0.0
@@ -110,6 +112,18 @@ def test_a_drooping_arm_is_refuted_at_the_error_that_lifts_its_tip() -> None:
     assert errors.certified <= low <= errors.refuted
     assert errors.refuted == pytest.approx(low, rel=1e-3)
     assert errors.certified == pytest.approx(low, rel=0.05)
+
+
+def test_a_motion_that_comes_nearest_at_its_end_is_refuted_there() -> None:
+    """The arm slides towards a wall across its rail, and back from it."""
+    bend = np.full((5, 8), 0.02)
+    tip = joint_centres(ARM, np.array([0.1]), bend[:1], bend[:1])[0, -1]
+    beyond = tip + (ARM.link_radius + 0.01) * np.eye(3)[0]
+    wall = HalfSpace("end", beyond, np.array([-1.0, 0.0, 0.0]))
+    for x0, moment in ((np.linspace(0, 0.1, 5), 4), (np.linspace(0.1, 0, 5), 0)):
+        rows = Trajectory(bend[:, 0] < 0, 0 * x0, x0, bend, bend)
+        found = checked(problem_with(wall), rows, ErrorBox(joint=0.02))
+        assert [one.interval + one.share for one in found] == [moment]
 
 
 def test_base_and_obstacle_errors_are_used_to_the_full() -> None:

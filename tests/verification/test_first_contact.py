@@ -133,5 +133,7 @@ def test_a_motion_that_ends_too_close_is_so_to_its_end() -> None:
     ):
         judged = verify(wall(0.05), motion, load_robot(ARM))
         (row,) = (one for one in judged.checks if "obstacles" in one.name)
+        assert row.stretches == 1
+        assert row.too_close == max(1, motion.n_samples - 1)
         assert row.last == pytest.approx(last, abs=1e-6)
         assert row.stretches == 1

@@ -1,0 +1,62 @@
+"""What planners are told of clearances, against what is proved of the same arms."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from vdsm_pin.arm.kinematics import joint_centres
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.proof.layouts import LOW, UP
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.clearance import prove_clearance
+from vdsm_pin.verification.link_clearance import link_clearance
+
+BODY = {"name": "camera", "link": 2, "shape": "box", "center": [0.2, 0.1, 0]}
+ARMS: dict[str, dict[str, Any]] = {
+    "alike": {"link_radius": 0.05},
+    "thinner": {"link_radius": [0.08, 0.05, 0.02]},
+    "tool": {"link_radius": 0.04, "tool": {"length": 0.3, "radius": 0.01}},
+    "thick tool": {"link_radius": 0.02, "tool": {"length": 0.1, "radius": 0.08}},
+    "body": {"link_radius": 0.05, "bodies": [BODY | {"size": [0.05, 0.05, 0.05]}]},
+}
+OBSTACLES = [
+    {"name": "ball", "shape": "sphere", "center": [0.8, 0.3, 0.2], "radius": 0.05},
+    {"name": "box", "shape": "box", "center": [0.3, -0.4, 0], "size": [0.2, 0.2, 0.3]},
+]
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_each_link_is_as_near_as_is_proved(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "p.yaml"
+    arm = {"link_lengths": [0.5, 0.4, 0.3], "max_link_angle_deg": 89}
+    data = {
+        "vdsm_problem": 1,
+        "length_unit": "m",
+        "manipulator": arm | {"max_joint_angle_deg": 89} | ARMS[name],
+        "obstacles": OBSTACLES,
+        "required_clearance": 0.0,
+    }
+    path.write_text(yaml.safe_dump(json.loads(json.dumps(data))))
+    problem, rng, none = read_problem(path).problem, np.random.default_rng(3), [0.0]
+    told = link_clearance(problem)
+    for _ in range(20):
+        alpha, theta = rng.uniform(-0.5, 0.5, (2, 1, 3))
+        row = Trajectory(np.zeros(1, bool), none, none, alpha, theta)
+        proof = prove_clearance(problem, row, ErrorBox())
+        centres = joint_centres(problem.manipulator, row.x0, alpha, theta)
+        for link, nearest in enumerate(told(centres)[0], start=1):
+            mine = [k for k, pair in enumerate(proof.pairs)
+                    if pair.obstacle and pair.link == link]  # fmt: skip
+            low, high = (float(proof.best[mine, at].min()) for at in (LOW, UP))
+            if high <= 0.0:
+                assert nearest <= 0.0
+                continue
+            assert nearest <= high + TOLERANCES.bracket_gap
+            if name != "body":  # which counts as round about its link
+                assert nearest >= low - TOLERANCES.bracket_gap
