@@ -15,9 +15,11 @@ from oracles.closed_solids import (
     sample_points,
     spoiled,
 )
+from scipy.sparse.csgraph import connected_components
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.closed_meshes import close_mesh
+from vdsm_pin.geometry.mesh_gaps import SLANT, clusters
 from vdsm_pin.geometry.winding import Location, Side, locate
 
 RADIUS = 0.02
@@ -243,3 +245,22 @@ def test_random_meshes(faults: tuple[Callable[..., None], ...]) -> None:
 def test_many_random_meshes(faults: tuple[Callable[..., None], ...]) -> None:
     seen = sum((hold_to_truth(seed, faults) for seed in range(60, 3000)), Counter())
     assert seen["in a solid", Side.INSIDE] > 500
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_vertices_are_joined_along_chains_in_which_one_of_two_is_loose(
+    seed: int,
+) -> None:
+    """Oracle: every pair looked at, parts of a graph by scipy."""
+    rng, gap = np.random.default_rng(seed), 0.2
+    vertices = rng.uniform(size=(80, 3))
+    loose = np.flatnonzero(rng.uniform(size=80) < 0.4)
+    joined = clusters(vertices, np.arange(80).reshape(-1, 2), loose, gap)
+    off = np.linalg.norm(vertices[:, None] - vertices, axis=2)
+    is_loose = np.isin(np.arange(80), loose)
+    graph = (off <= gap) & (is_loose[:, None] | is_loose)
+    assert np.linalg.norm(SLANT) <= 1.0
+    _, part = connected_components(graph)
+    least = [int(np.flatnonzero(part == one)[0]) for one in part]
+    assert joined.tolist() == least
+    assert 5 < len(set(least)) < 75

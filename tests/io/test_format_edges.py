@@ -2,6 +2,7 @@
 
 import json
 import struct
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -28,12 +29,14 @@ def turned(q: np.ndarray, point: np.ndarray) -> np.ndarray:
     return times(times(q, np.array([*point, 0.0])), conjugate)[:3]
 
 
-def made(positions: np.ndarray, faces: list[int], **node: Any) -> bytes:
+def made(
+    positions: np.ndarray, faces: list[int], indices: str = "H", **node: Any
+) -> bytes:
     """A GLB of one node, by hand."""
-    kinds = {"f": 5126, "h": 5122, "B": 5121}
+    kinds = dict(zip("bBhHIf", (5120, 5121, 5122, 5123, 5125, 5126), strict=True))
     kind = "f" if positions.dtype == np.float32 else positions.dtype.char
     data = positions.tobytes() + b"\0" * (-positions.nbytes % 4)
-    order = np.array(faces, np.uint16)
+    order = np.array(faces, indices)
     normalized = node.pop("normalized", False)
     stride = positions.itemsize * 3
     document = {
@@ -57,7 +60,7 @@ def made(positions: np.ndarray, faces: list[int], **node: Any) -> bytes:
             },
             {
                 "bufferView": 1,
-                "componentType": 5123,
+                "componentType": kinds[indices],
                 "count": len(order),
                 "type": "SCALAR",
             },
@@ -105,6 +108,35 @@ def test_what_a_node_of_glb_does_not_state_changes_nothing(
         "matrix": CORNERS * [2, 3, 4] + [1, 2, 3],
     }[key]
     np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", "bBhHIf")
+def test_indices_of_glb_are_of_the_three_types_without_a_sign(
+    kind: str, tmp_path: Path
+) -> None:
+    content = made(CORNERS, [2, 0, 1], indices=kind)
+    if kind.isupper():
+        np.testing.assert_array_equal(
+            triangles_of(content, tmp_path), [CORNERS[[2, 0, 1]]]
+        )
+        return
+    with pytest.raises(InvalidFile):
+        triangles_of(content, tmp_path)
+
+
+@pytest.mark.parametrize(
+    "spoiled",
+    [
+        lambda glb: b"glTX" + glb[4:],
+        lambda glb: glb[:4] + struct.pack("<I", 3) + glb[8:],
+        lambda glb: glb[:-4],
+    ],
+)
+def test_a_glb_of_another_kind_or_cut_short_is_no_glb(
+    spoiled: Callable[[bytes], bytes], tmp_path: Path
+) -> None:
+    with pytest.raises(InvalidFile, match="is no GLB file of version 2, or cut short"):
+        triangles_of(spoiled(made(CORNERS, [0, 1, 2])), tmp_path)
 
 
 def test_indices_of_glb_beyond_whole_triangles_are_left(tmp_path: Path) -> None:

@@ -175,9 +175,9 @@ def test_no_obstacles_no_row() -> None:
     assert check_coal_obstacles(ROBOT, problem_with(), trajectory_of(3)) == ()
 
 
-def ball_near_link_4(gap: float) -> PlanningProblem:
-    """A ball beside the middle of link 4 of the straight arm."""
-    middle = HRM8.stations[3] + HRM8.link_lengths[3] / 2.0
+def ball_near_link_4(gap: float, k: int = 3) -> PlanningProblem:
+    """A ball beside the middle of link 4, or of link k + 1, of the straight arm."""
+    middle = HRM8.stations[k] + HRM8.link_lengths[k] / 2.0
     centre = np.array([middle, 0.1 + HRM8.link_radius + gap, 0.0])
     return problem_with(solids.Sphere("ball", centre, 0.1))
 
@@ -253,20 +253,21 @@ def test_a_wrong_sign_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
         assert check.worst >= 0.01
 
 
-def test_an_interval_proof_above_coal_is_noticed() -> None:
-    problem = ball_near_link_4(0.01)
+@pytest.mark.parametrize("k", range(8))
+def test_an_interval_proof_above_coal_is_noticed(k: int) -> None:
+    problem = ball_near_link_4(0.01, k)
     interval, none = np.full((1, 8), -1.0), np.full(8, -1)
-    interval[0, 3] = 0.01 - 1e-6
+    interval[0, k] = 0.01 - 1e-6
     least = interval[0].copy()
     # A bound of the interval, or of the whole motion where there is none.
     for column, bound in ((np.arange(8), interval[0]), (none, least)):
         proved = ProvedLowers(least, column, interval)
         (check,) = check_coal_obstacles(ROBOT, problem, STRAIGHT, proved)
         assert check.verdict is Verdict.CERTIFIED
-        bound[3] = 0.01 + 1e-5
+        bound[k] = 0.01 + 1e-5
         (check,) = check_coal_obstacles(ROBOT, problem, STRAIGHT, proved)
         assert check.verdict is Verdict.UNDECIDED
-        assert "link 4 and ball" in check.where
+        assert f"link {k + 1} and ball" in check.where
 
 
 def test_poses_come_from_pinocchio_and_match_the_centres() -> None:

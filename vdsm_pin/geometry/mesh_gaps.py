@@ -9,8 +9,9 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct
 MANY: Final = 10_000_000
 """Most pairs of open edges and corners looked at for seams."""
 
-SLANT: Final = np.array([0.643, 0.377, 0.667])
-"""A direction along which few corners of a mesh lie side by side; [-]."""
+SLANT: Final = np.array([0.642, 0.377, 0.667])
+"""A direction along which few corners of a mesh lie side by side, not longer than 1, so
+that no two are farther apart along it than they are; [-]."""
 
 
 class Seams(NamedTuple):
