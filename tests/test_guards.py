@@ -26,7 +26,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification import coal_check
-from vdsm_pin.verification import coal_distances as measuring
+from vdsm_pin.verification import coal_shapes as measuring
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.robot_model import load_robot

@@ -67,7 +67,7 @@ def test_grazing_motion_is_repaired(tmp_path: Path) -> None:
         for share in np.linspace(0.0, 1.0, 40):
             poses = this.robot.tree.poses((a + share * (b - a))[None])
             all_poses = np.repeat(poses, len(this.pairs), axis=0)
-            distances = this.coal.distances(this.pairs, all_poses)
+            distances = this.distances(this.pairs, all_poses)
             assert distances.min() >= 1e-3 - 5e-6
 
 

@@ -26,8 +26,8 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.arm_counterexamples import find_counterexamples
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.coal_bodies import coal_bodies, distance_request, measure
-from vdsm_pin.verification.coal_distances import capsule_transforms
+from vdsm_pin.verification.coal_arm import arm_poses, arm_shapes
+from vdsm_pin.verification.coal_shapes import Sides
 from vdsm_pin.verification.records import ClearanceChunk
 from vdsm_pin.verification.robot_model import RobotModel, load_robot
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
@@ -143,16 +143,12 @@ def shown(bounds: FloatArray) -> FloatArray:
 
 def by_coal(obstacle: scene.Obstacle, q: FloatArray) -> FloatArray:
     """Coal's distance of every link at every row, shape (n_rows, N); [m]."""
-    poses = robot().link_poses(q[:, 0], q[:, 1::2], q[:, 2::2])
+    poses = arm_poses(robot(), (q[:, 0], q[:, 1::2], q[:, 2::2]))
     row, link = (a.ravel() for a in np.indices((len(q), N_LINKS)))
-    request, bodies = distance_request(), coal_bodies(obstacle)
-    found = [
-        measure(request, robot().capsules[i], pose, bodies).distance
-        for i, pose in zip(
-            link, capsule_transforms(robot(), poses, row, link), strict=True
-        )
-    ]
-    return np.array(found).reshape(len(q), N_LINKS)
+    shapes, number = arm_shapes(robot(), (), (obstacle,))
+    other = np.full(link.size, number[obstacle.name])
+    found = shapes.distances(poses, Sides(row, link, other)).distance
+    return found.reshape(len(q), N_LINKS)
 
 
 shapes = st.sampled_from(SHAPES)

@@ -1,6 +1,7 @@
 """Coal against the proved brackets: agreement is seen, disagreement is reported."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_check
-from vdsm_pin.verification import coal_distances as measuring
+from vdsm_pin.verification import coal_shapes as measuring
 from vdsm_pin.verification.approaches import CLOSEST
 from vdsm_pin.verification.coal_bodies import Measured
 from vdsm_pin.verification.coal_check import check_coal_obstacles
@@ -325,16 +326,13 @@ def test_a_lie_of_coal_at_a_closest_approach_is_seen(
     problem = read_problem("paper/obs1").problem
     plan = plan_and_verify(problem, "paper", ROBOT).plan
 
-    def lying(*arguments: object) -> CoalDistances:
-        found = measured(*arguments)
-        asked = arguments[1]
-        assert isinstance(asked, Trajectory)
-        if asked.n_samples <= CLOSEST:
-            found = replace(found, distance=found.distance + 2e-5)
-        return found
+    honest = coal_check.against_obstacles
 
-    measured = measuring._measured
-    monkeypatch.setattr(measuring, "_measured", lying)
+    def lying(*arguments: Any) -> CoalDistances:
+        found = honest(*arguments)
+        return replace(found, distance=found.distance + 2e-5)
+
+    monkeypatch.setattr(coal_check, "against_obstacles", lying)
     judged = verify(problem, plan.trajectory, ROBOT)
     row = next(check for check in judged.checks if check.name == coal_check.OBSTACLES)
     assert row.verdict is Verdict.UNDECIDED

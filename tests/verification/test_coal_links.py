@@ -17,7 +17,7 @@ from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification import coal_distances as measuring
+from vdsm_pin.verification import coal_shapes as measuring
 from vdsm_pin.verification.coal_bodies import Measured
 from vdsm_pin.verification.coal_check import check_coal_links
 from vdsm_pin.verification.coal_distances import link_distances

@@ -132,5 +132,5 @@ class _Slopes:
     def _of(self, k: int, q: FloatArray) -> FloatArray:
         """Room of one pair at rows of q, shape (n_rows,); [m]."""
         pairs, poses = [self._pairs[k]] * len(q), self._cell.poses(q)
-        found = self._cell.coal.distances(pairs, poses)
+        found = self._cell.distances(pairs, poses)
         return np.asarray(found - self._target[k])

@@ -1,5 +1,6 @@
 """A robot among its obstacles: from files named one by one, or from a problem file."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
@@ -10,19 +11,23 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.convex import Piece
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import ProblemSource
-from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.scene import Scene, solid_of
 from vdsm_pin.proof.bodies import Body, Pair
 from vdsm_pin.proof.packed_tree import TreePoses
 from vdsm_pin.proof.tree import Tree
-from vdsm_pin.robots.coal_pairs import CoalPairs
+from vdsm_pin.robots.contacts import in_world
 from vdsm_pin.robots.errors import check_errors
 from vdsm_pin.robots.files import RobotFiles, read_cell_file, source_of
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.scene_files import read_scene_with_files
+from vdsm_pin.robots.second_opinion import link_shapes
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.units import MM_PER_M
+from vdsm_pin.verification.coal_bodies import coal_bodies
+from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
 from vdsm_pin.verification.moving import frames_beside, tree_beside
 
 ROOT_FRAME: Final = 1
@@ -107,9 +112,32 @@ class Cell:
         return pairs + [Pair(i, k, own) for i, k in self.robot.held]
 
     @cached_property
-    def coal(self) -> CoalPairs:
-        """Coal's distances of them."""
-        return CoalPairs(self.bodies, self.robot, self.scene)
+    def coal(self) -> CoalShapes:
+        """The bodies as Coal has them."""
+        things = (coal_bodies(solid_of(one)) for one in self.scene.obstacles)
+        frames = [body.frame for body in self.bodies]
+        return CoalShapes(frames, [*link_shapes(self.robot), *things])
+
+    def distances(self, pairs: Sequence[Pair], poses: FloatArray) -> FloatArray:
+        """Coal's of each pair at poses of its own, (n_pairs,); [m]. NaN for none.
+
+        Args:
+            pairs: The pairs.
+            poses: Of all frames, shape (n_pairs, n_frames, 4, 4); [m].
+        """
+        both = np.array([(pair.one, pair.other) for pair in pairs], np.int64)
+        both = both.reshape(-1, 2)
+        # Seen from the obstacle, the first body of its pairs: a cloud has no pose.
+        outer = both[:, :1] >= len(self.robot.bodies)
+        one, other = np.where(outer, both[:, ::-1], both).T
+        sides = Sides(np.arange(len(pairs)), one, other)
+        return self.coal.distances(poses[:, :, :3], sides).distance
+
+    def pieces(self, pair: Pair, poses: FloatArray) -> tuple[list[Piece], list[Piece]]:
+        """Of both bodies in the world at poses of all frames, (n_frames, 4, 4); [m]."""
+        both = (self.bodies[pair.one], self.bodies[pair.other])
+        one, other = (list(in_world(b.pieces, poses[b.frame])) for b in both)
+        return one, other
 
     def under(self, errors: ErrorBox) -> "Cell":
         """The same, its clearances asked for under more errors.

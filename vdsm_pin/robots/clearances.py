@@ -83,7 +83,7 @@ def _met(
         intervals, shares = path.split(moments)
         poses = cell.poses(path.within(intervals, shares))
         for at, pose in enumerate(poses):
-            bodies = cell.coal.pieces(pairs[k], pose)
+            bodies = cell.pieces(pairs[k], pose)
             radius, centre = common_ball(*bodies, middle)
             if radius > 0.0:
                 found = intervals[at], shares[at], -radius, REFUTED, centre, centre

@@ -259,7 +259,7 @@ def _coal(
     found = np.full(len(cell.pairs), nan)
     seen = np.flatnonzero(np.isfinite(proof.upper))
     poses = cell.poses(path.within(proof.interval[seen], proof.share[seen]))
-    found[seen] = cell.coal.distances([cell.pairs[k] for k in seen], poses)
+    found[seen] = cell.distances([cell.pairs[k] for k in seen], poses)
     # Where bodies meet only the sign counts, on both sides.
     value = np.maximum(found, 0.0)
     low, high = np.maximum(proof.lower, 0.0), np.maximum(proof.upper, 0.0)

@@ -188,7 +188,7 @@ def _of_obstacles(
     numbers = ArmPairs(problem).number[:, still]
     if not still.all():
         problem = replace(problem, scene=problem.scene.at_rest)
-    scene, names = CoalScene.of(problem, deadline), problem.scene.names
+    scene, names = CoalScene.of(robot, problem, deadline), problem.scene.names
     if log is not None and (near := log.asked(names)).size:
         axes = problem.manipulator.axis_names
         pairs = [

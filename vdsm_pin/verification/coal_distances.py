@@ -11,7 +11,7 @@ does a row add any at which the arm has hardly moved since the row before.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -20,20 +20,13 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.geometry.row_bounds import coarse_bounds, link_gaps, row_brackets
-from vdsm_pin.geometry.solids import Solid
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import solid_of
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification.coal_bodies import (
-    CoalBody,
-    CoalObstacle,
-    coal_bodies,
-    distance_request,
-    measure,
-)
-from vdsm_pin.verification.robot_model import LinkPoses, RobotModel
+from vdsm_pin.verification.coal_arm import arm_poses, arm_shapes
+from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
+from vdsm_pin.verification.robot_model import RobotModel
 
 CHUNK_BOUNDS: Final = 1 << 17
 """Coarse bounds held in memory at a time: rows times links times obstacles."""
@@ -59,8 +52,8 @@ class CoalDistances:
         distance: By Coal; -inf where its answer is unusable, shape (m,); [m].
         lower: Our lower bound at the row, shape (m,); [m].
         upper: Our upper bound; the lower one where there is a closed form; [m].
-        link_point: Coal's witness on the link, base frame, shape (m, 3); [m].
-        other_point: Coal's witness on the other body, shape (m, 3); [m].
+        link_point: Coal's witness on the link, in the frame of the other, (m, 3); [m].
+        other_point: Coal's witness on the other body, the same; [m].
     """
 
     waypoint: IntArray
@@ -88,27 +81,28 @@ class CoalDistances:
 
 @dataclass(frozen=True)
 class CoalScene:
-    """The obstacles, as the proof and as Coal see them.
+    """Obstacles at rest, as the proof and as Coal see them.
 
     Args:
         pieces: Convex pieces for the proof's kernels.
-        bodies: Coal's, obstacle by obstacle.
+        shapes: Coal's: links and tool, then the obstacles.
     """
 
     pieces: PackedPieces
-    bodies: tuple[CoalObstacle, ...]
+    shapes: CoalShapes
 
     @classmethod
-    def of(cls, problem: PlanningProblem, deadline: Deadline) -> "CoalScene":
+    def of(
+        cls, robot: RobotModel, problem: PlanningProblem, deadline: Deadline
+    ) -> "CoalScene":
         """The obstacles of a problem, none of which moves.
 
         Raises:
             OutOfTime: If the time is over.
         """
         obstacles = problem.scene.obstacles
-        pieces = problem.packed_obstacles
-        bodies = (_bodies_of(solid_of(one), deadline) for one in obstacles)
-        return cls(pieces, tuple(bodies))
+        shapes, _ = arm_shapes(robot, (), obstacles, deadline)
+        return cls(problem.packed_obstacles, shapes)
 
 
 def reach_of(problem: PlanningProblem) -> float:
@@ -151,7 +145,7 @@ def coal_distances(
     arm, obstacles = problem.manipulator, problem.scene.obstacles
     if not obstacles:
         return
-    ready = scene or CoalScene.of(problem, deadline)
+    ready = scene or CoalScene.of(robot, problem, deadline)
     every = np.ones((arm.axis_radii.size, len(obstacles)), dtype=np.bool_)
 
     def bounds(axes: FloatArray) -> FloatArray:
@@ -193,11 +187,6 @@ def link_distances(
     near = _Nearness(arm, bounds, np.triu(every, k=2), CHUNK_GAPS)
     for pairs in near.pairs(trajectory, reach, 0.0, deadline):
         yield between_links(robot, trajectory, pairs)
-
-
-def _bodies_of(obstacle: Solid, deadline: Deadline) -> CoalObstacle:
-    deadline.check()
-    return coal_bodies(obstacle)
 
 
 def in_turns(pairs: IntArray, deadline: Deadline) -> Iterator[IntArray]:
@@ -290,13 +279,17 @@ def against_obstacles(
 ) -> CoalDistances:
     """Ask both about (waypoint, link, obstacle) triples, shape (m, 3)."""
     rows, place = np.unique(pairs[:, 0], return_inverse=True)
-    link, obstacle = pairs[:, 1], pairs[:, 2]
+    link, obstacle, radii = pairs[:, 1], pairs[:, 2], robot.manipulator.axis_radii
     axes = _axes(robot.manipulator, trajectory, rows)
     ends = np.stack([axes[place, link], axes[place, link + 1]], axis=1)
     bounds = row_brackets(scene.pieces, ends, obstacle, TOLERANCES.bracket_gap)
-    bounds -= robot.manipulator.axis_radii[link, None]
-    others = (scene.bodies[o] for o in obstacle)
-    return _measured(robot, trajectory, pairs, others, bounds)
+    bounds -= radii[link, None]
+    poses = arm_poses(robot, _joints(trajectory, rows))
+    found = scene.shapes.distances(poses, Sides(place, link, radii.size + obstacle))
+    lower, upper = bounds.T
+    return CoalDistances(
+        pairs[:, 0], link, obstacle, found.distance, lower, upper, found.near, found.far
+    )
 
 
 def between_links(
@@ -307,35 +300,10 @@ def between_links(
     link, other = pairs[:, 1], pairs[:, 2]
     axes = _axes(robot.manipulator, trajectory, rows)
     gaps = link_gaps(axes, robot.manipulator.axis_radii)[place, link, other]
-    poses = robot.link_poses(*_joints(trajectory, rows))
-    others = (
-        (CoalBody(robot.capsules[k], pose),)
-        for k, pose in zip(
-            other, capsule_transforms(robot, poses, place, other), strict=True
-        )
-    )
-    return _measured(robot, trajectory, pairs, others, np.column_stack([gaps, gaps]))
-
-
-def _measured(
-    robot: RobotModel,
-    trajectory: Trajectory,
-    pairs: IntArray,
-    others: Iterator[CoalObstacle],
-    bounds: FloatArray,
-) -> CoalDistances:
-    """Coal's distances of (waypoint, link, other) triples beside our bounds (m, 2)."""
-    rows, place = np.unique(pairs[:, 0], return_inverse=True)
-    poses = robot.link_poses(*_joints(trajectory, rows))
-    link, request = pairs[:, 1], distance_request()
-    distance = np.zeros(len(pairs))
-    near, far = np.zeros((2, len(pairs), 3))
-    mine = capsule_transforms(robot, poses, place, link)
-    for k, (pose, other) in enumerate(zip(mine, others, strict=True)):
-        found = measure(request, robot.capsules[link[k]], pose, other)
-        distance[k], near[k], far[k] = found.distance, found.near, found.far
+    poses, (shapes, _) = arm_poses(robot, _joints(trajectory, rows)), arm_shapes(robot)
+    found = shapes.distances(poses, Sides(place, link, other))
     return CoalDistances(
-        pairs[:, 0], link, pairs[:, 2], distance, bounds[:, 0], bounds[:, 1], near, far
+        pairs[:, 0], link, other, found.distance, gaps, gaps, found.near, found.far
     )
 
 
@@ -351,19 +319,3 @@ def _axes(
     """Ends of the links and of the tool at some rows, shape (m, n_axes + 1, 3); [m]."""
     centres = joint_centres(arm, *_joints(trajectory, rows))
     return np.ascontiguousarray(arm.axes(centres))
-
-
-def capsule_transforms(
-    robot: RobotModel, poses: LinkPoses, row: IntArray, link: IntArray
-) -> Iterator[Any]:
-    """Coal's pose of a link's capsule for each (row, link), one after the other."""
-    import coal
-
-    on = np.minimum(link, robot.manipulator.n_links - 1)  # the tool is on the last one
-    rotations = poses.rotations[row, on]
-    local = robot.T_link_capsule[link]
-    turned = rotations @ local[:, :3, :3]
-    shifted = poses.origins[row, on] + np.einsum(
-        "nij,nj->ni", rotations, local[:, :3, 3]
-    )
-    return (coal.Transform3s(R, p) for R, p in zip(turned, shifted, strict=True))
