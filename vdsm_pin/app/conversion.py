@@ -168,19 +168,12 @@ def read_arm_message(file: Path, arm: Manipulator) -> Trajectory:
         problem = f"has no joint {missing[0]!r}"
         raise InvalidFile(file=file, where="joint_names", problem=problem)
     found = found.of(names)
-    q, n = found.q, len(found.q)
-    if not (np.abs(q[:, 1:]) <= np.pi).all():
+    if not (np.abs(found.q[:, 1:]) <= np.pi).all():
         problem = "has an angle beyond pi; is it in degrees? expected radians"
         raise InvalidFile(file=file, problem=problem)
-    none, parts = np.zeros(n, dtype=np.bool_), (q[:, 0], q[:, 1::2], q[:, 2::2])
     try:
-        return Trajectory(
-            none,
-            np.zeros(n),
-            *parts,
-            times=found.times,
-            rates=found.rates,
-            changes=found.changes,
+        return Trajectory.of_joints(
+            found.q, times=found.times, rates=found.rates, changes=found.changes
         )
     except InvalidInput as error:
         raise InvalidFile(file=file, problem=str(error)) from None

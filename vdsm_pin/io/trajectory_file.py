@@ -148,16 +148,14 @@ def _read(
         notes.append("the last row has no line end; its last number is read as it is")
     n, first = len(columns), [found.index(names[0]) for names in smooth]
     further = [whole[:, k : k + n - 3] for k in first] + [None, None]
-    return Trajectory(
+    return Trajectory.of_joints(
+        whole[:, 3:n],
         whole[:, 1] != 0.0,
         whole[:, 2],
-        whole[:, 3],
-        whole[:, 4:n:2],
-        whole[:, 5:n:2],
+        whole[:, found.index(TIME)] if TIME in found else None,
+        further[0],
+        further[1],
         tuple(notes),
-        times=whole[:, found.index(TIME)] if TIME in found else None,
-        rates=further[0],
-        changes=further[1],
     )
 
 

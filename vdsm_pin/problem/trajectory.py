@@ -1,6 +1,6 @@
 """A trajectory: rows of joint values, joined by straight lines or by smooth pieces."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, Literal
 
@@ -110,13 +110,29 @@ class Trajectory(Summarised):
     def of_joints(
         cls,
         joints: FloatArray,
-        on_path: BoolArray,
-        path_m: FloatArray,
+        on_path: BoolArray | None = None,
+        path_m: FloatArray | None = None,
         times: FloatArray | None = None,
+        rates: FloatArray | None = None,
+        changes: FloatArray | None = None,
+        notes: tuple[str, ...] = (),
     ) -> "Trajectory":
-        """A trajectory from its rows of joint values, shape (n_samples, 1 + 2N)."""
-        x0, alpha, theta = joints[:, 0], joints[:, 1::2], joints[:, 2::2]
-        return cls(on_path, path_m, x0, alpha, theta, times=times)
+        """A trajectory from its rows of joint values, shape (n_samples, 1 + 2N).
+
+        Without `on_path` it draws nothing, without `path_m` it is at 0 m of the path.
+        """
+        nothing = np.zeros(len(joints))
+        return cls(
+            nothing.astype(np.bool_) if on_path is None else on_path,
+            nothing if path_m is None else path_m,
+            joints[:, 0],
+            joints[:, 1::2],
+            joints[:, 2::2],
+            notes,
+            times,
+            rates,
+            changes,
+        )
 
     @property
     def n_samples(self) -> int:
@@ -187,15 +203,13 @@ class Trajectory(Summarised):
     def part(self, first: int, last: int) -> "Trajectory":
         """The rows from `first` up to `last`, or to the end where there are fewer."""
         rows = slice(first, last)
-        return Trajectory(
+        return Trajectory.of_joints(
+            self.joints[rows],
             self.on_path[rows],
             self.path_m[rows],
-            self.x0[rows],
-            self.alpha[rows],
-            self.theta[rows],
-            times=None if self.times is None else self.times[rows],
-            rates=None if self.rates is None else self.rates[rows],
-            changes=None if self.changes is None else self.changes[rows],
+            None if self.times is None else self.times[rows],
+            None if self.rates is None else self.rates[rows],
+            None if self.changes is None else self.changes[rows],
         )
 
     def joints_at(self, moments: FloatArray) -> FloatArray:
@@ -237,8 +251,7 @@ class Trajectory(Summarised):
             return self
         if not (low % 1.0 or high % 1.0):
             return self.part(int(low), int(high) + 1)
-        none = np.zeros(2)
-        return self._through(np.array([low, high]), none.astype(bool), none)
+        return self._through(np.array([low, high]))
 
     def refined(self, parts: int) -> "Trajectory":
         """The same smooth motion with every piece cut into so many equal ones."""
@@ -253,7 +266,10 @@ class Trajectory(Summarised):
         return self._through(steps + share, on_path, self.path_m[steps] + share * way)
 
     def _through(
-        self, moments: FloatArray, on_path: BoolArray, path_m: FloatArray
+        self,
+        moments: FloatArray,
+        on_path: BoolArray | None = None,
+        path_m: FloatArray | None = None,
     ) -> "Trajectory":
         """The same motion with rows at rising moments in waypoints."""
         joints, times = self.joints_at(moments), self.times_at(moments)
@@ -266,8 +282,4 @@ class Trajectory(Summarised):
         if self.changes is not None:
             twice = bernstein.derivative(once)
             changes = bernstein.value(twice, share) / step**2
-        return replace(
-            Trajectory.of_joints(joints, on_path, path_m, times),
-            rates=rates,
-            changes=changes,
-        )
+        return Trajectory.of_joints(joints, on_path, path_m, times, rates, changes)

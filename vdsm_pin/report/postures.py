@@ -10,10 +10,7 @@ from vdsm_pin.problem.trajectory import Trajectory
 
 def one_row(joints: FloatArray) -> Trajectory:
     """The motion that stays at q = (x0, alpha1, theta1, ..), shape (1 + 2N,)."""
-    angles, zero = joints[1:].reshape(1, -1, 2), np.zeros(1)
-    return Trajectory(
-        zero.astype(bool), zero, joints[:1], angles[:, :, 0], angles[:, :, 1]
-    )
+    return Trajectory.of_joints(joints[None])
 
 
 def at_start(problem: PlanningProblem) -> Trajectory:

@@ -68,11 +68,7 @@ class Simulation:
     @property
     def trajectory(self) -> Trajectory:
         """The executed motion, for the verifier. It claims to draw nothing."""
-        off = np.zeros(len(self.times), dtype=np.bool_)
-        angles = self.executed[:, 1:]
-        return Trajectory(
-            off, self.path_m, self.executed[:, 0], angles[:, ::2], angles[:, 1::2]
-        )
+        return Trajectory.of_joints(self.executed, path_m=self.path_m)
 
 
 def simulate(
