@@ -315,7 +315,7 @@ def generality(per_family: int) -> tuple[Claim, list[str]]:
 
 def draws_all(file: Path) -> bool:
     """Whether the paper's rule draws the whole path, certified."""
-    problem = read_problem(file).problem
+    problem = read_problem(file)
     robot = load_robot(problem.manipulator)
     try:
         found = plan_and_verify(problem, "paper", robot)

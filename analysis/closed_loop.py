@@ -55,7 +55,7 @@ class Ran:
 
 def run(scene: str, strategy: str, settings: Settings) -> Ran:
     """Plan, simulate, prove."""
-    problem = read_problem(f"paper/{scene}").problem
+    problem = read_problem(f"paper/{scene}")
     robot = load_robot(problem.manipulator)
     trajectory = plan_and_verify(problem, strategy, robot).plan.trajectory
     found = simulate(problem.manipulator, trajectory, settings)

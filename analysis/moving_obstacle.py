@@ -58,7 +58,7 @@ def with_motion(scene: str, motion: dict[str, Any], **changes: Any) -> PlanningP
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / f"{scene}.yaml"
         file.write_text(yaml.safe_dump(data), encoding="utf-8")
-        return read_problem(file).problem
+        return read_problem(file)
 
 
 def arrival(scene: str, strategy: str) -> str:
@@ -92,7 +92,7 @@ def most_sway(scene: str, motion: Trajectory, **changes: Any) -> float:
 
 def line(scene: str, strategy: str) -> Line:
     """One plan, made for the resting obstacle."""
-    problem = read_problem(f"paper/{scene}").problem
+    problem = read_problem(f"paper/{scene}")
     robot = load_robot(problem.manipulator)
     plan = plan_and_verify(problem, strategy, robot).plan.trajectory
     timed = replace(plan, times=ROW_S * np.arange(plan.n_samples))

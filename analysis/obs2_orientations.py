@@ -63,7 +63,7 @@ def turned(problem: PlanningProblem, corners_at: float, turn: float) -> Planning
 
 def row_of(circle: str, turn_deg: float) -> Row:
     """Plan one turn."""
-    problem = read_problem("paper/obs2").problem
+    problem = read_problem("paper/obs2")
     problem = turned(problem, READINGS[circle], float(np.deg2rad(turn_deg)))
     try:
         plan = plan_paper(problem, link_clearance(problem), 0.0)

@@ -197,7 +197,7 @@ def table() -> list[Row]:
     """All rows."""
     rows = reach_rows()
     for scene in SCENES:
-        problem = read_problem(f"paper/{scene}").problem
+        problem = read_problem(f"paper/{scene}")
         robot = load_robot(problem.manipulator)
         rows += rows_of(scene, plan_and_verify(problem, "paper", robot))
     return rows

@@ -247,7 +247,7 @@ def main() -> None:
     """Measure, print, save."""
     folder, rows = output_folder(__doc__), []
     for name in PAPER:
-        problem = read_problem(f"paper/{name}").problem
+        problem = read_problem(f"paper/{name}")
         rows.append(row(f"paper/{name}", measured(problem)))
         print(rows[-1], flush=True)
     for family in FAMILIES:
@@ -255,12 +255,10 @@ def main() -> None:
         for number in range(PER_FAMILY):
             with tempfile.TemporaryDirectory() as work:
                 path = generate(Path(work), family, number)
-                found.append(measured(read_problem(path).problem))
+                found.append(measured(read_problem(path)))
         rows.append(row(f"{PER_FAMILY} of {family}", np.concatenate(found)))
         print(rows[-1], flush=True)
-    held = [
-        one for name in WHOLE for one in whole(read_problem(f"paper/{name}").problem)
-    ]
+    held = [one for name in WHOLE for one in whole(read_problem(f"paper/{name}"))]
     text = table(rows) + whole_table(held)
     write_table(folder, "scaling_choices", [*rows, *held], text)
 

@@ -50,7 +50,7 @@ def at_waypoints(n: int, folder: Path) -> Runs:
     def back() -> object:
         return joint_centres(ARM, joints[0], *angles_from_cables(ARM, lengths))
 
-    obs1 = read_problem("paper/obs1").problem
+    obs1 = read_problem("paper/obs1")
     drawn = replace(obs1, tip_path=replace(obs1.path, spacing=obs1.path.length / n))
     clearance = link_clearance(drawn)
     return {

@@ -68,7 +68,7 @@ def cases(problem: PlanningProblem, rows: int) -> dict[str, Callable[[], object]
 
 def measure(rows: int = 10_000, repeats: int = 25) -> Results:
     """Microseconds a waypoint of a long motion."""
-    problem = read_problem(PROBLEM).problem
+    problem = read_problem(PROBLEM)
     return {
         f"{name} [us/waypoint]": timed(run, repeats, MICRO / rows)
         for name, run in cases(problem, rows).items()

@@ -58,7 +58,7 @@ def dense(motion: Trajectory, rows: int) -> Trajectory:
 
 def measure(rows: int) -> Results:
     """Peak memory and processor time of the process, and what it wrote."""
-    problem = read_problem(PROBLEM).problem
+    problem = read_problem(PROBLEM)
     motion = strategy("paper")(problem, link_clearance(problem), 0.0).trajectory
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -38,7 +38,7 @@ def measure(repeats: int) -> Results:
     """Every strategy and the peer on every problem."""
     results: Results = {}
     for name in PROBLEMS:
-        problem = read_problem(f"paper/{name}").problem
+        problem = read_problem(f"paper/{name}")
         clearance = link_clearance(problem)
         for which in STRATEGIES:
             plan = strategy(which)

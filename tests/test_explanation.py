@@ -21,7 +21,7 @@ from vdsm_pin.verification.robot_model import load_robot
 
 
 def steps_of(name: str) -> PaperSteps:
-    problem = read_problem(name).problem
+    problem = read_problem(name)
     robot = load_robot(problem.manipulator)
     found = plan_and_verify(problem, "paper", robot).plan.steps
     assert found is not None
@@ -30,7 +30,7 @@ def steps_of(name: str) -> PaperSteps:
 
 def test_the_steps_kept_are_those_of_the_plan() -> None:
     made = steps_of("paper/obs1")
-    arm = read_problem("paper/obs1").problem.manipulator
+    arm = read_problem("paper/obs1").manipulator
     rows = made.trajectory
     centres = joint_centres(arm, rows.x0, rows.alpha, rows.theta)
     np.testing.assert_allclose(made.centres, centres, rtol=0, atol=1e-12)
@@ -44,7 +44,7 @@ def test_the_steps_kept_are_those_of_the_plan() -> None:
 @pytest.mark.parametrize("name", ["paper/obs1", "paper/obs2-small"])
 def test_the_four_points_lie_on_the_boundary_and_the_cross(name: str) -> None:
     """A moved joint stands on the boundary too, another one in proportion."""
-    made, arm = steps_of(name), read_problem(name).problem.manipulator
+    made, arm = steps_of(name), read_problem(name).manipulator
     assert isinstance(made.avoidance, AlongRail)
     moved = 0
     for row in range(0, made.trajectory.n_samples, 37):
@@ -82,11 +82,11 @@ def test_a_page_has_every_step_and_asks_nobody(name: str, tmp_path: Path) -> Non
 
 
 def test_what_cannot_be_explained_is_refused(tmp_path: Path) -> None:
-    source = read_problem("paper/obs1")
+    problem = read_problem("paper/obs1")
     with pytest.raises(InvalidInput, match="waypoint is 99999, expected 0 to "):
-        explain_to_folder(source, 99999, tmp_path)
-    bent = replace(source.problem.path, start_joints=np.array([0.0, *[0.1] * 16]))
-    asked = replace(source, problem=replace(source.problem, tip_path=bent))
+        explain_to_folder(problem, 99999, tmp_path)
+    bent = replace(problem.path, start_joints=np.array([0.0, *[0.1] * 16]))
+    asked = replace(problem, tip_path=bent)
     with pytest.raises(NoPlanFound, match="starts bent"):
         explain_to_folder(asked, 3, tmp_path)
     assert not (tmp_path / "explain.html").exists()

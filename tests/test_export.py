@@ -169,8 +169,8 @@ class TestWithABrowser:
         program.write_text('#!/bin/sh\nfor to; do :; done\ncat > "$to"\n')
         program.chmod(0o755)
         monkeypatch.setenv("FFMPEG", str(program))
-        source = read_problem(write_problem(tmp_path / "near.yaml", NEAR))
-        order = ExportOrder(source, None, tmp_path / "near.mp4", seconds=1.0)
+        problem = read_problem(write_problem(tmp_path / "near.yaml", NEAR))
+        order = ExportOrder(problem, None, tmp_path / "near.mp4", seconds=1.0)
         export(order)
         written = order.out.read_bytes()
         assert written.count(b"\xff\xd8\xff\xe0") == 2  # it stands still
@@ -201,7 +201,7 @@ required_clearance: 5
 """
     file = tmp_path / "p.yaml"
     file.write_text(ball)
-    problem = read_problem(file).problem
+    problem = read_problem(file)
     none, angles = np.zeros(n), np.zeros((2, n, 2))
     rows = Trajectory(none > 0, none, none, *angles, times=np.linspace(0.0, 4.0, n))
     content, binary = opened(glb(problem, rows, 1.0))

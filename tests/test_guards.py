@@ -95,7 +95,7 @@ def swaying(rows: int) -> Trajectory:
 
 
 def near() -> PlanningProblem:
-    return read_problem("paper/obs1").problem
+    return read_problem("paper/obs1")
 
 
 def work(rows: int, folder: Path) -> dict[str, int]:

@@ -62,7 +62,7 @@ def test_a_million_rows_fit_into_a_gibibyte(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_memory_beyond_the_joint_values_hardly_grows(tmp_path: Path) -> None:
     few, many = (peak_of_verifying(n, tmp_path) for n in (100_000, 300_000))
-    arm = read_problem("paper/obs1").problem.manipulator
+    arm = read_problem("paper/obs1").manipulator
     row = 8 * (2 + 2 * arm.n_links)
     # The values twice while they are frozen, and a few columns of one number a row.
     assert 1024.0 * (many - few) <= 200_000 * (2 * row + 200)

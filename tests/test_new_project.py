@@ -24,7 +24,7 @@ def test_what_is_made_is_read_under_its_name(
     if kind == "robot":
         assert read_cell(folder / "problem.yaml").robot.joints
     else:
-        problem = read_problem(folder / "problem.yaml").problem
+        problem = read_problem(folder / "problem.yaml")
         assert problem.name == name
         assert problem.tip_path is not None
     assert files == sorted(path.name for path in folder.iterdir())

@@ -100,7 +100,7 @@ def test_no_bar_for_what_is_soon_done_or_not_looked_at(
 
 
 def test_the_share_of_a_proof_grows_to_all_and_counts_what_is_far() -> None:
-    problem = read_problem("paper/obs2").problem
+    problem = read_problem("paper/obs2")
     proof = prove_problem(problem, trajectory(), ErrorBox())
     assert proof.proving.share == 0.0
     proof.proving.sweep(0, 64)

@@ -31,7 +31,7 @@ from vdsm_pin.verification.robust import largest_joint_error
 
 def short(name: str) -> PlanningProblem:
     """A paper scene with a short piece of its path, to keep the test quick."""
-    problem = read_problem(f"paper/{name}").problem
+    problem = read_problem(f"paper/{name}")
     points = np.array([[3.126, 0.9, 0.9], [3.126, 1.0, 1.0]])
     return replace(problem, tip_path=replace(problem.path, points=points, closed=False))
 
@@ -65,7 +65,7 @@ def test_missing_clearance_between_waypoints_is_added_to_the_margin(
 
 def test_margins_reach_beyond_what_a_plan_keeps_unasked() -> None:
     """Errors take what it kept, so that a margin within that asks for nothing."""
-    problem = read_problem("paper/obs1").problem
+    problem = read_problem("paper/obs1")
     problem = replace(problem, errors=ErrorBox(joint=np.deg2rad(0.1)))
     robot = load_robot(problem.manipulator)
     result = refinement.plan_and_verify(problem, "fewest", robot)
@@ -86,7 +86,7 @@ def test_a_plan_that_cannot_be_certified_is_not_handed_out(
     def blind(
         problem: PlanningProblem, clearance: LinkClearance, margin: Margin
     ) -> Plan:
-        free = replace(problem, scene=read_problem("paper/free").problem.scene)
+        free = replace(problem, scene=read_problem("paper/free").scene)
         return plan_paper(free, clearance, margin)
 
     monkeypatch.setattr(refinement, "strategy", lambda name: blind)
@@ -108,7 +108,7 @@ def test_of_rivals_the_one_that_is_proved_to_survive_most_is_taken(
 ) -> None:
     """Whatever the planner thinks: here it puts a plan through the obstacle first."""
     task = short("obs3")
-    free = replace(task, scene=read_problem("paper/free").problem.scene)
+    free = replace(task, scene=read_problem("paper/free").scene)
 
     def boasting(
         problem: PlanningProblem, clearance: LinkClearance, margin: Margin
@@ -286,7 +286,7 @@ def test_no_plan_round_the_hull_names_the_hull_first() -> None:
 def test_an_approach_that_is_not_read_is_told(
     name: str, strategy: str, why: str
 ) -> None:
-    problem = read_problem(f"paper/{name}").problem
+    problem = read_problem(f"paper/{name}")
     robot = load_robot(problem.manipulator)
     for approach in Approach:
         path = replace(problem.path, approach=approach)

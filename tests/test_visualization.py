@@ -154,7 +154,7 @@ def quietly(url: str) -> None:
 
 def test_without_a_motion_the_tip_is_drawn_at_the_start() -> None:
     """Oracle: forward kinematics of what is drawn."""
-    problem, rng = read_problem("paper/obs1").problem, np.random.default_rng(0)
+    problem, rng = read_problem("paper/obs1"), np.random.default_rng(0)
     starts = [np.array([2.9, 0.9, 0.3]), np.array([3.126, 0.0, 0.0])]
     starts += list(rng.uniform([-1.0, -0.7, -0.7], [4.0, 0.7, 0.7], (20, 3)))
     for start in starts:

@@ -45,7 +45,7 @@ required_clearance: 5
 def problem_of(folder: Path, hinge: float = 1400.0) -> PlanningProblem:
     path = folder / "p.yaml"
     path.write_text(TEXT % (hinge, hinge), encoding="utf-8")
-    return read_problem(path).problem
+    return read_problem(path)
 
 
 def test_the_arm_waits_until_the_door_is_open(tmp_path: Path) -> None:

@@ -16,8 +16,9 @@ from typing import Literal
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.io import problem_file, trajectory_file
+from vdsm_pin.io import trajectory_file
 from vdsm_pin.io.atomic import atomic_path
+from vdsm_pin.io.problem_file import read_problem as read_problem
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.error_boxes import NOTHING
 from vdsm_pin.problem.error_boxes import ErrorBox as Box
@@ -29,25 +30,6 @@ from vdsm_pin.verification.robot_model import load_robot
 
 PYTHON = "from Python"
 """What a report names as command and problem file where there is none."""
-
-
-def read_problem(name_or_path: str | Path) -> PlanningProblem:
-    """The problem of a built-in name or a file.
-
-    Args:
-        name_or_path: Such as `paper/obs1` or `problems/mine.yaml`.
-
-    Returns:
-        The problem in metres, radians and the base frame (x along the rail).
-
-    Raises:
-        InvalidFile: If the file or its content breaks the contract of docs/files.md.
-
-    Example:
-        >>> read_problem("paper/obs1").manipulator.n_links
-        8
-    """
-    return problem_file.read_problem(name_or_path).problem
 
 
 def plan(
@@ -190,14 +172,10 @@ def write_report(result: ArmVerification, path: str | Path) -> None:
     from vdsm_pin.report.html import write_report as write
     from vdsm_pin.report.run_record import RunRecord
 
-    source = result.problem.source
-    record = RunRecord(
-        command=PYTHON,
-        problem_file=str(source.path) if source else PYTHON,
-        problem_sha256=source.sha256 if source else "",
-        urdf_sha256=load_robot(result.problem.manipulator).urdf_sha256,
-    )
-    check_kept([Path(path)], source.files if source else ())
+    problem = result.problem
+    urdf_sha256 = load_robot(problem.manipulator).urdf_sha256
+    record = RunRecord.of(PYTHON, problem.source, urdf_sha256)
+    check_kept([Path(path)], problem.files)
     with atomic_path(path) as temporary:
         write(temporary, result, verification_file(result, record))
 

@@ -92,7 +92,7 @@ class Runs:
 
     def problem(self, scene: str) -> PlanningProblem:
         """The problem of a scene."""
-        problem = read_problem(f"paper/{scene}").problem
+        problem = read_problem(f"paper/{scene}")
         if self._spacing is None:
             return problem
         return replace(problem, tip_path=replace(problem.path, spacing=self._spacing))

@@ -128,7 +128,7 @@ def generate(folder: Path, family: str, number: int) -> Path:
         path = folder / f"{name}.yaml"
         data = _file(name, arm, draft)
         path.write_text(yaml.safe_dump(data, sort_keys=False), encoding="utf-8")
-        if _keeps_its_promise(read_problem(path).problem, draft):
+        if _keeps_its_promise(read_problem(path), draft):
             return path
         path.unlink()
         for obstacle in draft["obstacles"]:

@@ -146,7 +146,7 @@ def attempt(file: Path, key: tuple[str, int], name: str, limit: float) -> Outcom
         name: A strategy or a reference.
         limit: Processor time of planning; [s].
     """
-    problem = whole_or_nothing(read_problem(file).problem)
+    problem = whole_or_nothing(read_problem(file))
     robot = load_robot(problem.manipulator)
     plan = by_reference if name in REFERENCES else by_strategy
     begin = time.process_time()

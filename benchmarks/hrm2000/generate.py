@@ -54,7 +54,7 @@ def witness_of(path: Path) -> Path:
 
 def verified(path: Path) -> ArmVerification:
     """The judgement of a problem's witness, both read from their files."""
-    problem = read_problem(path).problem
+    problem = read_problem(path)
     trajectory = read_trajectory(witness_of(path), problem.manipulator)
     return verify(problem, trajectory, load_robot(problem.manipulator))
 

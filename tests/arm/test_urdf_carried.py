@@ -55,7 +55,7 @@ def test_the_urdf_has_what_links_carry(tmp_path: Path) -> None:
     assert {f"body{k}" for k in range(1, 7)} <= names
     from vdsm_pin.io.problem_file import read_problem
 
-    carried = read_problem(tmp_path / "p.yaml").problem.manipulator.carried
+    carried = read_problem(tmp_path / "p.yaml").manipulator.carried
     rng = np.random.default_rng(0)
     for k, (link, solid) in enumerate(carried, start=1):
         mine = [o for o in shapes.geometryObjects if o.name.startswith(f"body{k}_")]

@@ -134,7 +134,7 @@ def test_a_witness_is_certified_and_one_that_is_spoiled_is_not(
 ) -> None:
     path = generate(tmp_path, family, 1).path
     assert verified(path).verdict is Verdict.CERTIFIED
-    problem = read_problem(path).problem
+    problem = read_problem(path)
     assert problem.path.required_coverage == 1.0
     robot = load_robot(problem.manipulator)
     motion = read_trajectory(witness_of(path), problem.manipulator)
@@ -199,7 +199,7 @@ def test_the_witness_of_the_feasible_twin_is_refused(tmp_path: Path) -> None:
 
 def test_a_last_link_that_looks_elsewhere_is_a_fault(tmp_path: Path) -> None:
     path = generate(tmp_path, "pointing", 1).path
-    problem = read_problem(path).problem
+    problem = read_problem(path)
     motion = read_trajectory(witness_of(path), problem.manipulator)
     assert sample(problem, motion).faults == ()
     wish = problem.path.pointing

@@ -165,7 +165,7 @@ def test_sampling_finds_no_fault_in_a_witness_and_each_kind_in_a_spoiled_one(
     family: str, tmp_path: Path
 ) -> None:
     path = generate(tmp_path, family, 2).path
-    asked = read_problem(path).problem
+    asked = read_problem(path)
     motion = read_trajectory(witness_of(path), asked.manipulator)
     assert sample(asked, motion).faults == ()
 

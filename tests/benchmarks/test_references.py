@@ -21,7 +21,7 @@ from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 
-FREE = read_problem("paper/free").problem
+FREE = read_problem("paper/free")
 ROBOT = load_robot(FREE.manipulator)
 
 
@@ -45,7 +45,7 @@ def test_methods_without_obstacles_draw_the_free_square_and_change_every_angle(
 
 
 def test_a_method_that_looks_at_no_obstacle_is_refuted_by_the_judge() -> None:
-    problem = read_problem("paper/obs1").problem
+    problem = read_problem("paper/obs1")
     problem = replace(problem, tip_path=replace(problem.path, spacing=0.05))
     motion = reference("pseudo-inverse")(problem, ROBOT, link_clearance(problem))
     assert verify(problem, motion, ROBOT).verdict is Verdict.REFUTED

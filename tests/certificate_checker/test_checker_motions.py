@@ -89,9 +89,9 @@ class Motion:
     def certify(self, errors: ErrorBox) -> bool:
         """Write the certificate; false where the motion is not certified."""
         file = read_problem(self.problem)
-        arm = file.problem.manipulator
+        arm = file.manipulator
         self.motion = read_trajectory(self.rows, arm)
-        found = verify(file.problem, self.motion, load_robot(arm), errors=errors)
+        found = verify(file, self.motion, load_robot(arm), errors=errors)
         if found.verdict.value != "certified":
             return False
         hashes = Hashes(file.sha256, sha256(self.rows.read_bytes()))

@@ -401,14 +401,14 @@ def test_a_mesh_in_the_wrong_unit_is_refused_with_the_right_scale(
     message = refusal(path)
     assert f"try scale: {suggested}, else" in message
     path.write_text(edited(text, ("obstacles", 0, "scale"), float(suggested)))
-    (mesh,) = read_problem(path).problem.scene.obstacles
+    (mesh,) = read_problem(path).scene.obstacles
     (size_found,) = {float(np.ptp(mesh.vertices[:, i])) for i in range(3)}
     assert size_found == pytest.approx(0.5, rel=1e-6)
 
 
 def test_the_mesh_size_check_can_be_switched_off(tmp_path: Path) -> None:
     path = mesh_problem(tmp_path, binary_stl(TETRAHEDRON), check_size=False)
-    (mesh,) = read_problem(path).problem.scene.obstacles
+    (mesh,) = read_problem(path).scene.obstacles
     assert mesh.vertices.max() == 0.001
 
 

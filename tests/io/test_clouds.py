@@ -368,7 +368,7 @@ def test_points_stand_where_a_mesh_with_their_corners_would(tmp_path: Path) -> N
         "{name: scan, shape: points, file: a.xyz, scale: 10, center: [1, 2, 3], "
         "rpy_deg: [0, 0, 90], radius: 2}"
     )
-    found = read_problem(problem(tmp_path, text)).problem
+    found = read_problem(problem(tmp_path, text))
     (cloud,) = found.scene.obstacles
     assert isinstance(cloud, PointCloud)
     x, y, z = (10.0 * POINTS).T
@@ -383,7 +383,7 @@ def test_points_stand_where_a_mesh_with_their_corners_would(tmp_path: Path) -> N
 def test_a_cloud_without_unit_says_what_was_assumed(tmp_path: Path) -> None:
     (tmp_path / "a.xyz").write_bytes(lines(100.0 * POINTS) + b"nan 0 0\n")
     text = "{name: scan, shape: points, file: a.xyz, radius: 2, check_size: false}"
-    found = read_problem(problem(tmp_path, text)).problem
+    found = read_problem(problem(tmp_path, text))
     assert assumed_sizes(found) == ("'scan' is 1e+04 x 325 x 1050 mm",)
     none = Trajectory(*(np.zeros(1) for _ in range(3)), *np.zeros((2, 1, 8)))
     assert any("cloud 'scan': points" in note for note in input_notes(found, none))
@@ -394,7 +394,7 @@ def test_a_grid_has_its_cells_and_no_unit_of_its_own(tmp_path: Path) -> None:
     grid[1] = 1
     np.save(tmp_path / "a.npy", grid)
     text = "{name: map, shape: voxels, file: a.npy, size: [100, 40, 20]}"
-    found = read_problem(problem(tmp_path, text)).problem
+    found = read_problem(problem(tmp_path, text))
     (cells,) = found.scene.obstacles
     assert isinstance(cells, Voxels)
     corners = cells.pieces[0].points

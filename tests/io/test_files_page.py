@@ -23,7 +23,7 @@ EXAMPLE, OTHERS, ARM, ENDS, CURVES = re.findall(
 
 def test_the_example_is_read_with_all_shapes(tmp_path: Path) -> None:
     (tmp_path / "p.yaml").write_text(EXAMPLE)
-    problem = read_problem(tmp_path / "p.yaml").problem
+    problem = read_problem(tmp_path / "p.yaml")
     assert len(problem.scene.obstacles) == 7
     assert problem.manipulator.name == "hrm8"
 
@@ -34,7 +34,7 @@ def test_the_second_arm_shown_is_read(tmp_path: Path) -> None:
     mate = Trajectory(none > 0, none, none, *angles, times=times)
     write_trajectory(tmp_path / "mate.csv", mate)
     (tmp_path / "p.yaml").write_text(edited(EXAMPLE, ("others",)) + OTHERS)
-    moving = read_problem(tmp_path / "p.yaml").problem.scene.moving
+    moving = read_problem(tmp_path / "p.yaml").scene.moving
     names = [one.name for one in moving]
     assert names == ["door", *(f"mate: link {k}" for k in range(1, 9))]
 
@@ -55,7 +55,7 @@ def test_the_defaults_shown_are_the_defaults(tmp_path: Path) -> None:
         text = edited(text, location)
     (tmp_path / "short.yaml").write_text(text)
     full, short = (
-        read_problem(tmp_path / f"{name}.yaml").problem for name in ("full", "short")
+        read_problem(tmp_path / f"{name}.yaml") for name in ("full", "short")
     )
     for part in fields(full):
         if part.compare:
@@ -72,7 +72,7 @@ def test_the_arm_shown_is_read_and_its_defaults_hold(tmp_path: Path) -> None:
     arms = []
     for name, text in (("full", full), ("short", short)):
         (tmp_path / f"{name}.yaml").write_text(text)
-        arms.append(read_problem(tmp_path / f"{name}.yaml").problem.manipulator)
+        arms.append(read_problem(tmp_path / f"{name}.yaml").manipulator)
     assert repr(arms[0]) == repr(arms[1])
     assert (arms[0].cables.hole_angles == paper_hole_angles(5)).all()
 
@@ -80,7 +80,7 @@ def test_the_arm_shown_is_read_and_its_defaults_hold(tmp_path: Path) -> None:
 def test_the_start_and_goal_shown_are_read_without_a_path(tmp_path: Path) -> None:
     text = edited(EXAMPLE.replace("manipulator: hrm8", ARM.rstrip(), 1), ("tip_path",))
     (tmp_path / "p.yaml").write_text(text + ENDS)
-    problem = read_problem(tmp_path / "p.yaml").problem
+    problem = read_problem(tmp_path / "p.yaml")
     assert problem.tip_path is None
     assert problem.start is not None
     assert problem.goal is not None
@@ -95,7 +95,7 @@ def test_the_curves_shown_are_read_and_their_default_holds(tmp_path: Path) -> No
     for curves in (CURVES, "\n".join(CURVES.splitlines()[:-1])):
         text = "\n".join([*given[:line], curves.rstrip(), *given[line + 1 :]])
         (tmp_path / "p.yaml").write_text(text)
-        corners.append(read_problem(tmp_path / "p.yaml").problem.path.points)
+        corners.append(read_problem(tmp_path / "p.yaml").path.points)
     assert (corners[0] == corners[1]).all()
     assert len(corners[0]) > 100
 

@@ -38,7 +38,7 @@ def problem(folder: Path, size: float, unit: str = "mm", **fields: object) -> Pa
 
 
 def mesh_of(path: Path) -> Mesh:
-    (mesh,) = read_problem(path).problem.scene.obstacles
+    (mesh,) = read_problem(path).scene.obstacles
     assert isinstance(mesh, Mesh)
     return mesh
 
@@ -84,9 +84,9 @@ def test_metres_in_a_file_of_millimetres(tmp_path: Path) -> None:
 
 
 def test_a_size_that_nobody_states_is_told_in_the_files_unit(tmp_path: Path) -> None:
-    found = read_problem(problem(tmp_path, 500.0)).problem
+    found = read_problem(problem(tmp_path, 500.0))
     assert assumed_sizes(found) == ("'part' is 500 x 500 x 500 mm",)
-    found = read_problem(problem(tmp_path, 0.5, "m")).problem
+    found = read_problem(problem(tmp_path, 0.5, "m"))
     assert assumed_sizes(found) == ("'part' is 0.5 x 0.5 x 0.5 m",)
 
 
@@ -150,7 +150,7 @@ def test_bent_faces_and_odd_files_are_noted(tmp_path: Path) -> None:
         text = f"v 0 0 0\nv 900 0 0\nv 900 900 {lift}\nv 0 900 0\nf 1 2 3 4\nl 1 2\n"
         (tmp_path / "part.obj").write_text(text)
         ours = ("mesh 'part': lines", "mesh 'part': faces", "trajectory: ")
-        found = input_notes(read_problem(path).problem, still)
+        found = input_notes(read_problem(path), still)
         notes = [note for note in found if note.startswith(ours)]
         assert notes[0] == "mesh 'part': lines and points left out: 1"
         assert notes[-1] == "trajectory: column 't' is ignored"

@@ -26,7 +26,7 @@ obstacles:
 def read(folder: Path, motion: str) -> Moving:
     path = folder / "p.yaml"
     path.write_text(HEAD % motion, encoding="utf-8")
-    (found,) = read_problem(path).problem.scene.obstacles
+    (found,) = read_problem(path).scene.obstacles
     assert isinstance(found, Moving)
     return found
 

@@ -30,14 +30,14 @@ def written(folder: Path, parts: str, rest: str = "") -> Path:
 
 def test_a_circle_in_the_file_is_one_in_the_base_frame(tmp_path: Path) -> None:
     circle = "    - {circle: {center: [10, 3146, 30], normal: [0, 1, 0]}}\n"
-    path = read_problem(written(tmp_path, CORNER + circle)).problem.path
+    path = read_problem(written(tmp_path, CORNER + circle)).path
     radii = np.linalg.norm(path.points - [3.126, 0.0, 0.0], axis=1)
     assert radii == pytest.approx(0.2, abs=1e-12)
     assert path.points[:, 0] == pytest.approx(3.126, abs=1e-12)
     assert (path.points[-1] == path.points[0]).all()
     assert 0.0 < 0.4 * np.pi - path.length < 1e-3
     coarse = written(tmp_path, CORNER + circle, "  curve_tolerance: 10\n")
-    assert len(read_problem(coarse).problem.path.points) < len(path.points) / 5
+    assert len(read_problem(coarse).path.points) < len(path.points) / 5
 
 
 def test_parts_go_on_where_the_one_before_ends(tmp_path: Path) -> None:
@@ -52,7 +52,7 @@ def test_parts_go_on_where_the_one_before_ends(tmp_path: Path) -> None:
         + "    - [20, 3146, 30]\n"
     )
     found = read_problem(written(tmp_path, parts))
-    last = found.problem.path.points[-3:]
+    last = found.path.points[-3:]
     assert last == pytest.approx(
         np.array([[3.126, 0, 0], [3.126, -0.0005, 0], [3.126, -0.01, 0]]), abs=1e-12
     )

@@ -30,7 +30,7 @@ def read(
 ) -> DesiredPath:
     file = folder / "p.yaml"
     file.write_text(TEXT.format(points=points, pointing=pointing, closed=closed))
-    return read_problem(file).problem.path
+    return read_problem(file).path
 
 
 def wish(folder: Path, pointing: str, closed: str = "false") -> Pointing:

@@ -34,7 +34,7 @@ required_clearance: 0
 def read_text(folder: Path, text: str, name: str = "p.yaml") -> PlanningProblem:
     path = folder / name
     path.write_text(text, encoding="utf-8")
-    return read_problem(path).problem
+    return read_problem(path)
 
 
 def test_built_in_problems_are_those_of_the_paper() -> None:
@@ -49,7 +49,7 @@ def test_built_in_problems_are_those_of_the_paper() -> None:
 
 @pytest.mark.parametrize("name", built_in_names())
 def test_built_in_problems_share_the_papers_task(name: str) -> None:
-    problem = read_problem(name).problem
+    problem = read_problem(name)
     assert problem.name == name.removeprefix("paper/")
     assert problem.manipulator.name == "hrm8"
     assert problem.required_clearance == 0.0035
@@ -64,8 +64,8 @@ def test_built_in_problems_share_the_papers_task(name: str) -> None:
 
 
 def test_the_axes_of_obs1_and_obs3_are_the_papers() -> None:
-    (pillar,) = read_problem("paper/obs1").problem.scene.obstacles
-    (column,) = read_problem("paper/obs3").problem.scene.obstacles
+    (pillar,) = read_problem("paper/obs1").scene.obstacles
+    (column,) = read_problem("paper/obs3").scene.obstacles
     assert isinstance(pillar, solids.Cylinder)
     assert isinstance(column, solids.Cylinder)
     assert pillar.axis.tolist() == [1, 0, 0]
@@ -82,7 +82,7 @@ def test_the_axes_of_obs1_and_obs3_are_the_papers() -> None:
 def test_prisms_of_obs2_are_equilateral_about_the_papers_axis(
     name: str, inscribed: float, circumscribed: float
 ) -> None:
-    (prism,) = read_problem(name).problem.scene.obstacles
+    (prism,) = read_problem(name).scene.obstacles
     assert isinstance(prism, solids.Prism)
     arms = prism.polygon - [0.4, 0.4]
     np.testing.assert_allclose(np.linalg.norm(arms, axis=1), circumscribed, atol=1e-9)
@@ -104,7 +104,7 @@ def test_minimal_file_gets_the_stated_defaults(tmp_path: Path) -> None:
 
 
 def test_every_field_arrives_in_si(tmp_path: Path) -> None:
-    problem = read_problem(write_everything(tmp_path)).problem
+    problem = read_problem(write_everything(tmp_path))
     arm = problem.manipulator
     assert (arm.name, arm.n_links) == ("five", 5)
     assert arm.link_lengths.tolist() == [0.4, 0.4, 0.3, 0.3, 0.2]
@@ -157,7 +157,7 @@ def test_without_a_path_start_and_goal_stand_on_their_own(tmp_path: Path) -> Non
 
 
 def test_start_joints_and_their_tip_agree(tmp_path: Path) -> None:
-    problem = read_problem(write_everything(tmp_path)).problem
+    problem = read_problem(write_everything(tmp_path))
     q = problem.path.start_joints
     assert q is not None
     assert q[0] == 0.0125
@@ -170,7 +170,7 @@ def test_start_joints_and_their_tip_agree(tmp_path: Path) -> None:
 
 def test_scene_is_carried_into_the_base_frame(tmp_path: Path) -> None:
     """Oracle: the inverse of the 4x4 pose, applied to points written by hand."""
-    problem = read_problem(write_everything(tmp_path)).problem
+    problem = read_problem(write_everything(tmp_path))
     T = np.eye(4)
     T[:3, :3] = rotation_from_rpy(np.deg2rad([10, -20, 30]))
     T[:3, 3] = [0.1, -0.05, 0.025]
@@ -260,7 +260,7 @@ def test_millimetres_and_metres_give_the_same_numbers(tmp_path: Path) -> None:
     ):  # fmt: skip
         assert old in metres
         metres = metres.replace(old, new)
-    first = read_problem("paper/obs1").problem
+    first = read_problem("paper/obs1")
     second = read_text(tmp_path, metres)
     assert repr(first.scene) == repr(second.scene)
     assert repr(first.path) == repr(second.path)

@@ -70,7 +70,7 @@ def table(write: Callable[[Path], None]) -> Made:
     return make
 
 
-FREE = read_problem("paper/free").problem
+FREE = read_problem("paper/free")
 BOX = trimesh.creation.box()
 PLY = BOX.export(file_type="ply")
 GLB = BOX.export(file_type="glb")
@@ -172,7 +172,7 @@ def test_nodes_of_dae_stand_a_hundred_deep(
 def test_a_path_is_cut_into_as_many_rows_as_there_may_be(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = read_problem(write_everything(tmp_path)).problem.path
+    path = read_problem(write_everything(tmp_path)).path
     approach = float(np.linalg.norm(path.points[0] - path.start))
     rows = (path.length + approach) / path.spacing
     monkeypatch.setattr(path_builder, "MAX_ROWS", rows)

@@ -92,9 +92,8 @@ def assert_same_problem(path: Path) -> None:
 
 
 def assert_same_content(path: Path) -> None:
-    file, theirs = read_problem(path), ball_reader.Problem(path)
-    ours = file.problem
-    assert file.sha256 == theirs.sha256
+    ours, theirs = read_problem(path), ball_reader.Problem(path)
+    assert ours.sha256 == theirs.sha256
     arm = ours.manipulator
     np.testing.assert_allclose(
         arm.link_lengths, numbers(theirs.lengths), rtol=0, atol=CLOSE
@@ -143,7 +142,7 @@ def test_both_drop_repeated_and_closing_corners_alike(tmp_path: Path) -> None:
     path = tmp_path / "repeats.yaml"
     path.write_text(CLOSING_CORNERS, encoding="utf-8")
     assert_same_problem(path)
-    assert len(read_problem(path).problem.path.points) == 3
+    assert len(read_problem(path).path.points) == 3
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -224,7 +223,7 @@ def test_both_read_trajectories_alike(tmp_path: Path) -> None:
 
 def test_the_comparison_can_fail(tmp_path: Path) -> None:
     path = write_everything(tmp_path)
-    ours = read_problem(path).problem.scene.obstacles
+    ours = read_problem(path).scene.obstacles
     (tmp_path / "part.stl").write_bytes(binary_stl(TETRAHEDRON[::-1]))
     path.write_text(path.read_text().replace("radius: 200", "radius: 200.000001"))
     theirs = list(ball_reader.Problem(path).shapes.values())

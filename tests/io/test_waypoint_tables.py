@@ -15,7 +15,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.tables import write_cables, write_centres
 
-FREE = read_problem("paper/free").problem
+FREE = read_problem("paper/free")
 
 
 def problem_with(n_links: int, rng: np.random.Generator) -> PlanningProblem:

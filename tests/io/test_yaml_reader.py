@@ -84,7 +84,7 @@ def test_names_in_any_alphabet_are_read_and_the_schema_agrees(
         text = edited(PLAIN, where, name)
         SCHEMA.validate(yaml.safe_load(text))
         path.write_text(text, encoding="utf-8")
-        problem = read_problem(path).problem
+        problem = read_problem(path)
         assert name in (problem.name, problem.manipulator.name, *problem.scene.names)
 
 

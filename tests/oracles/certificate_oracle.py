@@ -119,8 +119,7 @@ class OracleWriter:
 
     def __post_init__(self) -> None:
         """Read the two files."""
-        self.file = read_problem(self.problem_path)
-        self.problem = self.file.problem
+        self.problem = read_problem(self.problem_path)
         self.arm = self.problem.manipulator
         self.trajectory = read_trajectory(self.trajectory_path, self.arm)
         self.lengths = np.array(self.arm.link_lengths)
@@ -294,7 +293,7 @@ class OracleWriter:
         ]
         return {
             "vdsm_certificate": 7,
-            "problem_sha256": self.file.sha256,
+            "problem_sha256": self.problem.sha256,
             "trajectory_sha256": sha256(self.trajectory_path.read_bytes()),
             "versions": {"vdsm_pin": "0", "numpy": np.__version__},
             "errors": {

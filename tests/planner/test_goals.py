@@ -159,10 +159,10 @@ required_clearance: 3.5
 def test_home_is_a_word_of_the_file(tmp_path: Path) -> None:
     file = tmp_path / "p.yaml"
     file.write_text(FILE.format(retreat="home"))
-    path = read_problem(file).problem.path
+    path = read_problem(file).path
     assert (path.home, path.retreat) == (True, 0.0)
     file.write_text(FILE.format(retreat="100"))
-    path = read_problem(file).problem.path
+    path = read_problem(file).path
     assert (path.home, path.retreat) == (False, pytest.approx(0.1))
     file.write_text(FILE.format(retreat="house"))
     with pytest.raises(InvalidFile, match="home"):

@@ -53,7 +53,7 @@ def written(folder: Path, unit: str) -> Path:
 def test_the_unit_of_the_file_changes_no_message(tmp_path: Path, strategy: str) -> None:
     said = []
     for unit in ("mm", "m"):
-        problem = read_problem(written(tmp_path, unit)).problem
+        problem = read_problem(written(tmp_path, unit))
         with pytest.raises(Infeasible) as refused:
             plan_and_verify(problem, strategy, load_robot(problem.manipulator))
         said.append(str(refused.value))
@@ -62,7 +62,7 @@ def test_the_unit_of_the_file_changes_no_message(tmp_path: Path, strategy: str) 
 
 
 def test_a_place_is_told_where_the_file_has_it(tmp_path: Path) -> None:
-    problem = read_problem(written(tmp_path, "m")).problem
+    problem = read_problem(written(tmp_path, "m"))
     told = problem.in_file(problem.path.start)
     assert (
         told

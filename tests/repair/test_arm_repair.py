@@ -30,7 +30,7 @@ ROBOT = load_robot(built_in("hrm8"))
 
 @cache
 def planned(name: str) -> tuple[PlanningProblem, Trajectory]:
-    problem = read_problem(name).problem
+    problem = read_problem(name)
     return problem, plan_and_verify(problem, "fewest", ROBOT).plan.trajectory
 
 
@@ -126,7 +126,7 @@ def test_jacobian_agrees_with_differences() -> None:
 def test_command_repairs_what_it_is_given(tmp_path: Path) -> None:
     """A file with a larger clearance; how far each waypoint moved is told."""
     problem, motion = planned("paper/obs3")
-    text = read_problem("paper/obs3").path.read_text(encoding="utf-8")
+    text = read_problem("paper/obs3").source.path.read_text(encoding="utf-8")
     assert "required_clearance: 3.5" in text
     file, given, out = tmp_path / "p.yaml", tmp_path / "t.csv", tmp_path / "out"
     file.write_text(text.replace("required_clearance: 3.5", "required_clearance: 33.5"))

@@ -21,7 +21,7 @@ from vdsm_pin.verification.verify import verify
 
 def beside_a_box(gap: float) -> Verification:
     """The straight arm along a box whose face is so far from the axis; [m]."""
-    problem = read_problem("paper/free").problem
+    problem = read_problem("paper/free")
     half = np.array([2.0, 0.5, 0.5])
     box = Box("box", np.array([1.5, 0.0, gap + 0.5]), np.eye(3), half)
     zero, links = np.zeros(1), np.zeros((1, problem.manipulator.n_links))

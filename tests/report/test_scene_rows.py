@@ -10,6 +10,7 @@ from problem_files import NEAR, write_problem
 
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.report.facts import verification_file
 from vdsm_pin.report.html import write_report
@@ -44,7 +45,8 @@ def scene_file(folder: Path) -> Path:
 
 
 def test_every_obstacle_is_listed_with_its_file_and_hash(tmp_path: Path) -> None:
-    rows = scene_rows(read_problem(scene_file(tmp_path)).problem)
+    problem = read_problem(scene_file(tmp_path)).under(ErrorBox(base=0.001))
+    rows = scene_rows(problem)
     digest = {
         name: hashlib.sha256((tmp_path / name).read_bytes()).hexdigest()
         for name in ("whole.obj", "open.obj")
@@ -58,7 +60,7 @@ def test_every_obstacle_is_listed_with_its_file_and_hash(tmp_path: Path) -> None
 
 
 def test_a_hash_is_of_what_was_read_or_there_is_none(tmp_path: Path) -> None:
-    problem = read_problem(scene_file(tmp_path)).problem
+    problem = read_problem(scene_file(tmp_path))
     (tmp_path / "open.obj").write_text(TETRAHEDRON)
     assert {row.sha256 for row in scene_rows(problem)} == {CHANGED, ""}
     (tmp_path / "open.obj").unlink()

@@ -258,7 +258,7 @@ def test_trajectories_are_converted(tmp_path: Path, robot: Robot) -> None:
         found = read_motion(out / f"trajectory{ending}", robot.joints)
         np.testing.assert_array_equal(found.q, given.q)
     assert run("convert", cell, "--cables", file, "--out", out) == 2
-    source = read_problem("paper/obs1")
+    problem = read_problem("paper/obs1")
     rng = np.random.default_rng(8)
     angles = rng.uniform(-0.1, 0.1, (2, 4, 8))
     flags = np.zeros(4, dtype=np.bool_)
@@ -269,7 +269,7 @@ def test_trajectories_are_converted(tmp_path: Path, robot: Robot) -> None:
     for ending in FORMATS:
         back = tmp_path / "back"
         assert run(*words, out / f"trajectory{ending}", "--out", back) == 0
-        found = read_trajectory(back / "trajectory.csv", source.problem.manipulator)
+        found = read_trajectory(back / "trajectory.csv", problem.manipulator)
         np.testing.assert_array_equal(found.joints, arm.joints)
 
 

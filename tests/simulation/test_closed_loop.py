@@ -114,7 +114,7 @@ def test_a_step_at_which_it_diverges_is_told() -> None:
 
 def test_what_is_proved_covers_the_errors_that_the_problem_states() -> None:
     """Obstacles off by more than the clearance: nothing is certified, whoever asks."""
-    problem, none = read_problem("paper/obs3").problem, ErrorBox()
+    problem, none = read_problem("paper/obs3"), ErrorBox()
     nominal = cleared(problem, bending(), none)
     assert nominal.verdict == "certified"
     assert nominal.min_clearance_m is not None
@@ -125,12 +125,12 @@ def test_what_is_proved_covers_the_errors_that_the_problem_states() -> None:
 
 
 def test_a_folder_holds_what_the_verifier_takes(tmp_path: Path) -> None:
-    source = read_problem("paper/obs3")
+    problem = read_problem("paper/obs3")
     file = tmp_path / "t.csv"
     vp.write_trajectory(file, bending())
-    order = SimulationOrder(source, file, tmp_path / "out", Settings())
+    order = SimulationOrder(problem, file, tmp_path / "out", Settings())
     told = simulate_to_folder(order)
-    executed = vp.read_trajectory(tmp_path / "out" / "executed.csv", source.problem)
+    executed = vp.read_trajectory(tmp_path / "out" / "executed.csv", problem)
     assert executed.n_links == 8
     assert told.executed.verdict == "certified"
     assert told.executed.min_clearance_m is not None

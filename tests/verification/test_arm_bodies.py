@@ -309,10 +309,10 @@ def certificate(folder: Path, problem: Path, rows: Path) -> Path:
     file = read_problem(problem)
     from vdsm_pin.io.trajectory_file import read_trajectory
 
-    motion = read_trajectory(rows, file.problem.manipulator)
+    motion = read_trajectory(rows, file.manipulator)
     box = ErrorBox(0.002, 0.001, 0.001)
-    arm = file.problem.manipulator
-    found = verify(file.problem, motion, load_robot(arm), errors=box)
+    arm = file.manipulator
+    found = verify(file, motion, load_robot(arm), errors=box)
     assert found.verdict is Verdict.CERTIFIED, found.checks
     path = folder / "c.certificate"
     digest = sha256(rows.read_bytes())

@@ -79,7 +79,7 @@ class Files:
         write_rows(self.trajectory, rows)
 
     def verify(self, errors: ErrorBox | None = None) -> Verification:
-        asked = read_problem(self.problem).problem
+        asked = read_problem(self.problem)
         rows = read_trajectory(self.trajectory, asked.manipulator)
         return verify(asked, rows, load_robot(asked.manipulator), errors=errors)
 
@@ -383,5 +383,5 @@ def test_many_random_bodies(tmp_path: Path) -> None:
 def test_names_of_parts_are_unique(tmp_path: Path) -> None:
     data = problem(*(random_body(np.random.default_rng(k), k) for k in range(20)))
     (tmp_path / "p.yaml").write_text(json.dumps(data))
-    bodies = arm_bodies(read_problem(tmp_path / "p.yaml").problem.manipulator)
+    bodies = arm_bodies(read_problem(tmp_path / "p.yaml").manipulator)
     assert all(a.name != b.name for a, b in combinations(bodies, 2))

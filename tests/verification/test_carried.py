@@ -15,8 +15,9 @@ from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import rotation_from_rpy
-from vdsm_pin.io.problem_file import ProblemFile, read_problem
+from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.certificate_writer import write_certificate
@@ -59,11 +60,11 @@ def motion_in(folder: Path, joints: Any) -> Path:
     return path
 
 
-def judged(problem: Path, rows: Path) -> tuple[ProblemFile, Verification]:
+def judged(problem: Path, rows: Path) -> tuple[PlanningProblem, Verification]:
     file = read_problem(problem)
-    arm = file.problem.manipulator
+    arm = file.manipulator
     motion = read_trajectory(rows, arm)
-    return file, verify(file.problem, motion, load_robot(arm))
+    return file, verify(file, motion, load_robot(arm))
 
 
 def certified(problem: Path, rows: Path) -> Path:
@@ -370,9 +371,9 @@ def cuboid(centre: Any, rotation: Any, half: Any) -> Any:
     return found
 
 
-def least_sampled(file: ProblemFile, rows: Path, riders: Any, balls: Any) -> float:
+def least_sampled(file: PlanningProblem, rows: Path, riders: Any, balls: Any) -> float:
     """The least distance of bodies, links and feed from balls over dense samples."""
-    arm = file.problem.manipulator
+    arm = file.manipulator
     q = read_trajectory(rows, arm).joints
     t = np.linspace(0.0, 1.0, 200)[:, None]
     dense = np.vstack([a + t * (b - a) for a, b in pairwise(q)])
@@ -428,7 +429,7 @@ def run_random(folder: Path, seed: int) -> tuple[bool, float]:
     if found.verdict is Verdict.CERTIFIED:
         outcome = check_certificate(certified(problem, rows), problem, rows)
         assert outcome.accepted, outcome.reason
-    required = file.problem.required_clearance
+    required = file.required_clearance
     if good[0] is Verdict.CERTIFIED:
         assert least >= required - 1e-9
     if good[0] is Verdict.REFUTED and not any(d["shape"] == "mesh" for d, _ in made):
@@ -457,7 +458,7 @@ def test_random_bodies_by_the_hundred(tmp_path: Path) -> None:
 def test_an_obstacle_may_be_named_like_a_part_of_a_mesh(tmp_path: Path) -> None:
     post = BALL | {"name": "post part 2"}
     file = problem_in(tmp_path, {"bodies": [CAMERA]}, [post])
-    problem = read_problem(file).problem
+    problem = read_problem(file)
     motion = motion_in(tmp_path, np.zeros((2, 7)))
     robot = load_robot(problem.manipulator)
     found = verify(problem, read_trajectory(motion, problem.manipulator), robot)
@@ -476,12 +477,12 @@ def test_a_pair_left_out_leaves_out_no_other_name(tmp_path: Path) -> None:
     ):
         arm = {"bodies": [CAMERA], "ignore_pairs": names}
         file = problem_in(tmp_path, arm, both)
-        source, found = judged(file, motion_in(tmp_path, np.zeros((2, 7))))
+        problem, found = judged(file, motion_in(tmp_path, np.zeros((2, 7))))
         check = next(c for c in found.checks if c.name == "clearance from obstacles")
         assert check.verdict is verdict
         pairs = {(p.own, p.obstacle) for p in found.pairs}
         assert (("camera", "post part 2") in pairs) == (verdict is Verdict.REFUTED)
-        assert source.problem.scene.names == ("post", "post part 2")
+        assert problem.scene.names == ("post", "post part 2")
 
 
 @pytest.mark.parametrize("name", ["camera", "camera part 2"])

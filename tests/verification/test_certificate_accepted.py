@@ -28,10 +28,10 @@ from vdsm_pin.verification.verify import verify
 def written(case: object, path: Path, box: ErrorBox | None = None) -> None:
     """A certificate by the verifier of a case that need not draw its path."""
     file = read_problem(case.problem)
-    arm = file.problem.manipulator
+    arm = file.manipulator
     trajectory = read_trajectory(case.trajectory, arm)
     box = box or ErrorBox(*case.writer.errors)
-    found = verify(file.problem, trajectory, load_robot(arm), errors=box)
+    found = verify(file, trajectory, load_robot(arm), errors=box)
     kept = [
         c for c in found.checks if not c.name.startswith(("tip", "change", "joints at"))
     ]
@@ -117,7 +117,7 @@ def test_the_certificate_of_the_survived_error_is_accepted(
     seed: int, tmp_path: Path
 ) -> None:
     case = random_case(np.random.default_rng(seed + 50), tmp_path, [SHAPES[seed]])
-    problem = read_problem(case.problem).problem
+    problem = read_problem(case.problem)
     rows = read_trajectory(case.trajectory, problem.manipulator)
     found = largest_joint_error(problem, rows, ErrorBox())
     assert found > 0.0

@@ -353,7 +353,7 @@ def test_moving_everything_rigidly_changes_nothing(
         }  # fmt: skip
         path = tmp_path / "problem.yaml"
         path.write_text(json.dumps(data))
-        found.append(brackets(read_problem(path).problem, rows))
+        found.append(brackets(read_problem(path), rows))
     one, two = found
     assert np.abs(shown(one.lower) - shown(two.lower))[:, :N_LINKS].max() <= PADDING
     apart = one.upper[:, :N_LINKS] > -RADIUS

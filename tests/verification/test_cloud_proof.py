@@ -98,21 +98,21 @@ def files(folder: Path) -> Path:
 def test_a_cloud_is_planned_certified_rechecked_and_lies_are_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    source = read_problem(files(tmp_path))
-    plan_to_folder(source, "fewest", tmp_path / "out", "plan")
+    problem = read_problem(files(tmp_path))
+    plan_to_folder(problem, "fewest", tmp_path / "out", "plan")
     rows = tmp_path / "out" / "trajectory.csv"
     proof = tmp_path / "proof.certificate"
-    order = VerifyOrder(source, rows, tmp_path / "v", "verify", certificate=proof)
+    order = VerifyOrder(problem, rows, tmp_path / "v", "verify", certificate=proof)
     verified = verify_to_folder(order)
     assert verified.file.verdict == "certified"
-    arguments = [str(proof), str(source.path), str(rows)]
+    arguments = [str(proof), str(problem.files[0]), str(rows)]
     assert check_certificate(arguments) == 0, capsys.readouterr()
     # The same certificate about a scan that comes 100 mm nearer proves nothing.
     scan = np.load(tmp_path / "scan.npy")
     text = gzip.decompress(proof.read_bytes()).decode()
     np.save(tmp_path / "scan.npy", scan - [0.0, 300.0, 0.0])
-    changed = read_problem(source.path).sha256
-    body = text.replace(source.sha256, changed, 1).splitlines(keepends=True)[:-1]
+    changed = read_problem(problem.files[0]).sha256
+    body = text.replace(problem.sha256, changed, 1).splitlines(keepends=True)[:-1]
     proof.write_bytes(gzip.compress("".join([*body, sealed(body)]).encode()))
     assert check_certificate(arguments) == 1
     assert "scan" in capsys.readouterr().out

@@ -302,7 +302,7 @@ def _nearest(start: np.ndarray, end: np.ndarray, point: np.ndarray) -> np.ndarra
 
 def test_coal_stands_beside_every_closest_approach_and_measured_row() -> None:
     """At an approach Coal lies in its bracket, at a waypoint above the lower end."""
-    problem = read_problem("paper/obs1").problem
+    problem = read_problem("paper/obs1")
     plan = plan_and_verify(problem, "paper", ROBOT).plan
     judged = verify(problem, plan.trajectory, ROBOT)
     assert len(judged.approaches) == CLOSEST
@@ -323,7 +323,7 @@ def test_a_lie_of_coal_at_a_closest_approach_is_seen(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Only the moments of the approaches are lied about: between two waypoints."""
-    problem = read_problem("paper/obs1").problem
+    problem = read_problem("paper/obs1")
     plan = plan_and_verify(problem, "paper", ROBOT).plan
 
     honest = coal_check.against_obstacles

@@ -23,10 +23,11 @@ from oracles.closed_solids import (
 from vdsm_pin.certificate_checker import check_certificate, main
 from vdsm_pin.errors import InsideUnknown, InvalidFile, StartInside
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io.problem_file import ProblemFile, read_problem
+from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.planner.start import check_start
 from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.report.inputs import input_notes
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.certificate_lines import Hashes
@@ -80,10 +81,10 @@ def written(
 
 def verified(
     problem: Path, rows: Path, **more: Any
-) -> tuple[ProblemFile, Verification]:
+) -> tuple[PlanningProblem, Verification]:
     file = read_problem(problem)
-    arm = file.problem.manipulator
-    found = verify(file.problem, read_trajectory(rows, arm), load_robot(arm), **more)
+    arm = file.manipulator
+    found = verify(file, read_trajectory(rows, arm), load_robot(arm), **more)
     return file, found
 
 
@@ -96,10 +97,10 @@ def certificate(folder: Path, corners: FloatArray, solid: bool | None) -> Path:
     return path
 
 
-def start_of(file: ProblemFile) -> str:
+def start_of(file: PlanningProblem) -> str:
     """What a planner says of the start."""
     try:
-        check_start(file.problem, link_clearance(file.problem))
+        check_start(file, link_clearance(file))
     except StartInside:
         return "refuted"
     except InsideUnknown:
@@ -210,7 +211,7 @@ def test_gaps_are_a_note_of_every_result(tmp_path: Path) -> None:
     corners[corners.mean(axis=1)[:, 2] > 0.0] += [0.0, 0.0, 1e-5]
     file, found = verified(*written(tmp_path, corners))
     assert found.verdict is Verdict.REFUTED
-    notes = input_notes(file.problem, found.trajectory)
+    notes = input_notes(file, found.trajectory)
     (note,) = (note for note in notes if "gaps" in note)
     assert "gaps of 'housing', up to 0.01 mm wide, were joined" in note
 
@@ -275,7 +276,7 @@ def test_what_an_open_mesh_is_the_problem_says(
             read_problem(problem)
         return
     file, found = verified(problem, rows, joint_error=True)
-    notes = input_notes(file.problem, found.trajectory)
+    notes = input_notes(file, found.trajectory)
     if solid is None:
         assert found.verdict is Verdict.UNDECIDED
         (row,) = (row for row in found.checks if row.verdict is Verdict.UNDECIDED)

@@ -35,7 +35,7 @@ def problem_of(
     base = kwargs.get("base", ([0, 0, 0], [0, 0, 0]))
     assert isinstance(base, tuple)
     path.write_text(HEAD % (lengths, *base, required) + obstacles, encoding="utf-8")
-    return read_problem(path).problem
+    return read_problem(path)
 
 
 def motion_of(joints: FloatArray, times: FloatArray) -> Trajectory:

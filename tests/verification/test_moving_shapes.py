@@ -61,7 +61,7 @@ def write_files(folder: Path) -> None:
 def problem_of(folder: Path, name: str, text: str) -> PlanningProblem:
     path = folder / f"{name}.yaml"
     path.write_text(HEAD + text, encoding="utf-8")
-    return read_problem(path).problem
+    return read_problem(path)
 
 
 def motion_of(q: FloatArray, times: FloatArray | None) -> Trajectory:
@@ -205,7 +205,7 @@ def test_a_counterexample_is_found_where_the_thing_then_is(tmp_path: Path) -> No
         "[[850, 0, 500], [850, 0, 110], [850, 0, 500]]}}\n"
     )
     path.write_text(text)
-    problem = read_problem(path).problem
+    problem = read_problem(path)
     still = motion_of(np.zeros((3, 7)), np.array([0.0, 3.0, 4.0]))
     # 15 mm of room; the ball is 850 mm out.
     small, large = (ErrorBox(joint=np.deg2rad(e)) for e in (0.2, 1.5))

@@ -101,7 +101,7 @@ def centres(problem: PlanningProblem, motion: Trajectory, t: FloatArray) -> Floa
 
 def compare(seed: int, folder: Path) -> Verdict:
     """Judge one arm beside the other, sample both, and ask the other way round."""
-    problems = [read_problem(path).problem for path in write_pair(folder, seed)]
+    problems = [read_problem(path) for path in write_pair(folder, seed)]
     motions = [
         read_trajectory(folder / f"t{k}.csv", problems[k].manipulator) for k in range(2)
     ]
@@ -152,7 +152,7 @@ def test_either_arm_is_as_far_from_the_other(seed: int, tmp_path: Path) -> None:
     """The same pair asked from both sides, over the same time."""
     paths = write_pair(tmp_path, seed)
     for k, path in enumerate(paths):
-        arm = read_problem(path).problem.manipulator
+        arm = read_problem(path).manipulator
         motion = read_trajectory(tmp_path / f"t{k}.csv", arm)
         n = motion.n_samples
         if n == 1:  # a motion of two rows that stands still
@@ -173,7 +173,7 @@ def test_either_arm_is_as_far_from_the_other(seed: int, tmp_path: Path) -> None:
         )  # fmt: skip
     least = []
     for k, path in enumerate(paths):
-        problem = read_problem(path).problem
+        problem = read_problem(path)
         motion = read_trajectory(tmp_path / f"t{k}.csv", problem.manipulator)
         row = next(
             c

@@ -28,7 +28,7 @@ required_clearance: 5
 def problem_of(folder: Path, more: str = "") -> PlanningProblem:
     path = folder / "p.yaml"
     path.write_text(HEAD + more, encoding="utf-8")
-    return read_problem(path).problem
+    return read_problem(path)
 
 
 def motion_of(

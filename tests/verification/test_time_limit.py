@@ -39,7 +39,7 @@ PASSED = Deadline(2.0, 0.0)
 
 def case(required: float = 0.0035, n: int = 400) -> tuple[PlanningProblem, Trajectory]:
     """The arm sways beside the bar of a problem of the paper."""
-    problem = read_problem("paper/obs1").problem
+    problem = read_problem("paper/obs1")
     rng, links = np.random.default_rng(3), problem.manipulator.n_links
     zero = np.zeros(n)
     angles = rng.uniform(-0.02, 0.02, (2, n, links))
@@ -154,14 +154,14 @@ def test_a_certificate_that_is_late_is_no_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("strategy", ["fewest", "clearest", "sturdiest", "paper"])
 def test_planning_that_is_late_says_so_and_nothing_else(strategy: str) -> None:
-    problem = read_problem("paper/obs1").problem
+    problem = read_problem("paper/obs1")
     robot = load_robot(problem.manipulator)
     with pytest.raises(OutOfTime, match="the time limit of 2 s came first"):
         plan_and_verify(problem, strategy, robot, deadline=PASSED)
 
 
 def test_proofs_of_the_planner_stop() -> None:
-    problem = read_problem("paper/obs1").problem
+    problem = read_problem("paper/obs1")
     pieces = pack_pieces([one.pieces for one in problem.scene.obstacles])
     segments = np.zeros((3, 2, 3))
     assert np.isfinite(upper_bounds(pieces, segments, np.inf)).all()

@@ -17,13 +17,13 @@ from vdsm_pin.io.joint_trajectory import (
     read_joint_trajectory,
     text_of,
 )
-from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.trajectory_file import (
     joint_names,
     read_trajectory,
     write_trajectory,
 )
 from vdsm_pin.io.waypoint_tables import read_cables, read_centres
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.tables import write_cables, write_centres
@@ -64,28 +64,28 @@ class Given:
             raise InvalidInput(message)
         return given[0]
 
-    def read(self, source: ProblemFile) -> Trajectory:
+    def read(self, problem: PlanningProblem) -> Trajectory:
         """The motion it describes.
 
         Raises:
             InvalidFile: If it breaks its contract or no posture of the arm fits it.
         """
         if self.centres is not None:
-            return read_centres(self.centres, source.problem)
+            return read_centres(self.centres, problem)
         if self.cables is not None:
-            return read_cables(self.cables, source.problem)
+            return read_cables(self.cables, problem)
         if is_bag(self.file) or self.file.suffix.lower() in ENDINGS:
-            return read_arm_message(self.file, source.problem.manipulator)
-        return read_trajectory(self.file, source.problem.manipulator)
+            return read_arm_message(self.file, problem.manipulator)
+        return read_trajectory(self.file, problem.manipulator)
 
 
 def convert_to_folder(
-    source: ProblemFile, given: Given, folder: Path, also: Sequence[str] = ()
+    problem: PlanningProblem, given: Given, folder: Path, also: Sequence[str] = ()
 ) -> Trajectory:
     """Write one motion as angles, as joint centres and as cable lengths.
 
     Args:
-        source: The problem, for its arm and frame.
+        problem: For its arm and frame.
         given: The file to convert.
         folder: Where the files go.
         also: Formats that the angles are written in too, as a JointTrajectory: yaml,
@@ -100,12 +100,12 @@ def convert_to_folder(
     file = given.file
     check_output_folder(folder)
     outputs = [folder / name for name in (*CONVERTED, *map(message_name, also))]
-    check_kept(outputs, [*source.source.files, file])
-    motion = given.read(source)
+    check_kept(outputs, [*problem.files, file])
+    motion = given.read(problem)
     with staged(folder) as aside:
         write_trajectory(aside / TRAJECTORY, motion)
-        write_centres(aside / CENTRES, source.problem, motion)
-        write_cables(aside / CABLES, source.problem, motion)
+        write_centres(aside / CENTRES, problem, motion)
+        write_cables(aside / CABLES, problem, motion)
         write_messages(aside, arm_message(motion), also)
     return motion
 

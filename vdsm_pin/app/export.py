@@ -10,7 +10,6 @@ from vdsm_pin.app.visualization import shown_motion
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.atomic import atomic_path
-from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.film import (
@@ -37,7 +36,7 @@ class ExportOrder:
     """What to export.
 
     Args:
-        source: The problem as it was read.
+        problem: As it was read.
         trajectory: The motion; None for the arm at the start.
         out: The file; its ending says what it is.
         moment: Which moment a picture shows, in waypoints.
@@ -45,7 +44,7 @@ class ExportOrder:
         shot: How to look.
     """
 
-    source: ProblemFile
+    problem: PlanningProblem
     trajectory: Path | None
     out: Path
     moment: float = 0.0
@@ -60,7 +59,7 @@ def export(order: ExportOrder) -> None:
         InvalidInput: If it cannot be written, or what draws it is missing.
     """
     _check(order)
-    problem = order.source.problem
+    problem = order.problem
     motion = shown_motion(problem, order.trajectory)
     with atomic_path(order.out) as file:
         match order.out.suffix.lower():
@@ -87,7 +86,7 @@ def _check(order: ExportOrder) -> None:
         find_encoder()
     check_output_file(order.out)
     motion = () if order.trajectory is None else (order.trajectory,)
-    check_kept([order.out], [*order.source.source.files, *motion])
+    check_kept([order.out], [*order.problem.files, *motion])
 
 
 def _within(moment: float, motion: Trajectory) -> float:

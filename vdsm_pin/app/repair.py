@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 
 from vdsm_pin import __version__
 from vdsm_pin.app.workflow import JUDGED, TRAJECTORY, VerifyOrder, verify_to_folder
-from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.repair.arm import repair_arm
 from vdsm_pin.repair.rounds import Repaired
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
@@ -40,13 +40,13 @@ def repair_to_folder(order: VerifyOrder, pinned: tuple[int, ...] = ()) -> Found:
         InvalidInput: If a file is bad or the folder cannot be written.
         Infeasible: If no certified motion was found near the given one.
     """
-    inputs = [*order.read.files, order.trajectory]
+    inputs = [*order.problem.files, order.trajectory]
     check_output_folder(order.folder)
     check_kept([order.folder / n for n in (TRAJECTORY, REPAIR, *JUDGED)], inputs)
-    if isinstance(order.source, ProblemFile):
-        found, write = _of_arm(order, order.source, pinned)
+    if isinstance(order.problem, PlanningProblem):
+        found, write = _of_arm(order, order.problem, pinned)
     else:
-        found, write = _of_robot(order, order.source, pinned)
+        found, write = _of_robot(order, order.problem, pinned)
     rows = zip(found.given.tolist(), found.moved.tolist(), strict=True)
     content = {
         "vdsm_repair": 1,
@@ -69,11 +69,11 @@ def repair_to_folder(order: VerifyOrder, pinned: tuple[int, ...] = ()) -> Found:
 
 
 def _of_arm(
-    order: VerifyOrder, source: ProblemFile, pinned: tuple[int, ...]
+    order: VerifyOrder, problem: PlanningProblem, pinned: tuple[int, ...]
 ) -> "tuple[Found, Callable[[Path], None]]":
     """The repaired motion of a snake arm, and what writes it."""
-    problem, read = source.problem, (order.trajectory, source.problem.manipulator)
-    trajectory = read_trajectory(*read, order.interpolation)
+    arm = problem.manipulator
+    trajectory = read_trajectory(order.trajectory, arm, order.interpolation)
     found = repair_arm(problem, trajectory, pinned, order.deadline)
     motion = found.verification.trajectory
     return found, partial(write_trajectory, trajectory=motion)

@@ -60,10 +60,10 @@ def write_page(path: Path, problem: str, trajectory: Path | None) -> None:
         InvalidInput: If a file is bad or the page cannot be written.
     """
     check_output_file(path)
-    file = read_problem(problem)
+    asked = read_problem(problem)
     motion = () if trajectory is None else (trajectory,)
-    check_kept([path], [*file.source.files, *motion])
-    write_text(path, page(file.problem, trajectory))
+    check_kept([path], [*asked.files, *motion])
+    write_text(path, page(asked, trajectory))
 
 
 class ViewServer(ThreadingHTTPServer):
@@ -113,10 +113,10 @@ class ViewServer(ThreadingHTTPServer):
 
     def _read(self) -> PlanningProblem:
         """Read the problem; from now on its files are watched."""
-        file = read_problem(self._problem)
+        problem = read_problem(self._problem)
         motion = () if self._trajectory is None else (self._trajectory,)
-        self._files = (*file.source.files, *motion)
-        return file.problem
+        self._files = (*problem.files, *motion)
+        return problem
 
     def current_page(self) -> str:
         """The page of the files as they are now, or what is wrong with them."""

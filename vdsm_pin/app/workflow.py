@@ -20,14 +20,13 @@ from vdsm_pin.errors import (
     OutOfTime,
     VerificationFailed,
 )
-from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import (
     Interpolation,
     read_trajectory,
     write_trajectory,
 )
-from vdsm_pin.problem.planning_problem import PlanningProblem, ProblemSource
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import step
@@ -83,7 +82,7 @@ class VerifyOrder:
     """What to verify and what to write besides the folder.
 
     Args:
-        source: The problem of an arm as it was read, or a robot in its cell.
+        problem: Of an arm, or of a robot in its cell, as it was read.
         trajectory: The trajectory file.
         folder: Where the results go.
         command: The exact command line, for the report.
@@ -97,7 +96,7 @@ class VerifyOrder:
             ones and the least of each alone.
     """
 
-    source: "ProblemFile | Cell"
+    problem: "PlanningProblem | Cell"
     trajectory: Path
     folder: Path
     command: str
@@ -108,12 +107,6 @@ class VerifyOrder:
     date: str | None = None
     interpolation: Interpolation = "auto"
     topic: str | None = None
-
-    @property
-    def read(self) -> ProblemSource:
-        """The files of the problem."""
-        assert self.source.source is not None  # it was read
-        return self.source.source
 
 
 @dataclass(frozen=True)
@@ -132,7 +125,7 @@ class Verified:
 
 
 def plan_to_folder(
-    source: ProblemFile,
+    problem: PlanningProblem,
     strategy: str,
     folder: Path,
     command: str,
@@ -144,7 +137,7 @@ def plan_to_folder(
     A plan is certified, or incomplete: it is clear, but draws less than required.
 
     Args:
-        source: The problem as it was read.
+        problem: As it was read.
         strategy: Name of the strategy.
         folder: Where the results go.
         command: The exact command line, for the files.
@@ -161,26 +154,21 @@ def plan_to_folder(
     from vdsm_pin.refinement import plan_and_verify
     from vdsm_pin.report.html import write_no_plan, write_report
 
-    _check_plannable(source)
+    _check_plannable(problem)
     check_output_folder(folder)
-    check_kept([folder / name for name in PLANNED], source.source.files)
-    robot = load_robot(source.problem.manipulator)
-    record = RunRecord(
-        command=command,
-        problem_file=str(source.path),
-        problem_sha256=source.sha256,
-        urdf_sha256=robot.urdf_sha256,
-        date=now() if report else None,
-    )
+    check_kept([folder / name for name in PLANNED], problem.files)
+    robot = load_robot(problem.manipulator)
+    date = now() if report else None
+    record = RunRecord.of(command, problem.source, robot.urdf_sha256, date=date)
     try:
-        refinement = plan_and_verify(source.problem, strategy, robot, deadline=deadline)
+        refinement = plan_and_verify(problem, strategy, robot, deadline=deadline)
     except (Infeasible, OutOfTime) as error:
         with staged(folder) as aside:
             run = PlanRun(strategy, record)
-            write_no_plan(aside / NO_PLAN, source.problem, error, run)
+            write_no_plan(aside / NO_PLAN, problem, error, run)
         error.page = folder / NO_PLAN
         raise
-    plan, problem = refinement.plan, source.problem
+    plan = refinement.plan
     with staged(folder) as aside:
         write_trajectory(aside / TRAJECTORY, plan.trajectory)
         write_centres(aside / CENTRES, problem, plan.trajectory, plan.centres)
@@ -197,20 +185,19 @@ def plan_to_folder(
     return file
 
 
-def _check_plannable(source: ProblemFile) -> None:
+def _check_plannable(problem: PlanningProblem) -> None:
     """Refuse what no strategy can plan.
 
     Raises:
         InvalidFile: If the problem has neither tip path nor start and goal.
     """
-    problem = source.problem
     if problem.tip_path is None and (problem.start is None or problem.goal is None):
         need = (
             "is missing; planning needs it, or a start and a goal: tip_path states the "
             "start and what the tip shall draw. Without them `vdsm verify` judges a "
             "given motion"
         )
-        raise InvalidFile(file=source.path, where="tip_path", problem=need)
+        raise InvalidFile(file=problem.files[0], where="tip_path", problem=need)
 
 
 def verify_to_folder(order: VerifyOrder) -> Verified:
@@ -227,7 +214,9 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
     judged = _judgement(order)
     with staged(order.folder) as aside:
         urdf, verification = judged(aside)
-        record = _record(order, urdf)
+        digest = sha256_of_file(order.trajectory)
+        source = order.problem.source
+        record = RunRecord.of(order.command, source, urdf, digest, order.date)
         file = verification_file(verification, record)
         (aside / VERIFICATION).write_text(file.text(), encoding="utf-8")
         write_report(aside / REPORT, verification, file, planned_by(order.trajectory))
@@ -240,22 +229,19 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
 
 def _judgement(order: VerifyOrder) -> Callable[[Path], tuple[str, Verification]]:
     """What judges the motion, which is read before anything is written."""
-    if not isinstance(order.source, ProblemFile):
+    problem = order.problem
+    if not isinstance(problem, PlanningProblem):
         from vdsm_pin.robots.trajectory_files import path_of, read_motion
 
-        file, cell = order.trajectory, order.source
-        joints, values = cell.robot.joints, cell.robot.values
-        motion = read_motion(file, joints, order.topic, values)
+        file, robot = order.trajectory, problem.robot
+        motion = read_motion(file, robot.joints, order.topic, robot.values)
         path = path_of(file, motion)
-        _check_times(order, cell.scene, path)
-        return partial(_judge_robot, order, cell, path, motion.notes)
-    problem = order.source.problem
-    robot = load_robot(problem.manipulator)
-    trajectory = read_trajectory(
-        order.trajectory, problem.manipulator, order.interpolation
-    )
+        _check_times(order, problem.scene, path)
+        return partial(_judge_robot, order, problem, path, motion.notes)
+    arm = problem.manipulator
+    trajectory = read_trajectory(order.trajectory, arm, order.interpolation)
     _check_times(order, problem.scene, trajectory)
-    return partial(_judge_arm, order, problem, robot, trajectory)
+    return partial(_judge_arm, order, problem, load_robot(arm), trajectory)
 
 
 def _check_times(order: VerifyOrder, scene: Scene, motion: Trajectory | Motion) -> None:
@@ -323,7 +309,7 @@ def _check_outputs(order: VerifyOrder) -> None:
         check_output_file(file)
     outputs = [*(order.folder / name for name in JUDGED), *alone]
     beside = order.trajectory.parent / PLAN
-    check_kept(outputs, [*order.read.files, order.trajectory, beside])
+    check_kept(outputs, [*order.problem.files, order.trajectory, beside])
     if order.pdf is not None:
         find_browser()
 
@@ -364,14 +350,3 @@ def _certify(order: VerifyOrder, verification: Verification, record: RunRecord) 
     except (OutOfTime, VerificationFailed) as error:
         return str(error)
     return ""
-
-
-def _record(order: VerifyOrder, urdf_sha256: str) -> RunRecord:
-    return RunRecord(
-        command=order.command,
-        problem_file=str(order.read.path),
-        problem_sha256=order.read.sha256,
-        trajectory_sha256=sha256_of_file(order.trajectory),
-        urdf_sha256=urdf_sha256,
-        date=order.date,
-    )

@@ -29,9 +29,10 @@ from vdsm_pin.errors import (
     VdsmError,
     VerificationFailed,
 )
-from vdsm_pin.io.problem_file import ProblemFile, ProblemOfRobot, read_problem
+from vdsm_pin.io.problem_file import ProblemOfRobot, read_problem
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.refinement import HANDED_OUT
 from vdsm_pin.report.facts import batch_row
 from vdsm_pin.report.files import BatchRow, ManifestFile, TimingFile
@@ -167,15 +168,15 @@ def perform(task: Task) -> Done:
     digest = ""
     try:
         with enforced(deadline, grace=0.0):
-            source = _read(task)
-            digest = source.source.sha256 if source.source else ""
-            _check_apart(task, source)
+            problem = _read(task)
+            digest = problem.source.sha256 if problem.source else ""
+            _check_apart(task, problem)
             if task.resume:
                 kept = finished(task, digest)
                 if kept is not None:
                     return Done(kept, kept=True)
         with enforced(deadline):
-            row = _done(task, source, deadline)
+            row = _done(task, problem, deadline)
     except Infeasible as error:
         row = failed_row(task, "infeasible", str(error))
     except OutOfTime as error:
@@ -201,7 +202,7 @@ def _clear(folder: Path) -> None:
             path.unlink()
 
 
-def _read(task: Task) -> "ProblemFile | Cell":
+def _read(task: Task) -> "PlanningProblem | Cell":
     """The problem of an arm, under the errors asked for, or of any other robot.
 
     Raises:
@@ -218,19 +219,19 @@ def _read(task: Task) -> "ProblemFile | Cell":
     return read_cell(Path(refusal.file)).under(task.proving.errors)
 
 
-def _check_apart(task: Task, source: "ProblemFile | Cell") -> None:
+def _check_apart(task: Task, problem: "PlanningProblem | Cell") -> None:
     """Refuse a problem with files in the folder that its results replace.
 
     Raises:
         InvalidFile: If there is one.
     """
     final = task.final.resolve()
-    files = list(source.source.files) if source.source else []
+    files = [*problem.files]
     files += [] if task.trajectory is None else [Path(task.trajectory)]
     for file in files:
         if final in file.resolve().parents:
-            problem = f"lies in {task.final}, which the results would replace"
-            raise InvalidFile(file=file, problem=problem)
+            why = f"lies in {task.final}, which the results would replace"
+            raise InvalidFile(file=file, problem=why)
 
 
 def keeps_files(keep: str, row: BatchRow) -> bool:
@@ -312,16 +313,18 @@ def _hash(problem: str) -> str:
     return hashlib.sha256(os.fsencode(problem)).hexdigest()
 
 
-def _done(task: Task, source: "ProblemFile | Cell", deadline: Deadline) -> BatchRow:
+def _done(
+    task: Task, problem: "PlanningProblem | Cell", deadline: Deadline
+) -> BatchRow:
     """Plan where no motion is given, verify, and tell."""
     asked, plan = task.proving, None
     if task.trajectory is None:
-        assert isinstance(source, ProblemFile)
+        assert isinstance(problem, PlanningProblem)
         plan = plan_to_folder(
-            source, task.strategy, task.aside, task.command, deadline, report=False
+            problem, task.strategy, task.aside, task.command, deadline, report=False
         )
     order = VerifyOrder(
-        source,
+        problem,
         Path(task.trajectory) if task.trajectory else task.aside / TRAJECTORY,
         task.aside,
         task.command,

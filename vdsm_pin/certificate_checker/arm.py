@@ -23,9 +23,9 @@ from vdsm_pin.certificate_checker.tree import (
     Tree,
     frame_of,
 )
-from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem as Problem
 
 
 def arm_joints(lengths: list[float], angles: list[float], base: Any) -> list[Joint]:
@@ -60,7 +60,7 @@ class Arm:
     """What the two files ask about, under the errors that a certificate states.
 
     Args:
-        file: The problem as it was read.
+        problem: As it was read.
         header: Of the certificate.
         trajectory: The file.
     """
@@ -71,11 +71,10 @@ class Arm:
     )
 
     def __init__(
-        self, file: ProblemFile, header: Mapping[str, Any], trajectory: File
+        self, problem: Problem, header: Mapping[str, Any], trajectory: File
     ) -> None:
-        problem = file.problem
         self.problem, self.arm = problem, problem.manipulator
-        belongs(header, "errors joined", file.sha256, sha256_of_file(trajectory))
+        belongs(header, "errors joined", problem.sha256, sha256_of_file(trajectory))
         joined = header["interpolation"]
         known = joined in ("linear", "cubic", "quintic")
         claim(known, f"interpolation is {joined}, expected linear, cubic or quintic")

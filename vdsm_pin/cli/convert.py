@@ -58,12 +58,12 @@ def convert(
 
     given, more = Given(trajectory, centres, cables), [one.value for one in also or ()]
     try:
-        source = read_problem(problem)
+        asked = read_problem(problem)
     except ProblemOfRobot as error:
         from vdsm_pin.robots.cell import read_cell
 
         refuse_beside("a robot", {"--centres": centres, "--cables": cables})
         count = convert_robot(read_cell(Path(error.file)), given.file, out, more)
     else:
-        count = convert_to_folder(source, given, out, more).n_samples
+        count = convert_to_folder(asked, given, out, more).n_samples
     typer.echo(f"wrote {count} waypoints to {out}")

@@ -65,6 +65,6 @@ def export(
     from vdsm_pin.report.film import Shot, look_of
 
     shot = Shot(look_of(look), width - width % 2, height - height % 2, numbers)
-    source = read_problem(problem)
-    write(ExportOrder(source, trajectory, out, moment, seconds, shot))
+    asked = read_problem(problem)
+    write(ExportOrder(asked, trajectory, out, moment, seconds, shot))
     typer.echo(f"wrote {out}")

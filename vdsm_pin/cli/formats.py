@@ -52,8 +52,8 @@ def urdf(
     known = name in BUILT_IN or name in built_in_names() or Path(name).exists()
     if not known:
         built_in(name)  # which says what arms there are
-    source = None if name in BUILT_IN else read_problem(name)
-    arm = BUILT_IN[name] if source is None else source.problem.manipulator
+    problem = None if name in BUILT_IN else read_problem(name)
+    arm = BUILT_IN[name] if problem is None else problem.manipulator
     text = urdf_text(arm)
     shapes = {solid.name: solid for _, solid in arm.carried}
     files = {
@@ -62,7 +62,7 @@ def urdf(
     }
     for file in (out, *files):
         check_output_file(file)
-    check_kept((out, *files), () if source is None else source.source.files)
+    check_kept((out, *files), () if problem is None else problem.files)
     for file, content in {**files, out: text}.items():
         with atomic_path(file) as path:
             path.write_text(content, encoding="utf-8")

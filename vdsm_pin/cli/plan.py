@@ -69,10 +69,10 @@ def plan(
     deadline, begin = Deadline.after(limit), time.monotonic()
     try:
         with enforced(deadline, grace=0.0):
-            source = read_problem(problem).under(box)
+            asked = read_problem(problem).under(box)
         told = nullcontext() if quiet or as_json else shown(limit=limit)
         with enforced(deadline), told:
-            file = plan_to_folder(source, strategy, out, context.obj, deadline)
+            file = plan_to_folder(asked, strategy, out, context.obj, deadline)
         note_planned()
     except OutOfTime as error:  # which tells its time itself
         if limit == COLD_LIMIT:

@@ -13,7 +13,7 @@ from vdsm_pin.cli.options import (
     grouped,
 )
 from vdsm_pin.cli.robot import ProblemOrNone, RobotOptions, Topic
-from vdsm_pin.cli.verify import read_source
+from vdsm_pin.cli.verify import asked_problem
 from vdsm_pin.time_limit import Deadline, enforced
 
 commands = family()
@@ -54,10 +54,10 @@ def repair(
 
     deadline = Deadline.after(time_limit)
     with enforced(deadline, grace=0.0):
-        source = read_source(problem, ErrorBox(), robot, {}, topic)
+        asked = asked_problem(problem, ErrorBox(), robot, {}, topic)
     with enforced(deadline):
         order = VerifyOrder(
-            source, trajectory, out, context.obj, deadline=deadline, topic=topic
+            asked, trajectory, out, context.obj, deadline=deadline, topic=topic
         )
         found = repair_to_folder(order, tuple(pin or ()))
     new, most = int((found.given < 0).sum()), found.moved.max()

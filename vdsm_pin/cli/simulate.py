@@ -46,8 +46,8 @@ def simulate(
     from vdsm_pin.simulation.terminal import show_simulation
 
     assumed = Settings() if settings is None else read_settings(settings)
-    source = read_problem(problem)
-    order = SimulationOrder(source, trajectory, out, assumed, settings)
+    asked = read_problem(problem)
+    order = SimulationOrder(asked, trajectory, out, assumed, settings)
     file = simulate_to_folder(order)
     show_simulation(file, out)
     passed = file.executed.verdict == "certified"

@@ -26,8 +26,8 @@ from vdsm_pin.time_limit import Deadline, enforced
 
 if TYPE_CHECKING:
     from vdsm_pin.app.workflow import VerifyOrder
-    from vdsm_pin.io.problem_file import ProblemFile
     from vdsm_pin.problem.error_boxes import ErrorBox
+    from vdsm_pin.problem.planning_problem import PlanningProblem
     from vdsm_pin.robots.cell import Cell
 
 commands = family()
@@ -113,11 +113,11 @@ def verify(
     from vdsm_pin.report.run_record import now
 
     with enforced(deadline, grace=0.0):
-        source = read_source(problem, box, robot, of_arm, topic)
+        asked = asked_problem(problem, box, robot, of_arm, topic)
         if certificate is not None and robot.urdf is not None:
-            source = _stated(source, robot, certificate, trajectory)
+            asked = _stated(asked, robot, certificate, trajectory)
         order = VerifyOrder(
-            source=source,
+            problem=asked,
             trajectory=trajectory,
             folder=out,
             command=context.obj,
@@ -132,13 +132,13 @@ def verify(
     raise typer.Exit(PASSED if _passes(order, said) else NOT_PASSED)
 
 
-def read_source(
+def asked_problem(
     problem: str | None,
     errors: "ErrorBox",
     of_robot: RobotOptions,
     of_arm: dict[str, object],
     topic: str | None,
-) -> "ProblemFile | Cell":
+) -> "PlanningProblem | Cell":
     """The problem of an arm or a robot, from a file or from options.
 
     Raises:
@@ -165,14 +165,17 @@ def read_source(
 
 
 def _stated(
-    source: "ProblemFile | Cell", robot: RobotOptions, certificate: Path, motion: Path
+    asked: "PlanningProblem | Cell",
+    robot: RobotOptions,
+    certificate: Path,
+    motion: Path,
 ) -> "Cell":
     """What options ask, from the problem file that their certificate is about."""
     from vdsm_pin.app.stated_problem import stated_cell
     from vdsm_pin.robots.cell import Cell
 
-    assert isinstance(source, Cell)  # of a URDF
-    return stated_cell(source, robot.files(), robot.scene, certificate, motion)
+    assert isinstance(asked, Cell)  # of a URDF
+    return stated_cell(asked, robot.files(), robot.scene, certificate, motion)
 
 
 def _passes(order: "VerifyOrder", said: Said) -> bool:
@@ -190,8 +193,9 @@ def _passes(order: "VerifyOrder", said: Said) -> bool:
         none = verified.no_certificate
         what = f"none: {none}" if none else str(order.certificate)
         written.append(("certificate", what))
-        if not none and order.read.path == problem_beside(order.certificate):
-            written.append(("its problem file", str(order.read.path)))
+        beside = problem_beside(order.certificate)
+        if not none and beside in order.problem.files:
+            written.append(("its problem file", str(beside)))
     if order.pdf is not None:
         written.append(("report on paper", str(order.pdf)))
     if said.as_json:

@@ -2,7 +2,6 @@
 
 import hashlib
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,7 +20,6 @@ from vdsm_pin.io.problem_schema import (
 )
 from vdsm_pin.io.source import check_is_file, decode, read_bytes
 from vdsm_pin.io.yaml_reader import read_yaml
-from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem, ProblemSource
 
 MAX_PROBLEM_BYTES: Final = 32 << 20
@@ -31,60 +29,26 @@ SCHEMA_DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
 _FOLDER: Final = Path(__file__).resolve().parent.parent / "problems"
 
 
-@dataclass(frozen=True)
-class ProblemFile:
-    """A problem and where it came from.
-
-    Args:
-        problem: What to plan.
-        source: The files it was read from.
-    """
-
-    problem: PlanningProblem
-    source: ProblemSource
-
-    def under(self, errors: ErrorBox) -> "ProblemFile":
-        """The same, its clearances asked for under more errors than the file states.
-
-        Raises:
-            UnknownName: If they name an obstacle that there is not.
-            InvalidInput: If they are of joints that only other robots have.
-        """
-        known = self.problem.scene.names
-        for one in errors.obstacles:
-            if one.name not in known:
-                raise UnknownName(kind="obstacle", name=one.name, known=known)
-        widened = self.problem.errors.widened(errors)
-        widened.angles(self.problem.manipulator.n_links)
-        return replace(self, problem=replace(self.problem, errors=widened))
-
-    @property
-    def path(self) -> Path:
-        """The problem file."""
-        return self.source.path
-
-    @property
-    def sha256(self) -> str:
-        """Of the problem file and the files it names."""
-        return self.source.sha256
-
-
 class ProblemOfRobot(InvalidFile):
     """The problem is about a robot of a URDF, which `robots.cell` reads."""
 
 
-def read_problem(name_or_path: str | Path) -> ProblemFile:
+def read_problem(name_or_path: str | Path) -> PlanningProblem:
     """The problem of a built-in name or a file.
 
     Args:
         name_or_path: Such as `paper/obs1` or `problems/mine.yaml`.
 
     Returns:
-        The problem in metres, radians and the base frame.
+        The problem in metres, radians and the base frame (x along the rail).
 
     Raises:
-        InvalidFile: If the file or its content breaks the contract.
+        InvalidFile: If the file or its content breaks the contract of docs/files.md.
         ProblemOfRobot: If it has `robot` in place of `manipulator`.
+
+    Example:
+        >>> read_problem("paper/obs1").manipulator.n_links
+        8
     """
     path = find_problem(name_or_path)
     content = read_bytes(path, limit=MAX_PROBLEM_BYTES)
@@ -107,7 +71,7 @@ def read_problem(name_or_path: str | Path) -> ProblemFile:
     named = tuple(path.parent / name for name in _files_named(model))
     of_obstacles = files_of_obstacles(model.obstacles, path.parent)
     source = ProblemSource(path, digest.hexdigest(), named, of_obstacles)
-    return ProblemFile(problem.read_from(source), source)
+    return problem.read_from(source)
 
 
 def _files_named(model: ProblemModel) -> list[str]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
-from vdsm_pin.errors import InvalidInput
+from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import FloatArray, frozen, running_sums
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -268,7 +268,8 @@ class PlanningProblem(Summarised):
             asked for under them.
         scaling: What takes the place of constant ratios about the rail in the paper's
             Step 3; None for those.
-        source: Where it was read; None where it was built in Python or changed since.
+        source: The files it was read from; None where it was built in Python or changed
+            since by more than its errors.
 
     Raises:
         InvalidInput: If a required clearance is negative, a tolerance or limit not
@@ -323,6 +324,31 @@ class PlanningProblem(Summarised):
         if joints.shape != (count,) or not np.isfinite(joints).all():
             message = f"joint values are {joints.tolist()}, expected {count} numbers"
             raise InvalidInput(message)
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files it was read from, the problem file first."""
+        return () if self.source is None else self.source.files
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of those files one after the other; empty where there are none."""
+        return "" if self.source is None else self.source.sha256
+
+    def under(self, errors: ErrorBox) -> "PlanningProblem":
+        """The same, its clearances asked for under more errors.
+
+        Raises:
+            UnknownName: If they name an obstacle that there is not.
+            InvalidInput: If they are of joints that only other robots have.
+        """
+        known = self.scene.names
+        for one in errors.obstacles:
+            if one.name not in known:
+                raise UnknownName(kind="obstacle", name=one.name, known=known)
+        widened = self.errors.widened(errors)
+        widened.angles(self.manipulator.n_links)
+        return replace(self, errors=widened).read_from(self.source)
 
     @cached_property
     def packed(self) -> "PackedPieces":
@@ -386,7 +412,7 @@ class PlanningProblem(Summarised):
             ("file", str(self.source.path) if self.source else "built in Python"),
         )
 
-    def read_from(self, source: ProblemSource) -> "PlanningProblem":
+    def read_from(self, source: ProblemSource | None) -> "PlanningProblem":
         """The same problem, known to stand in these files."""
         same = replace(self)
         object.__setattr__(same, "source", source)

@@ -10,6 +10,7 @@ from importlib import metadata
 from typing import Final
 
 from vdsm_pin import __version__
+from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.text import printable
 
 _LIBRARIES: Final = ("pin", "coal", "numpy", "numba", "yourdfpy", "meshcat")
@@ -34,6 +35,27 @@ class RunRecord:
     trajectory_sha256: str = ""
     urdf_sha256: str = ""
     date: str | None = None
+
+    @classmethod
+    def of(
+        cls,
+        command: str,
+        source: ProblemSource | None,
+        urdf_sha256: str,
+        trajectory_sha256: str = "",
+        date: str | None = None,
+    ) -> "RunRecord":
+        """The record of a run on a problem; one without files is named as the command.
+
+        Args:
+            command: As below.
+            source: The files of the problem.
+            urdf_sha256: As below.
+            trajectory_sha256: As below.
+            date: As below.
+        """
+        file, sha256 = (str(source.path), source.sha256) if source else (command, "")
+        return cls(command, file, sha256, trajectory_sha256, urdf_sha256, date)
 
     def __post_init__(self) -> None:
         """Spell what a file cannot hold: paths need not be text."""

@@ -8,7 +8,6 @@ import numpy as np
 from pydantic import Field
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -81,14 +80,14 @@ class SimulationOrder:
     """What to simulate and where the results go.
 
     Args:
-        source: The problem as it was read.
+        problem: As it was read.
         trajectory: The planned trajectory file.
         folder: Where the results go.
         settings: What is assumed.
         settings_file: Where that was read; None for the defaults.
     """
 
-    source: ProblemFile
+    problem: PlanningProblem
     trajectory: Path
     folder: Path
     settings: Settings
@@ -98,7 +97,7 @@ class SimulationOrder:
 def _check_outputs(order: SimulationOrder) -> None:
     """Refuse what cannot be written, or would take an input's place."""
     check_output_folder(order.folder)
-    read = [*order.source.source.files, order.trajectory, order.settings_file]
+    read = [*order.problem.files, order.trajectory, order.settings_file]
     outputs = [order.folder / name for name in (EXECUTED, RECORD, SUMMARY, PAGE)]
     check_kept(outputs, filter(None, read))
 
@@ -111,7 +110,7 @@ def simulate_to_folder(order: SimulationOrder) -> SimulationFile:
         VerificationFailed: If MuJoCo is missing or the simulation diverges.
     """
     _check_outputs(order)
-    problem = order.source.problem
+    problem = order.problem
     if problem.scene.moving:
         name = problem.scene.moving[0].name
         message = (

@@ -47,7 +47,7 @@ def test_the_shortest_tour_is_the_best_of_all_orders_and_directions(count: int) 
 
 @pytest.mark.parametrize("name", ["obs1", "obs2-small"])
 def test_a_free_order_shortens_the_detours_and_still_draws_all(name: str) -> None:
-    task = read_problem(f"paper/{name}").problem
+    task = read_problem(f"paper/{name}")
     _, given = planned(task, Order.AS_GIVEN)
     task, free = planned(task, Order.FREE)
     assert way_off_the_path(free) < 0.7 * way_off_the_path(given)

@@ -63,7 +63,7 @@ def changed_along(plan: Plan) -> float:
 def test_the_papers_square_is_drawn_whole_certified_and_sparse(
     name: str, most_changed: float, most_bent: float
 ) -> None:
-    task = read_problem(f"paper/{name}").problem
+    task = read_problem(f"paper/{name}")
     plan = planned(task)
     result = verify(task, plan.trajectory, load_robot(task.manipulator))
     assert result.verdict is Verdict.CERTIFIED
@@ -76,7 +76,7 @@ def test_the_papers_square_is_drawn_whole_certified_and_sparse(
 
 
 def test_the_tip_is_on_the_path_wherever_a_row_says_so() -> None:
-    task = read_problem("paper/obs1").problem
+    task = read_problem("paper/obs1")
     trajectory = planned(task).trajectory
     centres = joint_centres(ARM, trajectory.x0, trajectory.alpha, trajectory.theta)
     drawn = trajectory.on_path
@@ -86,7 +86,7 @@ def test_the_tip_is_on_the_path_wherever_a_row_says_so() -> None:
 
 
 def test_between_two_rows_the_tip_stays_on_the_path_it_draws() -> None:
-    trajectory = planned(read_problem("paper/obs3").problem).trajectory
+    trajectory = planned(read_problem("paper/obs3")).trajectory
     drawn = trajectory.on_path[1:] & trajectory.on_path[:-1]
     tips = joint_centres(ARM, trajectory.x0, trajectory.alpha, trajectory.theta)[:, -1]
     side = np.diff(tips, axis=0)
@@ -113,12 +113,12 @@ def test_cores_and_threads_do_not_change_a_plan(name: str) -> None:
         "from vdsm_pin.io.problem_file import read_problem\n"
         "from vdsm_pin.planner.fewest.strategy import plan_fewest\n"
         "from vdsm_pin.verification.link_clearance import link_clearance\n"
-        "task = read_problem(f'paper/{sys.argv[1]}').problem\n"
+        "task = read_problem(f'paper/{sys.argv[1]}')\n"
         "plan = plan_fewest(task, link_clearance(task), 0.0)\n"
         "joints = plan.trajectory.joints\n"
         "print(hashlib.sha256(joints.tobytes()).hexdigest())\n"
     )
-    task = read_problem(f"paper/{name}").problem
+    task = read_problem(f"paper/{name}")
     here = hashlib.sha256(planned(task).trajectory.joints.tobytes()).hexdigest()
     for cores in ("1", "4"):
         threads = {f"{lib}_NUM_THREADS": cores for lib in ("OPENBLAS", "OMP", "NUMBA")}
@@ -228,7 +228,7 @@ def test_an_arm_that_starts_bent_starts_there() -> None:
 def test_clearest_keeps_much_more_clearance_and_survives_larger_joint_errors(
     name: str, gain: float
 ) -> None:
-    task = read_problem(f"paper/{name}").problem
+    task = read_problem(f"paper/{name}")
     clearance = link_clearance(task)
     wide = plan_clearest(task, clearance, 0.0)
     lean = plan_fewest(task, clearance, 0.0)

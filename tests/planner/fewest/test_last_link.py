@@ -87,7 +87,7 @@ def test_a_link_fits_past_the_edge_of_a_plate_or_does_not() -> None:
 
 
 def test_the_tip_of_a_plan_is_never_hemmed_in() -> None:
-    tasks = [read_problem(f"paper/{name}").problem for name in ("obs1", "obs2", "obs3")]
+    tasks = [read_problem(f"paper/{name}") for name in ("obs1", "obs2", "obs3")]
     tasks += [random_problem(seed, clutter=True) for seed in range(3)]
     for task in tasks:
         clearance = link_clearance(task)

@@ -63,7 +63,7 @@ def test_a_window_lets_the_tip_in_from_the_bodys_width_on(seed: int) -> None:
 
 def test_the_tip_of_a_plan_is_never_cut_off() -> None:
     for name in ("obs1", "obs2", "obs3"):
-        task = read_problem(f"paper/{name}").problem
+        task = read_problem(f"paper/{name}")
         assert not cut_off(task, path_rows(task.path).tips).any()
     for seed in range(3):
         task = random_problem(seed, clutter=True)

@@ -133,14 +133,14 @@ def test_a_problem_moved_as_a_whole_has_the_same_plan(tmp_path: Path) -> None:
     for key in ("start", "points"):
         values = np.array(data["tip_path"][key], dtype=float)
         moved["tip_path"][key] = (values @ R.T + shift).tolist()
-    here = read_problem("paper/obs3").problem
+    here = read_problem("paper/obs3")
     given = dict(data["obstacles"][0])
     given["center"] = (R @ np.array(given["center"], float) + shift).tolist()
     given["axis"] = R[:, 2].tolist()
     moved["obstacles"] = [given]
     path = tmp_path / "moved.yaml"
     path.write_text(yaml.safe_dump(moved), encoding="utf-8")
-    there = read_problem(path).problem
+    there = read_problem(path)
     plans = [plan_fewest(task, link_clearance(task), 0.0) for task in (here, there)]
     one, other = (plan.trajectory for plan in plans)
     # Rounding may put one row more into a turn.

@@ -42,7 +42,7 @@ def survived(task: PlanningProblem, plan: Plan) -> float:
 
 def short(name: str) -> PlanningProblem:
     """A paper scene with a short piece of its path, to keep the test quick."""
-    task = read_problem(f"paper/{name}").problem
+    task = read_problem(f"paper/{name}")
     points = np.array([[3.126, 0.9, 0.9], [3.126, 1.0, 1.0]])
     return replace(task, tip_path=replace(task.path, points=points, closed=False))
 

@@ -13,7 +13,7 @@ from vdsm_pin.planner.paper.scale import scale
 from vdsm_pin.planner.paper.sections import section_along
 from vdsm_pin.planner.paper.tip_path import drawn_rows
 
-OBS3 = read_problem("paper/obs3").problem
+OBS3 = read_problem("paper/obs3")
 ARM = OBS3.manipulator
 POINTS = drawn_rows(OBS3.path, 0.0).points[::9]
 

@@ -14,7 +14,7 @@ from vdsm_pin.verification.robot_model import load_robot
 
 @pytest.mark.parametrize("name", ["free", "obs1", "obs2-small", "obs3"])
 def test_steps_are_the_rows_of_the_plan(name: str) -> None:
-    problem = read_problem(f"paper/{name}").problem
+    problem = read_problem(f"paper/{name}")
     plan = plan_and_verify(problem, "paper", load_robot(problem.manipulator)).plan
     assert plan.steps is not None
     rule, route = OnlineRule.of(plan), plan.steps.route
@@ -25,7 +25,7 @@ def test_steps_are_the_rows_of_the_plan(name: str) -> None:
 
 
 def test_what_the_rule_cannot_do_is_refused() -> None:
-    problem = read_problem("paper/free").problem
+    problem = read_problem("paper/free")
     plan = plan_and_verify(problem, "paper", load_robot(problem.manipulator)).plan
     with pytest.raises(Infeasible):
         OnlineRule.of(plan).step(np.array([3.126, 2.5, 0.0]))

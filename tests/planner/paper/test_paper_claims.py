@@ -15,7 +15,7 @@ from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.planning_problem import DesiredPath
 from vdsm_pin.verification.link_clearance import link_clearance
 
-FREE = read_problem("paper/free").problem
+FREE = read_problem("paper/free")
 
 
 def free_plan(*corners: tuple[float, float, float]) -> Plan:
@@ -49,7 +49,7 @@ def test_27_less_3i_cables_run_through_link_i() -> None:
 
 def test_the_tip_leaves_and_joins_the_path_where_the_region_crosses_it() -> None:
     """Section 4.2.3: A4 and A5 of obs1, with a region that reaches the path."""
-    problem = read_problem("paper/obs1").problem
+    problem = read_problem("paper/obs1")
     problem = replace(problem, required_clearance=0.010)
     plan = plan_paper(problem, link_clearance(problem), 0.0)
     assert plan.steps is not None

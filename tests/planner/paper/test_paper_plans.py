@@ -33,7 +33,7 @@ Z = np.array([0.0, 0.0, 1.0])
 
 
 def paper(name: str) -> PlanningProblem:
-    return read_problem(f"paper/{name}").problem
+    return read_problem(f"paper/{name}")
 
 
 def planned(problem: PlanningProblem, margin: float = 0.0) -> Plan:

@@ -24,7 +24,7 @@ def ours(scene: str, quantity: str) -> str:
 @pytest.mark.parametrize("scene", ["free", "obs1", "obs2", "obs2-small"])
 def test_table_shows_what_the_planner_does(scene: str) -> None:
     """These four are certified in the first round, so a plain plan is the final one."""
-    problem = read_problem(f"paper/{scene}").problem
+    problem = read_problem(f"paper/{scene}")
     trajectory = plan_paper(problem, link_clearance(problem), 0.0).trajectory
     psi = np.rad2deg(link_angles(trajectory.alpha, trajectory.theta).max())
     assert float(ours(scene, "largest psi")) == pytest.approx(psi, abs=0.01)
@@ -36,7 +36,7 @@ def test_table_shows_what_the_planner_does(scene: str) -> None:
 
 
 def test_table_shows_both_reaches() -> None:
-    arm = read_problem("paper/free").problem.manipulator
+    arm = read_problem("paper/free").manipulator
     assert ours("-", "Eq. 4") == f"{curled_reach(arm) * 1e3:.2f}"
     assert ours("-", "straight arm") == f"{straight_reach(arm) * 1e3:.2f}"
 

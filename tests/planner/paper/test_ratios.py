@@ -23,7 +23,7 @@ from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
 
-FREE = read_problem("paper/free").problem
+FREE = read_problem("paper/free")
 ARM = FREE.manipulator
 
 
@@ -88,7 +88,7 @@ def test_the_joint_stays_over_the_centre_while_the_tip_draws() -> None:
 def test_what_the_file_asks_for_is_planned_and_certified(
     block: str, tmp_path: Path
 ) -> None:
-    problem = read_problem(written(tmp_path, block)).problem
+    problem = read_problem(written(tmp_path, block))
     found = plan_and_verify(problem, "paper", load_robot(problem.manipulator))
     assert found.verification.verdict is Verdict.CERTIFIED
     assert np.abs(found.plan.centres - planned(None).centres[:1]).max() > 0.1
@@ -99,7 +99,7 @@ def test_what_the_file_asks_for_is_planned_and_certified(
 
 
 def test_the_rule_does_not_go_round_obstacles_with_other_ratios() -> None:
-    problem = read_problem("paper/obs3").problem
+    problem = read_problem("paper/obs3")
     with pytest.raises(NoPlanFound, match="with the ratios that are asked for"):
         planned(ProjectionCylinder(2.0), problem)
 

@@ -18,7 +18,7 @@ from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
 
-FREE = read_problem("paper/free").problem
+FREE = read_problem("paper/free")
 ROBOT = load_robot(FREE.manipulator)
 PAIR = (0.7, 0.6, 0.12), (0.5, 0.8, 0.10)
 TRIO = (0.7, 0.6, 0.10), (0.55, 0.75, 0.08), (0.85, 0.5, 0.06)

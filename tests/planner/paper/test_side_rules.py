@@ -77,7 +77,7 @@ def best_of_all(
 @pytest.mark.parametrize("core", CORES)
 @pytest.mark.parametrize("side", [1, -1])
 def test_no_rule_left_early_would_have_won(core: str, side: int) -> None:
-    problem = read_problem("paper/obs1").problem
+    problem = read_problem("paper/obs1")
     rng = np.random.default_rng(len(core))
     for _ in range(4):
         forbidden = DangerRegion(core, np.array(CORES[core]), rng.uniform(0.05, 0.2))
@@ -94,7 +94,7 @@ def test_no_rule_left_early_would_have_won(core: str, side: int) -> None:
 
 
 def test_nothing_wanted_takes_the_first_rule() -> None:
-    problem = read_problem("paper/obs1").problem
+    problem = read_problem("paper/obs1")
     forbidden = DangerRegion("disc", np.array(CORES["disc"]), 0.1)
     rule = choose_rule(problem, forbidden, [forbidden], 1, [], NONE)
     assert rule.region.radius == forbidden.radius

@@ -9,8 +9,8 @@ from vdsm_pin.app.explanation import steps
 from vdsm_pin.app.explanation.parts import Moment, Part, mm, table
 from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.io.problem_file import ProblemFile
 from vdsm_pin.planner.paper.steps import PaperSteps
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.refinement import Refinement, plan_and_verify
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.html import rendered
@@ -21,12 +21,12 @@ PAGE: Final = "explain.html"
 
 
 def explain_to_folder(
-    source: ProblemFile, waypoint: int | None, folder: Path
+    problem: PlanningProblem, waypoint: int | None, folder: Path
 ) -> tuple[Path, int]:
     """Plan by the paper's seven steps and write down what each did at a waypoint.
 
     Args:
-        source: The problem.
+        problem: As it was read.
         waypoint: From 0; None for the one with the largest link angle past joint 1.
         folder: Where the page goes.
 
@@ -38,13 +38,13 @@ def explain_to_folder(
         Infeasible: If the paper's rule has no plan.
     """
     check_output_folder(folder)
-    check_kept([folder / PAGE], source.source.files)
-    if source.problem.scene.moving:
-        name = source.problem.scene.moving[0].name
+    check_kept([folder / PAGE], problem.files)
+    if problem.scene.moving:
+        name = problem.scene.moving[0].name
         message = f"obstacle {name!r} moves, which the paper's steps know nothing of"
         raise InvalidInput(message)
-    robot = load_robot(source.problem.manipulator)
-    found = plan_and_verify(source.problem, "paper", robot)
+    robot = load_robot(problem.manipulator)
+    found = plan_and_verify(problem, "paper", robot)
     made = found.plan.steps
     assert made is not None  # the strategy `paper` tells them
     row = _row(made, waypoint)
@@ -62,7 +62,7 @@ def explain_to_folder(
     with staged(folder) as aside:
         text = rendered(  # pictures are our own SVG
             "explain.html.j2",
-            problem=source.problem,
+            problem=problem,
             waypoint=row,
             n_waypoints=made.trajectory.n_samples,
             parts=parts,
