@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.errors import NoWayOut
-from vdsm_pin.geometry.arrays import BoolArray, IntArray
+from vdsm_pin.geometry.arrays import BoolArray
 from vdsm_pin.planner.fewest.broad_phase import BroadPhase
 from vdsm_pin.planner.fewest.grown_nodes import fill
 from vdsm_pin.planner.fewest.insertion import insert, tip_space
@@ -26,12 +26,7 @@ from vdsm_pin.planner.fewest.roadmap import (
     link_limit,
 )
 from vdsm_pin.planner.fewest.route import PathRows, path_rows, rolled, tip_route
-from vdsm_pin.planner.fewest.search import (
-    Found,
-    Searched,
-    nothing_blocked,
-    search,
-)
+from vdsm_pin.planner.fewest.search import Found, Searched, search
 from vdsm_pin.planner.fewest.shapes import one_knee_shapes
 from vdsm_pin.planner.fewest.start_node import largest_start_angle, with_start
 from vdsm_pin.planner.fewest.stuck import Stuck
@@ -247,7 +242,7 @@ def _look(
     )
     roadmap, start_node = with_start(judge, roadmap, weights)
     rng = np.random.default_rng(SEED)
-    found = search(judge, roadmap, start_node, level.rounds, nothing_blocked())
+    found = search(judge, roadmap, start_node, level.rounds)
     for _ in range(level.grow):
         if found is None or not found.missing > 0.0:
             break
@@ -257,9 +252,7 @@ def _look(
         more = fill(judge, found.roadmap, found.lengths, skipped, rng, weights)
         if more is None:
             break
-        start_node = int(_same_nodes(found.roadmap, more, np.array(found.start_node)))
-        blocked = _same_nodes(found.roadmap, more, found.blocked)
-        again = search(judge, more, start_node, level.rounds, blocked)
+        again = search(judge, more, _same_node(found, more), level.rounds)
         if again is None or not again.missing < found.missing:
             break
         found = again
@@ -278,6 +271,7 @@ def _unreached(found: Searched) -> bool:
     return False
 
 
-def _same_nodes(before: Roadmap, after: Roadmap, nodes: IntArray) -> IntArray:
-    """The numbers of nodes in an extended roadmap."""
-    return after.nodes_of(before.tips_of(nodes), before.shapes_of(nodes))
+def _same_node(found: Searched, more: Roadmap) -> int:
+    """The number of the start node in an extended roadmap."""
+    node, before = np.array(found.start_node), found.roadmap
+    return int(more.nodes_of(before.tips_of(node), before.shapes_of(node)))

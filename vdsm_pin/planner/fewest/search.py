@@ -43,17 +43,15 @@ class Searched(Found):
         start_node: The node the motion starts from.
         lengths: From there to each node, over the arm's length, inf if no way is
             known that is not blocked, shape (v,); [-].
-        blocked: Pairs of nodes whose edges were found blocked, shape (n, 2).
     """
 
     roadmap: Roadmap
     start_node: int
     lengths: FloatArray
-    blocked: IntArray
 
 
 def search(
-    judge: Judge, roadmap: Roadmap, start_node: int, rounds: int, blocked: IntArray
+    judge: Judge, roadmap: Roadmap, start_node: int, rounds: int
 ) -> Searched | None:
     """The cheapest sequence whose every interval is clear.
 
@@ -62,14 +60,12 @@ def search(
         roadmap: The graph.
         start_node: The node the motion starts from.
         rounds: Largest number of sequences tried.
-        blocked: Pairs of nodes whose edges are known to be blocked, shape (n, 2).
 
     Returns:
         None if the rounds end or nothing is drawn.
     """
-    planner = Planner(
-        roadmap, judge.problem.manipulator.total_length, start_node, blocked
-    )
+    arm = judge.problem.manipulator
+    planner = Planner(roadmap, arm.total_length, start_node)
     known: set[tuple[int, int]] = set()
     for _ in range(rounds):
         sequence = planner.sequence()
@@ -77,7 +73,7 @@ def search(
             return None
         if judge.problem.path.order is Order.FREE:
             sequence = reordered(planner, sequence)
-        corners = motion_corners(judge.problem.manipulator, roadmap, sequence)
+        corners = motion_corners(arm, roadmap, sequence)
         fresh = _fresh(corners.edges, known)
         good = (
             judge.clear(judge.lines(corners, fresh)) if fresh.size else np.ones(0, bool)
@@ -86,10 +82,9 @@ def search(
         if not bad.size:
             return Searched(
                 roadmap.route, corners, sequence.skipped, roadmap, start_node,
-                planner.from_start, blocked,
+                planner.from_start,
             )  # fmt: skip
         known.update(_keys(corners.edges[fresh]))
-        blocked = np.concatenate([blocked, corners.edges[bad]])
         planner.block(corners.edges[bad], not corners.drawn[bad].all())
     return None
 
@@ -102,8 +97,3 @@ def _fresh(edges: IntArray, known: set[tuple[int, int]]) -> IntArray:
 def _keys(edges: IntArray) -> list[tuple[int, int]]:
     """Edges as pairs (low, high)."""
     return [(a, b) for a, b in np.sort(edges, axis=1).tolist()]
-
-
-def nothing_blocked() -> IntArray:
-    """No edge is known to be blocked, shape (0, 2)."""
-    return np.zeros((0, 2), dtype=np.int64)

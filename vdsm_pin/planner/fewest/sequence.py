@@ -69,12 +69,9 @@ class Planner:
         roadmap: The graph.
         length: Of the arm; all lengths are over it; [m].
         start_node: The node the motion starts from.
-        blocked: Pairs of nodes whose edges are known to be blocked, shape (n, 2).
     """
 
-    def __init__(
-        self, roadmap: Roadmap, length: float, start_node: int, blocked: IntArray
-    ) -> None:
+    def __init__(self, roadmap: Roadmap, length: float, start_node: int) -> None:
         self.roadmap, self.start_node, self.graph = roadmap, start_node, roadmap.graph()
         self.barred = nothing_barred(len(roadmap.node))
         route = roadmap.route
@@ -83,7 +80,6 @@ class Planner:
         self.gap[1:][self.gap[1:] == 0.0] = REST
         self.gaps = route.gaps / length
         self.connection_gaps = self.gaps.copy()
-        self._bar(blocked)
         self.from_start, self.before = self.lengths_from(start_node)
 
     def block(self, edges: IntArray, on_connections: bool) -> None:
@@ -95,14 +91,6 @@ class Planner:
             edges: Pairs of nodes, shape (n, 2).
             on_connections: Whether one of them was part of a way, so that ways change.
         """
-        self._bar(edges)
-        # Blocked on the path, an edge may be part of a way from the start all the same.
-        here, there = edges.T
-        on_tree = (self.before[here] == there) | (self.before[there] == here)
-        if on_connections or on_tree.any():
-            self.from_start, self.before = self.lengths_from(self.start_node)
-
-    def _bar(self, edges: IntArray) -> None:
         self.barred = with_barred(self.barred, edges)
         route = self.roadmap.route
         for a, b in self.roadmap.tips_of(edges):
@@ -110,6 +98,11 @@ class Planner:
                 row = slice(route.first[u], route.first[u + 1])
                 link = route.links[row] == v
                 self.connection_gaps[row] += link * (self.gaps[row] + DISTRUST)
+        # Blocked on the path, an edge may be part of a way from the start all the same.
+        here, there = edges.T
+        on_tree = (self.before[here] == there) | (self.before[there] == here)
+        if on_connections or on_tree.any():
+            self.from_start, self.before = self.lengths_from(self.start_node)
 
     def lengths_from(
         self, source: int, target: int = -1
