@@ -19,6 +19,7 @@ from vdsm_pin.robots.judgement import RobotVerification, verify_robot
 from vdsm_pin.robots.scene_files import read_scene
 from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.verification.certificate_lines import Hashes
+from vdsm_pin.verification.clearance_check import OBSTACLES
 from vdsm_pin.verification.inside import LINKS
 from vdsm_pin.verification.records import Verdict
 
@@ -85,6 +86,9 @@ def test_verdicts_are_those_of_solid_angles(seed: int, tmp_path: Path) -> None:
         assert row.where == "link 'arm' is inside 'shell'"
         assert result.closest(1)[0].upper <= 0.0
         np.testing.assert_allclose(result.closest(1)[0].link_point, [0.5, 0, 0])
+        clear = next(check for check in result.checks if check.name == OBSTACLES)
+        assert clear.first == 0.0
+        assert "first too close at waypoint 0: arm and shell" in clear.where
 
 
 def test_between_two_shells_is_outside_and_in_their_wall_is_not(tmp_path: Path) -> None:

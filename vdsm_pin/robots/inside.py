@@ -6,7 +6,7 @@ the inside of a mesh cannot be told, a link is outside if it is proved to keep i
 clearance from the mesh's hull.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from typing import NamedTuple
 
@@ -24,8 +24,9 @@ from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.robots.cell import Cell
+from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import worst_location
-from vdsm_pin.verification.records import ClearanceProfile, LeastClearances
+from vdsm_pin.verification.records import ClearanceProfile, LeastClearances, Pair
 
 
 class Place(NamedTuple):
@@ -134,6 +135,19 @@ def enclosed(least: LeastClearances, located: Mapping[int, Place]) -> LeastClear
             for values, value in zip(changed.values(), found, strict=True):
                 values[k] = value
     return LeastClearances(**changed)
+
+
+def enclosed_contacts(
+    contacts: tuple[FirstContact, ...],
+    pairs: Sequence[Pair],
+    located: Mapping[int, Place],
+) -> tuple[FirstContact, ...]:
+    """The first contacts: of a link that begins inside a mesh it is the first row."""
+    inside = [k for k, one in located.items() if one.where.side is Side.INSIDE]
+    if not inside:
+        return contacts
+    between = (one for one in contacts if not one.pair.obstacle)
+    return (FirstContact(pairs[inside[0]], 0.0, clear_before=True), *between)
 
 
 def enclosed_profile(

@@ -1,6 +1,6 @@
 """The judgement of a robot's trajectory: every check, one row each."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, nan
 from typing import Final
 
@@ -23,12 +23,19 @@ from vdsm_pin.robots.clearances import (
 from vdsm_pin.robots.counterexamples import robot_counterexamples, told_all
 from vdsm_pin.robots.errors import proof_box
 from vdsm_pin.robots.first_contact import robot_contacts
-from vdsm_pin.robots.inside import by_mesh, enclosed, enclosed_profile, locate_links
+from vdsm_pin.robots.inside import (
+    by_mesh,
+    enclosed,
+    enclosed_contacts,
+    enclosed_profile,
+    locate_links,
+)
 from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.robots.rates import largest_of, rate_checks
 from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.approaches import nearest_pairs
 from vdsm_pin.verification.besides import Besides
 from vdsm_pin.verification.clearance import profile_of
 from vdsm_pin.verification.clearance_check import LINKS, Evidence, clearance_checks
@@ -38,10 +45,8 @@ from vdsm_pin.verification.inside import check_inside
 from vdsm_pin.verification.moving import Knots, path_beside
 from vdsm_pin.verification.records import (
     Check,
-    ClosestApproach,
     Counterexample,
     LeastClearances,
-    Pair,
     Verdict,
     Verification,
 )
@@ -55,9 +60,6 @@ POSE_ERROR: Final = 1e-9
 
 COMPARED: Final = 1000
 """Most waypoints at which poses are compared, spread evenly."""
-
-CLOSEST: Final = 10
-"""Pairs listed as the closest approaches."""
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)
@@ -125,7 +127,9 @@ def verify_robot(
         deepest=lambda k, worst: bool(least.verdict[k] == REFUTED) and worst <= MEETING,
         counterexamples=lost,
         nominal=clear,
-        contacts=met,
+        contacts=tuple(
+            one.timed(path) for one in enclosed_contacts(met, named, located)
+        ),
     )
     checks = [
         _poses(robot, path),
@@ -135,13 +139,18 @@ def verify_robot(
         *clearance_checks(cell, evidence, None if proof.in_time else deadline),
         *([coal] if cell.pairs else [_no_pair(cell)]),
     ]
+    nearest = nearest_pairs(named, least).items()
+    approaches = tuple(
+        replace(one, coal=float(measured[k]), deeper=evidence.deepest(k, one.upper))
+        for k, one in nearest
+    )
     return RobotVerification(
         problem=cell,
         trajectory=path,
         errors=cell.errors,
         pairs=named,
         checks=tuple(checks),
-        approaches=_closest(named, least, measured),
+        approaches=approaches,
         profile=enclosed_profile(profile, cell, located),
         least=least,
         counterexamples=lost,
@@ -161,30 +170,6 @@ def _is_clear(cell: Cell, path: Path, deadline: Deadline) -> bool:
     """Whether the motion is proved clear of everything, without errors."""
     budget = Budget(until=deadline.end)
     return prove(cell.tree, cell.bodies, path, cell.pairs, budget=budget).is_certified
-
-
-def _closest(
-    pairs: tuple[Pair, ...], least: LeastClearances, coal: FloatArray
-) -> tuple[ClosestApproach, ...]:
-    """The pairs that come nearest, by their upper bounds; obstacles first."""
-    of_links = np.array([not pair.obstacle for pair in pairs], bool)
-    seen = np.flatnonzero(np.isfinite(least.upper))
-    order = seen[np.lexsort((least.upper[seen], of_links[seen]))]
-    return tuple(
-        ClosestApproach(
-            interval=int(least.interval[k]),
-            share=float(least.time[k]),
-            pair=pairs[k],
-            lower=float(least.lower[k]),
-            upper=float(least.upper[k]),
-            station=nan,
-            link_point=least.link_point[k],
-            other_point=least.other_point[k],
-            deeper=bool(least.verdict[k] == REFUTED and least.upper[k] <= MEETING),
-            coal=float(coal[k]),
-        )
-        for k in order[:CLOSEST]
-    )
 
 
 def _poses(robot: Robot, path: Path) -> Check:

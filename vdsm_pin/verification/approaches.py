@@ -1,18 +1,24 @@
 """The pairs that come nearest in a motion."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+from math import nan
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.layouts import AT_UPPER, LOW, OTHER, OWN, TIME, UP
-from vdsm_pin.verification.clearance import ClearanceProof
+from vdsm_pin.verification.clearance import ClearanceProof, least_clearances
 from vdsm_pin.verification.enclosed import enclosed_approaches
 from vdsm_pin.verification.inside import Enclosed
-from vdsm_pin.verification.records import ClosestApproach, is_deepest
+from vdsm_pin.verification.records import (
+    ClosestApproach,
+    LeastClearances,
+    Pair,
+    is_deepest,
+)
 from vdsm_pin.verification.task import ball_of
 
 CLOSEST: Final = 10
@@ -38,43 +44,51 @@ def closest_approaches(
     """
     around = around or {}
     rows = list(enclosed_approaches(problem, around))
-    of_links = np.array([not pair.obstacle for pair in proof.pairs])
-    seen = np.flatnonzero(np.isfinite(proof.best[:, UP]))
-    for k in seen[np.lexsort((proof.best[seen, UP], of_links[seen]))][:CLOSEST]:
-        pair, row = proof.pairs[k], proof.best[k]
-        if pair.own in around.get(pair.obstacle, ()):
+    nearest = nearest_pairs(proof.pairs, least_clearances(proof))
+    for near in nearest.values():
+        if near.pair.own in around.get(near.pair.obstacle, ()):
             continue
-        points = row[OWN:OTHER], row[OTHER : OTHER + 3]
-        # In a pair of links the sweep moves the second one against the first.
-        mine, theirs = points if pair.obstacle else points[::-1]
-        rows.append(
-            ClosestApproach(
-                interval=int(row[AT_UPPER]),
-                share=float(row[TIME]),
-                pair=pair,
-                lower=float(row[LOW]),
-                upper=float(row[UP]),
-                station=_station(problem, trajectory, row, pair.link, mine),
-                link_point=frozen(mine),
-                other_point=frozen(theirs),
-                deeper=is_deepest(float(row[UP]), ball_of(problem, pair)),
-            )
-        )
+        deeper = is_deepest(near.upper, ball_of(problem, near.pair))
+        station = _station(problem, trajectory, near)
+        rows.append(replace(near, station=station, deeper=deeper))
     return tuple(rows[:CLOSEST])
 
 
+def nearest_pairs(
+    pairs: Sequence[Pair], least: LeastClearances
+) -> dict[int, ClosestApproach]:
+    """The pairs of least upper bounds by their numbers, obstacles first.
+
+    Args:
+        pairs: Every pair, of an arm or a robot.
+        least: What is proved of them.
+    """
+    of_links = np.array([not pair.obstacle for pair in pairs], bool)
+    seen = np.flatnonzero(np.isfinite(least.upper))
+    order = seen[np.lexsort((least.upper[seen], of_links[seen]))][:CLOSEST]
+    return {
+        k: ClosestApproach(
+            interval=int(least.interval[k]),
+            share=float(least.time[k]),
+            pair=pairs[k],
+            lower=float(least.lower[k]),
+            upper=float(least.upper[k]),
+            station=nan,
+            link_point=least.link_point[k],
+            other_point=least.other_point[k],
+        )
+        for k in order.tolist()
+    }
+
+
 def _station(
-    problem: PlanningProblem,
-    trajectory: Trajectory,
-    row: FloatArray,
-    link: int,
-    point: FloatArray,
+    problem: PlanningProblem, trajectory: Trajectory, near: ClosestApproach
 ) -> float:
     """Arc length along a link's axis of the place below its witness; [m]."""
-    joints = trajectory.joints_at(row[[AT_UPPER]] + row[TIME])
+    joints, link = trajectory.joints_at(np.array([near.moment])), near.pair.link
     now = joints[:, 0], joints[:, 1::2], joints[:, 2::2]
     centres = joint_centres(problem.manipulator, *now)[0]
     length = float(problem.manipulator.link_lengths[link - 1])
     axis = (centres[link] - centres[link - 1]) / length
-    along = float(axis @ (point - centres[link - 1]))
+    along = float(axis @ (near.link_point - centres[link - 1]))
     return min(max(along, 0.0), length)
