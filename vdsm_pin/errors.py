@@ -186,6 +186,7 @@ class StartBlocked(Infeasible):
         clearance: Between the two; [m].
         required: What it must be; [m].
         bent: Whether the problem states the joints, not the tip of a straight arm.
+        called: The link in words; 'link k' unless stated.
     """
 
     def __init__(
@@ -196,11 +197,13 @@ class StartBlocked(Infeasible):
         clearance: float,
         required: float,
         bent: bool,
+        called: str = "",
     ) -> None:
         self.link, self.obstacle = link, obstacle
         self.clearance, self.required = clearance, required
         message = (
-            f"at its start link {link} of the {'' if bent else 'straight '}arm has "
+            f"at its start {called or f'link {link}'} of the "
+            f"{'' if bent else 'straight '}arm has "
             f"{in_mm(clearance)} to obstacle {obstacle!r}, required are "
             f"{in_mm(required)}"
         )

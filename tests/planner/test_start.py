@@ -1,12 +1,21 @@
 """A start too close to an obstacle: every strategy refuses it in the same words."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.arm.manipulator import (
+    CableLayout,
+    LinkBody,
+    Manipulator,
+    Tool,
+    built_in,
+)
 from vdsm_pin.errors import StartBlocked
-from vdsm_pin.geometry.solids import Cylinder
+from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
+from vdsm_pin.planner.fewest.stuck import no_way_in
 from vdsm_pin.planner.start import start_centres
 from vdsm_pin.planner.strategies import STRATEGIES, strategy
 from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
@@ -60,3 +69,60 @@ def test_a_start_stated_by_its_joints_is_judged_as_it_is_bent() -> None:
     joints[[3, 5]] = 0.3, -0.3
     task = starting(0.0, joints)
     assert strategy("fewest")(task, link_clearance(task), 0.0).trajectory.n_samples
+
+
+def thick(radii: list[float], **more: object) -> Manipulator:
+    lengths = np.full(4, 0.4)
+    lengths[-1] += 0.1 if "tool" in more else 0.0
+    limits = (0.7, 0.7, (-2.0, 2.0), CableLayout(0.01, 0.01, np.zeros((4, 3))))
+    arm = Manipulator("thick", lengths, max(radii), *limits, radii=np.array(radii))
+    return replace(arm, **more)
+
+
+TOOL = Tool(0.1, 0.01)
+BOX = Box("camera", np.array([0.2, 0.08, 0.0]), np.eye(3), np.full(3, 0.03))
+AROUND = float(np.hypot(0.11, 0.03))  # how far the camera reaches from its link's axis
+
+
+@pytest.mark.parametrize(
+    ("arm", "place", "link", "reach", "words"),
+    [
+        (thick([0.08, 0.04, 0.03, 0.02]), (0.2, 0.1), 1, 0.08, "link 1 of"),
+        (thick([0.02, 0.08, 0.03, 0.02]), (0.6, 0.1), 2, 0.08, "link 2 of"),
+        (thick([0.08, 0.04, 0.03, 0.02], tool=TOOL), (0.2, 0.1), 1, 0.08, "link 1 of"),
+        (thick([0.03] * 4, tool=TOOL), (1.65, 0.03), 4, 0.01, "4 with its tool of"),
+        (
+            thick([0.03] * 4, bodies=(LinkBody(3, BOX),)),
+            (1.0, -0.12),
+            3,
+            AROUND,
+            "link 3, taken to be as thick as what it carries, of",
+        ),
+    ],
+)
+def test_a_blocked_start_names_the_link_that_is_too_near_and_by_how_much(
+    arm: Manipulator, place: tuple[float, float], link: int, reach: float, words: str
+) -> None:
+    ball = Sphere("ball", np.array([*place, 0.0]), 0.018)
+    # Nearer to an axis than the ball is, but of a thin link, which it is clear of.
+    thin = Sphere("thin", np.array([1.4, 0.06, 0.0]), 0.01)
+    tip = np.array([arm.total_length, 0.0, 0.0])
+    path = DesiredPath(tip, np.stack([tip, tip + np.array([0.0, 0.1, 0.0])]), False)
+    scene = Scene((ball, thin))
+    task = PlanningProblem("start", arm, scene, path, 0.005, np.eye(4))
+    caught = refusal(task, "fewest")
+    assert (caught.link, caught.obstacle) == (link, "ball")
+    assert caught.clearance == pytest.approx(abs(place[1]) - 0.018 - reach, abs=1e-8)
+    assert words in str(caught)
+
+
+def test_a_narrow_place_is_as_wide_as_it_is_however_thick_the_links() -> None:
+    arm = thick([0.08, 0.04, 0.03, 0.02])
+    walls = tuple(
+        Box(name, np.array([1.0, side, 0.0]), np.eye(3), np.array([0.1, 0.1, 1.0]))
+        for name, side in (("left", 0.15), ("right", -0.15))
+    )
+    path = DesiredPath(np.array([1.6, 0.0, 0.0]), POINTS, False)
+    task = PlanningProblem("walls", arm, Scene(walls), path, 0.005, np.eye(4))
+    told = str(no_way_in(task, np.array([1.0, 0.0, 0.0]), "", 0.0).words)
+    assert "100.000 mm wide, for a body of 160.000 mm" in told

@@ -11,7 +11,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.geometry.winding import Location, Side, locate
 from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.planner.upper_clearance import culprit, upper_clearance
+from vdsm_pin.planner.upper_clearance import culprit, named, upper_clearance
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene, with_hulls
 
@@ -117,5 +117,10 @@ def check_start(problem: PlanningProblem, clearance: LinkClearance) -> None:
         link, obstacle, least = culprit(problem, centres)
         bent = problem.path.start_joints is not None
         raise StartBlocked(
-            link=link, obstacle=obstacle, clearance=least, required=required, bent=bent
+            link=link,
+            obstacle=obstacle,
+            clearance=least,
+            required=required,
+            bent=bent,
+            called=named(problem.manipulator, link),
         )

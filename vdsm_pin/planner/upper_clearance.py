@@ -4,6 +4,7 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.compiled import borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import new_body
@@ -49,34 +50,62 @@ def upper_bounds(
     return result
 
 
-def upper_clearance(problem: PlanningProblem, segments: FloatArray) -> FloatArray:
-    """Upper bounds of the clearance of links along segments to each obstacle.
+def upper_distances(problem: PlanningProblem, segments: FloatArray) -> FloatArray:
+    """Upper bounds of the distance of segments to each obstacle.
 
-    Each rests on two points, one of the link and one of the obstacle's surface.
+    Each rests on two points, one of the segment and one of the obstacle's surface.
 
     Args:
-        problem: Arm and scene.
-        segments: Axes of links, shape (n, 2, 3); [m].
+        problem: The scene.
+        segments: Shape (n, 2, 3); [m].
 
     Returns:
         Shape (n, n_obstacles); [m].
     """
     if not problem.scene.obstacles:
         return np.full((len(segments), 0), np.inf)
-    upper = upper_bounds(
-        problem.packed_obstacles, np.ascontiguousarray(segments), np.inf
-    )
-    return np.asarray(upper - problem.manipulator.least_radius)
+    pieces = problem.packed_obstacles
+    return np.asarray(upper_bounds(pieces, np.ascontiguousarray(segments), np.inf))
+
+
+def upper_clearance(problem: PlanningProblem, segments: FloatArray) -> FloatArray:
+    """Upper bounds of the clearance of links, however thick, as `upper_distances`."""
+    return upper_distances(problem, segments) - problem.manipulator.least_radius
+
+
+def nearest(problem: PlanningProblem, place: FloatArray) -> tuple[str, float]:
+    """The obstacle nearest to a point, shape (3,), and how far it is at most; [m]."""
+    (upper,) = upper_distances(problem, np.stack([place, place])[None])
+    obstacle = int(np.argmin(upper))
+    return problem.scene.obstacles[obstacle].name, float(upper[obstacle])
 
 
 def culprit(problem: PlanningProblem, centres: FloatArray) -> tuple[int, str, float]:
-    """The link nearest to an obstacle, that obstacle, and the clearance's upper bound.
+    """The link nearest to an obstacle, that obstacle, and the clearance between them.
+
+    As `LinkClearance` has it: the tool is part of the last link, and where links carry
+    something, they count as thick as it reaches.
 
     Args:
         problem: Arm and scene.
         centres: Joint centres of one configuration, shape (N + 1, 3); [m].
     """
-    upper = upper_clearance(problem, np.stack([centres[:-1], centres[1:]], axis=1))
-    link, obstacle = np.unravel_index(int(np.argmin(upper)), upper.shape)
+    arm = problem.manipulator
+    axes, radii = centres, arm.reaches
+    if not arm.bodies:
+        axes, radii = arm.axes(centres[None])[0], arm.axis_radii
+    segments = np.stack([axes[:-1], axes[1:]], axis=1)
+    upper = upper_distances(problem, segments) - radii[:, None]
+    axis, obstacle = np.unravel_index(int(np.argmin(upper)), upper.shape)
     name = problem.scene.obstacles[int(obstacle)].name
-    return int(link) + 1, name, float(upper[link, obstacle])
+    return min(int(axis) + 1, arm.n_links), name, float(upper[axis, obstacle])
+
+
+def named(arm: Manipulator, link: int) -> str:
+    """A link, counted from 1, in words, with what counts as part of it."""
+    words = f"link {link}"
+    if link == arm.n_links and arm.tool:
+        words += " with its tool"
+    if any(body.link == link for body in arm.bodies):
+        words += ", taken to be as thick as what it carries,"
+    return words

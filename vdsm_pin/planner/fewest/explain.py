@@ -28,7 +28,7 @@ from vdsm_pin.planner.impossible.bounds import (
 from vdsm_pin.planner.impossible.cut_off import narrowest
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.time_limit import deadline_of
-from vdsm_pin.planner.upper_clearance import culprit, upper_clearance
+from vdsm_pin.planner.upper_clearance import culprit, named, nearest, upper_clearance
 from vdsm_pin.problem.planning_problem import Blocked, PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import say
@@ -101,8 +101,8 @@ def _proved(
     if not proof.buried.any():
         return _cut_off(problem, rows, proof, deadline)
     first = int(np.flatnonzero(proof.buried)[0])
-    tip = rows.tips[first]
-    _, name, least = culprit(problem, np.stack([tip, tip]))
+    name, least = nearest(problem, rows.tips[first])
+    least -= float(problem.manipulator.axis_radii[-1])
     return PathBlocked(
         obstacle=name,
         station=float(rows.stations[first]),
@@ -224,8 +224,9 @@ def how_far(
     if not problem.scene.obstacles or not np.isfinite(centres).all():
         return Reached(words, station)
     link, name, least = culprit(problem, centres)
+    called = named(problem.manipulator, link)
     words += (
-        f"; link {link} of the straight arm there has {in_mm(least)} to {name!r}; try "
+        f"; {called} of the straight arm there has {in_mm(least)} to {name!r}; try "
         "another start or a longer time limit"
     )
     return Reached(words, station, link, name)

@@ -9,7 +9,7 @@ from vdsm_pin.errors import Reached
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.feasibility import rail_distance
 from vdsm_pin.planner.fewest.pose_kernels import bends_of
-from vdsm_pin.planner.upper_clearance import culprit, upper_clearance
+from vdsm_pin.planner.upper_clearance import culprit, named, nearest, upper_distances
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.units import in_mm
 
@@ -69,11 +69,10 @@ def where_stuck(
 
 def _opening(problem: PlanningProblem, stuck: Stuck) -> tuple[int, float]:
     """Number of the narrowest point of the way, and how wide it is there; [m]."""
-    clearances = upper_clearance(problem, np.stack([stuck.route, stuck.route], axis=1))
-    narrow = int(np.argmin(clearances.min(axis=1)))
-    return narrow, 2.0 * (
-        float(clearances[narrow].min()) + problem.manipulator.most_radius
-    )
+    points = np.stack([stuck.route, stuck.route], axis=1)
+    distances = upper_distances(problem, points).min(axis=1)
+    narrow = int(np.argmin(distances))
+    return narrow, 2.0 * float(distances[narrow])
 
 
 def _needed(problem: PlanningProblem) -> float:
@@ -83,11 +82,11 @@ def _needed(problem: PlanningProblem) -> float:
 
 def _passage(problem: PlanningProblem, place: FloatArray) -> str:
     """The narrowest place of the best way, its width and that of the body."""
-    _, name, least = culprit(problem, np.stack([place, place]))
+    name, distance = nearest(problem, place)
     radius = problem.manipulator.most_radius
     return (
         f"the best way in is narrowest at {problem.in_file(place)}, beside {name!r}: "
-        f"{in_mm(max(0.0, 2.0 * (least + radius)))} wide, for a body of "
+        f"{in_mm(max(0.0, 2.0 * distance))} wide, for a body of "
         f"{in_mm(2.0 * radius)} with {in_mm(problem.required_clearance)} on either side"
     )
 
@@ -103,7 +102,7 @@ def no_way_in(
         words: What is known besides, told first.
         station: Where along the path the first stretch begins that is not drawn; [m].
     """
-    _, name, _ = culprit(problem, np.stack([place, place]))
+    name, _ = nearest(problem, place)
     told = (
         f"{words}; no way for the tip was found: {_passage(problem, place)}; try a "
         "smaller `required_clearance` or a wider opening"
@@ -151,7 +150,8 @@ def on_the_path(
     arm, share = problem.manipulator, np.arange(FINER)[:, None, None] / FINER
     between = (1.0 - share) * tips[:-1] + share * tips[1:]
     places = np.concatenate([between.reshape(-1, 3), tips[-1:]])
-    clearances = upper_clearance(problem, np.stack([places, places], axis=1))
+    distances = upper_distances(problem, np.stack([places, places], axis=1))
+    clearances = distances - arm.axis_radii[-1]
     least = clearances.min(axis=1, initial=np.inf)
     near = int(np.argmin(least))
     if not least[near] < kept:
@@ -176,7 +176,9 @@ def _stop(problem: PlanningProblem, stuck: Stuck) -> str:
         words = f"the arm came all the way in and along the path to {tip}"
     if problem.scene.obstacles:
         link, name, least = culprit(problem, stuck.centres)
-        words += f", where link {link} has {in_mm(least)} to {name!r}"
+        words += (
+            f", where {named(problem.manipulator, link)} has {in_mm(least)} to {name!r}"
+        )
     return words
 
 
