@@ -20,6 +20,7 @@ from oracles.certificate_oracle import sealed, sha256
 from vdsm_pin.arm.bodies import ArmBody, arm_bodies
 from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.certificate_checker import Outcome, check_certificate
+from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import Hull
@@ -189,6 +190,22 @@ def test_the_feed_is_proved_and_checked(tmp_path: Path) -> None:
     wrong = Files(tmp_path, problem(obstacles=[beside], feed=thick), rows).verify()
     assert wrong.verdict is Verdict.REFUTED
     assert wrong.approaches[0].pair.own == "feed"
+
+
+@pytest.mark.parametrize("shift", [0.0, 1.0])
+def test_a_feed_stands_in_every_file(tmp_path: Path, shift: float) -> None:
+    """Nearest of all, and as the body of a counterexample."""
+    beside = ball("post", [-100.0, 0.0, 30.0 + 2.0 + 50.0 + 0.1])
+    asked = problem(obstacles=[beside], feed={"length": 600.0})
+    made = Files(tmp_path, {**asked, "errors": {"base": shift}}, STILL)
+    words = ["verify", str(made.problem), "--trajectory", str(made.trajectory)]
+    with pytest.raises(SystemExit) as ended:
+        main([*words, "--out", str(tmp_path / "out")])
+    assert ended.value.code == (1 if shift else 0)
+    told = json.loads((tmp_path / "out" / "verification.json").read_text())
+    for row in (told["closest"][0], told["min_clearance"], *told["counterexamples"]):
+        assert (row["link"], row["body"], row["obstacle"]) == (0, "feed", "post")
+    assert len(told["counterexamples"]) == bool(shift)
 
 
 def test_forged_certificates_of_bodies_are_rejected(tmp_path: Path) -> None:

@@ -79,8 +79,9 @@ def check_row(check: Check, time: float | None = None) -> CheckRow:
 
 
 def _both(pair: Pair) -> dict[str, Any]:
-    """The bodies of a pair; null for what it has not."""
-    return {name: value or None for name, value in asdict(pair).items()}
+    """The bodies of a pair; null for what it has not, link 0 for a feed."""
+    facts = {name: value or None for name, value in asdict(pair).items()}
+    return facts | {"link": pair.link}
 
 
 def closest_row(verification: Verification, approach: ClosestApproach) -> ClosestRow:

@@ -17,11 +17,11 @@ _MOMENT: Final = "in waypoints, 12.25 is a quarter of the way from 12 to 13"
 _TIME: Final = "when that is [s]; null where the trajectory has no times"
 LINK: Final = (
     "links count from 1 at the base; of a robot of a URDF those with solids do, and "
-    "`body` is the name"
+    "`body` is the name; 0 is a feed's"
 )
 _BODY: Final = (
-    "`tool` where it is that; of a robot of a URDF the name of the link; null for a "
-    "link of an arm"
+    "`tool`, `feed` or what a link carries where it is that; of a robot of a URDF the "
+    "name of the link; null for a link of an arm"
 )
 _FRAME: Final = "in the frame of the problem file"
 _DEEPER: Final = (
