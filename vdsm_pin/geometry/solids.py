@@ -283,8 +283,22 @@ class HalfSpace(_Solid):
         return (HalfSpacePiece(self.normal, float(self.normal @ self.point)),)
 
 
+@dataclass(frozen=True, kw_only=True)
+class FromFile(_Solid):
+    """What stands in a file of its own.
+
+    Args:
+        assumed_size: Its size in words where neither its file nor the problem states
+            a unit; else empty.
+        notes: What else its file had, one phrase each.
+    """
+
+    assumed_size: str = ""
+    notes: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True)
-class Mesh(_Solid):
+class Mesh(FromFile):
     """Triangles, and the inside of the closed surface that they make.
 
     Args:
@@ -293,16 +307,11 @@ class Mesh(_Solid):
         triangles: Vertex indices, shape (m, 3), m >= 1.
         solid: Whether the problem says that there is an inside; None where it leaves
             that to the triangles.
-        assumed_size: Its size in words where neither its file nor the problem states
-            a unit; else empty.
-        notes: What else its file had, one phrase each.
     """
 
     vertices: FloatArray
     triangles: IntArray
     solid: bool | None = None
-    assumed_size: str = ""
-    notes: tuple[str, ...] = ()
 
     POINTS = ("vertices",)
 
@@ -365,21 +374,17 @@ class ConvexCover:
 
 
 @dataclass(frozen=True)
-class PointCloud(_Solid):
+class PointCloud(FromFile):
     """Measured points, each a ball of the scan's error.
 
     Args:
         name: Unique name.
         points: Shape (n, 3), n >= 1; [m].
         radius: Of the balls; [m].
-        assumed_size: As of a mesh.
-        notes: As of a mesh.
     """
 
     points: FloatArray
     radius: float
-    assumed_size: str = ""
-    notes: tuple[str, ...] = ()
 
     POINTS, SIZES = ("points",), ("radius",)
 
@@ -400,7 +405,7 @@ class PointCloud(_Solid):
 
 
 @dataclass(frozen=True)
-class Voxels(_Solid):
+class Voxels(FromFile):
     """Occupied cells of a grid, each a cuboid; they need not touch.
 
     Args:
@@ -408,15 +413,11 @@ class Voxels(_Solid):
         centres: Shape (n, 3), n >= 1; [m].
         rotation: R_base_grid, shape (3, 3); [-].
         half_size: Half the edge lengths of a cell, shape (3,); [m].
-        assumed_size: As of a mesh.
-        notes: As of a mesh.
     """
 
     centres: FloatArray
     rotation: FloatArray
     half_size: FloatArray
-    assumed_size: str = ""
-    notes: tuple[str, ...] = ()
 
     POINTS, TURNED, SIZES = ("centres",), ("rotation",), ("half_size",)
 
@@ -446,7 +447,6 @@ class Voxels(_Solid):
         return np.asarray(self.centres[:, None] + corners)
 
 
-FromFile: TypeAlias = Mesh | PointCloud | Voxels
-"""Obstacles that stand in files of their own."""
-
-Solid: TypeAlias = Sphere | Capsule | Cylinder | Box | Prism | HalfSpace | FromFile
+Solid: TypeAlias = (
+    Sphere | Capsule | Cylinder | Box | Prism | HalfSpace | Mesh | PointCloud | Voxels
+)

@@ -292,9 +292,8 @@ class ObstacleBuilder:
         try:
             return reader(self.folder / model.file, self.digest)
         except InvalidFile as error:
-            place = f" {error.where}:" if error.where else ""
-            problem = f"{model.file!r}:{place} {error.problem}"
-            raise self.document.invalid((*at, "file"), problem) from None
+            at = (*at, "file")
+            raise self.document.invalid_file(at, model.file, error) from None
 
     def _placed(self, points: FloatArray, size: MeshSize, at: Location) -> FloatArray:
         """Points of a file in the base frame, of a size that is no slip; [m]."""

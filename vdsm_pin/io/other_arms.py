@@ -59,17 +59,16 @@ class OtherArms:
 
     def _motion(self, model: OtherModel, arm: Manipulator, at: Location) -> Trajectory:
         """Its trajectory, with times."""
-        file = self.folder / model.trajectory
+        at, file = (*at, "trajectory"), self.folder / model.trajectory
         try:
             motion = read_trajectory(file, arm)
         except InvalidFile as error:
-            place = f" {error.where}:" if error.where else ""
-            problem = f"{model.trajectory!r}:{place} {error.problem}"
-            raise self.document.invalid((*at, "trajectory"), problem) from None
+            name = model.trajectory
+            raise self.document.invalid_file(at, name, error) from None
         self.digest.update(read_bytes(file, limit=MAX_BYTES))
         if motion.times is None:
             problem = f"{model.trajectory!r} has no column {TIME!r}, which it needs"
-            raise self.document.invalid((*at, "trajectory"), problem)
+            raise self.document.invalid(at, problem)
         return motion
 
     def _pose(self, model: OtherModel) -> FloatArray:

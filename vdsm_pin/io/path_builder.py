@@ -137,11 +137,13 @@ class PathBuilder:
             tolerance = CURVE_TOLERANCE * UNITS_PER_METRE[self.frame.unit]
         made: list[FloatArray] = []
         for i, part in enumerate(model.points):
-            before = made[-1][-1] if made else None
+            before, at = made[-1][-1] if made else None, ("tip_path", "points", i)
             try:
                 made.append(self._part(part, before, tolerance))
+            except InvalidFile as error:
+                assert isinstance(part, FilePart)
+                raise self.document.invalid_file(at, part.file, error) from None
             except InvalidInput as error:
-                at = ("tip_path", "points", i)
                 raise self.document.invalid(at, str(error)) from None
         counts = [len(corners) for corners in made]
         return np.concatenate(made), np.repeat(np.arange(len(made)), counts)
@@ -153,7 +155,7 @@ class PathBuilder:
         if isinstance(part, list):
             return np.array([part])
         if isinstance(part, FilePart):
-            return self._from_file(part.file)
+            return read_points(self.folder / part.file, self.digest)
         if before is None:
             message = "has no point before it, expected one where it begins"
             raise InvalidInput(message)
@@ -168,14 +170,6 @@ class PathBuilder:
             case SplinePart(spline=points):
                 through = np.vstack([before[None], np.array(points)])
                 return curves.spline_through(through, tolerance)
-
-    def _from_file(self, name: str) -> FloatArray:
-        try:
-            return read_points(self.folder / name, self.digest)
-        except InvalidFile as error:
-            place = f" {error.where}:" if error.where else ""
-            message = f"{name!r}:{place} {error.problem}"
-            raise InvalidInput(message) from None
 
     def _check_extent(self, points: FloatArray, parts: IntArray) -> None:
         reach, limit = np.linalg.norm(points, axis=1), TOLERANCES.scene_extent

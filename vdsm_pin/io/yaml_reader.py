@@ -63,6 +63,11 @@ class YamlDocument:
             where = f"{where} (line {line})" if where else f"line {line}"
         return InvalidFile(file=self.file, where=where, problem=problem)
 
+    def invalid_file(self, at: Location, name: str, error: InvalidFile) -> InvalidFile:
+        """The same of a value that names a file, with what is wrong in that."""
+        place = f" {error.where}:" if error.where else ""
+        return self.invalid(at, f"{name!r}:{place} {error.problem}")
+
     def line(self, location: Location) -> int | None:
         """Line of a value, or of the closest thing around it that has one."""
         for end in range(len(location), -1, -1):
