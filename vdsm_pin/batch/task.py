@@ -66,8 +66,7 @@ LONGEST_NAME: Final = 100
 
 ALL: Final = "all"
 FAILED: Final = "failed"
-NONE: Final = "none"
-"""Whose files stay: every problem's, those of problems that did not pass, nobody's."""
+"""Whose files stay: every problem's, or those of problems that did not pass."""
 
 
 @dataclass(frozen=True)

@@ -47,27 +47,22 @@ class OpenFile:
     content: "io.BufferedReader[Any]"
 
 
-def check_is_file(path: Path, *, named: object = None) -> None:
+def check_is_file(path: Path) -> None:
     """Refuse what is not a readable regular file.
-
-    Args:
-        path: The file.
-        named: What the user called it; the path where not given.
 
     Raises:
         InvalidFile: If there is no file there, or something that is not one.
     """
-    name = path if named is None else named
     try:
         if path.is_dir():
-            raise InvalidFile(file=name, problem="is a folder, expected a file")
+            raise InvalidFile(file=path, problem="is a folder, expected a file")
         if not path.exists():
-            raise InvalidFile(file=name, problem="does not exist")
+            raise InvalidFile(file=path, problem="does not exist")
         if not path.is_file():
-            raise InvalidFile(file=name, problem="is not a regular file")
+            raise InvalidFile(file=path, problem="is not a regular file")
     except (OSError, ValueError) as error:  # a name too long, or with a NUL in it
         reason = getattr(error, "strerror", None) or str(error)
-        raise InvalidFile(file=name, problem=f"cannot be opened: {reason}") from None
+        raise InvalidFile(file=path, problem=f"cannot be opened: {reason}") from None
 
 
 @contextmanager

@@ -47,12 +47,7 @@ class RunRecord:
     ) -> "RunRecord":
         """The record of a run on a problem; one without files is named as the command.
 
-        Args:
-            command: As below.
-            source: The files of the problem.
-            urdf_sha256: As below.
-            trajectory_sha256: As below.
-            date: As below.
+        Arguments are as those of the record, and `source` has the problem's files.
         """
         file, sha256 = (str(source.path), source.sha256) if source else (command, "")
         return cls(command, file, sha256, trajectory_sha256, urdf_sha256, date)

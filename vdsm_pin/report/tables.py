@@ -166,16 +166,16 @@ def write_link_angles(path: Path, verification: ArmVerification) -> None:
     """link_angles.csv: psi and gamma of every joint at every row."""
     rows = verification.trajectory
     joints = range(1, rows.n_links + 1)
-    header = ["waypoint", "on_path", "path_m", "x0_m"]
-    header += [f"psi{j}_rad" for j in joints] + [f"gamma{j}_rad" for j in joints]
+    psi_columns, gamma_columns = (
+        [f"{angle}{j}_rad" for j in joints] for angle in ("psi", "gamma")
+    )
 
     def values(part: slice) -> FloatArray:
         angles = rows.alpha[part], rows.theta[part]
         psi, gamma = link_angles(*angles), position_angles(*angles)
-        first = [rows.on_path[part], rows.path_m[part], rows.x0[part]]
-        return np.column_stack([*first, psi, gamma])
+        return np.column_stack([rows.x0[part], psi, gamma])
 
-    _write_rows(path, header, 2, values, rows.n_samples)
+    _write_rows(path, rows, ["x0_m", *psi_columns, *gamma_columns], values)
 
 
 def write_centres(
@@ -194,29 +194,25 @@ def write_centres(
             from its angles otherwise; [m].
     """
     arm, pose = problem.manipulator, problem.T_world_base
-    header = [WAYPOINT, *PLACE, *centre_columns(rows.n_links)]
 
     def values(part: slice) -> FloatArray:
         joints = rows.x0[part], rows.alpha[part], rows.theta[part]
         own = joint_centres(arm, *joints) if centres is None else centres[part]
-        points = own @ pose[:3, :3].T + pose[:3, 3]
-        first = [rows.on_path[part], rows.path_m[part]]
-        return np.column_stack([*first, points.reshape(len(points), -1)])
+        points: FloatArray = own @ pose[:3, :3].T + pose[:3, 3]
+        return points.reshape(len(points), -1)
 
-    _write_rows(path, header, 2, values, rows.n_samples)
+    _write_rows(path, rows, centre_columns(rows.n_links), values)
 
 
 def write_cables(path: Path, problem: PlanningProblem, rows: Trajectory) -> None:
     """cables.csv: the base position and the 3N cable lengths at every row."""
-    header = [WAYPOINT, *PLACE, *cable_columns(rows.n_links)]
 
     def values(part: slice) -> FloatArray:
         angles = rows.alpha[part], rows.theta[part]
         lengths = cable_lengths(problem.manipulator, *angles)
-        first = [rows.on_path[part], rows.path_m[part], rows.x0[part]]
-        return np.column_stack([*first, lengths.reshape(len(lengths), -1)])
+        return np.column_stack([rows.x0[part], lengths.reshape(len(lengths), -1)])
 
-    _write_rows(path, header, 2, values, rows.n_samples)
+    _write_rows(path, rows, cable_columns(rows.n_links), values)
 
 
 @contextmanager
@@ -252,25 +248,25 @@ def read_summary(path: Path) -> tuple[BatchRow, ...]:
 
 def _write_rows(
     path: Path,
-    header: Sequence[str],
-    n_whole: int,
+    rows: Trajectory,
+    columns: Sequence[str],
     values: Callable[[slice], FloatArray],
-    n_rows: int,
 ) -> None:
-    """A table that begins with the row's number, made and written in parts.
+    """A table of waypoints and their places on the path, made and written in parts.
 
     Args:
         path: The file.
-        header: Names of all columns.
-        n_whole: Columns of whole numbers, the first ones.
-        values: Gives the other columns of a slice of the rows.
-        n_rows: Number of rows.
+        rows: The motion.
+        columns: Names of the columns behind those.
+        values: Gives these columns of a slice of the rows.
     """
-    decimals = [0] * n_whole + [_DECIMALS] * (len(header) - n_whole)
+    header = [WAYPOINT, *PLACE, *columns]
+    decimals = [0, 0] + [_DECIMALS] * (len(header) - 2)  # waypoint and on_path
     form = Form(decimals, [0] * len(header), ())
     with path.open("wb") as file:
         file.write(",".join(header).encode() + b"\n")
-        for first in range(0, n_rows, _CHUNK):
-            part = slice(first, min(first + _CHUNK, n_rows))
-            numbers = np.arange(part.start, part.stop, dtype=np.float64)
-            file.write(form.rows(np.column_stack([numbers, values(part)])))
+        for first in range(0, rows.n_samples, _CHUNK):
+            part = slice(first, min(first + _CHUNK, rows.n_samples))
+            places = np.arange(part.start, part.stop), rows.on_path[part]
+            table = [*places, rows.path_m[part], values(part)]
+            file.write(form.rows(np.column_stack(table)))

@@ -88,13 +88,12 @@ def cross_picture(moment: Moment, one: Cross, regions: Sequence[DangerRegion]) -
     return made.svg(f"Step 5 for joint {i}")
 
 
-def bars(values: FloatArray, limit: float, letter: str, unit: str) -> str:
-    """Values of the joints as bars beside their limit, in the unit said."""
-    names = [name(letter, k + 1) for k in range(len(values))]
-    rows = zip(names, values.tolist(), link_colours(len(values)), strict=True)
-    top = 1.1 * max(limit, float(np.abs(values).max()))
-    said = {"letter": letter, "unit": unit}
-    return rendered("bars.svg.j2", bars=list(rows), limit=limit, top=top, **said)
+def link_angle_bars(psi: FloatArray, limit: float) -> str:
+    """Link angles psi, shape (N,), as bars beside their limit; [deg]."""
+    names = [name("ψ", k + 1) for k in range(len(psi))]
+    rows = zip(names, psi.tolist(), link_colours(len(psi)), strict=True)
+    top = 1.1 * max(limit, float(np.abs(psi).max()))
+    return rendered("bars.svg.j2", bars=list(rows), limit=limit, top=top)
 
 
 def hole_circle(arm: Manipulator, change: FloatArray) -> str:

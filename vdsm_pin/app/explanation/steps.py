@@ -288,7 +288,7 @@ def angles_step(moment: Moment) -> Part:
             table(head, cables),
         ),
         (
-            pictures.bars(np.rad2deg(psi), limit, "ψ", "degrees"),
+            pictures.link_angle_bars(np.rad2deg(psi), limit),
             pictures.hole_circle(arm, lengths - straight),
         ),
     )
