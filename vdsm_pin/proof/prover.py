@@ -278,18 +278,23 @@ def prove_intervals(
     return RANK[worst], np.minimum.reduceat(dense.upper, first, axis=1)
 
 
+def verdicts_of(counts: IntArray) -> IntArray:
+    """Of each pair the worst, by how often it has each one, shape (n_pairs, 3)."""
+    found = np.where(counts[:, UNDECIDED] > 0, UNDECIDED, CERTIFIED)
+    found[counts[:, REFUTED] > 0] = REFUTED
+    return frozen(found, np.int64)
+
+
 def _summed(results: Results, plan: _Plan, n: int, in_time: bool) -> Proof:
     """What was proved of parts, summed up by pair."""
     best, owner, judged = results.best, plan.owner, np.zeros((n, 3), np.int64)
     np.add.at(judged, owner, results.counts)
-    verdict = np.where(judged[:, UNDECIDED] > 0, UNDECIDED, CERTIFIED)
-    verdict[judged[:, REFUTED] > 0] = REFUTED
     least, met = _least(best[:, LOW], owner, n), _least(best[:, UP], owner, n)
     points = best[met, OWN:].reshape(-1, 2, 3)
     turned = plan.swapped[met]
     points[turned] = points[turned, ::-1]
     return Proof(
-        verdict=frozen(verdict, np.int64),
+        verdict=verdicts_of(judged),
         lower=frozen(best[least, LOW]),
         upper=frozen(best[met, UP]),
         lower_interval=frozen(best[least, AT_LOWER], np.int64),

@@ -1,7 +1,7 @@
 """The judgement of a robot's trajectory: every check, one row each."""
 
 from dataclasses import dataclass, replace
-from math import inf, nan
+from math import nan
 from typing import Final
 
 import numpy as np
@@ -39,6 +39,8 @@ from vdsm_pin.verification.approaches import nearest_pairs
 from vdsm_pin.verification.besides import Besides
 from vdsm_pin.verification.clearance import profile_of
 from vdsm_pin.verification.clearance_check import LINKS, Evidence, clearance_checks
+from vdsm_pin.verification.coal_check import Evidence as CoalEvidence
+from vdsm_pin.verification.coal_shapes import disagreement
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import LINKS as INSIDE
 from vdsm_pin.verification.inside import check_inside
@@ -245,23 +247,14 @@ def _coal(
     seen = np.flatnonzero(np.isfinite(proof.upper))
     poses = cell.poses(path.within(proof.interval[seen], proof.share[seen]))
     found[seen] = cell.distances([cell.pairs[k] for k in seen], poses)
-    # Where bodies meet only the sign counts, on both sides.
-    value = np.maximum(found, 0.0)
-    low, high = np.maximum(proof.lower, 0.0), np.maximum(proof.upper, 0.0)
-    off = np.maximum(low - value, value - high)
-    off[np.isinf(found)] = inf
-    measured = ~np.isnan(found)
-    count = int(measured.sum())
-    k = int(np.argmax(np.where(measured, off, -inf))) if count else 0
-    agreed = count > 0 and off[k] <= TOLERANCES.coal_agreement
-    check = Check(
-        COAL,
-        Verdict.CERTIFIED if agreed else Verdict.UNDECIDED,
-        count,
-        float(off[k]) if count else nan,
-        TOLERANCES.coal_agreement,
-        "m",
-        f"{count} of {len(cell.pairs)} pairs measured, each where it was found nearest",
-        float(knots.moments(proof.interval, proof.share)[k]) if count else nan,
-    )
+    off = disagreement(found, proof.lower, proof.upper)
+    moments = knots.moments(proof.interval, proof.share)
+    evidence = CoalEvidence(COAL)
+    for k in np.flatnonzero(~np.isnan(found)).tolist():
+        evidence.count += 1
+        evidence.add(float(off[k]), "", float(moments[k]))
+    where = f"{evidence.count} of {len(cell.pairs)} pairs measured"
+    check = evidence.check(f"{where}, each where it was found nearest")
+    if not evidence.count:
+        check = replace(check, verdict=Verdict.UNDECIDED, worst=nan)
     return check, found

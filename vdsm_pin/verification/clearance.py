@@ -30,15 +30,12 @@ from vdsm_pin.proof.layouts import (
     TIME,
     UP,
 )
-from vdsm_pin.proof.prover import RANK
+from vdsm_pin.proof.prover import RANK, verdicts_of
 from vdsm_pin.proof.proving import dense_rows, room_for
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.terms import (
-    CERTIFIED,
     LINKS,
     OBSTACLES,
-    REFUTED,
-    UNDECIDED,
 )
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.moving import Knots
@@ -271,9 +268,7 @@ def _steps(first: IntArray, length: int) -> list[int]:
 
 def least_clearances(proof: ClearanceProof) -> LeastClearances:
     """The least bounds of every pair, with their witnesses."""
-    best, counts = proof.best, proof.counts
-    verdict = np.where(counts[:, UNDECIDED] > 0, UNDECIDED, CERTIFIED)
-    verdict[counts[:, REFUTED] > 0] = REFUTED
+    best = proof.best
     own, other = best[:, OWN:OTHER], best[:, OTHER : OTHER + 3]
     # In a pair of links the sweep moves the second one against the first.
     swapped = np.array([not pair.obstacle for pair in proof.pairs], bool)[:, None]
@@ -282,7 +277,7 @@ def least_clearances(proof: ClearanceProof) -> LeastClearances:
         time=frozen(best[:, TIME]),
         lower=frozen(best[:, LOW]),
         upper=frozen(best[:, UP]),
-        verdict=frozen(verdict, np.int64),
+        verdict=verdicts_of(proof.counts),
         link_point=frozen(np.where(swapped, other, own)),
         other_point=frozen(np.where(swapped, own, other)),
     )

@@ -6,6 +6,7 @@ bound alone.
 """
 
 from collections.abc import Iterator, Mapping
+from math import inf
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.coal_arm import arm_poses, arm_shapes
 from vdsm_pin.verification.coal_check import Evidence
 from vdsm_pin.verification.coal_log import CoalLog
-from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
+from vdsm_pin.verification.coal_shapes import CoalShapes, Sides, disagreement
 from vdsm_pin.verification.proved_lowers import ProvedLowers
 from vdsm_pin.verification.records import Check, Pair
 from vdsm_pin.verification.robot_model import RobotModel
@@ -146,10 +147,8 @@ def _at_approaches(
     for k, near in enumerate(log.approaches):
         if (near.pair.own, near.pair.label) != names or names[1] in log.around:
             continue
-        moments = np.array([near.moment])
-        distance = float(both.distances(moments)[0])
-        log.keep_approaches(np.array([k]), np.array([distance]))
-        value, excess = max(distance, 0.0), near.lower - max(distance, 0.0)
-        if not set(names) & set(meshes):
-            excess = max(excess, value - max(near.upper, 0.0))
-        yield near.moment, distance, excess
+        found = both.distances(np.array([near.moment]))
+        log.keep_approaches(np.array([k]), found)
+        upper = inf if set(names) & set(meshes) else near.upper
+        excess = disagreement(found, np.array([near.lower]), np.array([upper]))
+        yield near.moment, float(found[0]), float(excess[0])

@@ -25,7 +25,7 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.coal_arm import arm_poses, arm_shapes
-from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
+from vdsm_pin.verification.coal_shapes import CoalShapes, Sides, disagreement
 from vdsm_pin.verification.robot_model import RobotModel
 
 CHUNK_BOUNDS: Final = 1 << 17
@@ -67,16 +67,9 @@ class CoalDistances:
 
     @property
     def disagreement(self) -> FloatArray:
-        """How far Coal lies outside the bracket, inf if unusable, shape (m,); [m].
-
-        Where bodies meet only the sign counts, on both sides.
-        """
-        value, lower, upper = (
-            np.maximum(number, 0.0)
-            for number in (self.distance, self.lower, self.upper)
-        )
-        outside = np.maximum(np.maximum(lower - value, value - upper), 0.0)
-        return np.where(np.isfinite(self.distance), outside, np.inf)
+        """How far Coal lies outside the bracket, inf if unusable, shape (m,); [m]."""
+        found = disagreement(self.distance, self.lower, self.upper)
+        return np.maximum(found, 0.0)
 
 
 @dataclass(frozen=True)

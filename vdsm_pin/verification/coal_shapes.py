@@ -46,6 +46,19 @@ class Distances(NamedTuple):
     far: FloatArray
 
 
+def disagreement(
+    distance: FloatArray, lower: FloatArray, upper: FloatArray
+) -> FloatArray:
+    """How far distances lie outside brackets, below 0 inside of them, (m,); [m].
+
+    Where bodies meet only the sign counts, on both sides. It is inf where Coal's answer
+    is unusable, NaN where there is none.
+    """
+    value, low, high = (np.maximum(one, 0.0) for one in (distance, lower, upper))
+    outside = np.maximum(low - value, value - high)
+    return np.where(np.isinf(distance), np.inf, outside)
+
+
 class _Parts(NamedTuple):
     """Parts of a body in its frame.
 
