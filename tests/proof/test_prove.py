@@ -12,7 +12,7 @@ from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.paths import Path, cubic_path, together
-from vdsm_pin.proof.prover import Proof, prove
+from vdsm_pin.proof.prover import Proof, prove, prove_intervals
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.proof.tree import Joint, Kind, Tree, free_tree, shifted
 from vdsm_pin.tolerances import TOLERANCES
@@ -45,6 +45,27 @@ def test_brackets_hold_the_nearest_of_many_samples(degree: int, seed: int) -> No
         assert proof.lower[0] <= query.nearest + 1e-9
         held(query, proof)
         held(query, prove(*args, [Pair(1, 0, query.nearest - off)]), swapped=True)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_intervals_are_judged_as_each_by_itself(seed: int) -> None:
+    """Pairs of several parts, some refuted and some certified in every interval."""
+    rng = np.random.default_rng(seed)
+    pieces = tuple(Hull(np.array([[x, 0.0, 0.0]]), 0.05) for x in (0.3, 0.6, 0.9))
+    bodies = [Body(1, pieces, "arm"), *(
+        ball(0, *rng.uniform(-1.0, 1.0, 2), 0.0, 0.1) for _ in range(3)
+    )]  # fmt: skip
+    pairs = [Pair(k, 0, 0.05) for k in (1, 2, 3)]
+    path = Path(rng.uniform(-3.0, 3.0, (7, 1)))
+    found = prove_intervals(turning_arm(), bodies, path, pairs)
+    assert found is not None
+    verdicts, upper = found
+    assert len({*verdicts.ravel().tolist()}) == 2
+    for k in range(6):
+        one = prove(turning_arm(), bodies, path.between(k, k + 1), pairs)
+        np.testing.assert_array_equal(verdicts[k], one.verdict)
+        assert (upper[k] >= one.upper - 1e-9).all()
+        assert ((upper[k] < 0.05) == (one.verdict == REFUTED)).all()
 
 
 def held(query: object, proof: Proof, swapped: bool = False) -> None:

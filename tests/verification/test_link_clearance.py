@@ -43,7 +43,7 @@ def test_each_link_is_as_near_as_is_proved(name: str, tmp_path: Path) -> None:
         "required_clearance": 0.0,
     }
     path.write_text(yaml.safe_dump(json.loads(json.dumps(data))))
-    problem, rng, none = read_problem(path).problem, np.random.default_rng(3), [0.0]
+    problem, rng, none = read_problem(path), np.random.default_rng(3), [0.0]
     told = link_clearance(problem)
     for _ in range(20):
         alpha, theta = rng.uniform(-0.5, 0.5, (2, 1, 3))
