@@ -350,10 +350,12 @@ def _proved(
     reason = "every check passed"
     if failed:
         check = failed[0]
-        reason = (
-            f"{check.name}: {check.verdict} with {check.worst:.6g} {check.unit} "
-            f"against {check.limit:.6g} {check.unit}"
+        worst, limit = (
+            in_mm(value) if check.unit == "m" else f"{value:.6g} {check.unit}"
+            for value in (check.worst, check.limit)
         )
+        where = f" ({check.where})" if check.where else ""
+        reason = f"{check.name}: {check.verdict} with {worst} against {limit}{where}"
     verdict, clearance = verification.verdict, verification.min_clearance
     return Round(_largest(margins), verdict, clearance, reason, adjustments)
 

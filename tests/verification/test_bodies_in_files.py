@@ -208,6 +208,20 @@ def test_a_feed_stands_in_every_file(tmp_path: Path, shift: float) -> None:
     assert len(told["counterexamples"]) == bool(shift)
 
 
+def test_a_plan_that_fails_at_the_feed_says_so_in_millimetres(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    beside = ball("post", [-100.0, 0.0, 30.0 + 2.0 + 50.0 - 0.1])
+    asked = problem(obstacles=[beside], feed={"length": 600.0})
+    tip = [sum(asked["manipulator"]["link_lengths"]), 0.0, 0.0]
+    asked["tip_path"] = {"start": tip, "points": [[tip[0], 10.0, 0.0]]}
+    made = Files(tmp_path, asked, STILL)
+    with pytest.raises(SystemExit):
+        main(["plan", str(made.problem), "--out", str(tmp_path / "out")])
+    told = "refuted with 1.900 mm against 2.000 mm (feed and post"
+    assert told in capsys.readouterr().err
+
+
 def test_forged_certificates_of_bodies_are_rejected(tmp_path: Path) -> None:
     above = ball("lamp", [850.0, 0.0, 200.0])
     good = Files(tmp_path, problem(camera(), obstacles=[above]), STILL)
