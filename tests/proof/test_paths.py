@@ -1,9 +1,11 @@
 """Oracle: the polynomials themselves, by their coefficients."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.proof.packed_tree import bound_column, interpolate
 from vdsm_pin.proof.paths import Path, cubic_path, quintic_path, together
 
@@ -128,3 +130,27 @@ def test_rows_within_intervals_are_those_at_their_times() -> None:
     np.testing.assert_array_equal(
         one.within(intervals[:2], shares[:2])[1], one.knots[0]
     )
+
+
+@pytest.mark.parametrize("degree", [1, 3, 5])
+def test_a_path_cut_in_parts_is_the_same_motion(degree: int) -> None:
+    rng = np.random.default_rng([degree, 7])
+    for _ in range(20):
+        path, p = made(degree, rng)
+        counts = rng.integers(1, 6, 3)
+        cut, own = path.cut(counts), cut_times(path, counts)
+        np.testing.assert_allclose(cut.own_times, own, rtol=1e-14)
+        assert np.isin(path.knots, cut.knots).all()
+        for k, (start, end) in enumerate(pairwise(own)):
+            for t in [0.0, 1.0, *rng.uniform(size=3)]:
+                expected = p(start + t * (end - start))
+                assert value(cut, k, t)[0] == pytest.approx(expected, abs=1e-9)
+
+
+def cut_times(path: Path, counts: IntArray) -> FloatArray:
+    """Those of a path with its intervals in so many parts, one after the other."""
+    found = [path.own_times[:1]]
+    for k, count in enumerate(counts.tolist()):
+        start, end = path.own_times[k : k + 2]
+        found.append(np.linspace(start, end, count + 1)[1:])
+    return np.concatenate(found)

@@ -21,6 +21,7 @@ from vdsm_pin.robots.judgement import verify_robot
 from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.clearance_check import OBSTACLES
+from vdsm_pin.verification.moving import PART, Knots, in_short_parts
 from vdsm_pin.verification.records import Verdict
 
 URDF = """<robot name="two"><link name="base"/>
@@ -196,3 +197,18 @@ def test_what_is_not_done_beside_what_moves_is_said(tmp_path: Path) -> None:
         verify_robot(cell, Motion(rows))
     with pytest.raises(InvalidInput, match="takes obstacles at rest, but 'ball' moves"):
         repair_robot(cell, Motion(rows, times=np.array([0.0, 1.0])))
+
+
+def test_parts_of_long_intervals_are_told_in_those_of_the_trajectory() -> None:
+    rng = np.random.default_rng(12)
+    for _ in range(50):
+        times = np.cumsum(rng.uniform(0.1, 1.0, int(rng.integers(2, 6))))
+        path = Motion(rng.normal(size=(len(times), 2)), times=times)
+        more = rng.uniform(times[0], times[-1], int(rng.integers(0, 5)))
+        union = np.unique(np.concatenate([times, more]))
+        whole = Motion(path.at(union), times=union)
+        cut, knots = in_short_parts(whole, Knots.of(path, union))
+        assert np.abs(np.diff(cut.knots, axis=0)).max() <= PART + 1e-12
+        inner, share = rng.integers(0, cut.n_intervals, 20), rng.uniform(size=20)
+        told = path.within(knots.interval(inner), knots.share(inner, share))
+        np.testing.assert_allclose(told, cut.within(inner, share), atol=1e-12)

@@ -406,8 +406,9 @@ def test_a_problem_file_names_a_robot(
     scene, out = write(tmp_path, "s.yaml", SCENE), tmp_path / "out"
     problem = write(tmp_path, "cell.yaml", CELL + SCENE)
     pairs = []
-    for asked in (("verify", "--urdf", urdf, "--scene", scene), ("verify", problem)):
-        assert run(*asked, "--trajectory", rows, "--out", out) == 0
+    of_files = ("--urdf", urdf, "--scene", scene, "--required-clearance-mm", "149")
+    for asked in (of_files, (problem,)):
+        assert run("verify", *asked, "--trajectory", rows, "--out", out) == 0
         pairs.append(json.loads((out / "verification.json").read_text())["closest"])
     assert pairs[0] == pairs[1]
     for required, status in ((151, 1), (149, 0)):

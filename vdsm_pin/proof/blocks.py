@@ -10,8 +10,8 @@ from vdsm_pin.proof.layouts import OWN_POINT, ROW, UP, WIDTH
 from vdsm_pin.proof.packed_tree import Motion
 from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
 from vdsm_pin.proof.results import Results, note_block, note_upper
-from vdsm_pin.proof.rows import BLOCK, fill_rows
-from vdsm_pin.proof.terms import CERTIFIED, Task, mover_of
+from vdsm_pin.proof.rows import BLOCK, fill_rows, seen
+from vdsm_pin.proof.terms import CERTIFIED, Task
 from vdsm_pin.proof.workspace import Workspace
 
 
@@ -25,7 +25,7 @@ def _serves(
     blocks of most pairs end here.
     """
     plane, runs = work.planes[pair], work.runs
-    mover = mover_of(task, int(plane[ROW]))
+    mover = seen(task, work.rows, int(plane[ROW]))
     rules, count, group = task.rules, stretch.size, task.pairs.group[pair]
     bound_below(mover, work.rows.tracks, runs, plane, 0, count)
     bound_above(mover, work.rows.tracks, runs, plane, 0, count)

@@ -12,7 +12,7 @@ from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.proof.error_growth import crude_growth
-from vdsm_pin.proof.rows import Rows
+from vdsm_pin.proof.rows import Rows, seen
 from vdsm_pin.proof.terms import Task
 
 
@@ -40,9 +40,8 @@ def body_box(
     apart()
     low[:], high[:] = np.inf, -np.inf
     bodies, places, tracks = task.bodies, task.places, rows.tracks
-    body, slot = task.pairs.body[pair], task.pairs.slot[pair]
-    for corner in range(bodies.first[body + 1] - bodies.first[body]):
-        place = task.pairs.slots[slot + corner]
+    body = task.pairs.body[pair]
+    for place in seen(task, rows, pair).slots:
         grown, sag = bodies.discs[body, RADIUS], tracks.sags[place]
         drift = 0.0
         for r in range(count):

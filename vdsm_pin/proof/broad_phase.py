@@ -18,14 +18,13 @@ from vdsm_pin.proof.boxes import body_box, box_gaps, box_reaches
 from vdsm_pin.proof.cached_planes import place_disc
 from vdsm_pin.proof.pair_sweep import Stretch
 from vdsm_pin.proof.results import Dense, Results
-from vdsm_pin.proof.rows import Rows
+from vdsm_pin.proof.rows import Rows, seen
 from vdsm_pin.proof.terms import (
     CERTIFIED,
     OBSTACLES,
     WORLD,
     Task,
     finer,
-    mover_of,
 )
 from vdsm_pin.proof.workspace import Workspace, load_rows
 
@@ -147,7 +146,7 @@ def _nearest_upper(task: Task, work: Workspace, broad: BroadPhase, body: int) ->
     if pair < 0:
         return np.inf
     pair = finer(task.pairs, pair, pair)
-    mover = mover_of(task, pair)
+    mover = seen(task, work.rows, pair)
     place_disc(mover, work.rows, work.runs, 1)
     load_rows(task, mover, work, 0, 0)
     space.out[NORMAL : NORMAL + 3] = 1.0
@@ -205,11 +204,11 @@ def _dense_far(
     """Dense rows of the far pairs; witnesses are the obstacle's point and a corner."""
     apart()
     n_bodies, n_obstacles = broad.far.shape
-    bodies, pairs = task.bodies, task.pairs
+    bodies = task.bodies
     for body in range(n_bodies):
         if broad.some[body] < 0:
             continue
-        place = pairs.slots[pairs.slot[broad.some[body]]]
+        place = seen(task, rows, broad.some[body]).slots[0]
         at, radius = rows.tracks.places[place], bodies.radius[body]
         for o in range(n_obstacles):
             if not broad.far[body, o]:

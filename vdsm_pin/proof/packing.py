@@ -179,6 +179,7 @@ class _PlaceTable:
             way=np.concatenate([ways_of, *self._seen_on]),
             at=np.concatenate(self._at)[points],
             lever=np.concatenate(self._lever)[points],
+            every=np.arange(len(points)),
         )
 
 

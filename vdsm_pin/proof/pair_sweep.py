@@ -42,6 +42,7 @@ from vdsm_pin.proof.layouts import (
 )
 from vdsm_pin.proof.packed_tree import Motion
 from vdsm_pin.proof.results import Results, note_upper
+from vdsm_pin.proof.rows import seen
 from vdsm_pin.proof.search import bound_between, new_witness, resolve
 from vdsm_pin.proof.slices import leaf_bracket, loaded_bound
 from vdsm_pin.proof.swept_bodies import to_body
@@ -105,7 +106,7 @@ def _renew(
     apart()
     pieces, space, plane = task.pieces, work.space, work.planes[pair]
     root, proved = pieces.root[task.pairs.obstacle[row]], -np.inf
-    mover, plane[ROW] = mover_of(task, row), row
+    mover, plane[ROW] = seen(task, work.rows, row), row
     p, last = pieces.node_range[root]
     load_rows(task, mover, work, local, local + 1)
     space.out[NORMAL:NEAR] = plane[:3]
@@ -129,7 +130,7 @@ def _renew_witness(
     task: Task, row: int, work: Workspace, local: int, plane: FloatArray
 ) -> None:
     """Witnesses on a body that is no segment and on its partner, both at one row."""
-    mover, space, rows = mover_of(task, row), work.space, work.rows
+    mover, space, rows = seen(task, work.rows, row), work.space, work.rows
     load_rows(task, mover, work, local, local)
     space.out[NORMAL:NEAR] = plane[:3]
     loaded_bound(task, space, row, True, np.inf)
@@ -148,7 +149,7 @@ def _look_at_row(
 ) -> None:
     """Lower the limit to what can be proved at a row at all, within the error box."""
     apart()
-    load_rows(task, mover_of(task, pair), work, local, local)
+    load_rows(task, seen(task, work.rows, pair), work, local, local)
     space = work.space
     space.out[NORMAL:NEAR] = work.planes[pair, :3]
     loaded_bound(task, space, pair, False, np.inf)
@@ -277,7 +278,7 @@ def sweep_pair(
     slack = np.inf if yes_or_no else rules.slack
     local, tried, fresh, proved = 0, count, False, -np.inf
     row = int(plane[ROW])
-    mover = mover_of(task, row)
+    mover = seen(task, rows, row)
     place_disc(mover, rows, runs, count)
     place_own(mover, rows, runs, plane, count)
     while clock() <= rules.until:
@@ -293,7 +294,7 @@ def sweep_pair(
             if row != pair and most >= required:
                 # What few corners do not settle more of them may.
                 row = finer(task.pairs, pair, row)
-                mover = mover_of(task, row)
+                mover = seen(task, rows, row)
                 proved = _renew(task, row, work, local, pair, goal, bar)
                 continue
             # This interval allows no more, and may be proved nevertheless.
@@ -315,7 +316,7 @@ def sweep_pair(
             tried *= 2
             continue
         row = finer(task.pairs, pair, pair)
-        mover = mover_of(task, row)
+        mover = seen(task, rows, row)
         proved = _renew(task, row, work, local, pair, goal, bar)
         results.tally[RENEWED] += 1
         if not (rules.nominal or yes_or_no):

@@ -152,6 +152,21 @@ class Path:
         piece = part(self.pieces(np.array([k])), share[:1], share[1:])[0]
         return Path(piece[[0, -1]], piece[None, 1:-1], times)
 
+    def cut(self, counts: IntArray) -> "Path":
+        """The same motion with each interval in equal parts; new knots are rounded.
+
+        Args:
+            counts: Of the parts of each, shape (n_rows - 1,).
+        """
+        k = np.repeat(np.arange(len(counts)), counts)
+        place = np.arange(len(k)) - (np.cumsum(counts) - counts)[k]
+        low, high = place / counts[k], (place + 1) / counts[k]
+        controls = part(self.pieces(k), low, high)
+        knots = np.concatenate([controls[:, 0], self.knots[-1:]])
+        knots[:-1][place == 0] = self.knots[:-1]
+        moments = np.append(k + low, float(len(counts)))
+        return Path(knots, controls[:, 1:-1], self.times_at(moments))
+
     def packed(self) -> Motion:
         """The same for compiled code."""
         return Motion(self.knots, self.inner)

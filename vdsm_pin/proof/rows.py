@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from vdsm_pin.compiled import apart, compiled
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.proof.packed_tree import (
     PRISMATIC,
     REVOLUTE,
@@ -18,11 +18,15 @@ from vdsm_pin.proof.packed_tree import (
     PackedTree,
     bound_column,
 )
-from vdsm_pin.proof.terms import WORLD, Places, Task
+from vdsm_pin.proof.terms import WORLD, Mover, Places, Task, mover_of
 from vdsm_pin.proof.ways import WayErrors, Ways
 
 BLOCK: Final = 64
 """Intervals whose configurations are computed at once: they fit the cache."""
+
+
+FEW_PLACES: Final = 1024
+"""Of so many it is not asked which are wanted."""
 
 
 class Tracks(NamedTuple):
@@ -32,11 +36,14 @@ class Tracks(NamedTuple):
         places: In their frames at rest, shape (n_places, 3, BLOCK + 1); [m].
         sags: M/8, how far places may leave their chords, (n_places, BLOCK); [m].
         drifts: D of places, only where errors turn, the same shape; [m].
+        known: Number of the block over which each place is known, shape (n_places,);
+            the others hold anything.
     """
 
     places: FloatArray
     sags: FloatArray
     drifts: FloatArray
+    known: IntArray
 
 
 class Rows(NamedTuple):
@@ -51,6 +58,8 @@ class Rows(NamedTuple):
         joints: Bounds of each joint's value, its rate and how fast that changes, shape
             (n_joints, 3, BLOCK).
         work: Working space, shape (8, BLOCK + 1).
+        block: Number of the block, from 1, its intervals, 1 where pieces are not
+            straight, and 1 where all places are known, shape (4,).
     """
 
     frames: FloatArray
@@ -59,6 +68,17 @@ class Rows(NamedTuple):
     ways: FloatArray
     joints: FloatArray
     work: FloatArray
+    block: IntArray
+
+
+def new_tracks(n_places: int, block: int) -> Tracks:
+    """Of places of which none is known: memory is taken where one is written to."""
+    return Tracks(
+        np.zeros((n_places, 3, block + 1)),
+        np.zeros((n_places, block)),
+        np.zeros((n_places, block)),
+        np.zeros(n_places, np.int64),
+    )
 
 
 BEND: Final = 0
@@ -69,7 +89,7 @@ SWING: Final = 3
 
 
 @compiled
-def new_rows(n_frames: int, n_ways: int, n_places: int, block: int) -> Rows:
+def new_rows(n_frames: int, n_ways: int, tracks: Tracks, block: int) -> Rows:
     """Fresh working space of so many intervals; the world's frame is set."""
     frames = np.zeros((n_frames, 3, 3, block + 1))
     for c in range(3):
@@ -77,14 +97,11 @@ def new_rows(n_frames: int, n_ways: int, n_places: int, block: int) -> Rows:
     return Rows(
         frames,
         np.zeros((n_frames, 3, block + 1)),
-        Tracks(
-            np.zeros((n_places, 3, block + 1)),
-            np.zeros((n_places, block)),
-            np.zeros((n_places, block)),
-        ),
+        tracks,
         np.zeros((n_ways, 4, block)),
         np.zeros((n_frames - 1, 3, block)),
         np.zeros((8, block + 1)),
+        np.zeros(4, np.int64),
     )
 
 
@@ -339,12 +356,12 @@ def _drift_way(
 
 @compiled
 def _bend_places(
-    places: Places, errors: WayErrors, rows: Rows, count: int, straight: bool
+    places: Places, errors: WayErrors, rows: Rows, wanted: IntArray, count: int
 ) -> None:
-    """How far places leave their chords, and D where errors turn."""
+    """How far some places leave their chords, and D where errors turn."""
     apart()
-    turning = errors.any_turn
-    for place in range(places.way.size):
+    turning, straight = errors.any_turn, rows.block[2] == 0
+    for place in wanted:
         way, lever = places.way[place], places.lever[place]
         own, sag = rows.ways[way], rows.tracks.sags[place, :count]
         bend, turn = own[BEND, :count], own[TURN, :count]
@@ -360,10 +377,12 @@ def _bend_places(
 
 
 @compiled
-def _set_places(places: Places, ways: Ways, rows: Rows, n: int) -> None:
-    """Places in the frames from which they are seen."""
+def _set_places(
+    places: Places, ways: Ways, rows: Rows, wanted: IntArray, n: int
+) -> None:
+    """Some places in the frames from which they are seen, those in the world first."""
     apart()
-    for place in range(places.way.size):
+    for place in wanted:
         way, out = places.way[place], rows.tracks.places[place]
         if place < places.n_points:
             frame = ways.frame[way]
@@ -378,21 +397,61 @@ def _set_places(places: Places, ways: Ways, rows: Rows, n: int) -> None:
 
 
 @compiled
-def fill_rows(task: Task, motion: Motion, rows: Rows, first: int, count: int) -> None:
-    """Configurations of rows first .. first + count; the last row may repeat."""
+def _see_places(
+    places: Places, ways: Ways, errors: WayErrors, rows: Rows, wanted: IntArray
+) -> None:
+    """Find where some places go over the block."""
+    count = rows.block[1]
+    _set_places(places, ways, rows, wanted, count + 1)
+    _bend_places(places, errors, rows, wanted, count)
+
+
+@compiled
+def _see_corners(task: Task, rows: Rows, corners: IntArray) -> None:
+    """The same of a body's corners, and what they stem from, unless it is known."""
     apart()
-    tree, ways, places, errors = task.tree, task.ways, task.places, task.errors
+    places, known, size = task.places, rows.tracks.known, 0
+    missing = np.zeros(2 * corners.size, np.int64)
+    for in_world in (True, False):
+        for corner in corners:
+            place = places.point[corner] if in_world else corner
+            if known[place] != rows.block[0]:
+                known[place], missing[size] = rows.block[0], place
+                size += 1
+    _see_places(places, task.ways, task.errors, rows, missing[:size])
+
+
+@compiled
+def seen(task: Task, rows: Rows, pair: int) -> Mover:
+    """The moving side of a pair or rough version, its corners known over the block."""
+    mover = mover_of(task, pair)
+    if rows.block[3] == 0:
+        _see_corners(task, rows, mover.slots)
+    return mover
+
+
+@compiled
+def fill_rows(task: Task, motion: Motion, rows: Rows, first: int, count: int) -> None:
+    """Configurations of rows first .. first + count; the last row may repeat.
+
+    Where there are many places none is known yet: `seen` finds those it is asked for.
+    """
+    apart()
+    tree, ways, errors = task.tree, task.ways, task.errors
     straight = motion.inner.shape[1] == 0
+    rows.block[0] += 1
+    rows.block[1], rows.block[2], rows.block[3] = count, 0 if straight else 1, 0
     for joint in range(tree.parent.size):
         _move_frame(tree, motion, rows, first, count + 1, joint)
-    _set_places(places, ways, rows, count + 1)
     _bound_joints(tree, motion, rows, first, count)
     for way in range(ways.before.size):
         if ways.before[way] >= 0:
             _bend_way(tree, ways, rows, way, count, straight)
             if errors.any_turn:
                 _drift_way(tree, ways, errors.erring, rows, way, count)
-    _bend_places(places, errors, rows, count, straight)
+    if task.places.way.size <= FEW_PLACES:
+        _see_places(task.places, ways, errors, rows, task.places.every)
+        rows.block[3] = 1
 
 
 @compiled

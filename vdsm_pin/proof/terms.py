@@ -66,6 +66,7 @@ class Places(NamedTuple):
         way: The way to the point's frame, shape (n_places,).
         at: In that frame, shape (n_places, 3); [m].
         lever: Distance from the frame's origin, a disc included, (n_places,); [m].
+        every: Their numbers, shape (n_places,).
     """
 
     n_points: int
@@ -73,6 +74,7 @@ class Places(NamedTuple):
     way: IntArray
     at: FloatArray
     lever: FloatArray
+    every: IntArray
 
 
 class Pairs(NamedTuple):

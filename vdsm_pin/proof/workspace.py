@@ -10,7 +10,7 @@ from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.proof.cached_planes import Runs, new_runs
 from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE, ROW, SLICE, SUPPORT
 from vdsm_pin.proof.packed_tree import REVOLUTE, Pose
-from vdsm_pin.proof.rows import BLOCK, DRIFT, TURN, Rows, new_rows
+from vdsm_pin.proof.rows import BLOCK, DRIFT, TURN, Rows, new_rows, new_tracks
 from vdsm_pin.proof.slices import Space, new_space
 from vdsm_pin.proof.swept_bodies import Ends, load_errors, new_ends
 from vdsm_pin.proof.terms import Mover, Task
@@ -62,9 +62,10 @@ def new_workspace(
     many = np.diff(task.pieces.first_piece).max(initial=0) > 1
     held = HELD_AT + 3 * corners if many else HELD_AT
     planes = np.zeros((len(task.pairs.rough), held))
+    tracks = new_tracks(task.places.way.size, block)
     forget(planes)
     return Workspace(
-        new_rows(n_joints + 1, n_ways, task.places.way.size, block),
+        new_rows(n_joints + 1, n_ways, tracks, block),
         new_runs(corners, block),
         planes,
         new_ends(n_joints + 1, n_ways, n_columns),

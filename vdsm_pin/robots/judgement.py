@@ -44,7 +44,7 @@ from vdsm_pin.verification.coal_shapes import disagreement
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import LINKS as INSIDE
 from vdsm_pin.verification.inside import check_inside
-from vdsm_pin.verification.moving import Knots, path_beside
+from vdsm_pin.verification.moving import Knots, in_short_parts, path_beside
 from vdsm_pin.verification.records import (
     Check,
     Counterexample,
@@ -95,7 +95,7 @@ def verify_robot(
     robot = cell.robot
     columns, budget = np.arange(len(cell.bodies)), Budget(until=deadline.end)
     box = proof_box(robot, cell.scene, cell.errors)
-    whole, knots = path_beside(path, cell.scene)
+    whole, knots = in_short_parts(*path_beside(path, cell.scene))
     proof = prove(cell.tree, cell.bodies, whole, cell.pairs, box, budget, columns)
     located = locate_links(cell, whole, box, budget)
     named = named_pairs(cell)

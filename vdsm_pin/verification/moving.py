@@ -6,6 +6,7 @@ are told in the trajectory's own intervals.
 """
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -18,6 +19,12 @@ from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, TIME
 from vdsm_pin.proof.paths import Path, together
 from vdsm_pin.proof.terms import WORLD
 from vdsm_pin.proof.tree import Tree
+
+PART: Final = 0.4
+"""How far a column goes in a part of a long interval, about; [rad], [m]."""
+
+MOST_PARTS: Final = 64
+"""Of an interval."""
 
 
 def tree_beside(tree: Tree, scene: Scene) -> Tree:
@@ -85,6 +92,13 @@ class Knots:
         first = np.searchsorted(times, path.times)
         return cls(np.interp(times, path.times, rows), first)
 
+    def cut(self, counts: IntArray) -> "Knots":
+        """Those of a path each of whose intervals is cut in so many equal parts."""
+        after = np.concatenate([[0], np.cumsum(counts)])
+        places = np.interp(np.arange(after[-1] + 1.0), after, np.arange(len(after)))
+        moment = np.interp(places, np.arange(len(after)), self.moment)
+        return Knots(moment, after[self.first])
+
     @property
     def are_rows(self) -> bool:
         """Whether there are none but the rows."""
@@ -135,6 +149,17 @@ def path_beside(path: Path, scene: Scene) -> tuple[Path, Knots]:
     ends = float(path.own_times[0]), float(path.own_times[-1])
     whole = together(path, *(one.path for one in scene.carriers), within=ends)
     return whole, Knots.of(path, whole.times)
+
+
+def in_short_parts(path: Path, knots: Knots) -> tuple[Path, Knots]:
+    """The same motion, its long intervals cut: of short ones less is to be proved."""
+    if path.n_samples == 1:
+        return path, knots
+    way = np.abs(np.diff(path.controls, axis=1)).sum(axis=1).max(axis=1)
+    counts = np.clip(np.ceil(way / PART), 1, MOST_PARTS).astype(np.int64)
+    if (counts == 1).all():
+        return path, knots
+    return path.cut(counts), knots.cut(counts)
 
 
 def whole_path(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Path, Knots]:
