@@ -83,7 +83,7 @@ SEED: Final = 0
 THOROUGH: Final[tuple[Level, ...]] = (
     Search(rounds=20, back=0.0, grow=1, ease=0.79, around=4),
     Search(rounds=40, back=0.0, grow=2, around=4),
-    Search(rounds=40, back=1.0, grow=2),
+    Search(rounds=20, back=1.0, grow=2),
     Insert(population=10, routes=1, returns=2, seed=0, cells=60_000),
     Insert(population=10, routes=2, returns=3, seed=0, cells=60_000, directed=True),
     Insert(population=30, routes=2, returns=4, seed=1),
