@@ -81,11 +81,10 @@ def _missing(found: CoalDistances, k: int, n_links: int) -> Missing:
     towards = found.link_point[k] - found.other_point[k]
     # Inside each other the witness points lie the other way round.
     towards = towards if found.distance[k] >= 0.0 else -towards
-    length = float(np.linalg.norm(towards))
     return Missing(
         waypoint=int(found.waypoint[k]),
         link=min(int(found.link[k]) + 1, n_links),
         obstacle=int(found.other[k]),
         distance=float(found.distance[k]),
-        normal=towards / length if length > 0.0 else np.zeros(3),
+        normal=towards / (np.linalg.norm(towards) or 1.0),
     )
