@@ -125,6 +125,8 @@ class _Places(ast.NodeVisitor):
         """Note a node and go on below it, where it is no annotation and no text."""
         if isinstance(node, ast.JoinedStr | ast.Import | ast.ImportFrom):
             return
+        if isinstance(node, ast.keyword) and node.arg == "strict":
+            return  # of zip: what is alike is known to be
         self.found.append((node, ".".join(self._within)))
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             self._within.append(node.name)

@@ -132,6 +132,19 @@ def test_coal_measures_every_approach_of_all_that_the_arm_has(tmp_path: Path) ->
     assert {("", "rack"), ("feed", "rack"), ("", "own")} <= seen
 
 
+def test_a_body_beside_a_joint_is_held_off_the_link_before_it(tmp_path: Path) -> None:
+    """Links that meet at a joint are no pair; what one carries there is."""
+    clip = CAMERA | {"center": [0.03, 0.1, 0.0], "size": [0.02, 0.02, 0.02]}
+    rows = motion_in(tmp_path, sliding())
+    problem = problem_in(tmp_path, {"bodies": [clip]}, [])
+    path = certified(problem, rows)
+    outcome = check_certificate(path, problem, rows)
+    assert outcome.accepted, outcome.reason
+    pairs = certificate_lines(path)[0]["pairs"]
+    assert ["camera", "link 2"] in pairs
+    assert ["link 3", "link 2"] not in pairs
+
+
 def test_forged_certificates_are_rejected(tmp_path: Path) -> None:
     rows = motion_in(tmp_path, sliding())
     feed = {"length": 0.3, "radius": 0.04}
