@@ -410,6 +410,8 @@ TEXT_DAMAGE = [
     ("a.dae", dae(HERE).replace("0 0 2 0", "0 0 9 0"), "names vertices that are not"),
     ("a.dae", dae(HERE).replace("0 0 2 0", f"0 0 {10**30} 0"), "where numbers are me"),
     ("a.dae", dae(HERE).replace('count="4" st', 'count="5" st'), "or is cut short"),
+    ("a.dae", dae(HERE).replace('count="4" st', 'count="-1" st'), "or is cut short"),
+    ("a.dae", dae(HERE).replace('4" st', '1" offset="-3" st'), "or is cut short"),
     ("a.dae", dae(HERE).replace("0 0 1</f", "0 0 inf</f"), "vertex 4: has a coordin"),
     ("a.dae", dae("<node><skew>1</skew></node>"), "places a part by <skew>"),
     ("a.dae", dae("<node><instance_controller/></node>"), "is bent by a skin"),

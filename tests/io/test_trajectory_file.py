@@ -324,7 +324,11 @@ def test_columns_stand_in_any_order(tmp_path: Path) -> None:
     assert same(found, read_trajectory(tmp_path / "plain.csv", short_arm()))
 
 
-def test_a_table_has_decimal_points_or_decimal_commas(tmp_path: Path) -> None:
+@pytest.mark.parametrize("chunk", [1, 5_000])
+def test_a_table_has_decimal_points_or_decimal_commas(
+    chunk: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tables, "CHUNK_ROWS", chunk)
     rows = [line.replace(",", ";") for line in csv()]
     for first, second, third in (("0.5", "0,5", "2"), ("0,5", "0.5", "2")):
         rows[2] = f"1;1;0;{first};0;0;0;0"

@@ -132,6 +132,12 @@ def test_coal_measures_every_approach_of_all_that_the_arm_has(tmp_path: Path) ->
     assert {("", "rack"), ("feed", "rack"), ("", "own")} <= seen
 
 
+def test_a_tool_prolongs_the_last_link_alone(tmp_path: Path) -> None:
+    problem = problem_in(tmp_path, {"tool": {"length": 0.1, "radius": 0.01}}, [])
+    lengths = read_problem(problem).problem.manipulator.link_lengths
+    np.testing.assert_allclose(lengths, [0.5, 0.4, 0.5], rtol=1e-15)
+
+
 def test_a_body_beside_a_joint_is_held_off_the_link_before_it(tmp_path: Path) -> None:
     """Links that meet at a joint are no pair; what one carries there is."""
     clip = CAMERA | {"center": [0.03, 0.1, 0.0], "size": [0.02, 0.02, 0.02]}

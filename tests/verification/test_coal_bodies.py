@@ -267,3 +267,13 @@ def test_an_answer_of_coal_is_used_where_all_it_says_agrees(
 ) -> None:
     far = NEAR + np.array([0.0, away, 0.0])
     assert coal_side._usable(distance, stored, NEAR, far) is usable
+
+
+@pytest.mark.parametrize("n", [3, 4, 5, 12, 40])
+def test_the_faces_of_a_swept_polygon_enclose_it(n: int) -> None:
+    """Coal's own volume of the faces it is told: area times length."""
+    turn = np.arange(n) * 2.0 * np.pi / n
+    ends = [np.column_stack([np.cos(turn), np.sin(turn), 0 * turn + z]) for z in (1, 3)]
+    swept = coal_side._swept(coal, np.vstack(ends))
+    area = n / 2.0 * np.sin(2.0 * np.pi / n)
+    assert swept.computeVolume() == pytest.approx(2.0 * area, rel=1e-12)

@@ -223,7 +223,7 @@ def _swept(coal: Any, corners: FloatArray) -> Any:
     zigzag = [i // 2 if i % 2 == 0 else k - 1 - i // 2 for i in range(k)]
     faces: list[tuple[int, int, int]] = []
     for i, (a, b, c) in enumerate(zip(zigzag, zigzag[1:], zigzag[2:], strict=False)):
-        low = (a, b, c) if i % 2 else (a, c, b)
+        low = (a, c, b) if i % 2 else (a, b, c)
         faces += [low, (k + low[0], k + low[2], k + low[1])]
     for i in range(k):
         j = (i + 1) % k
