@@ -134,7 +134,7 @@ def test_coal_measures_every_approach_of_all_that_the_arm_has(tmp_path: Path) ->
 
 def test_a_tool_prolongs_the_last_link_alone(tmp_path: Path) -> None:
     problem = problem_in(tmp_path, {"tool": {"length": 0.1, "radius": 0.01}}, [])
-    lengths = read_problem(problem).problem.manipulator.link_lengths
+    lengths = read_problem(problem).manipulator.link_lengths
     np.testing.assert_allclose(lengths, [0.5, 0.4, 0.5], rtol=1e-15)
 
 
