@@ -46,13 +46,18 @@ def named_pairs(cell: Cell) -> tuple[Pair, ...]:
 
 
 def least_clearances(
-    cell: Cell, pairs: Sequence[BodyPair], path: Path, proof: Proof
+    cell: Cell,
+    pairs: Sequence[BodyPair],
+    path: Path,
+    proof: Proof,
+    enough: float = np.inf,
 ) -> LeastClearances:
     """What a proof says of some pairs, the witness on the link first.
 
-    Where a ball is proved to lie in both bodies they are refuted, and so deep.
+    Where a ball is proved to lie in both bodies they are refuted, and so deep. No ball
+    deeper than `enough` is looked for; [m].
     """
-    return _met(cell, pairs, path, _least(cell, pairs, proof))
+    return _met(cell, pairs, path, _least(cell, pairs, proof), enough)
 
 
 def _least(cell: Cell, pairs: Sequence[BodyPair], proof: Proof) -> LeastClearances:
@@ -71,7 +76,11 @@ def _least(cell: Cell, pairs: Sequence[BodyPair], proof: Proof) -> LeastClearanc
 
 
 def _met(
-    cell: Cell, pairs: Sequence[BodyPair], path: Path, least: LeastClearances
+    cell: Cell,
+    pairs: Sequence[BodyPair],
+    path: Path,
+    least: LeastClearances,
+    enough: float,
 ) -> LeastClearances:
     """The same, with the balls in both bodies that are found."""
     near = (least.verdict != CERTIFIED) & (least.upper <= MEETING)
@@ -84,7 +93,7 @@ def _met(
         poses = cell.poses(path.within(intervals, shares))
         for at, pose in enumerate(poses):
             bodies = cell.pieces(pairs[k], pose)
-            radius, centre = common_ball(*bodies, middle)
+            radius, centre = common_ball(*bodies, middle, enough)
             if radius > 0.0:
                 found = intervals[at], shares[at], -radius, REFUTED, centre, centre
                 names = "interval", "time", "upper", "verdict", *POINTS

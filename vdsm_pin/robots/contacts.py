@@ -46,7 +46,10 @@ Slack: TypeAlias = Callable[[FloatArray], tuple[float, FloatArray]]
 
 
 def common_ball(
-    one: Sequence[Piece], other: Sequence[Piece], point: FloatArray
+    one: Sequence[Piece],
+    other: Sequence[Piece],
+    point: FloatArray,
+    enough: float = np.inf,
 ) -> tuple[float, FloatArray]:
     """A ball proved to lie in a piece of each body.
 
@@ -54,6 +57,7 @@ def common_ball(
         one: Pieces in the world's frame.
         other: Of the other body.
         point: Where it is looked for first, shape (3,); [m].
+        enough: Depth beyond which none deeper is looked for; [m].
 
     Returns:
         Radius, 0 if none is found, and centre; [m]. Where one of the pieces has no
@@ -73,7 +77,7 @@ def common_ball(
         if not thick:
             continue
         if len(thick) == 2:
-            depth, centre = _climb((thick[0][1], thick[1][1]), point)
+            depth, centre = _climb((thick[0][1], thick[1][1]), point, enough)
         else:
             (flat,) = (piece for piece, slack in both if slack is None)
             assert isinstance(flat, Hull)  # all others have an inside
@@ -139,7 +143,9 @@ def _deepest_of(points: FloatArray, slack: Slack) -> tuple[float, FloatArray]:
     return best, where
 
 
-def _climb(slacks: tuple[Slack, Slack], start: FloatArray) -> tuple[float, FloatArray]:
+def _climb(
+    slacks: tuple[Slack, Slack], start: FloatArray, enough: float
+) -> tuple[float, FloatArray]:
     """The deepest point that steps along slopes find, and how deep it seems to lie.
 
     The lesser of two concave depths is concave: shortening steps up its slope lead near
@@ -156,6 +162,8 @@ def _climb(slacks: tuple[Slack, Slack], start: FloatArray) -> tuple[float, Float
             depth, way = min(found, key=lambda one: one[0])
             if depth > best:
                 best, where = depth, at
+                if best > enough:
+                    return best, where
             elif along_ridge:
                 at, found = where, [slack(where) for slack in slacks]
             both = found[0][1] + found[1][1]

@@ -23,6 +23,12 @@ from vdsm_pin.verification.first_contact import (
 from vdsm_pin.verification.moving import path_beside
 from vdsm_pin.verification.records import LeastClearances, Pair
 
+ENOUGH: Final = 1e-6
+"""How deep a ball in both bodies need lie to tell that they meet; [m]."""
+
+SHALLOW: Final = 1e-7
+"""Of a contact no deeper than this nothing more is told; [m]."""
+
 MOST_MEETINGS: Final = 32
 """Intervals in which a ball in both bodies is looked for; of more none are counted."""
 
@@ -59,10 +65,10 @@ def robot_contacts(
         deadline.check()
         whole, _ = path_beside(path.between(low, high), cell.scene)
         proof = prove(cell.tree, cell.bodies, whole, few, box, budget)
-        return least_clearances(cell, few, whole, proof)
+        return least_clearances(cell, few, whole, proof, ENOUGH)
 
     noted = _noted(cell, path, left, box, judge, budget)
-    return first_contacts(named, least.of(left), path, judge, noted)
+    return first_contacts(cell, named, least.of(left), path, judge, noted, SHALLOW)
 
 
 def _noted(

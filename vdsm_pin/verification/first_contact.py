@@ -18,7 +18,7 @@ from vdsm_pin.verification.clearance import (
     least_clearances,
     prove_clearance,
 )
-from vdsm_pin.verification.records import ClearanceChunk, Motion, Pair
+from vdsm_pin.verification.records import ClearanceChunk, Motion, Pair, Problem
 from vdsm_pin.verification.task import pack_scene
 
 STRETCH: Final = 64
@@ -26,6 +26,9 @@ STRETCH: Final = 64
 
 LEAST_SHARE: Final = 2.0**-24
 """The interval of a contact is halved down to this; [-]."""
+
+FINE_SHARE: Final = 2.0**-14
+"""The least one at which a contact may be shallow enough to end there; [-]."""
 
 DIGITS: Final = 6
 """Decimals of a moment, in waypoints; coarser than what halving tells."""
@@ -113,21 +116,25 @@ class TooClose:
 
 
 def first_contacts(
+    problem: Problem,
     pairs: Sequence[Pair],
     whole: Judged,
     motion: Motion,
     judge: Judge,
     noted: Noted | None = None,
+    shallow: float = 0.0,
 ) -> tuple[FirstContact, ...]:
     """Where the clearance is first lost, from obstacles and between links.
 
     Args:
+        problem: What is asked, with what pairs have to keep.
         pairs: Every pair.
         whole: What is proved of the whole motion; what it does not refute has no
             contact.
         motion: The motion.
         judge: Proves the same of its stretches.
         noted: The intervals that are too close, where the whole motion was noted.
+        shallow: A contact no deeper than this is not told more finely; [m].
 
     Returns:
         One at most of either kind.
@@ -137,10 +144,13 @@ def first_contacts(
     """
     of_obstacles = np.array([bool(pair.obstacle) for pair in pairs], dtype=bool)
     contacts = []
-    for mine, kind in ((of_obstacles, True), (~of_obstacles, False)):
+    for mine, kind, enough in (
+        (of_obstacles, True, problem.required_clearance - shallow),
+        (~of_obstacles, False, problem.required_self_clearance - shallow),
+    ):
         if not (whole.verdict[mine] == REFUTED).any():
             continue
-        search = _Search(pairs, motion, judge, mine)
+        search = _Search(pairs, motion, judge, mine, enough)
         found = search.first()
         if found is not None and noted is not None:
             found = search.with_end(found, noted[kind])
@@ -170,18 +180,23 @@ def arm_contacts(
         return least_clearances(found)
 
     whole = least_clearances(proof)
-    return first_contacts(proof.pairs, whole, trajectory, judge, noted)
+    return first_contacts(problem, proof.pairs, whole, trajectory, judge, noted)
 
 
 class _Search:
     """Proofs of stretches of one motion, of the pairs of one kind."""
 
     def __init__(
-        self, pairs: Sequence[Pair], motion: Motion, judge: Judge, mine: BoolArray
+        self,
+        pairs: Sequence[Pair],
+        motion: Motion,
+        judge: Judge,
+        mine: BoolArray,
+        enough: float,
     ) -> None:
         self.pairs, self.motion = pairs, motion
-        self.judge, self.mine = judge, mine
-        self.clear = True
+        self.judge, self.mine, self.enough = judge, mine, enough
+        self.clear, self.least = True, -np.inf
 
     def first(self) -> FirstContact | None:
         """The first pair that is refuted, and when; None if none is."""
@@ -201,10 +216,8 @@ class _Search:
         if at_once := self._refuted(0, 0) if first == 0 else None:
             return FirstContact(at_once, 0.0, self.clear)
         low, high = float(first), float(last)
-        while high - low > LEAST_SHARE:
+        while self._can_halve(low, high):
             now = (low + high) / 2.0
-            if not self._can_halve(low, now, high):
-                break
             if sooner := self._refuted(low, now):
                 pair, high = sooner, now
             else:
@@ -219,10 +232,9 @@ class _Search:
         end = float(intervals[-1]) + 1.0
         to_the_end = end == rows - 1 and self._refuted(end, end)
         low, high = (end if to_the_end else end - 1.0), end
-        while high - low > LEAST_SHARE:
+        self.least = -np.inf
+        while self._can_halve(low, high):
             now = (low + high) / 2.0
-            if not self._can_halve(low, now, high):
-                break
             low, high = (now, high) if self._refuted(now, end) else (low, now)
         return replace(
             found,
@@ -231,16 +243,24 @@ class _Search:
             stretches=1 + int((np.diff(intervals) > 1).sum()),
         )
 
-    def _can_halve(self, *moments: float) -> bool:
-        """Whether moments are at different times, where there are times."""
-        times = self.motion.times_at(np.array(moments))
+    def _can_halve(self, low: float, high: float) -> bool:
+        """Whether halving tells more, and times differ where there are times."""
+        least = FINE_SHARE if self.least >= self.enough else LEAST_SHARE
+        if high - low <= least:
+            return False
+        times = self.motion.times_at(np.array([low, (low + high) / 2.0, high]))
         return times is None or bool((np.diff(times) > 0.0).all())
 
     def _refuted(self, low: float, high: float) -> Pair | None:
-        """The worst pair that is refuted in a stretch; None notes if all are proved."""
+        """The worst pair that is refuted in a stretch; notes by how much.
+
+        None is refuted where all are proved; notes if they are.
+        """
         found = self.judge(low, high)
         refuted = self.mine & (found.verdict == REFUTED)
         if not refuted.any():
             self.clear &= bool((found.verdict[self.mine] == CERTIFIED).all())
             return None
-        return self.pairs[int(np.argmin(np.where(refuted, found.upper, np.inf)))]
+        worst = int(np.argmin(np.where(refuted, found.upper, np.inf)))
+        self.least = float(found.upper[worst])
+        return self.pairs[worst]
