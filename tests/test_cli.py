@@ -23,6 +23,7 @@ from problem_files import BEHIND_A_WALL, NEAR, OUT_OF_REACH, write_problem
 from vdsm_pin.batch.run import Batch, run_batch
 from vdsm_pin.cli import app, main
 from vdsm_pin.errors import NoPlanFound
+from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.strategies import STRATEGIES, strategy
 from vdsm_pin.report.files import SCHEMA_NAMES, schema
 
@@ -352,10 +353,11 @@ def test_a_search_in_vain_tells_how_far_it_came_and_how_long_it_took(
 
 
 def test_a_time_limit_ends_planning(vdsm: Shell, tmp_path: Path) -> None:
-    words = ["plan", "paper/obs2", "--out", tmp_path / "out"]
-    ran = vdsm(*words, "--time-limit", "0.004")
+    read_problem("paper/obs2")  # so that the time is not over before it is read
+    words = ["plan", "paper/obs2", "--strategy", "sturdiest", "--out", tmp_path / "out"]
+    ran = vdsm(*words, "--time-limit", "0.1")
     assert ran.status == 1
-    assert "time limit of 0.004 s" in one_message(ran)
+    assert "time limit of 0.1 s" in one_message(ran)
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["no_plan.html"]
 
 
