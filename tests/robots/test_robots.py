@@ -237,6 +237,58 @@ def test_limits_are_checked_at_and_between_waypoints(
             assert limit.worst == pytest.approx(0.39 + speed / 4)
 
 
+@pytest.mark.parametrize(
+    ("follower", "limits", "verdict", "whose"),
+    [
+        ('lower="-3" upper="3"', (-0.1, 0.4, 0.5), "certified", ""),
+        ('lower="0.3" upper="0.5"', (0.1, 0.2, 0.5), "refuted", "'follow'"),
+        ('lower="-9" upper="9"', (-0.1, 0.4, 0.5), "certified", ""),
+        ('lower="2" upper="3"', (0.95, 0.4, 0.5), "refuted", "'follow'"),
+    ],
+)
+def test_a_joint_is_held_to_the_limits_of_what_mimics_it(
+    tmp_path: Path,
+    follower: str,
+    limits: tuple[float, float, float],
+    verdict: str,
+    whose: str,
+) -> None:
+    """Follow = 2 slide + 0.1, 1 rad/s; where both contradict each other too."""
+    head, tail = URDF.split('offset="0.1"/>')
+    text = head + 'offset="0.1"/>' + tail.replace('lower="-3" upper="3"', follower)
+    robot = read_robot(write(tmp_path, "two.urdf", text))
+    slide = robot.joints[1]
+    assert (slide.lower, slide.upper, slide.velocity) == pytest.approx(limits)
+    rows = "turn_rad,slide_m,time_s\n0,0.1,0\n0.2,0.3,1\n"
+    path = read_path(write(tmp_path, "t.csv", rows), robot)
+    scene = read_scene(write(tmp_path, "s.yaml", SCENE), 1.0)
+    checks = verify_robot(Cell(robot, scene), path).checks
+    (row,) = (c for c in checks if c.name == "joint 'slide' in its limits")
+    assert row.verdict.value == verdict
+    assert whose in row.where
+    (rate,) = (c for c in checks if c.name == "joint 'slide' in its velocity limit")
+    assert (rate.verdict, rate.limit) == (Verdict.CERTIFIED, 0.5)
+    assert "'follow'" in rate.where
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [('multiplier="0" offset="3.1"', "stands at 3.1 by what it mimics, outside of its"),
+     ('multiplier="2" offset="3.1"', "stands at 3.3"),
+     ('multiplier="2" offset="2.8"', "")],
+)  # fmt: skip
+def test_what_follows_a_joint_that_stands_is_within_its_limits(
+    tmp_path: Path, change: str, problem: str
+) -> None:
+    text = URDF.replace('multiplier="2" offset="0.1"', change)
+    file, lock = write(tmp_path, "two.urdf", text), {"slide": 0.1}
+    if not problem:
+        assert read_robot(file, lock=lock).joints[0].narrowed_by == ()
+        return
+    with pytest.raises(InvalidFile, match=problem):
+        read_robot(file, lock=lock)
+
+
 def test_planning_scenes_are_read_as_they_stand(tmp_path: Path) -> None:
     can, floor = read_scene(write(tmp_path, "m.yaml", MOVEIT), 1.0).obstacles
     assert isinstance(can, Cylinder)

@@ -39,7 +39,7 @@ from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.robots.files import CellFile, RobotFiles, find_mesh
-from vdsm_pin.robots.joint_limits import Limits, read_limits, stated_limits
+from vdsm_pin.robots.joint_limits import Limits, narrowed, read_limits, stated_limits
 from vdsm_pin.robots.model import RobotJoint
 from vdsm_pin.robots.srdf import Srdf, end
 from vdsm_pin.robots.trajectory_files import read_motion
@@ -118,6 +118,7 @@ class Joints:
             own = numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"))
             frame = self._hang(parent, name, kind, placed(joint), own)
             self.frames[end(joint, "child")] = frame
+        self.moved = narrowed(self.moved, self.values, document, given)
 
     def _own(self, name: str, kind: str, limits: Limits) -> None:
         """Of a joint that follows none: columns of its own, or values that stay."""

@@ -1,17 +1,26 @@
-"""Limits of joints: from the URDF, or from a joint_limits.yaml of MoveIt."""
+"""Limits of joints: from the URDF, or from a joint_limits.yaml of MoveIt.
+
+A joint that moves is held to its own, and to those of joints that mimic it.
+"""
 
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import read_yaml
+from vdsm_pin.robots.model import RobotJoint, Values
 from vdsm_pin.robots.places import Place
+from vdsm_pin.tolerances import TOLERANCES
 
 MAX_BYTES: Final = 4 << 20
+ONE_VALUE: Final = "revolute", "continuous", "prismatic"
+"""Types of joints that can mimic another."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +69,61 @@ def stated_limits(joint: ET.Element, given: Limits) -> Limits:
         min(acceleration, given.acceleration),
         stated,
     )
+
+
+def narrowed(
+    joints: Sequence[RobotJoint],
+    values: Values,
+    document: ET.Element,
+    given: Mapping[str, Limits],
+) -> list[RobotJoint]:
+    """The joints that move, held to the limits of those that mimic them too.
+
+    Args:
+        joints: Those that move; one by one the columns of `values`.
+        values: Of all joints by those that move.
+        document: The URDF.
+        given: Limits that count besides.
+
+    Raises:
+        InvalidInput: If a joint stands outside of its limits by what it mimics.
+    """
+    held = list(joints)
+    for element in document.findall("joint"):
+        if element.get("type") not in ONE_VALUE or element.find("mimic") is None:
+            continue
+        name = element.get("name", "")
+        limits, value = stated_limits(element, given.get(name, Limits())), values[name]
+        column, ratio, offset = value
+        if column is not None and ratio:
+            held[column] = _narrower(held[column], name, limits, value)
+            continue
+        past = max(limits.lower - offset, offset - limits.upper)
+        if not past <= TOLERANCES.arithmetic:
+            message = (
+                f"joint {name!r} stands at {offset:g} by what it mimics, outside of "
+                f"its limits {limits.lower:g} to {limits.upper:g}"
+            )
+            raise InvalidInput(message)
+    return held
+
+
+def _narrower(
+    joint: RobotJoint, name: str, limits: Limits, value: tuple[int | None, float, float]
+) -> RobotJoint:
+    """A joint held to the limits of one that mimics it."""
+    _, ratio, offset = value
+    low, high = sorted((x - offset) / ratio for x in (limits.lower, limits.upper))
+    found = replace(
+        joint,
+        lower=max(joint.lower, low),
+        upper=min(joint.upper, high),
+        velocity=min(joint.velocity, limits.velocity / abs(ratio)),
+        acceleration=min(joint.acceleration, limits.acceleration / abs(ratio)),
+    )
+    if found == joint:
+        return joint
+    return replace(found, narrowed_by=(*joint.narrowed_by, name))
 
 
 def read_limits(path: Path) -> dict[str, Limits]:

@@ -12,10 +12,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidFile
+from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.tree import IDENTITY, Joint, Kind, X, Y, Z
-from vdsm_pin.robots.joint_limits import Limits, stated_limits
+from vdsm_pin.robots.joint_limits import Limits, narrowed, stated_limits
 from vdsm_pin.robots.link_solids import origin_of
 from vdsm_pin.robots.model import RobotJoint
 from vdsm_pin.robots.srdf import Base, end
@@ -110,6 +110,11 @@ class JointReader:
             self._own_values(base.name, parts, Limits())
         self._check_names(elements)
         self._read_values(elements)
+        given = self.moving.limits
+        try:
+            self.movable = narrowed(self.movable, self._values, document, given)
+        except InvalidInput as error:
+            raise self.invalid(str(error)) from None
         self.joints.append(Joint(0))  # the base stands in the world, beside obstacles
         self.frames[root] = 1
         if base is not None:
@@ -199,7 +204,8 @@ class JointReader:
     def _own_values(self, name: str, parts: Sequence[_Part], limits: Limits) -> None:
         """Of a joint that mimics none: columns of its own, or values that stay."""
         if not limits.stated:
-            self.notes.append(f"joint {name!r} states no limits, and none are checked")
+            note = f"joint {name!r} states no limits, and none of its own are checked"
+            self.notes.append(note)
         for part in parts:
             value = self._standing(name, name + part.suffix, limits)
             if value is None:

@@ -224,8 +224,9 @@ def _limit(joint: RobotJoint, path: Path, k: int) -> Check:
         len(past),
         value,
         joint.upper if upper else joint.lower,
-        "rad" if joint.turns else "m",
-        moment=moment,
+        joint.unit,
+        joint.whose,
+        moment,
     )
 
 

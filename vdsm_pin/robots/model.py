@@ -10,6 +10,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.geometry.convex import Hull
+from vdsm_pin.io.tables import listed
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.packed_tree import TreePoses
 from vdsm_pin.proof.tree import Tree
@@ -31,6 +32,7 @@ class RobotJoint:
         turns: Whether its values are angles.
         velocity: Largest rate, inf where there is no limit; [rad/s] or [m/s].
         acceleration: Largest change of it; [rad/s^2] or [m/s^2].
+        narrowed_by: Joints that mimic it and whose limits are the stricter ones.
     """
 
     name: str
@@ -39,11 +41,18 @@ class RobotJoint:
     turns: bool
     velocity: float = np.inf
     acceleration: float = np.inf
+    narrowed_by: tuple[str, ...] = ()
 
     @property
     def unit(self) -> str:
         """Of its values."""
         return "rad" if self.turns else "m"
+
+    @property
+    def whose(self) -> str:
+        """Whose limits count besides its own, in words; empty if none do."""
+        names = listed(self.narrowed_by)
+        return f"narrowed by limits of what mimics it: {names}" if names else ""
 
 
 @dataclass(frozen=True)

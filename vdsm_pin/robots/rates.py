@@ -35,8 +35,9 @@ def rate_checks(joints: tuple[RobotJoint, ...], path: Path) -> list[Check]:
         if controls.shape[1] > 1:
             controls = derivative(controls) / step
         for k in np.flatnonzero(np.isfinite(limits)):
-            name = f"joint {joints[k].name!r} in its {word} limit"
-            unit = joints[k].unit + ("/s" if order == 1 else "/s^2")
+            joint = joints[k]
+            name = f"joint {joint.name!r} in its {word} limit"
+            unit = joint.unit + ("/s" if order == 1 else "/s^2")
             if order > path.degree:
                 where = "straight lines change their rates at once"
                 none = Verdict.UNDECIDED, path.n_intervals, nan
@@ -44,9 +45,8 @@ def rate_checks(joints: tuple[RobotJoint, ...], path: Path) -> list[Check]:
                 continue
             verdict, value, moment = largest_of(controls[:, :, k], float(limits[k]))
             count, limit = path.n_intervals, float(limits[k])
-            checks.append(
-                Check(name, verdict, count, value, limit, unit, moment=moment)
-            )
+            check = Check(name, verdict, count, value, limit, unit, joint.whose, moment)
+            checks.append(check)
     return checks
 
 
