@@ -118,7 +118,7 @@ class Joints:
             own = numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"))
             frame = self._hang(parent, name, kind, placed(joint), own)
             self.frames[end(joint, "child")] = frame
-        self.moved = narrowed(self.moved, self.values, document, given)
+        self.moved, _ = narrowed(self.moved, self.values, document, given)
 
     def _own(self, name: str, kind: str, limits: Limits) -> None:
         """Of a joint that follows none: columns of its own, or values that stay."""

@@ -11,7 +11,6 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import read_yaml
 from vdsm_pin.robots.model import RobotJoint, Values
@@ -76,8 +75,11 @@ def narrowed(
     values: Values,
     document: ET.Element,
     given: Mapping[str, Limits],
-) -> list[RobotJoint]:
+) -> tuple[list[RobotJoint], list[str]]:
     """The joints that move, held to the limits of those that mimic them too.
+
+    Limits that contradict those of what is mimicked, as some robots state them, leave
+    it no room: they are not judged, and noted.
 
     Args:
         joints: Those that move; one by one the columns of `values`.
@@ -85,10 +87,10 @@ def narrowed(
         document: The URDF.
         given: Limits that count besides.
 
-    Raises:
-        InvalidInput: If a joint stands outside of its limits by what it mimics.
+    Returns:
+        The joints; a sentence for each limit that is not judged and not kept.
     """
-    held = list(joints)
+    held, notes = list(joints), list[str]()
     for element in document.findall("joint"):
         if element.get("type") not in ONE_VALUE or element.find("mimic") is None:
             continue
@@ -96,16 +98,20 @@ def narrowed(
         limits, value = stated_limits(element, given.get(name, Limits())), values[name]
         column, ratio, offset = value
         if column is not None and ratio:
-            held[column] = _narrower(held[column], name, limits, value)
-            continue
-        past = max(limits.lower - offset, offset - limits.upper)
-        if not past <= TOLERANCES.arithmetic:
-            message = (
-                f"joint {name!r} stands at {offset:g} by what it mimics, outside of "
-                f"its limits {limits.lower:g} to {limits.upper:g}"
-            )
-            raise InvalidInput(message)
-    return held
+            joint = held[column]
+            found = held[column] = _narrower(joint, name, limits, value)
+            kept = found.upper - found.lower > TOLERANCES.arithmetic
+            why = f"they leave joint {joint.name!r}, which it mimics, no room"
+            if not kept:
+                rates = replace(limits, lower=-np.inf, upper=np.inf)
+                held[column] = _narrower(joint, name, rates, value)
+        else:
+            past = max(limits.lower - offset, offset - limits.upper)
+            kept, why = past <= TOLERANCES.arithmetic, f"it stands at {offset:g}"
+        if not kept:
+            span = f"{limits.lower:g} to {limits.upper:g}"
+            notes.append(f"limits of joint {name!r}, {span}, are not judged: {why}")
+    return held, notes
 
 
 def _narrower(

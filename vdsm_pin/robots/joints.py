@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.tree import IDENTITY, Joint, Kind, X, Y, Z
 from vdsm_pin.robots.joint_limits import Limits, narrowed, stated_limits
@@ -111,10 +111,8 @@ class JointReader:
         self._check_names(elements)
         self._read_values(elements)
         given = self.moving.limits
-        try:
-            self.movable = narrowed(self.movable, self._values, document, given)
-        except InvalidInput as error:
-            raise self.invalid(str(error)) from None
+        self.movable, notes = narrowed(self.movable, self._values, document, given)
+        self.notes += notes
         self.joints.append(Joint(0))  # the base stands in the world, beside obstacles
         self.frames[root] = 1
         if base is not None:
