@@ -169,7 +169,8 @@ ODD = {
     "turn_rad,slide_m,turn_velocity_rad_s\n0,0,0\n": "no column slide_velocity_m_s",
     "turn_rad,slide_m,turn_velocity_m_s,slide_velocity_m_s\n": "expected _rad or _deg",
     "turn_rad,slide_m,turn_velocity_rad_s,slide_velocity_m_s\n": "expected time_s",
-    "turn_rad,slide_m,time_s\n0,0,1\n0,0,1\n": "times must rise",
+    "turn_rad,slide_m,time_s\n0,0,1\n0,0,1\n": "line 3: time is 1 s after 1 s",
+    "turn_rad,slide_m,time_s\n0,0,1\n0,0,2\n0,0,1.5\n": "line 4: time is 1.5 s after 2",
 }
 
 
@@ -178,6 +179,15 @@ def test_odd_tables_are_refused(tmp_path: Path, robot: Robot, text: str) -> None
     with pytest.raises(InvalidFile) as caught:
         read_path(write(tmp_path, "t.csv", text), robot)
     assert ODD[text] in str(caught.value)
+
+
+def test_points_of_messages_whose_times_do_not_rise_are_named(
+    tmp_path: Path, robot: Robot
+) -> None:
+    given = replace(motion(0), times=np.array([0.0, 1.0, 2.0, 2.0, 3.0]))
+    file = written(tmp_path, ".yaml", given, robot)
+    with pytest.raises(InvalidFile, match=r"points\[3\]: time is 2 s after 2 s"):
+        read_path(file, robot)
 
 
 def test_rates_agree_with_dense_samples() -> None:

@@ -131,6 +131,7 @@ def path_of(file: File, motion: JointTrajectory) -> "Path":
     """
     from vdsm_pin.proof.paths import Path, cubic_path, quintic_path
 
+    _check_times(file, motion.times)
     try:
         if motion.times is None or motion.rates is None:
             return Path(motion.q, times=motion.times)
@@ -139,6 +140,19 @@ def path_of(file: File, motion: JointTrajectory) -> "Path":
         return quintic_path(motion.q, motion.rates, motion.changes, motion.times)
     except ValueError as error:
         raise InvalidFile(file=file, problem=str(error)) from None
+
+
+def _check_times(file: File, times: FloatArray | None) -> None:
+    """Refuse times that do not rise from row to row; names the first that does not."""
+    still = [] if times is None else np.flatnonzero(~(np.diff(times) > 0.0))
+    if times is None or not len(still):
+        return
+    row = int(still[0]) + 1
+    points = is_bag(file) or file.suffix.lower() in ENDINGS
+    problem = f"time is {times[row]:.12g} s after {times[row - 1]:.12g} s, expected it "
+    problem += "to rise from row to row"
+    where = f"points[{row}]" if points else f"line {row + 2}"
+    raise InvalidFile(file=file, where=where, problem=problem)
 
 
 def _of_joints(
