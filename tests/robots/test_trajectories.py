@@ -340,6 +340,29 @@ def test_what_is_not_read_is_noted(tmp_path: Path, robot: Robot) -> None:
     assert note == "joints that are not read: 'wheel'"
 
 
+def test_a_joint_that_goes_the_long_way_round_is_noted(tmp_path: Path) -> None:
+    """One without limits; half a turn, or one between limits, is as it must be."""
+    free = URDF.replace('type="revolute"', 'type="continuous"', 1)
+    robot = read_robot(write(tmp_path, "free.urdf", free))
+    for values, words in (
+        ((0, 3, -3, -2), "344 deg between waypoints 1 and 2: judged as it stands"),
+        (
+            (0, 3, -3, 3),
+            "344 deg between waypoints 1 and 2, the first of 2 such turns: jud",
+        ),
+        ((-1.5, 1.5, 4), ""),
+        ((0,), ""),
+    ):
+        rows = "".join(f"{value},0\n" for value in values)
+        file = write(tmp_path, "t.csv", f"turn_rad,slide_m\n{rows}")
+        notes = read_motion(file, robot.joints, values=robot.values).notes
+        assert len(notes) == bool(words)
+        assert all(f"joint 'turn' turns by {words}" in note for note in notes)
+    file = write(tmp_path, "t.csv", "turn_rad,slide_m\n3,0\n-3,0\n")
+    limited = read_robot(write(tmp_path, "two.urdf", URDF))
+    assert read_motion(file, limited.joints, values=limited.values).notes == ()
+
+
 def test_a_joint_has_one_column(tmp_path: Path, robot: Robot) -> None:
     file = write(tmp_path, "t.csv", "turn_rad,slide_m,turn_deg\n0,0,90\n")
     with pytest.raises(InvalidFile, match="expected one of them"):

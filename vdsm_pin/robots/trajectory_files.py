@@ -80,7 +80,7 @@ def read_motion(
         if name not in known and f"{name.rpartition('/')[0]}/theta" not in known
     ]
     notes = [f"joints that are not read: {listed(unread)}"] if unread else []
-    notes += _agree(file, found.q, others, values)
+    notes += [*_agree(file, found.q, others, values), *_long_ways(found.q, joints)]
     return replace(found, notes=(*whole.notes, *notes))
 
 
@@ -109,6 +109,26 @@ def _agree(
             raise InvalidFile(file=file, problem=problem)
         if off[row] > STILL:
             yield f"joint {name!r} is up to {off[row]:.2g} off where it is judged"
+
+
+def _long_ways(q: FloatArray, joints: Sequence[RobotJoint]) -> Iterator[str]:
+    """Notes on joints without limits that turn by more than half a turn at once.
+
+    Measured angles are often kept within half a turn either way, and jump by a whole.
+    """
+    for k, joint in enumerate(joints if len(q) > 1 else ()):
+        steps = np.abs(np.diff(q[:, k]))
+        jumps = np.flatnonzero(steps > np.pi)
+        if not joint.turns or np.isfinite([joint.lower, joint.upper]).any():
+            continue
+        if len(jumps):
+            row, turn = int(jumps[0]), np.degrees(steps[jumps[0]])
+            first = f", the first of {len(jumps)} such turns" if len(jumps) > 1 else ""
+            yield (
+                f"joint {joint.name!r} turns by {turn:.0f} deg between waypoints {row} "
+                f"and {row + 1}{first}: judged as it stands, the long way round; "
+                "unwrap it if the robot takes the short way"
+            )
 
 
 def read_path(file: File, robot: Robot, topic: str | None = None) -> "Path":
@@ -144,10 +164,10 @@ def path_of(file: File, motion: JointTrajectory) -> "Path":
 
 def _check_times(file: File, times: FloatArray | None) -> None:
     """Refuse times that do not rise from row to row; names the first that does not."""
-    still = [] if times is None else np.flatnonzero(~(np.diff(times) > 0.0))
-    if times is None or not len(still):
+    rises = np.array([]) if times is None else np.diff(times) > 0.0
+    if times is None or rises.all():
         return
-    row = int(still[0]) + 1
+    row = int(np.argmin(rises)) + 1
     points = is_bag(file) or file.suffix.lower() in ENDINGS
     problem = f"time is {times[row]:.12g} s after {times[row - 1]:.12g} s, expected it "
     problem += "to rise from row to row"
