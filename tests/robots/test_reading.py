@@ -9,7 +9,8 @@ from tests.robots.test_robots import URDF, mutated, write
 from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
-from vdsm_pin.robots.files import Solids, solids_of
+from vdsm_pin.robots.cell import cell_of
+from vdsm_pin.robots.files import RobotFiles, Solids, solids_of
 from vdsm_pin.robots.joint_limits import read_limits
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.second_opinion import link_shapes, pose_difference
@@ -207,6 +208,30 @@ def test_xacro_is_expanded(tmp_path: Path) -> None:
     for bad in (text.replace("0.05 *", "length *"), text[:300]):
         with pytest.raises(InvalidFile, match="is not expanded by xacrodoc"):
             read_robot(write(tmp_path, "two.urdf.xacro", bad))
+
+
+def test_what_a_xacro_includes_is_in_its_hash(tmp_path: Path) -> None:
+    """Also what it reads as YAML, both from wherever the command runs."""
+    pytest.importorskip("xacrodoc")
+    space = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
+    head = f'<robot name="two" {space}><xacro:include filename="sizes/ball.xacro"/>'
+    head += '<xacro:include filename="absent.xacro" optional="true"/>'
+    (tmp_path / "sizes").mkdir()
+    size = "${xacro.load_yaml('ball.yaml')['size']}"
+    ball = f'<robot {space}><xacro:property name="size" value="{size}"/></robot>'
+    yaml = write(tmp_path, "ball.yaml", "size: 0.1\n")
+    inner = write(tmp_path, "sizes/ball.xacro", ball)
+    text = URDF.replace('<robot name="two">', head).replace('"0.1"', '"${size}"')
+    files = RobotFiles(write(tmp_path, "two.xacro", text))
+    source = cell_of(files).source
+    assert source is not None
+    assert {inner, yaml} <= set(source.files)
+    for file in (inner, yaml):
+        file.write_text(file.read_text() + " ")
+        changed = cell_of(files).source
+        assert changed is not None
+        assert changed.sha256 != source.sha256
+        source = changed
 
 
 def test_damaged_semantics_never_end_in_a_traceback(tmp_path: Path, urdf: Path) -> None:

@@ -199,7 +199,7 @@ class Robot:
         self, file: CellFile, header: Mapping[str, Any], trajectory: File
     ) -> None:
         self.files, self.rows = file.robot, self
-        text = urdf_text(self.files.urdf, self.files.package_dirs)
+        text, included = urdf_text(self.files.urdf, self.files.package_dirs)
         validate_urdf(text, geometry_only=True)
         document = ET.fromstring(text)
         named = document.findall("link/collision/geometry/mesh")
@@ -210,7 +210,7 @@ class Robot:
         size = float(sum(joint.lever for joint in joints)) or 1.0
         others = {name for name, frame in self.joints.frames.items() if frame != 1}
         self.scene, of_obstacles = file.scene(size, others)
-        source = file.source(meshes, of_obstacles).sha256
+        source = file.source((*included, *meshes), of_obstacles).sha256
         belongs(header, "errors links topic", source, sha256_of_file(trajectory))
         own = self._branch(header, trajectory)
         self.own = Path(own)

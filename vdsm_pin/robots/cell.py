@@ -172,7 +172,7 @@ def cell_of(
         InvalidInput: If a file is bad or a value makes no sense.
     """
     robot = robot_of(files)
-    named = (*files.files, *robot.meshes)
+    named = (*files.files, *robot.more_files)
     if scene is None:
         source = source_of(named, ())
         return Cell(robot, Scene(), required, required_self, source=source)
@@ -201,7 +201,7 @@ def read_cell(path: Path) -> Cell:
         required_self_clearance=required_self,
         stated_name=file.model.name or "",
         T_world_base=frozen(pose),
-        source=file.source(robot.meshes, of_obstacles),
+        source=file.source(robot.more_files, of_obstacles),
     )
     try:
         return cell.under(file.errors(scene))

@@ -275,10 +275,10 @@ class CellFile:
         """
         return build_errors(self.model.errors, self.frame, scene, self.document)
 
-    def source(self, meshes: tuple[Path, ...], of_obstacles: Named) -> ProblemSource:
+    def source(self, more: tuple[Path, ...], of_obstacles: Named) -> ProblemSource:
         """All files that it is read from, those of links and obstacles too."""
         scene = filter(None, [self.model.scene])
-        named = (*meshes, *(self.path.parent / file for file in scene))
+        named = (*more, *(self.path.parent / file for file in scene))
         return source_of((self.path, *self.robot.files, *named), of_obstacles)
 
 

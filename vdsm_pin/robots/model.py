@@ -86,7 +86,7 @@ class Robot:
         base: The joint between world and root link; None where it stands.
         solids: What stands for the meshes of links.
         notes: What else a reader should know, a sentence each.
-        meshes: The files of its links' meshes.
+        more_files: What the file of its URDF includes, and its links' meshes.
         covers: By link, of each of its meshes the triangles under each hull, or the
             primitive around it.
     """
@@ -102,7 +102,7 @@ class Robot:
     base: Base | None = None
     solids: Solids = HULLS
     notes: tuple[str, ...] = ()
-    meshes: tuple[Path, ...] = ()
+    more_files: tuple[Path, ...] = ()
     covers: Mapping[str, Sequence[tuple[IntArray, ...] | Hull]] = field(
         default_factory=dict
     )

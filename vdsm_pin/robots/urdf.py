@@ -47,7 +47,7 @@ def read_robot(
             or a joint is of a kind that is not judged.
         InvalidInput: If a group is named without a SRDF.
     """
-    text = urdf_text(urdf, package_dirs)
+    text, included = urdf_text(urdf, package_dirs)
     try:
         validate_urdf(text, geometry_only=True)
     except InvalidInput as error:
@@ -79,7 +79,7 @@ def read_robot(
         base=base,
         solids=solids,
         notes=(*reader.notes, *_not_solid(document)),
-        meshes=links.meshes(document),
+        more_files=(*included, *links.meshes(document)),
         covers=links.covers,
     )
 

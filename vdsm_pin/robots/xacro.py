@@ -1,5 +1,6 @@
 """The text of a URDF; a xacro file is expanded by xacrodoc (extra `xacro`)."""
 
+import json
 import subprocess
 import sys
 import tempfile
@@ -11,12 +12,25 @@ from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.source import check_is_file, read_text
 
 MAX_BYTES: Final = 16 << 20
+SCRIPT: Final = """
+import json, sys, xacro
+from xacrodoc.cli import main
+try:
+    main()
+finally:
+    print()
+    print(json.dumps(xacro.all_includes))
+"""
+"""Expands a file, and prints in its last line which other files it has read."""
+
 SLOWEST: Final = 60.0
 """How long an expansion may take; [s]."""
 
 
-def urdf_text(path: Path, package_dirs: tuple[Path, ...] = ()) -> str:
-    """The URDF in a file.
+def urdf_text(
+    path: Path, package_dirs: tuple[Path, ...] = ()
+) -> tuple[str, tuple[Path, ...]]:
+    """The URDF in a file, and the files that this one includes.
 
     Args:
         path: A URDF, or a xacro file by its ending `.xacro`.
@@ -26,7 +40,7 @@ def urdf_text(path: Path, package_dirs: tuple[Path, ...] = ()) -> str:
         InvalidFile: If it cannot be read or expanded, or xacrodoc is not installed.
     """
     if path.suffix.lower() != ".xacro":
-        return read_text(path, limit=MAX_BYTES)
+        return read_text(path, limit=MAX_BYTES), ()
     check_is_file(path)
     if find_spec("xacrodoc") is None:
         problem = "xacro needs xacrodoc: pip install 'vdsm-pin[xacro]'"
@@ -35,11 +49,16 @@ def urdf_text(path: Path, package_dirs: tuple[Path, ...] = ()) -> str:
         return _expanded(path, package_dirs, Path(folder) / "robot.urdf")
 
 
-def _expanded(path: Path, package_dirs: tuple[Path, ...], out: Path) -> str:
-    """The text that xacrodoc makes, in a process of its own: macros are programs."""
+def _expanded(
+    path: Path, package_dirs: tuple[Path, ...], out: Path
+) -> tuple[str, tuple[Path, ...]]:
+    """The text that xacrodoc makes, in a process of its own: macros are programs.
+
+    It takes names that are relative from where it runs, which is beside the file.
+    """
+    beside = path.resolve().parent
     places = [word for folder in package_dirs for word in ("-d", str(folder.resolve()))]
-    script = "import sys; from xacrodoc.cli import main; sys.exit(main())"
-    command = [sys.executable, "-c", script, str(path.resolve()), "-o", str(out)]
+    command = [sys.executable, "-c", SCRIPT, str(path.resolve()), "-o", str(out)]
     try:
         done = subprocess.run(
             [*command, *places],
@@ -47,6 +66,7 @@ def _expanded(path: Path, package_dirs: tuple[Path, ...], out: Path) -> str:
             text=True,
             errors="replace",
             timeout=SLOWEST,
+            cwd=beside,
             check=False,
         )
     except subprocess.TimeoutExpired:
@@ -56,4 +76,7 @@ def _expanded(path: Path, package_dirs: tuple[Path, ...], out: Path) -> str:
         said = done.stderr.strip().splitlines() or ["no output"]
         problem = f"is not expanded by xacrodoc: {said[-1].strip()}"
         raise InvalidFile(file=path, problem=problem)
-    return read_text(out, limit=MAX_BYTES)
+    named = dict.fromkeys(json.loads(done.stdout.splitlines()[-1]))
+    included = dict.fromkeys((beside / name).resolve() for name in named)
+    # One that is optional need not be there.
+    return read_text(out, limit=MAX_BYTES), tuple(filter(Path.is_file, included))
