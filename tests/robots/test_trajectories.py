@@ -379,7 +379,7 @@ def test_names_with_signs_of_csv_are_read_back(tmp_path: Path) -> None:
 
 
 def test_a_folder_of_a_ros_2_bag_is_verified_and_checked(
-    tmp_path: Path, robot: Robot
+    tmp_path: Path, robot: Robot, capsys: pytest.CaptureFixture[str]
 ) -> None:
     rosbag2 = pytest.importorskip("rosbags.rosbag2")
     types = pytest.importorskip("rosbags.typesys")
@@ -395,5 +395,8 @@ def test_a_folder_of_a_ros_2_bag_is_verified_and_checked(
     assert run("check-certificate", proof, cell, bag) == 0
     (bag / "metadata.yaml").write_bytes((bag / "metadata.yaml").read_bytes() + b"\n")
     assert run("check-certificate", proof, cell, bag) == 1
+    (bag / "more").mkdir()
+    assert run("check-certificate", proof, cell, bag) == 1
     (bag / "metadata.yaml").unlink()
     assert run("check-certificate", proof, cell, bag) == 2
+    assert f"{bag}: is a folder, expected a file" in capsys.readouterr().err

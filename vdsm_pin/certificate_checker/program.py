@@ -24,7 +24,7 @@ from vdsm_pin.certificate_checker.claims import Clearances
 from vdsm_pin.certificate_checker.robot import Robot
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.problem_file import ProblemOfRobot, read_problem
-from vdsm_pin.io.source import bounded_lines, check_is_file
+from vdsm_pin.io.source import bounded_lines, check_is_file, check_is_file_or_bag
 from vdsm_pin.robots.files import read_cell_file
 from vdsm_pin.text import printable, show_everything
 
@@ -139,7 +139,7 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
         InvalidFile: If one of the files is not what its format says.
     """
     check_is_file(certificate)
-    check_is_file(trajectory / "metadata.yaml" if trajectory.is_dir() else trajectory)
+    check_is_file_or_bag(trajectory)
     run, reason = _Run(problem, trajectory), ""
     with ctx.workprec(PRECISION), np.errstate(all="ignore"):
         try:

@@ -65,6 +65,18 @@ def check_is_file(path: Path) -> None:
         raise InvalidFile(file=path, problem=f"cannot be opened: {reason}") from None
 
 
+def check_is_file_or_bag(path: Path) -> None:
+    """Refuse what is neither a readable file nor the folder of a ROS 2 bag.
+
+    Raises:
+        InvalidFile: If it is another thing, or not there.
+    """
+    with readable(path):
+        is_bag = (path / "metadata.yaml").is_file()
+    if not is_bag:
+        check_is_file(path)
+
+
 @contextmanager
 def readable(path: Path) -> Iterator[None]:
     """Tells what the system says of a file that is read within, or of its packing.
@@ -206,7 +218,7 @@ def _unpacked(path: Path) -> Iterator[IO[bytes]]:
 
 def sha256_of_file(path: Path) -> str:
     """SHA-256 of a file's bytes, or of those in a bag's folder, in hexadecimal."""
-    inside = sorted(path.iterdir()) if path.is_dir() else [path]
+    inside = sorted(filter(Path.is_file, path.rglob("*"))) if path.is_dir() else [path]
     digest = hashlib.sha256()
     for one in inside:
         with one.open("rb") as file:
