@@ -181,12 +181,13 @@ class StartBlocked(Infeasible):
     """The arm as it starts is too close to an obstacle.
 
     Args:
-        link: Number of the link, from 1.
+        link: Number of the link, from 1; 0 for the feed.
         obstacle: Name of the obstacle.
         clearance: Between the two; [m].
         required: What it must be; [m].
         bent: Whether the problem states the joints, not the tip of a straight arm.
         called: The link in words; 'link k' unless stated.
+        deeper: Whether the clearance is that deep or deeper.
     """
 
     def __init__(
@@ -198,14 +199,15 @@ class StartBlocked(Infeasible):
         required: float,
         bent: bool,
         called: str = "",
+        deeper: bool = False,
     ) -> None:
         self.link, self.obstacle = link, obstacle
         self.clearance, self.required = clearance, required
         message = (
             f"at its start {called or f'link {link}'} of the "
             f"{'' if bent else 'straight '}arm has "
-            f"{in_mm(clearance)} to obstacle {obstacle!r}, required are "
-            f"{in_mm(required)}"
+            f"{in_mm(clearance)}{' or deeper' if deeper else ''} to obstacle "
+            f"{obstacle!r}, required are {in_mm(required)}"
         )
         if not bent:
             message += "; `start: {joints: ...}` states a start that is bent"

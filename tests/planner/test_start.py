@@ -8,6 +8,7 @@ import pytest
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import (
     CableLayout,
+    Feed,
     LinkBody,
     Manipulator,
     Tool,
@@ -16,7 +17,7 @@ from vdsm_pin.arm.manipulator import (
 from vdsm_pin.errors import StartBlocked
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
 from vdsm_pin.planner.fewest.stuck import no_way_in
-from vdsm_pin.planner.start import start_centres
+from vdsm_pin.planner.start import check_start, start_centres
 from vdsm_pin.planner.strategies import STRATEGIES, strategy
 from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
 from vdsm_pin.problem.scene import Scene
@@ -114,6 +115,30 @@ def test_a_blocked_start_names_the_link_that_is_too_near_and_by_how_much(
     assert (caught.link, caught.obstacle) == (link, "ball")
     assert caught.clearance == pytest.approx(abs(place[1]) - 0.018 - reach, abs=1e-8)
     assert words in str(caught)
+
+
+@pytest.mark.parametrize("name", STRATEGIES)
+def test_a_feed_that_is_too_near_at_the_start_is_named(name: str) -> None:
+    arm = thick([0.03] * 4, feed=Feed(0.8, 0.06))
+    ball = Sphere("ball", np.array([-0.3, 0.0845, 0.0]), 0.02)
+    behind = Sphere("behind", np.array([-0.9, 0.0, 0.0]), 0.02)
+    tip = np.array([1.6, 0.0, 0.0])
+    path = DesiredPath(tip, np.stack([tip, tip + np.array([0.0, 0.1, 0.0])]), False)
+    scene = Scene((behind, ball))
+    task = PlanningProblem("feed", arm, scene, path, 0.005, np.eye(4))
+    caught = refusal(task, name)
+    assert (caught.link, caught.obstacle) == (0, "ball")
+    assert caught.clearance == pytest.approx(0.0045, abs=1e-8)
+    assert "at its start the feed of the straight arm has 4.500 mm to" in str(caught)
+    ignoring = replace(arm, ignore_pairs=(("ball", "feed"),))
+    check_start(replace(task, manipulator=ignoring), link_clearance(task))
+    check_start(replace(task, required_clearance=0.004), link_clearance(task))
+
+
+def test_a_start_whose_axis_meets_an_obstacle_is_that_deep_or_deeper() -> None:
+    assert "-1.000 mm to" in str(refusal(starting(-0.001), "fewest"))
+    told = str(refusal(starting(-0.1), "fewest"))
+    assert f"{-1e3 * ARM.link_radius:.3f} mm or deeper to" in told
 
 
 def test_a_narrow_place_is_as_wide_as_it_is_however_thick_the_links() -> None:

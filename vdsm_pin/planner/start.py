@@ -11,7 +11,13 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.geometry.winding import Location, Side, locate
 from vdsm_pin.planner.records import LinkClearance
-from vdsm_pin.planner.upper_clearance import culprit, named, upper_clearance
+from vdsm_pin.planner.upper_clearance import (
+    Culprit,
+    culprit,
+    feed_culprit,
+    named,
+    upper_clearance,
+)
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene, with_hulls
 
@@ -104,7 +110,8 @@ def check_start(problem: PlanningProblem, clearance: LinkClearance) -> None:
 
     Raises:
         StartInside: Where it is inside a mesh.
-        StartBlocked: With the link, the obstacle and the clearance between them.
+        StartBlocked: With the link or the feed, the obstacle and the clearance
+            between them.
         InsideUnknown: Where it is within the convex hull of a mesh whose inside
             cannot be told.
     """
@@ -114,13 +121,19 @@ def check_start(problem: PlanningProblem, clearance: LinkClearance) -> None:
         return
     _check_outside(problem)
     if not clearance(centres[None]).min() >= required:
-        link, obstacle, least = culprit(problem, centres)
-        bent = problem.path.start_joints is not None
-        raise StartBlocked(
-            link=link,
-            obstacle=obstacle,
-            clearance=least,
-            required=required,
-            bent=bent,
-            called=named(problem.manipulator, link),
-        )
+        raise _blocked(problem, culprit(problem, centres))
+    feed = feed_culprit(problem, centres[0])
+    if feed and feed.clearance < required:
+        raise _blocked(problem, feed)
+
+
+def _blocked(problem: PlanningProblem, found: Culprit) -> StartBlocked:
+    return StartBlocked(
+        link=found.link,
+        obstacle=found.obstacle,
+        clearance=found.clearance,
+        required=problem.required_clearance,
+        bent=problem.path.start_joints is not None,
+        called=named(problem.manipulator, found.link),
+        deeper=found.deeper,
+    )

@@ -1,18 +1,20 @@
 """Upper bounds of a clearance: what proves that a link is too near an obstacle."""
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.manipulator import Manipulator
+from vdsm_pin.arm.manipulator import FEED, Manipulator
 from vdsm_pin.compiled import borrowed, clock, compiled
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.bodies import new_body
 from vdsm_pin.geometry.kernels import BRACKET, NORMAL, SCRATCH_ROWS, UPPER
 from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.units import in_mm
 
 GOAL: Final = TOLERANCES.bracket_gap
 """Width of a bracket at which to stop; [m]."""
@@ -80,7 +82,30 @@ def nearest(problem: PlanningProblem, place: FloatArray) -> tuple[str, float]:
     return problem.scene.obstacles[obstacle].name, float(upper[obstacle])
 
 
-def culprit(problem: PlanningProblem, centres: FloatArray) -> tuple[int, str, float]:
+@dataclass(frozen=True)
+class Culprit:
+    """The part of an arm that is nearest to an obstacle.
+
+    Args:
+        link: Number of the link, from 1; 0 for the feed.
+        obstacle: Name of the obstacle.
+        clearance: Between the two, from above; [m].
+        deeper: Whether the axis meets the obstacle: no depth beyond the radius is
+            measured.
+    """
+
+    link: int
+    obstacle: str
+    clearance: float
+    deeper: bool
+
+    @property
+    def words(self) -> str:
+        """The clearance as people read it."""
+        return in_mm(self.clearance) + (" or deeper" if self.deeper else "")
+
+
+def culprit(problem: PlanningProblem, centres: FloatArray) -> Culprit:
     """The link nearest to an obstacle, that obstacle, and the clearance between them.
 
     As `LinkClearance` has it: the tool is part of the last link, and where links carry
@@ -95,14 +120,46 @@ def culprit(problem: PlanningProblem, centres: FloatArray) -> tuple[int, str, fl
     if not arm.bodies:
         axes, radii = arm.axes(centres[None])[0], arm.axis_radii
     segments = np.stack([axes[:-1], axes[1:]], axis=1)
-    upper = upper_distances(problem, segments) - radii[:, None]
-    axis, obstacle = np.unravel_index(int(np.argmin(upper)), upper.shape)
-    name = problem.scene.obstacles[int(obstacle)].name
-    return min(int(axis) + 1, arm.n_links), name, float(upper[axis, obstacle])
+    links = np.minimum(np.arange(len(segments)) + 1, arm.n_links)
+    return _nearest_of(problem, upper_distances(problem, segments), radii, links)
+
+
+def feed_culprit(problem: PlanningProblem, base: FloatArray) -> Culprit | None:
+    """The obstacle nearest to the feed, of those that it is held apart from.
+
+    Args:
+        problem: Arm and scene.
+        base: Where O_1 is, shape (3,); [m].
+
+    Returns:
+        None without a feed or such an obstacle.
+    """
+    arm = problem.manipulator
+    held = [not arm.ignores(FEED, name) for name in problem.scene.names]
+    if not arm.feed or not any(held):
+        return None
+    rear = base - np.array([arm.feed.length, 0.0, 0.0])
+    distances = upper_distances(problem, np.stack([rear, base])[None])
+    distances[:, ~np.array(held)] = np.inf
+    radii, link = np.array([arm.feed.radius]), np.zeros(1, np.int64)
+    return _nearest_of(problem, distances, radii, link)
+
+
+def _nearest_of(
+    problem: PlanningProblem, distances: FloatArray, radii: FloatArray, links: IntArray
+) -> Culprit:
+    """The least clearance of axes (n,) to obstacles, their distances (n, m) given."""
+    upper = distances - radii[:, None]
+    at = np.unravel_index(int(np.argmin(upper)), upper.shape)
+    name = problem.scene.obstacles[int(at[1])].name
+    deeper = bool(distances[at] <= GOAL)
+    return Culprit(int(links[at[0]]), name, float(upper[at]), deeper)
 
 
 def named(arm: Manipulator, link: int) -> str:
-    """A link, counted from 1, in words, with what counts as part of it."""
+    """A link, counted from 1, in words, with what counts as part of it; 0, the feed."""
+    if link == 0:
+        return "the feed"
     words = f"link {link}"
     if link == arm.n_links and arm.tool:
         words += " with its tool"

@@ -223,13 +223,13 @@ def how_far(
     centres = standing(problem.manipulator, tip[None], zero)[0]
     if not problem.scene.obstacles or not np.isfinite(centres).all():
         return Reached(words, station)
-    link, name, least = culprit(problem, centres)
-    called = named(problem.manipulator, link)
+    found = culprit(problem, centres)
+    called = named(problem.manipulator, found.link)
     words += (
-        f"; {called} of the straight arm there has {in_mm(least)} to {name!r}; try "
-        "another start or a longer time limit"
+        f"; {called} of the straight arm there has {found.words} to "
+        f"{found.obstacle!r}; try another start or a longer time limit"
     )
-    return Reached(words, station, link, name)
+    return Reached(words, station, found.link, found.obstacle)
 
 
 def notes_of(

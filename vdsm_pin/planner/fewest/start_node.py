@@ -96,10 +96,11 @@ def _kept_there(judge: Judge, clearance: float, tried: int) -> str:
     """
     kept = in_mm(judge.required)
     if clearance < judge.required:
-        _, name, least = culprit(judge.problem, start_centres(judge.problem))
+        found = culprit(judge.problem, start_centres(judge.problem))
         return (
-            f"the arm starts with {in_mm(least)} to {name!r}, and the search keeps "
-            f"{kept}; try a smaller margin or `required_clearance`, or another start"
+            f"the arm starts with {found.words} to {found.obstacle!r}, and the "
+            f"search keeps {kept}; try a smaller margin or "
+            "`required_clearance`, or another start"
         )
     if not tried:
         return (

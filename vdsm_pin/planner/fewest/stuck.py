@@ -59,7 +59,8 @@ def where_stuck(
     if problem.scene.obstacles:
         narrow = stuck.route[_opening(problem, stuck)[0]]
         parts.append(_passage(problem, narrow))
-        link, obstacle, _ = culprit(problem, stuck.centres)
+        found = culprit(problem, stuck.centres)
+        link, obstacle = found.link, found.obstacle
         narrowest = narrow.tolist()
     parts.append(_stop(problem, stuck))
     parts.append(f"try {' or '.join(_advice(problem, stuck))}")
@@ -175,10 +176,9 @@ def _stop(problem: PlanningProblem, stuck: Stuck) -> str:
         tip = problem.in_file(stuck.centres[-1])
         words = f"the arm came all the way in and along the path to {tip}"
     if problem.scene.obstacles:
-        link, name, least = culprit(problem, stuck.centres)
-        words += (
-            f", where {named(problem.manipulator, link)} has {in_mm(least)} to {name!r}"
-        )
+        found = culprit(problem, stuck.centres)
+        called = named(problem.manipulator, found.link)
+        words += f", where {called} has {found.words} to {found.obstacle!r}"
     return words
 
 
