@@ -34,7 +34,7 @@ def posed(tips: np.ndarray) -> tuple[Shapes, np.ndarray, np.ndarray, np.ndarray]
     whole = np.ones(len(tips), dtype=np.bool_)
     node, ends, bends = pose_shapes(
         tips, whole, shapes.knees, shapes.slopes, ARM.stations, ARM.max_link_angle,
-        -5.0, 5.0,
+        (-5.0, 5.0),
     )  # fmt: skip
     return shapes, node, ends, bends
 

@@ -11,7 +11,8 @@ from math import sqrt
 import numpy as np
 
 from vdsm_pin.compiled import borrowed, compiled
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.fewest.pose_kernels import Lines, Places
 
 ROUNDS = 30
 """Newton steps at which a configuration is given up."""
@@ -173,33 +174,22 @@ def vary_directions(
 
 @compiled
 def placed_between(
-    tips: FloatArray,
-    next_tips: FloatArray,
-    axes: FloatArray,
-    next_axes: FloatArray,
-    interval: IntArray,
-    share: FloatArray,
-    lengths: FloatArray,
-    low: float,
-    high: float,
+    lines: Lines, places: Places, lengths: FloatArray, base_range: tuple[float, float]
 ) -> FloatArray:
     """Joint centres at places of intervals given by directions.
 
     Args:
-        tips: Where the intervals begin, shape (n, 3); [m].
-        next_tips: Where they end; [m].
-        axes: Directions of the links where they begin, shape (n, N, 3); [-].
-        next_axes: Directions where they end; [-].
-        interval: Interval of each place, shape (r,).
-        share: Where in its interval, 0 to 1, shape (r,).
+        lines: The intervals.
+        places: The places.
         lengths: Of the links, shape (N,); [m].
-        low: Smallest x0; [m].
-        high: Largest x0; [m].
+        base_range: Smallest and largest x0; [m].
 
     Returns:
         Shape (r, N + 1, 3), NaN where the base cannot be on its rail; [m].
     """
-    axes, next_axes = borrowed(axes), borrowed(next_axes)
+    tips, next_tips = lines.tips, lines.next_tips
+    axes, next_axes = borrowed(lines.offsets), borrowed(lines.next_offsets)
+    (interval, share), (low, high) = places, base_range
     count = lengths.size
     centres = np.full((interval.size, count + 1, 3), np.nan)
     for r in range(interval.size):

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.planner.fewest.pose_kernels import parts_of_pieces
+from vdsm_pin.planner.fewest.pose_kernels import Cutting, Seen, parts_of_pieces
 
 MOST_PARTS: Final = 8
 """Parts of one cut. More at once takes fewer turns, but looks at more where the first
@@ -52,10 +52,10 @@ class Parts:
             finest: A way that is too short to matter; [m].
             length: Of the arm; [m].
         """
-        return parts_of_pieces(
-            self.centres, self.next_centres, self.clearances, self.next_clearances,
-            knees, self.interval, need, finest, LONG_TRAVEL * length, MOST_PARTS,
-        )  # fmt: skip
+        begin = Seen(self.centres, self.clearances)
+        end = Seen(self.next_centres, self.next_clearances)
+        cutting = Cutting(finest, LONG_TRAVEL * length, MOST_PARTS)
+        return parts_of_pieces(begin, end, knees, self.interval, need, cutting)
 
     def inner(self, counts: IntArray) -> Inner:
         """The places that cut every part evenly, shape (n,) counts of 2 and more."""

@@ -21,7 +21,12 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.fewest.direction_kernels import placed_between
-from vdsm_pin.planner.fewest.pose_kernels import centres_between, knees_between
+from vdsm_pin.planner.fewest.pose_kernels import (
+    Lines,
+    Places,
+    centres_between,
+    knees_between,
+)
 from vdsm_pin.planner.fewest.roadmap import Roadmap
 from vdsm_pin.planner.fewest.sequence import Sequence
 from vdsm_pin.planner.spacing import count_of, row_steps
@@ -148,15 +153,11 @@ class Intervals:
             Shape (r, N + 1, 3), NaN where a link is too short or the base is off its
             rail; [m].
         """
+        lines = Lines(self.tips, self.next_tips, self.offsets, self.next_offsets)
+        places, lengths = Places(interval, share), manipulator.link_lengths
         if self.directed:
-            return placed_between(
-                self.tips, self.next_tips, self.offsets, self.next_offsets,
-                interval, share, manipulator.link_lengths, *manipulator.base_range,
-            )  # fmt: skip
-        return centres_between(
-            self.tips, self.next_tips, self.offsets, self.next_offsets,
-            interval, share, manipulator.ratios, manipulator.link_lengths,
-        )  # fmt: skip
+            return placed_between(lines, places, lengths, manipulator.base_range)
+        return centres_between(lines, places, manipulator.ratios, lengths)
 
 
 def is_directed(offsets: FloatArray) -> bool:

@@ -1,37 +1,93 @@
 """Compiled: configurations along straight lines in the chart (Eq. 7)."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 
 
+class Lines(NamedTuple):
+    """Straight lines in the chart, each an interval."""
+
+    tips: FloatArray
+    """Where they begin, shape (n, 3); [m]."""
+
+    next_tips: FloatArray
+    """Where they end; [m]."""
+
+    offsets: FloatArray
+    """D_1..D_{N+1} where they begin, shape (n, N + 1, 2) [m], or the directions of the
+    links, shape (n, N, 3) [-]."""
+
+    next_offsets: FloatArray
+    """The same where they end."""
+
+
+class Places(NamedTuple):
+    """Places of intervals."""
+
+    interval: IntArray
+    """Interval of each place, shape (r,)."""
+
+    share: FloatArray
+    """Where in its interval, 0 to 1, shape (r,)."""
+
+
+class Seen(NamedTuple):
+    """Configurations, one end of a part each, and what their pieces keep."""
+
+    centres: FloatArray
+    """Joint centres, shape (r, N + 1, 3); [m]."""
+
+    clearances: FloatArray
+    """Of the pieces, inf where none ends, shape (r, N); [m]."""
+
+
+class Cutting(NamedTuple):
+    """How parts are cut."""
+
+    finest: float
+    """A way that is too short to matter; [m]."""
+
+    long_way: float
+    """A way that is cut whatever the clearance; [m]."""
+
+    most: int
+    """Largest number of parts."""
+
+
+class Chain(NamedTuple):
+    """Corners of a motion in the chart."""
+
+    tips: FloatArray
+    """Shape (n, 3); [m]."""
+
+    offsets: FloatArray
+    """Shape (n, N + 1, 2) [m], or directions (n, N, 3) [-]."""
+
+    stations: FloatArray
+    """Arc length along the desired path, shape (n,); [m]."""
+
+
 @compiled
 def centres_between(
-    tips: FloatArray,
-    next_tips: FloatArray,
-    offsets: FloatArray,
-    next_offsets: FloatArray,
-    interval: IntArray,
-    share: FloatArray,
-    ratios: FloatArray,
-    lengths: FloatArray,
+    lines: Lines, places: Places, ratios: FloatArray, lengths: FloatArray
 ) -> FloatArray:
     """Joint centres at places of intervals (Eq. 7).
 
     Args:
-        tips: Where the intervals begin, shape (n, 3); [m].
-        next_tips: Where they end; [m].
-        offsets: D_1..D_{N+1} where they begin, shape (n, N + 1, 2); [m].
-        next_offsets: D_1..D_{N+1} where they end; [m].
-        interval: Interval of each place, shape (r,).
-        share: Where in its interval, 0 to 1, shape (r,).
+        lines: The intervals.
+        places: The places.
         ratios: k_i of each joint centre, shape (N + 1,); [-].
         lengths: Of the links, shape (N,); [m].
 
     Returns:
         Shape (r, N + 1, 3), NaN from the base to a link that is too short; [m].
     """
+    tips, next_tips, offsets, next_offsets = lines
+    interval, share = places
     n_links = lengths.size
     centres = np.zeros((interval.size, n_links + 1, 3))
     for r in range(interval.size):
@@ -173,16 +229,12 @@ def clearances_along(
 
 @compiled
 def parts_of_pieces(
-    centres: FloatArray,
-    next_centres: FloatArray,
-    clearances: FloatArray,
-    next_clearances: FloatArray,
+    begin: Seen,
+    end: Seen,
     knees: BoolArray,
     interval: IntArray,
     need: FloatArray,
-    finest: float,
-    long_way: float,
-    most: int,
+    cutting: Cutting,
 ) -> IntArray:
     """Into how many parts to cut the way of a piece to see that it is clear.
 
@@ -190,20 +242,19 @@ def parts_of_pieces(
     it takes if there is as much clearance on the way as at its ends, as a power of 2.
 
     Args:
-        centres: Joint centres, shape (r, N + 1, 3); [m].
-        next_centres: The same at the other end; [m].
-        clearances: Clearance of the pieces, inf where none ends, shape (r, N); [m].
-        next_clearances: The same at the other end; [m].
+        begin: Configurations where the ways begin.
+        end: Those where they end.
         knees: Of each interval, shape (n, N + 1).
         interval: Interval of both configurations, shape (r,).
         need: Clearance to keep in each interval, shape (n,); [m].
-        finest: A way that is too short to matter; [m].
-        long_way: A way that is cut whatever the clearance; [m].
-        most: Largest number of parts.
+        cutting: What is cut.
 
     Returns:
         Shape (r, N), 0 where a piece is clear all the way.
     """
+    centres, clearances = begin
+    next_centres, next_clearances = end
+    finest, long_way, most = cutting
     n_rows, n_links = clearances.shape
     parts = np.zeros((n_rows, n_links), dtype=np.int64)
     for r in range(n_rows):
@@ -234,13 +285,10 @@ def parts_of_pieces(
 
 @compiled
 def on_line(
-    tips: FloatArray,
-    offsets: FloatArray,
-    stations: FloatArray,
+    chain: Chain,
     drawn: bool,
     unit: float,
-    a: int,
-    b: int,
+    span: tuple[int, int],
     line_tips: FloatArray,
     line_offsets: FloatArray,
 ) -> None:
@@ -250,16 +298,14 @@ def on_line(
     as far apart as they are now.
 
     Args:
-        tips: Shape (n, 3); [m].
-        offsets: Shape (n, N + 1, 2) [m], or directions (n, N, 3) [-].
-        stations: Arc length along the desired path, shape (n,); [m].
+        chain: The corners.
         drawn: Whether the tip draws here.
-        unit: Way of the tip that one of these counts for; [m] or [-].
-        a: The first corner.
-        b: The last one.
+        unit: Way of the tip that one of the offsets counts for; [m] or [-].
+        span: The first corner and the last one.
         line_tips: Result in rows a + 1 to b - 1, shape (n, 3); [m].
         line_offsets: Result likewise, shape (n, N + 1, 2); [m].
     """
+    (tips, offsets, stations), (a, b) = chain, span
     share = np.zeros(b - a + 1)
     for k in range(a, b):
         if drawn:

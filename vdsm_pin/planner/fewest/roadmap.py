@@ -173,7 +173,7 @@ def build_roadmap(
     def tried(whole: BoolArray) -> Roadmap:
         node, ends, bends = pose_shapes(
             route.tips, whole, shapes.knees, shapes.slopes, arm.stations, pricing.limit,
-            *arm.base_range,
+            arm.base_range,
         )  # fmt: skip
         if aims is not None:
             there, axes = aims[node // shapes.size], ends[:, 2] - ends[:, 1]

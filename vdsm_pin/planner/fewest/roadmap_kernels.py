@@ -88,8 +88,7 @@ def pose_shapes(
     slopes: FloatArray,
     stations: FloatArray,
     limit: float,
-    base_low: float,
-    base_high: float,
+    base_range: tuple[float, float],
 ) -> tuple[IntArray, FloatArray, FloatArray]:
     """Every shape at every tip, where it keeps the joint limits (Eq. 7).
 
@@ -100,8 +99,7 @@ def pose_shapes(
         slopes: Of `Shapes`, shape (n, 2); [-].
         stations: Arc length of each joint centre, shape (N + 1,); [m].
         limit: Largest link angle; [rad].
-        base_low: Smallest x0; [m].
-        base_high: Largest x0; [m].
+        base_range: Smallest and largest x0; [m].
 
     Returns:
         node numbers tip * n + shape, ascending, shape (v,); the ends of both straight
@@ -111,7 +109,7 @@ def pose_shapes(
     node = np.zeros(size, dtype=np.int64)
     ends, bends = np.zeros((size, 3, 3)), np.zeros((size, 2))
     tried = (tips, whole, knees, slopes, stations)
-    count = _pose_all(tried, limit, base_low, base_high, (node, ends, bends))
+    count = _pose_all(tried, limit, base_range, (node, ends, bends))
     return node[:count], ends[:count], bends[:count]
 
 
@@ -119,8 +117,7 @@ def pose_shapes(
 def _pose_all(
     tried: tuple[FloatArray, BoolArray, IntArray, FloatArray, FloatArray],
     limit: float,
-    base_low: float,
-    base_high: float,
+    base_range: tuple[float, float],
     out: tuple[IntArray, FloatArray, FloatArray],
 ) -> int:
     """Write what `pose_shapes` returns; its number of rows is returned."""
@@ -133,7 +130,7 @@ def _pose_all(
             fits = _pose(
                 tips[k], knees[c], slopes[c], stations, limit, ends[count], bends[count]
             )
-            if fits and base_low <= ends[count, 0, 0] <= base_high:
+            if fits and base_range[0] <= ends[count, 0, 0] <= base_range[1]:
                 node[count] = k * n_shapes + c
                 count += 1
     return count

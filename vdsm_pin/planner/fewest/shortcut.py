@@ -8,7 +8,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners
-from vdsm_pin.planner.fewest.pose_kernels import farthest_apart, on_line
+from vdsm_pin.planner.fewest.pose_kernels import Chain, farthest_apart, on_line
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -45,15 +45,9 @@ def _flattened(judge: Judge, corners: Corners, spans: list[tuple[int, int]]) -> 
         corners.edges.copy(),
     )
     unit = corners.unit(judge.problem.manipulator)
+    chain = Chain(corners.tips, corners.offsets, corners.stations)
     for a, b in spans:
-        now = (
-            corners.tips,
-            corners.offsets,
-            corners.stations,
-            bool(corners.drawn[a]),
-            unit,
-        )
-        on_line(*now, a, b, tips, offsets)
+        on_line(chain, bool(corners.drawn[a]), unit, (a, b), tips, offsets)
         edges[a:b] = -1
     return replace(corners, tips=tips, offsets=offsets, edges=edges)
 
@@ -154,10 +148,10 @@ def straightened(judge: Judge, corners: Corners) -> Corners:
     kept = np.ones(len(corners.tips), dtype=np.bool_)
     tips, offsets = corners.tips.copy(), corners.offsets.copy()
     unit, a = corners.unit(judge.problem.manipulator), 0
+    chain = Chain(corners.tips, corners.offsets, corners.stations)
     for k in range(1, len(corners.tips) - 1):
         if not (corners.drawn[k - 1] or corners.drawn[k]):
-            now = corners.tips, corners.offsets, corners.stations, False, unit
-            on_line(*now, a, k + 1, tips, offsets)
+            on_line(chain, False, unit, (a, k + 1), tips, offsets)
             span = slice(a + 1, k + 1)
             gap = farthest_apart(
                 corners.tips[span], corners.offsets[span], tips[span], offsets[span]

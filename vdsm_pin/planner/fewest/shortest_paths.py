@@ -36,12 +36,12 @@ def _expand(
     graph: Graph,
     tips: TipLinks,
     u: int,
-    strain: FloatArray,
-    turn: float,
+    price: tuple[FloatArray, float],
     labels: Labels,
     barred: Barred,
 ) -> None:
-    """Every move from node u; arguments as in `shortest_paths`."""
+    """Every move from node u; `price` is strain and turn, see `shortest_paths`."""
+    strain, turn = price
     cost, parent = labels.cost, labels.parent
     tip, c = graph.node[u] // graph.n_shapes, graph.node[u] % graph.n_shapes
     corner, begin = tip * graph.n_shapes, graph.first[c]
@@ -118,5 +118,5 @@ def shortest_paths(
         done[u] = True
         if u == target:
             break
-        _expand(heap, graph, tips, u, strain, turn, labels, barred)
+        _expand(heap, graph, tips, u, (strain, turn), labels, barred)
     return labels.cost, labels.parent

@@ -171,7 +171,7 @@ def least_changed(
     everywhere, straight = np.ones(len(tips), dtype=np.bool_), np.zeros((n_links, 2))
     node, ends, bends = pose_shapes(
         np.ascontiguousarray(tips), everywhere, knees, straight, arm.stations,
-        float(slack.bend.max()), low - reserve, high + reserve,
+        float(slack.bend.max()), (low - reserve, high + reserve),
     )  # fmt: skip
     possible = bends.max(axis=1, initial=0.0) <= slack.bend[node % n_links]
     node, ends = node[possible], ends[possible]
