@@ -14,11 +14,14 @@ from vdsm_pin.arm.manipulator import (
     Tool,
     built_in,
 )
-from vdsm_pin.errors import StartBlocked
+from vdsm_pin.errors import NoPlanFound, StartBlocked
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
+from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.stuck import no_way_in
+from vdsm_pin.planner.impossible.bounds import prove_tips
 from vdsm_pin.planner.start import check_start, start_centres
 from vdsm_pin.planner.strategies import STRATEGIES, strategy
+from vdsm_pin.planner.upper_clearance import held_from_all
 from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.verification.link_clearance import link_clearance
@@ -151,3 +154,30 @@ def test_a_narrow_place_is_as_wide_as_it_is_however_thick_the_links() -> None:
     task = PlanningProblem("walls", arm, Scene(walls), path, 0.005, np.eye(4))
     told = str(no_way_in(task, np.array([1.0, 0.0, 0.0]), "", 0.0).words)
     assert "100.000 mm wide, for a body of 160.000 mm" in told
+
+
+@pytest.mark.parametrize("name", STRATEGIES)
+def test_a_start_too_near_what_is_ignored_is_not_told_as_blocked(name: str) -> None:
+    """The post is 1 mm from link 3, which need not keep off it."""
+    task = starting(0.001)
+    ignoring = replace(task.manipulator, ignore_pairs=(("link 3", "post"),))
+    task = replace(task, manipulator=ignoring)
+    with pytest.raises(NoPlanFound, match="that ignore_pairs names"):
+        strategy(name)(task, link_clearance(task), 0.0)
+
+
+def test_what_is_ignored_proves_nothing() -> None:
+    """The path ends in a ball: no way there, unless the last link may touch it."""
+    ball = Sphere("ball", POINTS[1], 0.05)
+    tip = np.array([3.126, 0.0, 0.0])
+    path = DesiredPath(tip, POINTS, False)
+    task = PlanningProblem("ball", ARM, Scene((ball,)), path, 0.0035, np.eye(4))
+    rows = POINTS
+    assert prove_tips(held_from_all(task), link_clearance(task), rows).closed.any()
+    ignoring = replace(ARM, ignore_pairs=(("ball", "link 8"),))
+    task = replace(task, manipulator=ignoring)
+    assert held_from_all(task).scene.obstacles == ()
+    assert not prove_tips(held_from_all(task), link_clearance(task), rows).closed.any()
+    plan = plan_fewest(task, link_clearance(task), 0.0)
+    assert plan.undrawn
+    assert not any("proved" in words for words in plan.undrawn)

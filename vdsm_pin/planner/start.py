@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
 from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.errors import InsideUnknown, StartBlocked, StartInside
+from vdsm_pin.errors import InsideUnknown, NoPlanFound, StartBlocked, StartInside
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.geometry.winding import Location, Side, locate
@@ -20,6 +21,13 @@ from vdsm_pin.planner.upper_clearance import (
 )
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene, with_hulls
+
+TOO_NEAR_FOR_PLANNERS: Final = (
+    "at its start the arm is too near an obstacle that ignore_pairs names: they leave "
+    "pairs out of what is judged, and planners keep every link apart from every "
+    "obstacle; vdsm verify judges a motion made elsewhere"
+)
+"""Why there is no plan where what is judged is clear."""
 
 
 def start_centres(problem: PlanningProblem) -> FloatArray:
@@ -110,6 +118,7 @@ def check_start(problem: PlanningProblem, clearance: LinkClearance) -> None:
 
     Raises:
         StartInside: Where it is inside a mesh.
+        NoPlanFound: Where only pairs that are not judged are too near.
         StartBlocked: With the link or the feed, the obstacle and the clearance
             between them.
         InsideUnknown: Where it is within the convex hull of a mesh whose inside
@@ -121,7 +130,10 @@ def check_start(problem: PlanningProblem, clearance: LinkClearance) -> None:
         return
     _check_outside(problem)
     if not clearance(centres[None]).min() >= required:
-        raise _blocked(problem, culprit(problem, centres))
+        found = culprit(problem, centres)
+        if not found.clearance < required and problem.manipulator.ignore_pairs:
+            raise NoPlanFound(TOO_NEAR_FOR_PLANNERS)
+        raise _blocked(problem, found)
     feed = feed_culprit(problem, centres[0])
     if feed and feed.clearance < required:
         raise _blocked(problem, feed)

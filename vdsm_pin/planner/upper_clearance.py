@@ -1,6 +1,6 @@
 """Upper bounds of a clearance: what proves that a link is too near an obstacle."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -13,6 +13,7 @@ from vdsm_pin.geometry.kernels import BRACKET, NORMAL, SCRATCH_ROWS, UPPER
 from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
 
@@ -75,6 +76,19 @@ def upper_clearance(problem: PlanningProblem, segments: FloatArray) -> FloatArra
     return upper_distances(problem, segments) - problem.manipulator.least_radius
 
 
+def held_from_all(problem: PlanningProblem) -> PlanningProblem:
+    """The problem with those obstacles alone that no body of the arm may touch.
+
+    What is impossible among them is so whatever `ignore_pairs` leaves out.
+    """
+    arm, scene = problem.manipulator, problem.scene
+    left_out = {arm.owner_of(name) for pair in arm.ignore_pairs for name in pair}
+    held = tuple(one for one in scene.obstacles if one.name not in left_out)
+    if len(held) == len(scene.obstacles):
+        return problem  # with what it keeps packed
+    return replace(problem, scene=Scene(held))
+
+
 def nearest(problem: PlanningProblem, place: FloatArray) -> tuple[str, float]:
     """The obstacle nearest to a point, shape (3,), and how far it is at most; [m]."""
     (upper,) = upper_distances(problem, np.stack([place, place])[None])
@@ -121,7 +135,22 @@ def culprit(problem: PlanningProblem, centres: FloatArray) -> Culprit:
         axes, radii = arm.axes(centres[None])[0], arm.axis_radii
     segments = np.stack([axes[:-1], axes[1:]], axis=1)
     links = np.minimum(np.arange(len(segments)) + 1, arm.n_links)
-    return _nearest_of(problem, upper_distances(problem, segments), radii, links)
+    distances = upper_distances(problem, segments)
+    for axis, obstacle in np.ndindex(distances.shape if arm.ignore_pairs else (0, 0)):
+        mine = _bodies_along(arm, axis)
+        name = problem.scene.obstacles[obstacle].name
+        if any(arm.ignores(body, name) for body in mine):
+            distances[axis, obstacle] = np.inf
+    return _nearest_of(problem, distances, radii, links)
+
+
+def _bodies_along(arm: Manipulator, axis: int) -> list[str]:
+    """Names of what counts as one with an axis of `culprit`."""
+    names = [arm.axis_names[axis]]
+    if arm.bodies:
+        names += [body.name for body in arm.bodies if body.link == axis + 1]
+        names += arm.axis_names[arm.n_links :] if axis + 1 == arm.n_links else ()
+    return names
 
 
 def feed_culprit(problem: PlanningProblem, base: FloatArray) -> Culprit | None:

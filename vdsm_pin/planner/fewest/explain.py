@@ -28,7 +28,13 @@ from vdsm_pin.planner.impossible.bounds import (
 from vdsm_pin.planner.impossible.cut_off import narrowest
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.time_limit import deadline_of
-from vdsm_pin.planner.upper_clearance import culprit, named, nearest, upper_clearance
+from vdsm_pin.planner.upper_clearance import (
+    culprit,
+    held_from_all,
+    named,
+    nearest,
+    upper_clearance,
+)
 from vdsm_pin.problem.planning_problem import Blocked, PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import say
@@ -138,6 +144,7 @@ def _cut_off(
     place = _shut(problem, rows.tips[first], deadline)
     words = ""
     if place is not None:
+        problem = held_from_all(problem)
         clearances = upper_clearance(problem, np.stack([place, place])[None])[0]
         scene, required = problem.scene.obstacles, problem.required_clearance
         near = [o.name for o, r in zip(scene, clearances, strict=True) if r < required]
@@ -361,6 +368,7 @@ def _closed_by(
         reasons.append("beyond the reach of the arm")
     tips = rows.tips[proof.buried & here]
     if len(tips):
+        problem = held_from_all(problem)
         bounds = upper_clearance(problem, np.stack([tips, tips], axis=1))
         near = np.flatnonzero(bounds.min(axis=0) < problem.required_clearance)
         names = [repr(problem.scene.obstacles[int(o)].name) for o in near]
