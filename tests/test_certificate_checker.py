@@ -39,7 +39,8 @@ from vdsm_pin.certificate_checker import check_certificate, main
 from vdsm_pin.certificate_checker.path import Drawing
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.convex import HalfSpacePiece
-from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.desired_path import DesiredPath
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.drawing import check_order

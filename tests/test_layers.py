@@ -49,7 +49,8 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 CHECKER = PACKAGE / "certificate_checker"
 READING = {
     *("errors", "text", "geometry.solids"),
-    *("problem.planning_problem", "problem.scene", "problem.trajectory"),
+    *("problem.planning_problem", "problem.desired_path"),
+    *("problem.scene", "problem.trajectory"),
     *("problem.error_boxes",),
     *("io.problem_file", "io.source", "io.trajectory_file", "io.mesh_file"),
     *("arm.urdf_validator", "robots.files", "robots.joint_limits", "robots.model"),

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
         Prism,
         Sphere,
     )
-    from vdsm_pin.problem.planning_problem import DesiredPath
+    from vdsm_pin.problem.desired_path import DesiredPath
     from vdsm_pin.problem.planning_problem import PlanningProblem as Problem
     from vdsm_pin.problem.scene import Scene
     from vdsm_pin.problem.trajectory import Trajectory
@@ -89,7 +89,7 @@ _HOMES: Final = {
     "geometry.solids": (
         *("Box", "Capsule", "Cylinder", "HalfSpace", "Mesh", "Prism", "Sphere"),
     ),
-    "problem.planning_problem": ("DesiredPath",),
+    "problem.desired_path": ("DesiredPath",),
     "problem.scene": ("Scene",),
     "problem.trajectory": ("Trajectory",),
     "verification.records": ("Verdict",),

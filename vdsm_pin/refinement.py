@@ -21,8 +21,9 @@ from vdsm_pin.planner.start import with_known_insides
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.planner.time_limit import within_time
 from vdsm_pin.planner.waiting import waited
+from vdsm_pin.problem.desired_path import Approach
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.problem.planning_problem import Approach, PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.progress import say
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES

@@ -15,7 +15,8 @@ from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.planner.time_limit import within_time
-from vdsm_pin.problem.planning_problem import Blocked, PlanningProblem
+from vdsm_pin.problem.desired_path import Blocked
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.report.motion_facts import changed_angles, motion_facts

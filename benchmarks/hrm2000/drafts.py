@@ -17,7 +17,7 @@ from benchmarks.hrm2000.motions import (
 from benchmarks.hrm2000.sweeps import Rng, scale
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.problem.planning_problem import DesiredPath
+from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.scene import Obstacle
 
 Range: TypeAlias = tuple[float, float]

@@ -15,7 +15,7 @@ from benchmarks.hrm2000.motions import DraftRejected, Witness
 from benchmarks.hrm2000.sweeps import Rng
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.problem.planning_problem import DesiredPath
+from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.pointing import Pointing, angles_between
 
 WIDEST: Final = np.deg2rad(15.0)

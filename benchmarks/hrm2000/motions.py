@@ -13,7 +13,7 @@ from benchmarks.hrm2000.curves import TipCurve, follow_the_leader
 from vdsm_pin.arm.kinematics import joint_angles, joint_centres, link_angles
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.problem.planning_problem import DesiredPath
+from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.pointing import Pointing
 from vdsm_pin.problem.trajectory import Trajectory
 

@@ -26,7 +26,7 @@ from benchmarks.hrm2000.twins import TWINS
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory
-from vdsm_pin.problem.planning_problem import DesiredPath
+from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify

@@ -9,7 +9,7 @@ from flint import arb, ctx
 
 from vdsm_pin.certificate_checker.balls import Rejected, column, norm, number, unit
 from vdsm_pin.certificate_checker.path import Drawing
-from vdsm_pin.problem.planning_problem import DesiredPath
+from vdsm_pin.problem.desired_path import DesiredPath
 
 TINY = 1e-12
 

@@ -13,7 +13,8 @@ from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.obstacles import encloses
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.geometry.solids import Mesh
-from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.desired_path import DesiredPath
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.verification.link_clearance import link_clearance
 

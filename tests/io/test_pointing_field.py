@@ -7,7 +7,7 @@ import pytest
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.problem_file import read_problem
-from vdsm_pin.problem.planning_problem import DesiredPath
+from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.pointing import Pointing
 
 TEXT = """

@@ -20,7 +20,8 @@ from vdsm_pin.io.problem_file import (
     problem_schema,
     read_problem,
 )
-from vdsm_pin.problem.planning_problem import Approach, Blocked, Order, PlanningProblem
+from vdsm_pin.problem.desired_path import Approach, Blocked, Order
+from vdsm_pin.problem.planning_problem import PlanningProblem
 
 MINIMAL = """\
 vdsm_problem: 1

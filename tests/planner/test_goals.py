@@ -12,7 +12,8 @@ from vdsm_pin.errors import InvalidFile, NoPlanFound, UnknownName
 from vdsm_pin.geometry.solids import Box, Sphere
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.joint_lines import clear_line
-from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem, Posture
+from vdsm_pin.problem.desired_path import DesiredPath
+from vdsm_pin.problem.planning_problem import PlanningProblem, Posture
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.refinement import Refinement, plan_and_verify
 from vdsm_pin.verification.link_clearance import link_clearance

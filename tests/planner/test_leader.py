@@ -9,7 +9,8 @@ from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Sphere
-from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.desired_path import DesiredPath
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.verification.records import Verdict

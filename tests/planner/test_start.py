@@ -22,7 +22,8 @@ from vdsm_pin.planner.impossible.bounds import prove_tips
 from vdsm_pin.planner.start import check_start, start_centres
 from vdsm_pin.planner.strategies import STRATEGIES, strategy
 from vdsm_pin.planner.upper_clearance import held_from_all
-from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.desired_path import DesiredPath
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.verification.link_clearance import link_clearance
 

@@ -12,7 +12,8 @@ from vdsm_pin.arm.manipulator import (
     paper_hole_angles,
 )
 from vdsm_pin.errors import InconsistentCables
-from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.desired_path import DesiredPath
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification import cable_check

@@ -14,7 +14,7 @@ from vdsm_pin.certificate_checker.balls import column
 from vdsm_pin.certificate_checker.path import Drawing
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
-from vdsm_pin.problem.planning_problem import DesiredPath
+from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.drawing import exact_length, runs

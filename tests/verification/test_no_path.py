@@ -9,7 +9,8 @@ from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.solids import Sphere
-from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem, Posture
+from vdsm_pin.problem.desired_path import DesiredPath
+from vdsm_pin.problem.planning_problem import PlanningProblem, Posture
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.records import Check, Verdict

@@ -6,7 +6,7 @@ from itertools import pairwise
 from flint import arb
 
 from vdsm_pin.certificate_checker.balls import Ball, Matrix, column, norm
-from vdsm_pin.problem.planning_problem import DesiredPath
+from vdsm_pin.problem.desired_path import DesiredPath
 
 
 class Drawing:

@@ -19,7 +19,7 @@ from vdsm_pin.certificate_checker.balls import (
 from vdsm_pin.certificate_checker.motion import Interval, Slices, Sweep, part
 from vdsm_pin.certificate_checker.path import Drawing
 from vdsm_pin.certificate_checker.tree import Pose, frame_of
-from vdsm_pin.problem.planning_problem import Order, Posture
+from vdsm_pin.problem.planning_problem import Posture
 from vdsm_pin.problem.trajectory import Trajectory
 
 PARTS: Final = 32  # of a smooth piece, whose control points hold what lies between
@@ -38,7 +38,7 @@ class Rows:
         self.arm, self.rows, self.problem = arm, rows, arm.problem
         self.place, path = "header", self.problem.tip_path
         self.drawing = None if path is None else Drawing(path)
-        self.ordered = path is not None and path.order is Order.AS_GIVEN
+        self.ordered = path is not None and path.order == "as_given"
         self.link, self.last = frame_of(len(arm.lengths)), arm.lengths[-1]
 
     def check(self, first: Pose) -> None:

@@ -24,7 +24,7 @@ from vdsm_pin.io.points_file import read_points
 from vdsm_pin.io.posture_builder import PostureBuilder
 from vdsm_pin.io.source import Digest
 from vdsm_pin.io.yaml_reader import YamlDocument
-from vdsm_pin.problem.planning_problem import Approach, Blocked, DesiredPath, Order
+from vdsm_pin.problem.desired_path import Approach, Blocked, DesiredPath, Order
 from vdsm_pin.problem.pointing import Pointing
 from vdsm_pin.problem.trajectory import MAX_ROWS
 from vdsm_pin.tolerances import TOLERANCES

@@ -12,7 +12,7 @@ import numpy as np
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import OutOfReach
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.problem.planning_problem import DesiredPath
+from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.units import in_mm
 
 

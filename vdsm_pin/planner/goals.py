@@ -18,12 +18,8 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.joint_lines import clear_line
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.planner.strategies import Strategy
-from vdsm_pin.problem.planning_problem import (
-    Blocked,
-    DesiredPath,
-    PlanningProblem,
-    Posture,
-)
+from vdsm_pin.problem.desired_path import Blocked, DesiredPath
+from vdsm_pin.problem.planning_problem import PlanningProblem, Posture
 from vdsm_pin.problem.trajectory import Trajectory
 
 JOINS: Final = 8

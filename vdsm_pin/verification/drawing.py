@@ -9,7 +9,8 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
-from vdsm_pin.problem.planning_problem import DesiredPath, Order, PlanningProblem
+from vdsm_pin.problem.desired_path import DesiredPath, Order
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.records import Check, Verdict

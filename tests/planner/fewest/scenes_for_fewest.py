@@ -5,7 +5,8 @@ import numpy as np
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, Prism, Sphere
-from vdsm_pin.problem.planning_problem import Blocked, DesiredPath, PlanningProblem
+from vdsm_pin.problem.desired_path import Blocked, DesiredPath
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.verification.link_clearance import link_clearance
 

@@ -11,7 +11,8 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.fewest.sequence import shortest_tour, tour_length
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.problem.planning_problem import Order, PlanningProblem
+from vdsm_pin.problem.desired_path import Order
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot

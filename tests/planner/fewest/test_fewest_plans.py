@@ -16,8 +16,9 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.fewest.strategy import plan_clearest, plan_fewest
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.planner.time_limit import within_time
+from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.problem.planning_problem import Blocked, PlanningProblem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance

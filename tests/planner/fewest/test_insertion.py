@@ -37,7 +37,8 @@ from vdsm_pin.planner.fewest.sparsify import sparser
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.problem.planning_problem import DesiredPath, PlanningProblem
+from vdsm_pin.problem.desired_path import DesiredPath
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.link_clearance import link_clearance

@@ -13,7 +13,7 @@ from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.impossible.cut_off import cut_off
 from vdsm_pin.planner.impossible.octree import DEPTH, adjoining, places
-from vdsm_pin.problem.planning_problem import Blocked
+from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.verification.link_clearance import link_clearance
 
 KEEP = built_in("hrm8").link_radius + 0.0035

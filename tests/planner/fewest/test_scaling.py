@@ -17,7 +17,8 @@ from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.shortcut import shortcut
 from vdsm_pin.planner.fewest.strategy import CLEAREST, FEWEST
 from vdsm_pin.planner.fewest.unbend import unbend
-from vdsm_pin.problem.planning_problem import DesiredPath, Order, PlanningProblem
+from vdsm_pin.problem.desired_path import DesiredPath, Order
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.verification.link_clearance import link_clearance
 

@@ -23,7 +23,8 @@ from vdsm_pin.planner.fewest.stuck import (
     on_the_path,
     where_stuck,
 )
-from vdsm_pin.problem.planning_problem import Blocked, PlanningProblem
+from vdsm_pin.problem.desired_path import Blocked
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.progress import shown
 from vdsm_pin.verification.link_clearance import link_clearance

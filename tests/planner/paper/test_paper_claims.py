@@ -12,7 +12,7 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.paper.along_rail import AlongRail
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.problem.planning_problem import DesiredPath
+from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.verification.link_clearance import link_clearance
 
 FREE = read_problem("paper/free")

@@ -19,7 +19,8 @@ from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, Prism, Sphere
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.problem.planning_problem import Approach, Blocked, PlanningProblem
+from vdsm_pin.problem.desired_path import Approach, Blocked
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.link_clearance import link_clearance

@@ -25,7 +25,7 @@ from vdsm_pin.planner.paper.lift import largest_angles, lift
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.scale import scale
 from vdsm_pin.planner.paper.solve import check_limits
-from vdsm_pin.problem.planning_problem import DesiredPath
+from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.tolerances import TOLERANCES
 
 HRM8 = built_in("hrm8")

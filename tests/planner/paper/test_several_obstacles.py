@@ -12,7 +12,8 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.detours import first_station
 from vdsm_pin.planner.paper.sections import Section, merged
-from vdsm_pin.problem.planning_problem import Approach, PlanningProblem
+from vdsm_pin.problem.desired_path import Approach
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.verification.records import Verdict

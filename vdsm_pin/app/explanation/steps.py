@@ -12,7 +12,7 @@ from vdsm_pin.planner.paper.across_rail import AcrossRail
 from vdsm_pin.planner.paper.along_rail import AlongRail
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.joint_paths import chain_ratios
-from vdsm_pin.problem.planning_problem import Approach
+from vdsm_pin.problem.desired_path import Approach
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
 

@@ -35,7 +35,8 @@ from vdsm_pin.planner.upper_clearance import (
     nearest,
     upper_clearance,
 )
-from vdsm_pin.problem.planning_problem import Blocked, PlanningProblem
+from vdsm_pin.problem.desired_path import Blocked
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import say
 from vdsm_pin.time_limit import Deadline

@@ -23,7 +23,7 @@ from vdsm_pin.planner.fewest.search import Found
 from vdsm_pin.planner.fewest.start_node import checked_start
 from vdsm_pin.planner.fewest.stuck import Stuck
 from vdsm_pin.planner.fewest.tip_routes import TipSpace
-from vdsm_pin.problem.planning_problem import Blocked
+from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.progress import say
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.units import in_mm

@@ -7,7 +7,8 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.planner.spacing import count_of
-from vdsm_pin.problem.planning_problem import DesiredPath, Order, PlanningProblem
+from vdsm_pin.problem.desired_path import DesiredPath, Order
+from vdsm_pin.problem.planning_problem import PlanningProblem
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from vdsm_pin.planner.fewest.motion import Corners, motion_corners
 from vdsm_pin.planner.fewest.roadmap import Roadmap
 from vdsm_pin.planner.fewest.route import TipRoute
 from vdsm_pin.planner.fewest.sequence import Planner, reordered
-from vdsm_pin.problem.planning_problem import Order
+from vdsm_pin.problem.desired_path import Order
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,8 @@ from vdsm_pin.planner.fewest.unbend import (
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.planner.start import check_start
 from vdsm_pin.planner.time_limit import deadline_of
-from vdsm_pin.problem.planning_problem import Blocked, PlanningProblem
+from vdsm_pin.problem.desired_path import Blocked
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES

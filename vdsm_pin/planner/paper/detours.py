@@ -30,7 +30,7 @@ from vdsm_pin.planner.paper.tip_path import (
     rows_at,
     undrawn_by,
 )
-from vdsm_pin.problem.planning_problem import Approach, DesiredPath
+from vdsm_pin.problem.desired_path import Approach, DesiredPath
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
 

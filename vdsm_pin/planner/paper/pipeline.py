@@ -16,7 +16,8 @@ from vdsm_pin.planner.paper.tip_path import Route, subdivided
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.planner.spacing import row_steps
 from vdsm_pin.planner.start import check_start
-from vdsm_pin.problem.planning_problem import Blocked, PlanningProblem
+from vdsm_pin.problem.desired_path import Blocked
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
 
