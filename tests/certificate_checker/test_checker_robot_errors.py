@@ -126,12 +126,12 @@ ASKED: dict[str, tuple[Callable[[Made], None], str]] = {
 def test_larger_errors_than_certified_are_refused(tmp_path: Path) -> None:
     made = erring(tmp_path)
     lines, urdf = made.certified(), made.texts["all.urdf"]
-    meshes = read_cell(made.files[0]).robot.meshes
+    named = read_cell(made.files[0]).robot.more_files
     for what, (change, reason) in ASKED.items():
         made.texts["all.urdf"], made.cell["errors"] = urdf, ERRORS
         change(made)
         made.write()
-        source = read_cell_file(made.files[0]).source(meshes, ())
+        source = read_cell_file(made.files[0]).source(named, ())
         lines[0]["problem_sha256"] = source.sha256
         outcome = made.check(lines, fits=False)
         assert not outcome.accepted, what

@@ -211,10 +211,11 @@ def test_a_feed_stands_in_every_file(tmp_path: Path, shift: float) -> None:
 def test_a_plan_that_fails_at_the_feed_says_so_in_millimetres(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    beside = ball("post", [-100.0, 0.0, 30.0 + 2.0 + 50.0 - 0.1])
+    # The feed comes there as the arm goes back.
+    beside = ball("post", [-650.0, 0.0, 30.0 + 2.0 + 50.0 - 0.1])
     asked = problem(obstacles=[beside], feed={"length": 600.0})
     tip = [sum(asked["manipulator"]["link_lengths"]), 0.0, 0.0]
-    asked["tip_path"] = {"start": tip, "points": [[tip[0], 10.0, 0.0]]}
+    asked["tip_path"] = {"start": tip, "points": [[tip[0] - 100.0, 0.0, 0.0]]}
     made = Files(tmp_path, asked, STILL)
     with pytest.raises(SystemExit):
         main(["plan", str(made.problem), "--out", str(tmp_path / "out")])
