@@ -111,6 +111,16 @@ def test_a_forged_certificate_of_other_files_is_refused(
     assert any(word in outcome.reason for word in reason.split("|")), outcome.reason
 
 
+def test_limits_that_are_not_judged_are_told(tmp_path: Path) -> None:
+    """Those of a mimic that leave what it mimics no room, as the verifier says too."""
+    made = Made(tmp_path, "fixed", 1)
+    text('lower="-3" upper="3"', 'lower="2" upper="3"')(made)
+    outcome = made.check(made.certified())
+    assert outcome.accepted
+    (note,) = (one for one in outcome.notes if "not judged" in one)
+    assert note.startswith("limits of joint 'follow', 2 to 3, are not judged: they")
+
+
 @pytest.mark.parametrize("rows", [1, 2])
 def test_motions_of_few_rows_are_accepted_and_held_to_their_rates(
     tmp_path: Path, rows: int

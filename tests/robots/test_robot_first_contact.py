@@ -46,7 +46,7 @@ def test_a_contact_begins_and_ends_where_the_closed_form_says(
 ) -> None:
     """In and out of the wall's margin twice; with no margin balls in both prove it."""
     row = slid(tmp_path, [0.0, 0.2, 0.5, 0.1, 0.1, 0.6, -0.3], required)
-    limit, off = ROOM - required, 1e-3 if required == 0.0 else 2e-6
+    limit, off = ROOM - required, 2e-6
     assert row.verdict is Verdict.REFUTED
     assert row.first == pytest.approx(1.0 + (limit - 0.2) / 0.3, abs=off)
     assert row.last == pytest.approx(5.0 + (0.6 - limit) / 0.9, abs=off)

@@ -118,7 +118,7 @@ class Joints:
             own = numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"))
             frame = self._hang(parent, name, kind, placed(joint), own)
             self.frames[end(joint, "child")] = frame
-        self.moved, _ = narrowed(self.moved, self.values, document, given)
+        self.moved, self.notes = narrowed(self.moved, self.values, document, given)
 
     def _own(self, name: str, kind: str, limits: Limits) -> None:
         """Of a joint that follows none: columns of its own, or values that stay."""
@@ -202,20 +202,20 @@ class Robot:
         text, included = urdf_text(self.files.urdf, self.files.package_dirs)
         validate_urdf(text, geometry_only=True)
         document = ET.fromstring(text)
-        named = document.findall("link/collision/geometry/mesh")
-        meshes = tuple(dict.fromkeys(map(self._mesh, named)))
+        meshes = [*map(self._mesh, document.findall("link/collision/geometry/mesh"))]
         srdf = Srdf(self.files.srdf, document) if self.files.srdf else None
         self.joints = Joints(self.files, document, srdf)
         self.place, joints = "header", self.joints.joints
         size = float(sum(joint.lever for joint in joints)) or 1.0
         others = {name for name, frame in self.joints.frames.items() if frame != 1}
         self.scene, of_obstacles = file.scene(size, others)
-        source = file.source((*included, *meshes), of_obstacles).sha256
+        source = file.source((*included, *dict.fromkeys(meshes)), of_obstacles).sha256
         belongs(header, "errors links topic", source, sha256_of_file(trajectory))
         own = self._branch(header, trajectory)
         self.own = Path(own)
         self.tree, self.path, self.rests = beside(own, joints, self.scene)
         self.notes = [self.files.solids.words, f"{header['interpolation']} pieces"]
+        self.notes += self.joints.notes
         self.pairs = [*self._pairs(file, header, document, srdf)]
 
     def _mesh(self, mesh: ET.Element) -> Any:

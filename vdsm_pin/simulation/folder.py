@@ -19,7 +19,7 @@ from vdsm_pin.report.rows import FileModel, VerdictWord
 from vdsm_pin.report.run_record import versions
 from vdsm_pin.report.words import finite
 from vdsm_pin.simulation.closed_loop import SLACK, Simulation, simulate
-from vdsm_pin.simulation.page import page
+from vdsm_pin.simulation.page import BAND_DEG, page
 from vdsm_pin.simulation.plant import cable_name
 from vdsm_pin.simulation.settings import Settings
 from vdsm_pin.verification.clearance import prove_clearance
@@ -33,8 +33,8 @@ RECORD: Final = "simulation.csv"
 SUMMARY: Final = "simulation.json"
 PAGE: Final = "simulation.html"
 
-BAND: Final = float(np.deg2rad(0.3))
-"""The paper's main range of joint errors (Fig. 21); [rad]."""
+BAND: Final = float(np.deg2rad(BAND_DEG))
+"""The same in radians; [rad]."""
 
 
 class Cleared(FileModel):
