@@ -115,8 +115,11 @@ def test_odd_scene_text_is_refused(
     assert expected in str(caught.value)
 
 
-def test_worlds_stand_where_mujoco_has_them(tmp_path: Path) -> None:
+def test_worlds_stand_where_mujoco_has_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
     pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
     floor, crate, rod, ball, can = read_scene(
         write(tmp_path, "world.xml", WORLD), 1.0
     ).obstacles
@@ -145,9 +148,14 @@ def test_worlds_stand_where_mujoco_has_them(tmp_path: Path) -> None:
         ),
         (WORLD[:200], "is not XML"),
         (WORLD.replace("box", "bax"), "is refused by mujoco"),
+        (WORLD.replace('pos="1 0', 'pos="nan 0'), "centre is .nan  0"),
     ):
         with pytest.raises(InvalidFile, match=expected):
             read_scene(write(tmp_path, "world.xml", text), 1.0)
+    assert (
+        "NaN" in caplog.text
+    )  # mujoco's own words; nothing is written beside the file
+    assert [file.name for file in tmp_path.iterdir()] == ["world.xml"]
 
 
 def test_a_geom_that_collides_by_a_pair_is_there(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """What stands in a world of MuJoCo (MJCF), by mujoco (extra `mjcf`)."""
 
+import logging
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -36,14 +37,27 @@ def read_mjcf(file: Path) -> Scene:
         raise InvalidFile(file=file, problem=str(error)) from None
 
 
+def load_mujoco() -> Any:
+    """The module, whose warnings then go to Python's log and to no file.
+
+    By itself mujoco appends them to MUJOCO_LOG.TXT in the current folder.
+
+    Raises:
+        ImportError: If it is not installed.
+    """
+    import mujoco
+
+    mujoco.set_mju_user_warning(logging.getLogger("mujoco").warning)
+    return mujoco
+
+
 def _is_text(name: str) -> bool:
     return not any("\ud800" <= sign <= "\udfff" for sign in name)
 
 
 def _solids(file: Path) -> list[Obstacle]:
     """What collides in the world of a file."""
-    import mujoco
-
+    mujoco = load_mujoco()
     try:
         model = mujoco.MjModel.from_xml_path(str(file))
         data = mujoco.MjData(model)

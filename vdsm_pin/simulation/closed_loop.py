@@ -14,6 +14,7 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidInput, VerificationFailed
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.robots.mjcf import load_mujoco
 from vdsm_pin.simulation.feed_forward import Statics
 from vdsm_pin.simulation.plant import free_ends, plant_xml, stiffnesses
 from vdsm_pin.simulation.settings import Kick, Settings
@@ -98,11 +99,10 @@ def simulate(
 
 def _mujoco() -> Any:
     try:
-        import mujoco
+        return load_mujoco()
     except ImportError as error:
         message = "mujoco is not installed: pip install 'vdsm-pin[simulation]'"
         raise VerificationFailed(message) from error
-    return mujoco
 
 
 class _Loop:
