@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from math import ceil, floor
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.paths import Path, cubic_path, together
-from vdsm_pin.proof.prover import Proof, prove, prove_intervals
+from vdsm_pin.proof.prover import Proof, prove
+from vdsm_pin.proof.stretches import Stretches
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.proof.tree import Joint, Kind, Tree, free_tree, shifted
 from vdsm_pin.tolerances import TOLERANCES
@@ -57,7 +59,8 @@ def test_intervals_are_judged_as_each_by_itself(seed: int) -> None:
     )]  # fmt: skip
     pairs = [Pair(k, 0, 0.05) for k in (1, 2, 3)]
     path = Path(rng.uniform(-3.0, 3.0, (7, 1)))
-    found = prove_intervals(turning_arm(), bodies, path, pairs)
+    stretches = Stretches(turning_arm(), bodies, path, pairs)
+    found = stretches.each()
     assert found is not None
     verdicts, upper = found
     assert len({*verdicts.ravel().tolist()}) == 2
@@ -66,6 +69,28 @@ def test_intervals_are_judged_as_each_by_itself(seed: int) -> None:
         np.testing.assert_array_equal(verdicts[k], one.verdict)
         assert (upper[k] >= one.upper - 1e-9).all()
         assert ((upper[k] < 0.05) == (one.verdict == REFUTED)).all()
+        halves = [stretches.over(k + low, k + low + 0.5) for low in (0.0, 0.5)]
+        worst = np.maximum(*(half.verdict for half in halves))
+        np.testing.assert_array_equal(worst, one.verdict)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_stretch_is_judged_whatever_was_asked_before(seed: int) -> None:
+    """Whole intervals and parts of them, in any order: nothing goes on to the next."""
+    rng = np.random.default_rng(seed)
+    bodies = [Body(1, (Hull(np.array([[0.7, 0.0, 0.0]]), 0.05),), "arm"), *(
+        ball(0, *rng.uniform(-1.0, 1.0, 2), 0.0, 0.2) for _ in range(12)
+    )]  # fmt: skip
+    pairs = [Pair(k, 0, 0.05) for k in range(1, 13)]
+    asked = turning_arm(), bodies, Path(np.linspace(-3.0, 3.0, 25)[:, None]), pairs
+    stretches, met = Stretches(*asked), 0
+    for k in range(60):
+        low, high = np.sort(rng.uniform(0.0, 24.0, 2))
+        low, high = (floor(low), ceil(high)) if k % 2 else (low, high)
+        fresh, found = Stretches(*asked).over(low, high), stretches.over(low, high)
+        np.testing.assert_array_equal(found.verdict, fresh.verdict)
+        met += (found.verdict != CERTIFIED).sum()
+    assert met
 
 
 def held(query: object, proof: Proof, swapped: bool = False) -> None:

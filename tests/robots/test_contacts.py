@@ -6,7 +6,7 @@ import pytest
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.geometry.convex import FlatCylinder, Hull, Hulls, Piece
 from vdsm_pin.geometry.solids import BOX_CORNERS
-from vdsm_pin.robots.contacts import common_ball, in_world
+from vdsm_pin.robots.contacts import Placed, common_ball
 
 BALL = Hull(np.zeros((1, 3)), 0.1)
 CAPSULE = Hull(np.array([[0.0, 0.0, -0.2], [0.0, 0.0, 0.2]]), 0.1)
@@ -17,10 +17,10 @@ WIDTH = 0.1
 """Half of each along x, turned about x or not; [m]."""
 
 
-def placed(piece: Piece, x: float, turn: FloatArray) -> list[Piece]:
+def placed(piece: Piece, x: float, turn: FloatArray) -> Placed:
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = turn, turn @ [x, 0.0, 0.0]
-    return list(in_world([piece], pose))
+    return Placed([piece], pose)
 
 
 @pytest.mark.parametrize("depth", [1e-4, 1e-3, 0.05])
@@ -60,7 +60,7 @@ def test_ball_about_a_point_of_a_triangle_that_goes_in(one: str, depth: float) -
         (tip + np.array([[0, 0, 0], [1, 0.2, 0.3], [1, -0.4, 0.1]])) @ turn.T
     )
     radius, centre = common_ball(
-        placed(PIECES[one], 0.0, turn), [triangle], turn @ [WIDTH, 0.0, 0.0]
+        placed(PIECES[one], 0.0, turn), Placed([triangle]), turn @ [WIDTH, 0.0, 0.0]
     )
     assert (radius > 0.0) == (depth > 0.0)
     if depth > 0.0:
@@ -74,6 +74,6 @@ def test_of_many_pieces_the_near_ones_are_looked_at() -> None:
     far = rng.normal([5.0, 0.0, 0.0], 1.0, (1000, 3, 3))
     through = np.array([[[-1.0, 0.01, 0], [1.0, 0.02, 1], [1.0, -0.03, -1]]])
     body = placed(BOX, 0.0, np.eye(3))
-    radius, _ = common_ball(Hulls(np.concatenate([far, through])), body, np.zeros(3))
-    assert radius > 0.01
-    assert common_ball(Hulls(far), body, np.zeros(3))[0] == 0.0
+    many = Placed(Hulls(np.concatenate([far, through])))
+    assert common_ball(many, body, np.zeros(3))[0] > 0.01
+    assert common_ball(Placed(Hulls(far)), body, np.zeros(3))[0] == 0.0

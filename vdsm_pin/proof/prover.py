@@ -6,27 +6,25 @@ included. If it is REFUTED, two points, one of each body, come nearer at a state
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.budget import Budget, rounding_pad
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, OWN, TIME, UP
 from vdsm_pin.proof.packing import pack_task, with_errors
+from vdsm_pin.proof.parts import PartPlan, planned_parts
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.proving import Proving, dense_rows, new_proving
+from vdsm_pin.proof.proving import Proving, new_proving
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.rough import with_rough
-from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED, WORLD
+from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.proof.tree import Tree
-
-MOST_BRACKETS: Final = 500_000
-"""Brackets of intervals that are held at once."""
 
 RANK: Final = np.array([0, 2, 1])
 """Of verdicts, the worst last: refuted, before it undecided; its own inverse."""
@@ -71,91 +69,6 @@ class Proof:
         return bool(self.verdict.size and (self.verdict == CERTIFIED).all())
 
 
-@dataclass(frozen=True)
-class _Plan:
-    """How pairs of bodies are asked: each as some of a convex part and a partner.
-
-    Args:
-        bodies: Those at rest in the world first, then the others, then parts of bodies
-            with several.
-        pairs: Of parts and partners.
-        owner: The pair that each stands for, shape (n,).
-        swapped: Whether its first body is the partner, shape (n,).
-        number: Number of the body as it was given, of each body, (n_bodies,).
-        n_obstacles: Number of those at rest in the world.
-    """
-
-    bodies: list[Body]
-    pairs: PairTable
-    owner: IntArray
-    swapped: BoolArray
-    number: IntArray
-    n_obstacles: int
-
-
-def _mover(one: Body, other: Body, apart: bool) -> bool:
-    """Whether the second of two bounded bodies moves past the first, not reversed.
-
-    Args:
-        one: The first.
-        other: The second.
-        apart: Whether they are of two branches of the tree.
-    """
-    if WORLD in (one.frame, other.frame):
-        return one.frame == WORLD
-    return apart or len(other.pieces) < len(one.pieces)
-
-
-def _planned(tree: Tree, bodies: Sequence[Body], pairs: PairTable) -> _Plan:
-    """Which side of each pair moves, and its convex parts.
-
-    Raises:
-        ValueError: If both have a half-space.
-    """
-    branches = tree.branches[[body.frame for body in bodies]].tolist()
-    order = sorted(range(len(bodies)), key=lambda k: bodies[k].frame != WORLD)
-    place = {number: k for k, number in enumerate(order)}
-    all_bodies, number = [bodies[k] for k in order], list(order)
-    parts: dict[int, range] = {}
-    bounded = [body.is_bounded for body in bodies]
-    rows: list[tuple[int, int, float, int, bool]] = []
-    asked = zip(
-        pairs.one.tolist(), pairs.other.tolist(), pairs.required.tolist(), strict=True
-    )
-    for row, (one, other, required) in enumerate(asked):
-        if not (bounded[one] or bounded[other]):
-            names = f"{bodies[one].name!r} and {bodies[other].name!r}"
-            message = f"{names} are both unbounded: they always meet"
-            raise ValueError(message)
-        swapped = not bounded[one]
-        if bounded[one] and bounded[other]:
-            apart = branches[one] != branches[other]
-            swapped = _mover(bodies[one], bodies[other], apart)
-        mover, partner = (other, one) if swapped else (one, other)
-        body, first = bodies[mover], len(all_bodies)
-        if mover not in parts and len(body.pieces) == 1:
-            parts[mover] = range(place[mover], place[mover] + 1)
-        elif mover not in parts:
-            parts[mover] = range(first, first + len(body.pieces))
-            all_bodies += [Body(body.frame, (p,), body.name) for p in body.pieces]
-            number += [mover] * len(body.pieces)
-        partner = place[partner]
-        rows += [(k, partner, required, row, swapped) for k in parts[mover]]
-    table = PairTable(
-        np.array([row[0] for row in rows], dtype=np.int64),
-        np.array([row[1] for row in rows], dtype=np.int64),
-        np.array([row[2] for row in rows], dtype=np.float64),
-    )
-    return _Plan(
-        bodies=all_bodies,
-        pairs=table,
-        owner=np.array([row[3] for row in rows], dtype=np.int64),
-        swapped=np.array([row[4] for row in rows], dtype=np.bool_),
-        number=np.array(number, dtype=np.int64),
-        n_obstacles=sum(body.frame == WORLD for body in bodies),
-    )
-
-
 def _extent(tree: Tree, path: Path, pieces: PackedPieces) -> float:
     """Bound of all lengths and coordinates; [m]."""
     far = 0.0
@@ -175,10 +88,10 @@ def start_proof(
     errors: ErrorBox | None = None,
     budget: Budget | None = None,
     columns: IntArray | None = None,
-) -> tuple[Proving, _Plan]:
+) -> tuple[Proving, PartPlan]:
     """Everything ready, nothing judged; arguments as for `prove`."""
     _check(tree, bodies, path)
-    budget, plan = budget or Budget(), _planned(tree, bodies, pairs)
+    budget, plan = budget or Budget(), planned_parts(tree, bodies, pairs)
     rough = with_rough(plan.bodies, plan.pairs)
     number, every = plan.number[rough.original], rough.bodies
     pieces = pack_pieces([body.pieces for body in every])
@@ -247,35 +160,7 @@ def prove(
     table = pairs if isinstance(pairs, PairTable) else PairTable.of(pairs)
     proving, plan = start_proof(tree, bodies, path, table, errors, budget, columns)
     in_time = proving.run()
-    return _summed(proving.results, plan, table.size, in_time)
-
-
-def prove_intervals(
-    tree: Tree,
-    bodies: Sequence[Body],
-    path: Path,
-    pairs: Sequence[Pair],
-    errors: ErrorBox | None = None,
-    budget: Budget | None = None,
-) -> tuple[IntArray, FloatArray] | None:
-    """What `prove` says of every interval by itself; arguments as there.
-
-    Returns:
-        Verdicts and upper bounds, shape (n_intervals, n_pairs) each; [m]. None where
-        they are more than `MOST_BRACKETS`, or the time ended before.
-    """
-    table = PairTable.of(pairs)
-    proving, plan = start_proof(tree, bodies, path, table, errors, budget)
-    n_intervals, n_parts = path.n_intervals, len(plan.owner)
-    if n_intervals * n_parts > MOST_BRACKETS:
-        return None
-    dense = dense_rows(n_intervals, n_parts)
-    proving = replace(proving, results=proving.results._replace(dense=dense))
-    if not proving.sweep(0, n_intervals):
-        return None
-    first = np.searchsorted(plan.owner, np.arange(table.size))
-    worst = np.maximum.reduceat(RANK[dense.verdict], first, axis=1)
-    return RANK[worst], np.minimum.reduceat(dense.upper, first, axis=1)
+    return summed(proving.results, plan, table.size, in_time)
 
 
 def verdicts_of(counts: IntArray) -> IntArray:
@@ -285,8 +170,8 @@ def verdicts_of(counts: IntArray) -> IntArray:
     return frozen(found, np.int64)
 
 
-def _summed(results: Results, plan: _Plan, n: int, in_time: bool) -> Proof:
-    """What was proved of parts, summed up by pair."""
+def summed(results: Results, plan: PartPlan, n: int, in_time: bool) -> Proof:
+    """What was proved of the parts of n pairs, summed up by pair."""
     best, owner, judged = results.best, plan.owner, np.zeros((n, 3), np.int64)
     np.add.at(judged, owner, results.counts)
     least, met = _least(best[:, LOW], owner, n), _least(best[:, UP], owner, n)

@@ -1,6 +1,6 @@
 """A proof at work: what is asked, its working space, where it writes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -120,20 +120,45 @@ class Proving:
         Returns:
             Whether there was time to judge all; what is not judged is undecided.
         """
-        in_time = self.sweep(0, self.n_intervals)
-        self._merge_far()
-        self._own_up()
+        in_time = self.judge(0, self.n_intervals)
         for group in (OBSTACLES, LINKS):
             if in_time:
                 self._narrow(group)
-        best = self.results.best
-        place_best(self.task, self.motion, self.work.ends, best)
+        self.place_witnesses()
         return in_time
 
-    def _own_up(self) -> None:
+    def judge(self, first: int, last: int) -> bool:
+        """Judge some intervals, whatever the time does not allow as undecided.
+
+        Returns:
+            Whether there was time for all.
+        """
+        in_time = self.sweep(first, last)
+        self._merge_far()
+        self._own_up(last - first)
+        return in_time
+
+    def place_witnesses(self) -> None:
+        """Put the witnesses that were found on the surfaces, in the world's frame."""
+        best = self.results.best
+        place_best(self.task, self.motion, self.work.ends, best)
+
+    def fresh(self, dense: Dense | None = None) -> "Proving":
+        """The same question with nothing found yet; the planes are carried on.
+
+        Args:
+            dense: Room for the brackets of single intervals; None where nobody asks.
+        """
+        n_pairs, columns = len(self.results.best), self.results.profile.shape[1]
+        results = new_results(n_pairs, columns, self.n_intervals, self.budget)
+        results = results if dense is None else results._replace(dense=dense)
+        broad = new_broad_phase(self.task, self.broad.number.shape[1])
+        return replace(self, results=results, broad=broad)
+
+    def _own_up(self, n_intervals: int) -> None:
         """Call undecided what the time did not allow to judge."""
         results = self.results
-        left = self.n_intervals - results.counts.sum(axis=1)
+        left = n_intervals - results.counts.sum(axis=1)
         if left.any():
             results.counts[:, UNDECIDED] += left
             results.best[left > 0, LOW] = -np.inf

@@ -222,7 +222,7 @@ def resolve(
     row: FloatArray,
     witness: Witness,
 ) -> tuple[int, int]:
-    """Decide one pair over one interval.
+    """Decide one pair over one slice of an interval.
 
     Args:
         task: The scene, pairs and rules.
@@ -230,8 +230,8 @@ def resolve(
         ends: Working space for two configurations.
         space: Working space with a guess of n.
         heap: Working space; its length is the budget. On return its first rows tile
-            the interval.
-        row: The interval as one slice; row[KEY] is the proved bound on return.
+            the slice.
+        row: The slice; row[KEY] is the proved bound on return.
         witness: The least upper bound, updated.
 
     Returns:
@@ -240,8 +240,8 @@ def resolve(
     apart()
     required = task.pairs.required[int(row[PAIR])]
     rounding = task.rules.pad + task.rules.goal
-    examine(task, motion, ends, space, row, 0.0, witness)
-    examine(task, motion, ends, space, row, 1.0, witness)
+    examine(task, motion, ends, space, row, row[START], witness)
+    examine(task, motion, ends, space, row, row[END], witness)
     _bound_towards(task, motion, ends, space, row, required)
     count = push(heap, 0, row)
     while True:

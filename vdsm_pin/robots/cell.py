@@ -11,14 +11,13 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, frozen
-from vdsm_pin.geometry.convex import Piece
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.problem.scene import Scene, solid_of
 from vdsm_pin.proof.bodies import Body, Pair
 from vdsm_pin.proof.packed_tree import TreePoses
 from vdsm_pin.proof.tree import Tree
-from vdsm_pin.robots.contacts import in_world
+from vdsm_pin.robots.contacts import Placed
 from vdsm_pin.robots.errors import check_errors
 from vdsm_pin.robots.files import RobotFiles, read_cell_file, source_of
 from vdsm_pin.robots.model import Robot
@@ -133,11 +132,13 @@ class Cell:
         sides = Sides(np.arange(len(pairs)), one, other)
         return self.coal.distances(poses[:, :, :3], sides).distance
 
-    def pieces(self, pair: Pair, poses: FloatArray) -> tuple[list[Piece], list[Piece]]:
-        """Of both bodies in the world at poses of all frames, (n_frames, 4, 4); [m]."""
-        both = (self.bodies[pair.one], self.bodies[pair.other])
-        one, other = (list(in_world(b.pieces, poses[b.frame])) for b in both)
-        return one, other
+    def placed(self, pair: Pair, poses: FloatArray) -> tuple[Placed, Placed]:
+        """Both bodies at poses of all frames, shape (n_frames, 4, 4); [m]."""
+        one, other = self.bodies[pair.one], self.bodies[pair.other]
+        return (
+            Placed(one.pieces, poses[one.frame]),
+            Placed(other.pieces, poses[other.frame]),
+        )
 
     def under(self, errors: ErrorBox) -> "Cell":
         """The same, its clearances asked for under more errors.

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import frozen
+from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.proof.bodies import Pair as BodyPair
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import Proof
@@ -51,13 +51,22 @@ def least_clearances(
     path: Path,
     proof: Proof,
     enough: float = np.inf,
+    span: FloatArray | None = None,
 ) -> LeastClearances:
     """What a proof says of some pairs, the witness on the link first.
 
-    Where a ball is proved to lie in both bodies they are refuted, and so deep. No ball
-    deeper than `enough` is looked for; [m].
+    Where a ball is proved to lie in both bodies they are refuted, and so deep.
+
+    Args:
+        cell: Robot and scene.
+        pairs: The pairs.
+        path: Of all that moves.
+        proof: Of them along it.
+        enough: No ball deeper than this is looked for; [m].
+        span: From when to when it is, in knots of the path; None for all of it.
     """
-    return _met(cell, pairs, path, _least(cell, pairs, proof), enough)
+    span = np.array([0.0, path.n_intervals]) if span is None else span
+    return _met(cell, pairs, path, _least(cell, pairs, proof), enough, span)
 
 
 def _least(cell: Cell, pairs: Sequence[BodyPair], proof: Proof) -> LeastClearances:
@@ -81,18 +90,20 @@ def _met(
     path: Path,
     least: LeastClearances,
     enough: float,
+    span: FloatArray,
 ) -> LeastClearances:
     """The same, with the balls in both bodies that are found."""
     near = (least.verdict != CERTIFIED) & (least.upper <= MEETING)
     changed = {one.name: getattr(least, one.name).copy() for one in fields(least)}
+    beside = min(1.0, span[1] - span[0]) * np.array(BESIDE)
     for k in np.flatnonzero(near).tolist():
         moment = least.interval[k] + least.time[k]
         middle = 0.5 * (least.link_point[k] + least.other_point[k])
-        moments = np.clip(moment + np.array(BESIDE), 0.0, path.n_intervals)
+        moments = np.clip(moment + beside, *span)
         intervals, shares = path.split(moments)
         poses = cell.poses(path.within(intervals, shares))
         for at, pose in enumerate(poses):
-            bodies = cell.pieces(pairs[k], pose)
+            bodies = cell.placed(pairs[k], pose)
             radius, centre = common_ball(*bodies, middle, enough)
             if radius > 0.0:
                 found = intervals[at], shares[at], -radius, REFUTED, centre, centre

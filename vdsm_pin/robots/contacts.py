@@ -7,16 +7,26 @@ piece without an inside, as a triangle is, the ball is about a point of it and l
 the other body.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from functools import cached_property, lru_cache
 from itertools import product
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Hulls, Piece
+from vdsm_pin.geometry.depths import (
+    CAPSULE,
+    CYLINDER,
+    PLANES,
+    Inside,
+    climb,
+    deepest_of,
+)
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
+from vdsm_pin.proof.tree import IDENTITY
 from vdsm_pin.robots.hulls import hull_planes
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -29,34 +39,31 @@ SHARES: Final = (0.9, 0.5, 0.1)
 MOST_PIECES: Final = 64
 """Of bodies of more pieces those nearest to the witness are looked at."""
 
-STEPS: Final = 200
-"""Of a climb."""
+KEPT: Final = 128
+"""Hulls whose planes are kept."""
 
-SHORTER: Final = 0.97
-"""How much shorter each step is than the one before; [-]."""
 
-FIRST_RATE: Final = 10.0
-"""Of the weights of corners; [-]."""
+class Placed(NamedTuple):
+    """Pieces of a body in a frame that stands somewhere in the world.
 
-LEAST_WEIGHT: Final = 1e-9
-"""Of a corner, so that it can grow again; [-]."""
+    Args:
+        pieces: In the frame.
+        pose: T_world_frame, shape (4, 4); [m].
+    """
 
-Slack: TypeAlias = Callable[[FloatArray], tuple[float, FloatArray]]
-"""How deep a point lies in a piece, at most, and the way to lie deeper; [m], [-]."""
+    pieces: Sequence[Piece]
+    pose: FloatArray = IDENTITY
 
 
 def common_ball(
-    one: Sequence[Piece],
-    other: Sequence[Piece],
-    point: FloatArray,
-    enough: float = np.inf,
+    one: Placed, other: Placed, point: FloatArray, enough: float = np.inf
 ) -> tuple[float, FloatArray]:
     """A ball proved to lie in a piece of each body.
 
     Args:
-        one: Pieces in the world's frame.
-        other: Of the other body.
-        point: Where it is looked for first, shape (3,); [m].
+        one: A body.
+        other: The other one.
+        point: Where it is looked for first, in the world, shape (3,); [m].
         enough: Depth beyond which none deeper is looked for; [m].
 
     Returns:
@@ -66,28 +73,80 @@ def common_ball(
     if not np.isfinite(point).all():
         return 0.0, point
     lost = TOLERANCES.bracket_gap + TOLERANCES.arithmetic
-    near = [
-        [(piece, _slack(piece)) for piece in nearest_pieces(body, point)]
-        for body in (one, other)
-    ]
-    for both in product(*near):
-        if not _may_meet(both[0][0], both[1][0]):
+    for both in product(_near(one, point), _near(other, point)):
+        if not _may_meet(both[0].piece, both[1].piece):
             continue
-        thick = [(piece, slack) for piece, slack in both if slack is not None]
+        thick = [near.piece for near in both if near.inside is not None]
         if not thick:
             continue
-        if len(thick) == 2:
-            depth, centre = _climb((thick[0][1], thick[1][1]), point, enough)
-        else:
-            (flat,) = (piece for piece, slack in both if slack is None)
-            assert isinstance(flat, Hull)  # all others have an inside
-            depth, centre = _deepest_of(flat.points, thick[0][1])
+        depth, centre = _deepest(both, point, enough)
         for share in SHARES:
             corners = centre + share * depth * CORNERS
             radius = share * depth / 3.0 - lost
-            if radius > 0.0 and all(_holds(piece, corners, lost) for piece, _ in thick):
+            if radius > 0.0 and _hold(thick, corners, lost):
                 return radius, centre
     return 0.0, point
+
+
+class _Near:
+    """A piece in the world and its inside, worked out when it is asked for.
+
+    Args:
+        own: The piece in its frame.
+        pose: T_world_frame, shape (4, 4); [m].
+    """
+
+    def __init__(self, own: Piece, pose: FloatArray) -> None:
+        self._own, self._pose = own, pose
+        (self.piece,) = in_world([own], pose)
+
+    @cached_property
+    def inside(self) -> Inside | None:
+        """What bounds it; None of one without an inside."""
+        piece, none = self.piece, np.zeros((2, 3))
+        if isinstance(piece, HalfSpacePiece):
+            offsets = np.array([piece.offset])
+            return Inside(PLANES, piece.normal[None].copy(), offsets, none, 0.0, 0.0)
+        blank = np.zeros((0, 3)), np.zeros(0)
+        if isinstance(piece, FlatCylinder):
+            spine = np.array([piece.centre, piece.axis])
+            return Inside(CYLINDER, *blank, spine, piece.half_length, piece.radius)
+        first, last = piece.points[0], piece.points[-1]
+        if len(piece.points) <= 2 and piece.radius > 0.0:
+            spine = np.array([first, last - first])
+            return Inside(CAPSULE, *blank, spine, 0.0, piece.radius)
+        assert isinstance(self._own, Hull)
+        planes = _planes(np.asarray(self._own.points, np.float64).tobytes())
+        if planes is None:
+            return None
+        normals = planes[0] @ self._pose[:3, :3].T
+        offsets = planes[1] + normals @ self._pose[:3, 3]
+        return Inside(PLANES, normals, offsets, none, 0.0, piece.radius)
+
+
+@lru_cache(maxsize=KEPT)
+def _planes(content: bytes) -> tuple[FloatArray, FloatArray] | None:
+    """The planes of the hull of points, given as their bytes."""
+    return hull_planes(np.frombuffer(content).reshape(-1, 3))
+
+
+def _near(body: Placed, point: FloatArray) -> list[_Near]:
+    """The pieces of a body that are nearest to a point of the world."""
+    seen = (point - body.pose[:3, 3]) @ body.pose[:3, :3]
+    return [_Near(piece, body.pose) for piece in nearest_pieces(body.pieces, seen)]
+
+
+def _deepest(
+    both: tuple[_Near, _Near], point: FloatArray, enough: float
+) -> tuple[float, FloatArray]:
+    """A point deep in two pieces of which one at least has an inside; how deep."""
+    where, start = np.zeros(3), np.array(point)
+    one, other = (near.inside for near in both)
+    if one is not None and other is not None:
+        return climb(one, other, start, enough, where), where
+    flat, thick = (both[0], other) if one is None else (both[1], one)
+    assert isinstance(flat.piece, Hull) and thick is not None  # all others have one
+    return deepest_of(np.array(flat.piece.points), thick, where), where
 
 
 def nearest_pieces(pieces: Sequence[Piece], point: FloatArray) -> list[Piece]:
@@ -124,104 +183,12 @@ def _may_meet(one: Piece, other: Piece) -> bool:
     return bool((low <= most + grown).all() and (least <= high + grown).all())
 
 
-def _deepest_of(points: FloatArray, slack: Slack) -> tuple[float, FloatArray]:
-    """The point of a flat hull that lies deepest in a piece, as far as steps find it.
-
-    The weights of its corners grow with how far each lies up the slope.
-    """
-    weights = np.full(len(points), 1.0 / len(points))
-    best, where, rate = -np.inf, points[0], FIRST_RATE
-    size = max(float(np.ptp(points, axis=0).max()), TOLERANCES.arithmetic)
-    for _ in range(STEPS):
-        at = weights @ points
-        depth, way = slack(at)
-        if depth > best:
-            best, where = depth, at
-        up = points @ way / size
-        weights = np.maximum(weights * np.exp(rate * (up - up.max())), LEAST_WEIGHT)
-        weights, rate = weights / weights.sum(), SHORTER * rate
-    return best, where
-
-
-def _climb(
-    slacks: tuple[Slack, Slack], start: FloatArray, enough: float
-) -> tuple[float, FloatArray]:
-    """The deepest point that steps along slopes find, and how deep it seems to lie.
-
-    The lesser of two concave depths is concave: shortening steps up its slope lead near
-    its top, and steps up both slopes at once along the ridge on which both are equal.
-    """
-    best, where = -np.inf, start
-    longest = max(1e-3, *(abs(slack(start)[0]) for slack in slacks))
-    if not np.isfinite(longest):
-        return best, where
-    for along_ridge in (False, True):
-        at, step = where, longest
-        for _ in range(STEPS):
-            found = [slack(at) for slack in slacks]
-            depth, way = min(found, key=lambda one: one[0])
-            if depth > best:
-                best, where = depth, at
-                if best > enough:
-                    return best, where
-            elif along_ridge:
-                at, found = where, [slack(where) for slack in slacks]
-            both = found[0][1] + found[1][1]
-            size = float(both @ both) ** 0.5
-            level = abs(found[0][0] - found[1][0]) <= step
-            if along_ridge and level and size > 0.0:
-                way = both / size
-            at, step = at + step * way, SHORTER * step
-    return best, where
-
-
-def _slack(piece: Piece) -> Slack | None:
-    """How deep points lie in a piece; None of one without an inside."""
-    if isinstance(piece, HalfSpacePiece):
-        return lambda x: (piece.offset - float(piece.normal @ x), -piece.normal)
-    if isinstance(piece, FlatCylinder):
-        return lambda x: _in_cylinder(piece, x)
-    if len(piece.points) <= 2 and piece.radius > 0.0:
-        return lambda x: _in_capsule(piece, x)
-    planes = hull_planes(piece.points)
-    if planes is None:
-        return None
-    normals, offsets = planes
-    inward = -normals
-
-    def in_hull(x: FloatArray) -> tuple[float, FloatArray]:
-        rooms = offsets - normals @ x
-        k = int(rooms.argmin())
-        return float(rooms[k]) + piece.radius, inward[k]
-
-    return in_hull
-
-
-def _in_cylinder(piece: FlatCylinder, x: FloatArray) -> tuple[float, FloatArray]:
-    along = float(piece.axis @ (x - piece.centre))
-    across = x - piece.centre - along * piece.axis
-    far = float(np.linalg.norm(across))
-    end, side = piece.half_length - abs(along), piece.radius - far
-    if end < side:
-        return end, -np.copysign(1.0, along) * piece.axis
-    return side, -across / far if far > 0.0 else np.zeros(3)
-
-
-def _in_capsule(piece: Hull, x: FloatArray) -> tuple[float, FloatArray]:
-    first, way = piece.points[0], piece.points[-1] - piece.points[0]
-    length = float(way @ way)
-    share = float(np.clip((x - first) @ way / length, 0.0, 1.0)) if length else 0.0
-    off = first + share * way - x
-    far = float(np.linalg.norm(off))
-    return piece.radius - far, off / far if far > 0.0 else np.zeros(3)
-
-
-def _holds(piece: Piece, corners: FloatArray, lost: float) -> bool:
-    """Whether a piece holds all corners, to within what is lost."""
-    ends = np.ascontiguousarray(np.repeat(corners[:, None], 2, axis=1))
-    none = np.zeros(len(corners), np.int64)
-    packed = pack_pieces([[piece]])
-    off = row_brackets(packed, ends, none, TOLERANCES.bracket_gap)[:, 1]
+def _hold(pieces: Sequence[Piece], corners: FloatArray, lost: float) -> bool:
+    """Whether each piece holds all corners, to within what is lost."""
+    ends = np.repeat(np.tile(corners, (len(pieces), 1))[:, None], 2, axis=1)
+    number = np.repeat(np.arange(len(pieces)), len(corners))
+    packed = pack_pieces([[piece] for piece in pieces])
+    off = row_brackets(packed, ends, number, TOLERANCES.bracket_gap)[:, 1]
     return bool((off <= lost).all())
 
 

@@ -65,7 +65,7 @@ def _question(cell: Cell, path: Path, k: int, named: Pair) -> Question:
     one, other = cell.bodies[pair.one], cell.bodies[pair.other]
 
     def ball(q: FloatArray, middle: FloatArray) -> tuple[float, FloatArray]:
-        return common_ball(*cell.pieces(pair, cell.poses(q[None])[0]), middle)
+        return common_ball(*cell.placed(pair, cell.poses(q[None])[0]), middle)
 
     n, sizes = len(cell.robot.joints), np.zeros(tree.n_columns)
     sizes[:n] = joint_errors(cell.robot.joints, cell.errors)

@@ -1,26 +1,26 @@
 """When a robot is first and last too close to something, and in which intervals."""
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import IntArray
+from vdsm_pin.proof.bodies import Pair as BodyPair
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import prove, prove_intervals
+from vdsm_pin.proof.stretches import Stretches
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.clearances import MEETING, least_clearances
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.first_contact import (
     FirstContact,
-    Judge,
     Judged,
     Noted,
     first_contacts,
 )
-from vdsm_pin.verification.moving import path_beside
+from vdsm_pin.verification.moving import in_short_parts, path_beside
 from vdsm_pin.verification.records import LeastClearances, Pair
 
 ENOUGH: Final = 1e-6
@@ -58,42 +58,53 @@ def robot_contacts(
         return ()
     # What is proved of the whole motion holds for its stretches.
     left = np.flatnonzero(least.verdict != CERTIFIED)
-    few, named = [cell.pairs[k] for k in left], [pairs[k] for k in left]
-    budget = Budget(until=deadline.end)
-
-    def judge(low: float, high: float) -> Judged:
-        deadline.check()
-        whole, _ = path_beside(path.between(low, high), cell.scene)
-        proof = prove(cell.tree, cell.bodies, whole, few, box, budget)
-        return least_clearances(cell, few, whole, proof, ENOUGH)
-
-    noted = _noted(cell, path, left, box, judge, budget)
+    judge = _Judge(cell, path, [cell.pairs[k] for k in left], box, deadline)
+    named, noted = [pairs[k] for k in left], judge.noted()
     return first_contacts(cell, named, least.of(left), path, judge, noted, SHALLOW)
 
 
-def _noted(
-    cell: Cell,
-    path: Path,
-    left: IntArray,
-    box: ErrorBox | None,
-    judge: Judge,
-    budget: Budget,
-) -> Noted | None:
-    """The intervals in which some of the pairs are too close; None where too many."""
-    whole, knots = path_beside(path, cell.scene)
-    few = [cell.pairs[k] for k in left]
-    found = prove_intervals(cell.tree, cell.bodies, whole, few, box, budget)
-    if found is None:
-        return None
-    refuted, near = (
-        np.logical_or.reduceat(one, knots.first[:-1])
-        for one in (found[0] == REFUTED, found[1] <= MEETING)
-    )
-    meeting = np.flatnonzero((near & ~refuted).any(axis=1))
-    if meeting.size > MOST_MEETINGS:
-        return None
-    for k in meeting.tolist():
-        refuted[k] |= judge(k, k + 1).verdict == REFUTED
-    outer = np.array([pair.one >= len(cell.robot.bodies) for pair in few], bool)
-    of_kind = (np.asarray(refuted[:, outer == k].any(axis=1)) for k in (False, True))
-    return dict(zip((False, True), of_kind, strict=True))
+class _Judge:
+    """Proves stretches of a motion between moments in waypoints, of some pairs."""
+
+    def __init__(
+        self,
+        cell: Cell,
+        path: Path,
+        pairs: Sequence[BodyPair],
+        box: ErrorBox | None,
+        deadline: Deadline,
+    ) -> None:
+        self._cell, self._pairs, self._deadline = cell, pairs, deadline
+        self._path, self._knots = in_short_parts(*path_beside(path, cell.scene))
+        asked, budget = (self._path, pairs, box), Budget(until=deadline.end)
+        self._stretches = Stretches(cell.tree, cell.bodies, *asked, budget)
+
+    def __call__(self, low: float, high: float) -> Judged:
+        """What is proved, balls in both bodies included."""
+        self._deadline.check()
+        span = self._knots.inner(np.array([low, high]))
+        proof = self._stretches.over(*span.tolist())
+        return least_clearances(
+            self._cell, self._pairs, self._path, proof, ENOUGH, span
+        )
+
+    def noted(self) -> Noted | None:
+        """The intervals in which some pair is too close; None where too many."""
+        found = self._stretches.each()
+        if found is None:
+            return None
+        refuted, near = (
+            np.logical_or.reduceat(one, self._knots.first[:-1])
+            for one in (found[0] == REFUTED, found[1] <= MEETING)
+        )
+        meeting = np.flatnonzero((near & ~refuted).any(axis=1))
+        if meeting.size > MOST_MEETINGS:
+            return None
+        for k in meeting.tolist():
+            refuted[k] |= self(k, k + 1).verdict == REFUTED
+        n = len(self._cell.robot.bodies)
+        outer = np.array([pair.one >= n for pair in self._pairs], bool)
+        of_kind = (
+            np.asarray(refuted[:, outer == k].any(axis=1)) for k in (False, True)
+        )
+        return dict(zip((False, True), of_kind, strict=True))

@@ -151,7 +151,7 @@ def first_contacts(
         if not (whole.verdict[mine] == REFUTED).any():
             continue
         search = _Search(pairs, motion, judge, mine, enough)
-        found = search.first()
+        found = search.first(None if noted is None else noted[kind])
         if found is not None and noted is not None:
             found = search.with_end(found, noted[kind])
         contacts += [] if found is None else [found.timed(motion)]
@@ -198,10 +198,18 @@ class _Search:
         self.judge, self.mine, self.enough = judge, mine, enough
         self.clear, self.least = True, -np.inf
 
-    def first(self) -> FirstContact | None:
-        """The first pair that is refuted, and when; None if none is."""
+    def first(self, noted: BoolArray | None) -> FirstContact | None:
+        """The first pair that is refuted, and when; None if none is.
+
+        Args:
+            noted: The intervals known to be too close, if they are.
+        """
         n_intervals = max(1, self.motion.n_samples - 1)
         first, last = 0, min(STRETCH, n_intervals)
+        if noted is not None and noted.any():
+            known = int(np.argmax(noted))
+            if not known or self._refuted(0, known) is None:
+                first, last = known, known + 1
         while (pair := self._refuted(first, last)) is None:
             if last == n_intervals:
                 return None

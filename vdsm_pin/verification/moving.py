@@ -114,6 +114,11 @@ class Knots:
         step = self.moment[after] - self.moment[inner]
         return np.asarray(self.moment[inner] + share * step)
 
+    def inner(self, moments: FloatArray) -> FloatArray:
+        """Moments in waypoints of the trajectory, in knots of the path."""
+        number = np.arange(float(len(self.moment)))
+        return np.asarray(np.interp(moments, self.moment, number))
+
     def share(self, inner: IntArray, share: FloatArray) -> FloatArray:
         """The same as shares of the trajectory's intervals; [-]."""
         found = self.moments(inner, share) - self.interval(inner)

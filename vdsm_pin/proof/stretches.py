@@ -1,0 +1,145 @@
+"""Proofs of stretches of one motion, one after the other, by one task."""
+
+from collections.abc import Sequence
+from math import floor
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.compiled import borrowed, compiled
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.kernels import NEAR, NORMAL
+from vdsm_pin.proof.bodies import Body, Pair, PairTable
+from vdsm_pin.proof.budget import Budget
+from vdsm_pin.proof.error_box import ErrorBox
+from vdsm_pin.proof.layouts import (
+    AT_LOWER,
+    AT_UPPER,
+    END,
+    HELD_CLEARANCE,
+    INTERVAL,
+    KEY,
+    KNOWN,
+    LOW,
+    MET,
+    OWN,
+    PAIR,
+    SLICE,
+    START,
+    SUPPORT,
+    TIME,
+    UP,
+    WHEN,
+)
+from vdsm_pin.proof.packed_tree import Motion
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.prover import RANK, Proof, start_proof, summed
+from vdsm_pin.proof.proving import dense_rows
+from vdsm_pin.proof.results import Results
+from vdsm_pin.proof.search import new_witness, resolve
+from vdsm_pin.proof.terms import Task
+from vdsm_pin.proof.tree import Tree
+from vdsm_pin.proof.workspace import Workspace
+
+MOST_BRACKETS: Final = 500_000
+"""Brackets of intervals that are held at once."""
+
+
+class Stretches:
+    """A motion of which stretches are asked about; arguments as for `prove`.
+
+    Raises:
+        ValueError: If bodies, pairs, path and tree do not fit together.
+    """
+
+    def __init__(
+        self,
+        tree: Tree,
+        bodies: Sequence[Body],
+        path: Path,
+        pairs: Sequence[Pair],
+        errors: ErrorBox | None = None,
+        budget: Budget | None = None,
+    ) -> None:
+        self._table = PairTable.of(pairs)
+        started = start_proof(tree, bodies, path, self._table, errors, budget)
+        self._proving, self._plan = started
+
+    def over(self, low: float, high: float) -> Proof:
+        """What is proved of every pair between two moments, no bracket narrowed.
+
+        Args:
+            low: In knots of the path, as 1.25 is a quarter of the way from 1 to 2.
+            high: Not before; both may be one moment.
+        """
+        fresh = self._proving.fresh()
+        if low == floor(low) < high == floor(high):
+            in_time = fresh.judge(int(low), int(high))
+        else:
+            slices, work = _slices(low, high, fresh.n_intervals), fresh.work
+            _judge_slices(fresh.task, fresh.motion, work, fresh.results, slices)
+            in_time = True
+        fresh.place_witnesses()
+        return summed(fresh.results, self._plan, self._table.size, in_time)
+
+    def each(self) -> tuple[IntArray, FloatArray] | None:
+        """What is proved of every interval by itself.
+
+        Returns:
+            Verdicts and upper bounds, shape (n_intervals, n_pairs) each; [m]. None
+            where they are more than `MOST_BRACKETS`, or the time ended before.
+        """
+        n_intervals, owner = self._proving.n_intervals, self._plan.owner
+        if n_intervals * len(owner) > MOST_BRACKETS:
+            return None
+        dense = dense_rows(n_intervals, len(owner))
+        if not self._proving.fresh(dense).sweep(0, n_intervals):
+            return None
+        first = np.searchsorted(owner, np.arange(self._table.size))
+        worst = np.maximum.reduceat(RANK[dense.verdict], first, axis=1)
+        return RANK[worst], np.minimum.reduceat(dense.upper, first, axis=1)
+
+
+def _slices(low: float, high: float, n_intervals: int) -> FloatArray:
+    """Intervals, and from when to when in each, shape (n, 3)."""
+    first = min(floor(low), n_intervals - 1)
+    last = max(first + 1, int(np.ceil(high)))
+    k = np.arange(float(first), last)
+    return np.stack([k, np.maximum(low - k, 0.0), np.minimum(high - k, 1.0)], axis=1)
+
+
+@compiled
+def _judge_slices(
+    task: Task, motion: Motion, work: Workspace, results: Results, slices: FloatArray
+) -> None:
+    """Decide every pair over some slices, each as a whole of its own.
+
+    Args:
+        task: The scene, pairs and rules.
+        motion: Rows of joint values.
+        work: Working space; what the pairs remember is carried on.
+        results: Counts and best rows are written.
+        slices: Interval, start and end of each, shape (n, 3).
+    """
+    task, motion, work = borrowed(task), borrowed(motion), borrowed(work)
+    results, row, space = borrowed(results), np.zeros(SLICE), work.space
+    for pair in range(results.best.shape[0]):
+        best, plane = results.best[pair], work.planes[pair]
+        for k in range(slices.shape[0]):
+            row[INTERVAL], row[PAIR] = slices[k, 0], pair
+            row[START], row[END] = slices[k, 1], slices[k, 2]
+            witness = new_witness()
+            witness.value[KNOWN] = best[UP]
+            space.out[NORMAL:NEAR] = plane[:3]
+            verdict, _ = resolve(
+                task, motion, work.ends, space, work.heap, row, witness
+            )
+            plane[:3] = space.out[NORMAL:NEAR]
+            results.counts[pair, verdict] += 1
+            if row[KEY] < best[LOW]:
+                best[LOW], best[AT_LOWER] = row[KEY], slices[k, 0]
+            if witness.value[MET] < best[UP]:
+                best[UP], best[AT_UPPER] = witness.value[MET], slices[k, 0]
+                best[TIME], best[OWN:] = witness.value[WHEN], witness.points
+        # The support that is remembered is of another direction.
+        plane[SUPPORT] = plane[HELD_CLEARANCE] = -np.inf
