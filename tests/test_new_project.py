@@ -9,7 +9,7 @@ import trimesh
 
 from vdsm_pin.app.new_project import KINDS, TEMPLATES, new_project
 from vdsm_pin.cli import main
-from vdsm_pin.errors import InvalidInput
+from vdsm_pin.errors import CannotWrite, InvalidInput
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.robots.cell import read_cell
 
@@ -101,6 +101,6 @@ def test_a_folder_that_cannot_be_filled_leaves_nothing(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(shutil, "copyfile", full)
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(CannotWrite, match="mine: cannot be written: No space left"):
         new_project(tmp_path / "mine", "port")
     assert not list(tmp_path.iterdir())

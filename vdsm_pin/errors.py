@@ -3,6 +3,7 @@
     VdsmError
     ├── InvalidInput          exit 2: a file, field or argument is wrong
     │   ├── InvalidFile       names the file, the place in it and the expectation
+    │   │   └── CannotWrite   a full disk, a folder that may not be written
     │   ├── UnknownName       lists the known names
     │   └── InconsistentCables  no joint angles give these cable lengths
     ├── Infeasible            exit 1: the problem is well-formed and has no plan here
@@ -68,6 +69,18 @@ class InvalidFile(InvalidInput):
         self.others: tuple[InvalidFile, ...] = ()
         place = f"{file}: {where}" if where else str(file)
         super().__init__(f"{place}: {problem}")
+
+
+class CannotWrite(InvalidFile):
+    """A result cannot be written.
+
+    Attributes:
+        reason: As the system says it.
+    """
+
+    def __init__(self, *, file: object, reason: str) -> None:
+        self.reason = reason
+        super().__init__(file=file, problem=f"cannot be written: {reason}")
 
 
 class UnknownName(InvalidInput):

@@ -6,11 +6,13 @@ Timing files are the only ones that may differ.
 import contextlib
 import fcntl
 import random
+import resource
 import shutil
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -19,10 +21,12 @@ import pytest
 from batch_folders import tree
 from problem_files import BEHIND_A_WALL, NEAR, OUT_OF_REACH, write_problem
 
+import vdsm_pin.batch.run as run_module
 import vdsm_pin.batch.task as task_module
+from vdsm_pin.batch.pool import Ended
 from vdsm_pin.batch.run import Batch, Interrupted, expanded, run_batch
 from vdsm_pin.batch.task import MANIFEST, TIMING, Done, Task, folder_names, perform
-from vdsm_pin.errors import InvalidFile, InvalidInput, UnknownName
+from vdsm_pin.errors import CannotWrite, InvalidFile, InvalidInput, UnknownName
 from vdsm_pin.report.tables import read_summary
 
 NAMES = ("good", "other", "far", "bad")
@@ -173,12 +177,32 @@ def test_what_a_killed_batch_was_writing_is_gone_after_the_next(
 ) -> None:
     out = tmp_path / "out"
     shutil.copytree(reference, out)
-    for name in ("summary.csv", "rows.parquet"):
-        (out / f".{name}.0123456789abcdef.part").write_text("half")
-    (out / ".mine.part").write_text("whole")
     (out / ".unfinished" / "good").mkdir(parents=True)
     run_batch(Batch((str(problems),), out, "paper", resume=True))
-    (out / ".mine.part").unlink()
+    assert tree(out) == tree(reference)
+
+
+def test_a_full_disk_ends_the_batch_and_costs_no_earlier_result(
+    problems: Path, reference: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    most, never = resource.getrlimit(resource.RLIMIT_FSIZE)
+
+    def on_a_small_disk(_: Batch, tasks: list[Task]) -> Iterator[Ended[Task, Done]]:
+        for task in tasks:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, never))
+            try:
+                done = perform(task)
+            finally:
+                resource.setrlimit(resource.RLIMIT_FSIZE, (most, never))
+            yield Ended(task, done, "done")
+
+    monkeypatch.setattr(run_module, "_all_ended", on_a_small_disk)
+    out = tmp_path / "out"
+    shutil.copytree(reference, out)
+    why = "File too large; 1 of 4 problems are finished, --resume does the rest"
+    with pytest.raises(CannotWrite, match=why):
+        run_batch(Batch((str(problems),), out, "paper"))
+    (out / "running.csv").unlink()
     assert tree(out) == tree(reference)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from vdsm_pin.errors import InvalidFile
-from vdsm_pin.io.atomic import atomic_path, remove_parts, write_text
+from vdsm_pin.io.atomic import atomic_path, write_text
 
 
 def test_the_file_takes_its_name_when_the_block_ends(tmp_path: Path) -> None:
@@ -45,16 +45,6 @@ def test_long_names_get_a_temporary_name_too(tmp_path: Path) -> None:
     for name in ("n" * 250, "\u754c" * 80, "[x]" * 40):
         write_text(tmp_path / name, "x")
         assert (tmp_path / name).read_text() == "x"
-
-
-def test_what_a_killed_process_left_is_found_whatever_the_name(tmp_path: Path) -> None:
-    for name in ("a.txt", "\u754c" * 80, "[x]" * 40):
-        with atomic_path(tmp_path / name) as temporary:
-            left = temporary
-            temporary.write_text("")
-        left.write_text("half")
-        remove_parts(tmp_path / name)
-        assert not left.exists()
 
 
 def test_what_cannot_be_written_is_told_in_one_sentence(tmp_path: Path) -> None:

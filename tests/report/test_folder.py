@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.errors import CannotWrite, InvalidFile
+from vdsm_pin.io.atomic import write_text
 from vdsm_pin.report.folder import check_output_file, check_output_folder, staged
 
 
@@ -32,8 +33,12 @@ def test_a_failure_leaves_everything_as_it_was(tmp_path: Path) -> None:
 
 def test_a_folder_where_a_file_must_go_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "a").mkdir()
-    with pytest.raises(InvalidInput, match="cannot write"), staged(tmp_path) as aside:
+    with pytest.raises(CannotWrite) as told, staged(tmp_path) as aside:
         (aside / "a").write_text("new")
+    assert str(told.value) == f"{tmp_path}: cannot be written: Is a directory"
+    with pytest.raises(CannotWrite) as told, staged(tmp_path) as aside:
+        write_text(aside / ("n" * 300), "of a file aside, told by its final name")
+    assert told.value.file == str(tmp_path / ("n" * 300))
     assert [p.name for p in tmp_path.iterdir()] == ["a"]
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from vdsm_pin.errors import InvalidInput
+from vdsm_pin.io.atomic import writing
 from vdsm_pin.io.problem_file import built_in_text
 
 TEMPLATES: Final = Path(__file__).parent / "templates"
@@ -38,7 +39,7 @@ def new_project(folder: Path, kind: str) -> list[str]:
     Raises:
         InvalidInput: If there is such a folder, its name is none for a problem, or
             there is no such kind.
-        OSError: If it cannot be written; nothing is left.
+        CannotWrite: If it cannot be written; nothing is left.
     """
     name = folder.name
     if not _NAME.fullmatch(name):
@@ -53,12 +54,13 @@ def new_project(folder: Path, kind: str) -> list[str]:
     if folder.exists() or folder.is_symlink():
         message = f"{folder}: is there already; expected a new folder"
         raise InvalidInput(message)
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".vdsm-") as aside:
-        made = Path(aside) / "made"
-        made.mkdir()
-        _fill(made, kind, name)
-        made.rename(folder)
+    with writing(folder):
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".vdsm-") as aside:
+            made = Path(aside) / "made"
+            made.mkdir()
+            _fill(made, kind, name)
+            made.rename(folder)
     return sorted(path.name for path in folder.iterdir())
 
 

@@ -28,15 +28,15 @@ from vdsm_pin.batch.task import (
     perform,
     write_manifest,
 )
-from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
-from vdsm_pin.io.atomic import atomic_path, remove_parts, write_text
+from vdsm_pin.errors import CannotWrite, InvalidFile, InvalidInput, VdsmError
+from vdsm_pin.io.atomic import write_text, writing
 from vdsm_pin.io.bags import is_bag
 from vdsm_pin.io.problem_file import built_in_names
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.report.browser import find_browser
 from vdsm_pin.report.columns import COLUMNS, write_columns
 from vdsm_pin.report.files import BatchRow
-from vdsm_pin.report.folder import check_kept, check_output_folder
+from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.html import write_index
 from vdsm_pin.report.junit import junit_text
 from vdsm_pin.report.tables import summary_csv, write_summary
@@ -106,6 +106,7 @@ def run_batch(batch: Batch) -> tuple[BatchRow, ...]:
 
     Raises:
         InvalidInput: If the folder, a name or the strategy is wrong.
+        CannotWrite: If results cannot be written; earlier ones stay.
         Interrupted: On Ctrl-C or SIGTERM, after everything finished is written down.
     """
     strategy(batch.strategy)
@@ -114,30 +115,44 @@ def run_batch(batch: Batch) -> tuple[BatchRow, ...]:
     check_output_folder(batch.folder)
     tasks = _tasks(batch)
     batch.folder.mkdir(parents=True, exist_ok=True)
-    with _locked(batch.folder), _stoppable() as stop:
-        for name in OWN:
-            remove_parts(batch.folder / name)
-        shutil.rmtree(batch.folder / _ASIDE, ignore_errors=True)
+    with writing(batch.folder), _locked(batch.folder), _stoppable() as stop:
         rows: list[BatchRow] = []
-        running = batch.folder / RUNNING
-        with progress(len(tasks), batch.quiet) as show, summary_csv(running) as so_far:
-            try:
-                for ended in _all_ended(batch, tasks):
-                    done = _settle(ended)
-                    rows.append(done.row)
-                    so_far(done.row)
-                    show(done)
-                    if stop.asked:
-                        break
-            except KeyboardInterrupt:
-                stop.asked = True
-        shutil.rmtree(batch.folder / _ASIDE, ignore_errors=True)
-        _write_summaries(batch, rows)
-        running.unlink()
+        with progress(len(tasks), batch.quiet) as show, _fresh_aside(batch.folder):
+            with summary_csv(batch.folder / RUNNING) as so_far:
+                try:
+                    for ended in _all_ended(batch, tasks):
+                        done = _settle(ended)
+                        if done.unwritten:
+                            why = f"{done.unwritten}; {_count(rows, tasks)}"
+                            raise CannotWrite(file=batch.folder, reason=why)
+                        rows.append(done.row)
+                        so_far(done.row)
+                        show(done)
+                        if stop.asked:
+                            break
+                except KeyboardInterrupt:
+                    stop.asked = True
+            _write_summaries(batch, rows)
+        (batch.folder / RUNNING).unlink()
     if stop.asked and len(rows) < len(tasks):
-        message = f"stopped; {len(rows)} of {len(tasks)} problems are finished"
-        raise Interrupted(message + ", --resume does the rest")
+        message = f"stopped; {_count(rows, tasks)}"
+        raise Interrupted(message)
     return tuple(rows)
+
+
+def _count(rows: Sequence[BatchRow], tasks: Sequence[Task]) -> str:
+    finished = f"{len(rows)} of {len(tasks)} problems are finished"
+    return f"{finished}, --resume does the rest"
+
+
+@contextmanager
+def _fresh_aside(folder: Path) -> Iterator[None]:
+    """A block before and after which nothing lies aside, whoever was killed before."""
+    shutil.rmtree(folder / _ASIDE, ignore_errors=True)
+    try:
+        yield
+    finally:
+        shutil.rmtree(folder / _ASIDE, ignore_errors=True)
 
 
 def _all_ended(batch: Batch, tasks: list[Task]) -> Iterator[Ended[Task, Done]]:
@@ -294,16 +309,15 @@ def _settle(ended: Ended[Task, Done]) -> Done:
 def _write_summaries(batch: Batch, rows: list[BatchRow]) -> None:
     folder = batch.folder
     ordered = sorted(rows, key=lambda row: row.folder)
-    with atomic_path(folder / SUMMARY) as path:
-        write_summary(path, ordered)
-    write_columns(folder / COLUMNS, ordered)
-    write_text(folder / JUNIT, junit_text(ordered))
-    with atomic_path(folder / INDEX) as path:
-        write_index(path, ordered, _pages(batch, ordered))
     seconds = {row.folder: _seconds(folder / row.folder) for row in ordered}
     known = {name: value for name, value in seconds.items() if value is not None}
     script = f"window.vdsmTiming = {json.dumps(known, indent=1)};\n"
-    write_text(folder / SECONDS, script)
+    with staged(folder, folder / _ASIDE) as aside:
+        write_summary(aside / SUMMARY, ordered)
+        write_columns(aside / COLUMNS, ordered)
+        write_text(aside / JUNIT, junit_text(ordered))
+        write_index(aside / INDEX, ordered, _pages(batch, ordered))
+        write_text(aside / SECONDS, script)
 
 
 def _pages(batch: Batch, rows: list[BatchRow]) -> dict[str, str]:

@@ -23,12 +23,14 @@ from vdsm_pin.app.workflow import (
     verify_to_folder,
 )
 from vdsm_pin.errors import (
+    CannotWrite,
     Infeasible,
     InvalidFile,
     OutOfTime,
     VdsmError,
     VerificationFailed,
 )
+from vdsm_pin.io.atomic import writing
 from vdsm_pin.io.problem_file import ProblemOfRobot, read_problem
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -154,14 +156,25 @@ class Done:
     Args:
         row: The summary's row.
         kept: Whether an earlier result stays; else `aside` holds a new one.
+        unwritten: Why there is no new one: no results can be written.
     """
 
     row: BatchRow
     kept: bool
+    unwritten: str = ""
 
 
 def perform(task: Task) -> Done:
     """Do one problem; whatever goes wrong becomes its row."""
+    try:
+        with writing(task.aside):
+            return _performed(task)
+    except CannotWrite as error:
+        row = failed_row(task, "error", str(error))
+        return Done(row, kept=True, unwritten=error.reason)
+
+
+def _performed(task: Task) -> Done:
     started, deadline = time.monotonic(), Deadline.after(task.time_limit)
     shutil.rmtree(task.aside, ignore_errors=True)
     digest = ""
@@ -176,6 +189,8 @@ def perform(task: Task) -> Done:
                     return Done(kept, kept=True)
         with enforced(deadline):
             row = _done(task, problem, deadline)
+    except (CannotWrite, OSError):  # of our own files: readers tell of theirs
+        raise
     except Infeasible as error:
         row = failed_row(task, "infeasible", str(error))
     except OutOfTime as error:

@@ -1,13 +1,12 @@
 """Files that appear whole or not at all."""
 
-import glob
 import os
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from vdsm_pin.errors import InvalidFile
+from vdsm_pin.errors import CannotWrite, InvalidFile
 
 
 def check_replaceable(path: Path) -> None:
@@ -20,6 +19,21 @@ def check_replaceable(path: Path) -> None:
         raise InvalidFile(file=path, problem="is a folder, expected a file")
     if path.exists() and not path.is_file():
         raise InvalidFile(file=path, problem="is there and is not a regular file")
+
+
+@contextmanager
+def writing(place: str | Path) -> Iterator[None]:
+    """Tell of whatever keeps a block from writing to a file or folder.
+
+    Raises:
+        CannotWrite: For the block's OSError.
+    """
+    try:
+        yield
+    except BrokenPipeError:  # of who reads what we print
+        raise
+    except OSError as error:
+        raise CannotWrite(file=place, reason=error.strerror or str(error)) from error
 
 
 @contextmanager
@@ -37,46 +51,31 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         The temporary path.
 
     Raises:
-        InvalidFile: If the folder cannot be made or the file not be written.
+        InvalidFile: If something stands there that is no file.
+        CannotWrite: If the folder cannot be made or the file not be written.
     """
     final = Path(path)
-    temporary = final.parent / _part(_begin(final), secrets.token_hex(8))
+    begin = os.fsdecode(os.fsencode(final.name)[:80])  # names have 255 bytes
+    temporary = final.parent / f".{begin}.{secrets.token_hex(8)}.part"
     try:
-        check_replaceable(final)
-        final.parent.mkdir(parents=True, exist_ok=True)
-        yield temporary
-        _flush(temporary)
-        temporary.replace(final)
-        _flush(final.parent)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InvalidFile(file=path, problem=f"cannot be written: {reason}") from error
+        with writing(path):
+            check_replaceable(final)
+            final.parent.mkdir(parents=True, exist_ok=True)
+            yield temporary
+            _flush(temporary)
+            temporary.replace(final)
+            _flush(final.parent)
     finally:
         with suppress(OSError):  # told above already, or nothing to remove
             temporary.unlink()
-
-
-def remove_parts(path: Path) -> None:
-    """Remove what killed processes left of a file that nobody is writing now."""
-    for part in path.parent.glob(_part(glob.escape(_begin(path)), "?" * 16)):
-        part.unlink(missing_ok=True)
-
-
-def _begin(final: Path) -> str:
-    """The name of a file, as far as another fits behind it: names have 255 bytes."""
-    return os.fsdecode(os.fsencode(final.name)[:80])
-
-
-def _part(begin: str, mark: str) -> str:
-    """Name of a file that is being written; marks tell writers apart."""
-    return f".{begin}.{mark}.part"
 
 
 def write_text(path: str | Path, text: str) -> None:
     """Write UTF-8 text, whole or not at all.
 
     Raises:
-        InvalidFile: If the file cannot be written.
+        InvalidFile: If something stands there that is no file.
+        CannotWrite: If the file cannot be written.
     """
     with atomic_path(path) as temporary:
         temporary.write_bytes(text.encode("utf-8"))

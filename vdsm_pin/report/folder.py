@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from vdsm_pin.errors import InvalidFile, InvalidInput
-from vdsm_pin.io.atomic import check_replaceable
+from vdsm_pin.errors import CannotWrite, InvalidFile
+from vdsm_pin.io.atomic import check_replaceable, writing
 
 
 def check_output_folder(folder: Path) -> None:
@@ -74,32 +74,34 @@ def identity(path: Path) -> tuple[int, int] | None:
 
 
 @contextmanager
-def staged(folder: Path) -> Iterator[Path]:
+def staged(folder: Path, within: Path | None = None) -> Iterator[Path]:
     """A temporary folder whose files move into `folder` when the block succeeds.
 
     Files of the same name are replaced, each in one step; other files stay.
 
+    Args:
+        folder: Made where missing.
+        within: Where the temporary folder lies, on the same file system; in `folder`
+            where None.
+
     Yields:
-        The temporary folder, on the same file system.
+        The temporary folder.
 
     Raises:
-        InvalidInput: If the file system refuses.
+        CannotWrite: If the file system refuses.
     """
     check_output_folder(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        aside = Path(tempfile.mkdtemp(prefix=".vdsm-", dir=folder))
-    except OSError as error:
-        raise _refused(folder, error) from error
-    try:
-        yield aside
-        for path in sorted(aside.iterdir()):
-            path.replace(folder / path.name)
-    except OSError as error:
-        raise _refused(folder, error) from error
-    finally:
-        shutil.rmtree(aside, ignore_errors=True)
-
-
-def _refused(folder: Path, error: OSError) -> InvalidInput:
-    return InvalidInput(f"{folder}: cannot write: {error.strerror or error}")
+    with writing(folder):
+        within = within or folder
+        within.mkdir(parents=True, exist_ok=True)
+        aside = Path(tempfile.mkdtemp(prefix=".vdsm-", dir=within))
+        try:
+            yield aside
+            for path in sorted(aside.iterdir()):
+                path.replace(folder / path.name)
+        except CannotWrite as error:  # of a file aside, whose place says nothing
+            file = Path(error.file)
+            told = folder / file.name if file.parent == aside else file
+            raise CannotWrite(file=told, reason=error.reason) from error
+        finally:
+            shutil.rmtree(aside, ignore_errors=True)
