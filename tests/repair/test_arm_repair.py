@@ -22,7 +22,7 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.repair.arm import repair_arm
-from vdsm_pin.verification.coal_distances import coal_distances
+from vdsm_pin.verification.coal_distances import obstacles_at_rest
 from vdsm_pin.verification.robot_model import load_robot
 
 ROBOT = load_robot(built_in("hrm8"))
@@ -62,7 +62,7 @@ def test_larger_clearance_is_reached(name: str) -> None:
     assert rows.joints[0].tolist() == motion.joints[0].tolist()
     assert found.given[0] == 0
     assert 0.0 < found.moved.max() < 0.2
-    near = coal_distances(ROBOT, asked, finely(rows), 0.05)
+    near = obstacles_at_rest(ROBOT, asked).distances(finely(rows), 0.05)
     least = min(chunk.distance.min() for chunk in near)
     assert least >= asked.required_clearance - 5e-6
 

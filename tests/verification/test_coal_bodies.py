@@ -189,7 +189,9 @@ def test_inside_a_solid_mesh_coal_speaks_of_its_skin_only() -> None:
     problem = room(0.4 + HRM8.link_radius, True)
     still, x0 = np.zeros((1, 8)), np.full(1, 0.1)
     trajectory = Trajectory(np.zeros(1), np.zeros(1), x0, still, still)
-    (found,) = measuring.coal_distances(load_robot(HRM8), problem, trajectory, np.inf)
+    (found,) = measuring.obstacles_at_rest(load_robot(HRM8), problem).distances(
+        trajectory, np.inf
+    )
     np.testing.assert_allclose(found.distance, 0.4, atol=1e-7)
     (check,) = check_coal_obstacles(load_robot(HRM8), problem, trajectory)
     assert check.verdict is Verdict.CERTIFIED, "the distances to the skin agree"

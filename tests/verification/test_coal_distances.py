@@ -25,7 +25,8 @@ from vdsm_pin.verification.coal_bodies import Measured
 from vdsm_pin.verification.coal_check import check_coal_obstacles
 from vdsm_pin.verification.coal_distances import (
     CoalDistances,
-    coal_distances,
+    Partners,
+    obstacles_at_rest,
     reach_of,
 )
 from vdsm_pin.verification.proved_lowers import ProvedLowers
@@ -106,7 +107,7 @@ def test_coal_agrees_with_the_brackets_everywhere(shape: str) -> None:
     rng = np.random.default_rng(SHAPES.index(shape))
     three = [replace(obstacle_of(shape, rng), name=f"number {k}") for k in range(3)]
     problem = problem_with(*three)
-    found = list(coal_distances(ROBOT, problem, trajectory_of(25), np.inf))
+    found = list(obstacles_at_rest(ROBOT, problem).distances(trajectory_of(25), np.inf))
     assert sum(chunk.waypoint.size for chunk in found) == 25 * 8 * 3
     for chunk in found:
         assert chunk.disagreement.max() < 2e-7
@@ -120,8 +121,8 @@ def test_culling_skips_only_what_is_far(shape: str) -> None:
     obstacle = obstacle_of(shape, np.random.default_rng(10 + SHAPES.index(shape)))
     problem, trajectory = problem_with(obstacle), trajectory_of(60)
     reach = reach_of(problem)
-    full = list(coal_distances(ROBOT, problem, trajectory, np.inf))
-    culled = list(coal_distances(ROBOT, problem, trajectory, reach))
+    full = list(obstacles_at_rest(ROBOT, problem).distances(trajectory, np.inf))
+    culled = list(obstacles_at_rest(ROBOT, problem).distances(trajectory, reach))
     near = {
         (s, i)
         for chunk in full
@@ -149,7 +150,7 @@ def test_rows_close_to_each_other_are_seen_once(
     reach = reach_of(problem)
 
     def rows() -> list[int]:
-        found = coal_distances(ROBOT, problem, motion, reach, travel)
+        found = obstacles_at_rest(ROBOT, problem).distances(motion, reach, travel)
         near = np.concatenate([chunk.waypoint[chunk.link == 3] for chunk in found])
         return near.tolist()
 
@@ -159,7 +160,7 @@ def test_rows_close_to_each_other_are_seen_once(
     np.testing.assert_allclose(np.diff(along[seen]), travel, atol=2e-5)
     monkeypatch.setattr("vdsm_pin.verification.coal_distances.CHUNK_BOUNDS", 800)
     assert rows() == seen, "in parts or at once"
-    everything = list(coal_distances(ROBOT, problem, motion, reach))
+    everything = list(obstacles_at_rest(ROBOT, problem).distances(motion, reach))
     assert sum(int((chunk.link == 3).sum()) for chunk in everything) == n
 
 
@@ -279,7 +280,7 @@ def test_poses_come_from_pinocchio_and_match_the_centres() -> None:
     for i in range(8):
         outward = centres[0, i] + np.array([0.0, 0.0, 5.0])
         problem = problem_with(solids.Sphere("far", outward, 0.1))
-        (chunk,) = coal_distances(ROBOT, problem, trajectory, np.inf)
+        (chunk,) = obstacles_at_rest(ROBOT, problem).distances(trajectory, np.inf)
         expected = np.linalg.norm(
             centres[0, :-1]
             + _nearest(centres[0, :-1], centres[0, 1:], outward)[:, None]
@@ -327,13 +328,14 @@ def test_a_lie_of_coal_at_a_closest_approach_is_seen(
     problem = read_problem("paper/obs1")
     plan = plan_and_verify(problem, "paper", ROBOT).plan
 
-    honest = coal_check.against_obstacles
+    honest = Partners.measured
 
     def lying(*arguments: Any) -> CoalDistances:
         found = honest(*arguments)
-        return replace(found, distance=found.distance + 2e-5)
+        off = 2e-5 * (arguments[1] is not plan.trajectory)
+        return replace(found, distance=found.distance + off)
 
-    monkeypatch.setattr(coal_check, "against_obstacles", lying)
+    monkeypatch.setattr(Partners, "measured", lying)
     judged = verify(problem, plan.trajectory, ROBOT)
     row = next(check for check in judged.checks if check.name == coal_check.OBSTACLES)
     assert row.verdict is Verdict.UNDECIDED

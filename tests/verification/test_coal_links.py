@@ -21,7 +21,7 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_shapes as measuring
 from vdsm_pin.verification.coal_bodies import Measured
 from vdsm_pin.verification.coal_check import check_coal_links
-from vdsm_pin.verification.coal_distances import link_distances
+from vdsm_pin.verification.coal_distances import links_farther_out
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
 
@@ -70,7 +70,7 @@ def test_closed_form_is_inside_the_proved_bracket(size: float) -> None:
 def test_coal_agrees_on_every_pair(n_links: int) -> None:
     arm = coiling_arm(n_links)
     motion = trajectory_of(arm, 12, 1.3)
-    found = list(link_distances(load_robot(arm), motion, np.inf))
+    found = list(links_farther_out(load_robot(arm)).distances(motion, np.inf))
     count = sum(chunk.waypoint.size for chunk in found)
     assert count == 12 * (n_links - 1) * (n_links - 2) // 2
     assert max(chunk.disagreement.max() for chunk in found) < 1e-12
@@ -84,7 +84,7 @@ def test_links_that_meet_are_measured_as_meeting() -> None:
     rings = np.random.default_rng(1).uniform(0.85, 1.0, (60, 8))
     still = np.zeros(60)
     motion = Trajectory(still, still, still, rings, np.zeros((60, 8)))
-    found = list(link_distances(load_robot(arm), motion, 0.0))
+    found = list(links_farther_out(load_robot(arm)).distances(motion, 0.0))
     meeting = np.concatenate([chunk.distance[chunk.upper < 0.0] for chunk in found])
     assert meeting.size > 20
     assert (meeting <= 0.0).all()

@@ -4,7 +4,7 @@ Coal proves nothing, so agreement certifies no clearance, and a disagreement lea
 motion undecided.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -19,11 +19,9 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.coal_distances import (
     CoalDistances,
-    CoalScene,
-    against_obstacles,
-    between_links,
-    coal_distances,
-    link_distances,
+    Partners,
+    links_farther_out,
+    obstacles_at_rest,
     reach_of,
 )
 from vdsm_pin.verification.coal_log import BETWEEN_LINKS, CoalLog
@@ -81,6 +79,31 @@ class Evidence:
         )
 
 
+@dataclass(frozen=True)
+class _Asked:
+    """Distances that Coal is asked for, and what they are held against.
+
+    Args:
+        partners: Of links and tool.
+        numbers: Of the pairs, as they are judged; below 0 where they are not, shape
+            (n_axes, n_partners).
+        near: Names of the obstacles of closest approaches among them.
+        reach: Pairs are measured within it; [m].
+        travel: How far the arm moves from a row that is looked at to the next; [m].
+        proved: Proved lower bounds; Coal must not fall below them at either end of an
+            interval; None for the brackets of the rows alone.
+        against: Where the brackets come from.
+    """
+
+    partners: Partners
+    numbers: IntArray
+    near: Collection[str]
+    reach: float
+    travel: float
+    proved: ProvedLowers | None
+    against: str
+
+
 def check_coal_obstacles(
     robot: RobotModel,
     problem: PlanningProblem,
@@ -106,17 +129,23 @@ def check_coal_obstacles(
     Raises:
         OutOfTime: If the time is over.
     """
-    scene, names = problem.scene.at_rest, problem.manipulator.axis_names
-    if not scene.obstacles:
+    still = [not isinstance(one, Moving) for one in problem.scene.obstacles]
+    if not any(still):
         return ()
-    evidence = Evidence(OBSTACLES)
-    answers = _of_obstacles(robot, problem, trajectory, proved, deadline, log)
-    for answer in answers:
-        _add(evidence, answer, names, scene.names, "proved")
-    total = trajectory.n_samples * len(names) * len(scene.obstacles)
-    alone = "" if proved is not None else "; against brackets of the rows alone"
-    note = f"; {evidence.count} of {total} pairs within reach measured{alone}"
-    return (evidence.check(note),)
+    numbers = ArmPairs(problem).number[:, still]
+    if not all(still):  # else with what the problem keeps packed
+        problem = replace(problem, scene=problem.scene.at_rest)
+    asked = _Asked(
+        partners=obstacles_at_rest(robot, problem, deadline),
+        numbers=numbers,
+        near=problem.scene.names,
+        reach=reach_of(problem),
+        travel=TOLERANCES.coal_travel,
+        proved=proved,
+        against="proved",
+    )
+    note = "" if proved is not None else "; against brackets of the rows alone"
+    return _check(Evidence(OBSTACLES), asked, trajectory, deadline, log, note)
 
 
 def check_coal_links(
@@ -128,128 +157,82 @@ def check_coal_links(
 ) -> tuple[Check, ...]:
     """Hold Coal's distances between links two or more apart against the closed form.
 
-    Args:
-        robot: The arm in Pinocchio and Coal.
-        problem: Names the arm and the required self-clearance.
-        trajectory: What is judged.
-        deadline: When to give up.
-        log: Asks for the closest approaches too, and keeps every answer.
-
-    Returns:
-        One row of evidence with the largest disagreement; none for an arm of two links.
-        Measured are the pairs nearer than the required self-clearance and a link's
-        radius past it, and every pair where it is nearest.
-
-    Raises:
-        OutOfTime: If the time is over.
+    Measured are the pairs nearer than the required self-clearance and a link's radius
+    past it, and every pair where it is nearest. Arguments, result and errors are those
+    of `check_coal_obstacles`; of an arm of two links there is no row.
     """
-    names = problem.manipulator.axis_names
-    n_pairs = (len(names) - 1) * (len(names) - 2) // 2
-    if n_pairs == 0:
+    asked = _Asked(
+        partners=links_farther_out(robot),
+        numbers=_numbers_of_links(problem),
+        near=BETWEEN_LINKS,
+        reach=problem.required_self_clearance + robot.manipulator.most_radius,
+        travel=0.0,
+        proved=None,
+        against="closed form",
+    )
+    return _check(Evidence(LINKS), asked, trajectory, deadline, log)
+
+
+def _check(
+    evidence: Evidence,
+    asked: _Asked,
+    trajectory: Trajectory,
+    deadline: Deadline,
+    log: CoalLog | None,
+    note: str = "",
+) -> tuple[Check, ...]:
+    """The row of evidence; none where there is no pair."""
+    n_pairs = int(asked.partners.apart.sum())
+    if not n_pairs:
         return ()
-    evidence = Evidence(LINKS)
-    for answer in _of_links(robot, problem, trajectory, deadline, log):
-        _add(evidence, answer, names, names, "closed form")
+    for found, moments, beyond in _answers(asked, trajectory, deadline, log):
+        # Where there is no number the two do not agree.
+        excess = np.where(np.isnan(beyond), np.inf, beyond)
+        evidence.count += excess.size
+        k = int(np.argmax(excess))
+        evidence.add(float(excess[k]), _words(asked, found, k), float(moments[k]))
     total = n_pairs * trajectory.n_samples
-    note = f"; {evidence.count} of {total} pairs within reach measured"
+    note = f"; {evidence.count} of {total} pairs within reach measured{note}"
     return (evidence.check(note),)
 
 
-def _add(
-    evidence: Evidence,
-    answer: Answer,
-    links: Sequence[str],
-    others: Sequence[str],
-    against: str,
-) -> None:
-    """Add many answers; where there is no number the two do not agree."""
-    found, moments, excess = answer
-    excess = np.where(np.isnan(excess), np.inf, excess)
-    evidence.count += excess.size
-    k = int(np.argmax(excess))
+def _words(asked: _Asked, found: CoalDistances, k: int) -> str:
+    """Which bodies one answer is about, what Coal says and what the bracket."""
     distance, lower, upper = (
         float(one[k]) * MM_PER_M for one in (found.distance, found.lower, found.upper)
     )
     ours = f"{lower:.6f}" if lower == upper else f"[{lower:.6f}, {upper:.6f}]"
-    both = f"{links[found.link[k]]} and {others[found.other[k]]}"
-    where = f"{both}: Coal {distance:.6f} mm, {against} {ours} mm"
-    evidence.add(float(excess[k]), where, float(moments[k]))
+    links = asked.partners.robot.manipulator.axis_names
+    both = f"{links[found.link[k]]} and {asked.partners.names[found.other[k]]}"
+    return f"{both}: Coal {distance:.6f} mm, {asked.against} {ours} mm"
 
 
-def _of_obstacles(
-    robot: RobotModel,
-    problem: PlanningProblem,
-    trajectory: Trajectory,
-    proved: ProvedLowers | None,
-    deadline: Deadline,
-    log: CoalLog | None,
+def _answers(
+    asked: _Asked, trajectory: Trajectory, deadline: Deadline, log: CoalLog | None
 ) -> Iterator[Answer]:
-    still = np.array([not isinstance(o, Moving) for o in problem.scene.obstacles])
-    numbers = ArmPairs(problem).number[:, still]
-    if not still.all():
-        problem = replace(problem, scene=problem.scene.at_rest)
-    scene, names = CoalScene.of(robot, problem, deadline), problem.scene.names
-    if log is not None and (near := log.asked(names)).size:
-        axes = problem.manipulator.axis_names
+    """Of the closest approaches first, then of the rows."""
+    partners, axes = asked.partners, asked.partners.robot.manipulator.axis_names
+    if log is not None and (near := log.asked(asked.near)).size:
+        approaches = [log.approaches[k] for k in near]
         pairs = [
-            (k, axes.index(one.own), names.index(one.obstacle))
-            for k, one in enumerate(log.approaches[n].pair for n in near)
+            (k, axes.index(one.pair.own), partners.names.index(one.pair.label))
+            for k, one in enumerate(approaches)
         ]
-        rows, moments = _at_approaches(trajectory, log, near)
-        found = against_obstacles(robot, rows, scene, np.array(pairs))
+        moments = np.array([one.moment for one in approaches])
+        found = partners.measured(trajectory.at(moments), np.array(pairs))
         log.keep_approaches(near, found.distance)
         yield found, moments, found.disagreement
-    reach, travel = reach_of(problem), TOLERANCES.coal_travel
-    for found in coal_distances(
-        robot, problem, trajectory, reach, travel, deadline, scene
-    ):
-        excess, pair = found.disagreement, numbers[found.link, found.other]
+    for found in partners.distances(trajectory, asked.reach, asked.travel, deadline):
+        excess, pair = found.disagreement, asked.numbers[found.link, found.other]
+        judged = pair >= 0
         if log is not None:
-            _keep(log, found, pair)
-        if proved is not None:
+            log.keep(found.waypoint[judged], pair[judged], found.distance[judged])
+        if asked.proved is not None:
             # Where bodies meet only the sign counts.
-            below = proved.at(found.waypoint, pair) - np.maximum(found.distance, 0.0)
-            excess = np.maximum(excess, np.where(pair >= 0, below, -np.inf))
+            lower = asked.proved.at(found.waypoint, pair)
+            below = lower - np.maximum(found.distance, 0.0)
+            excess = np.maximum(excess, np.where(judged, below, -np.inf))
         yield found, found.waypoint.astype(np.float64), excess
-
-
-def _of_links(
-    robot: RobotModel,
-    problem: PlanningProblem,
-    trajectory: Trajectory,
-    deadline: Deadline,
-    log: CoalLog | None,
-) -> Iterator[Answer]:
-    axes = problem.manipulator.axis_names
-    if log is not None and (near := log.asked(BETWEEN_LINKS)).size:
-        pairs = [
-            (k, *sorted((axes.index(one.own), axes.index(one.label))))
-            for k, one in enumerate(log.approaches[n].pair for n in near)
-        ]
-        rows, moments = _at_approaches(trajectory, log, near)
-        found = between_links(robot, rows, np.array(pairs))
-        log.keep_approaches(near, found.distance)
-        yield found, moments, found.disagreement
-    reach = problem.required_self_clearance + robot.manipulator.most_radius
-    numbers = _numbers_of_links(problem)
-    for found in link_distances(robot, trajectory, reach, deadline):
-        if log is not None:
-            _keep(log, found, numbers[found.link, found.other])
-        yield found, found.waypoint.astype(np.float64), found.disagreement
-
-
-def _at_approaches(
-    trajectory: Trajectory, log: CoalLog, numbers: IntArray
-) -> tuple[Trajectory, FloatArray]:
-    """Configurations at some closest approaches, and their moments, shape (m,)."""
-    moments = np.array([log.approaches[k].moment for k in numbers])
-    return trajectory.at(moments), moments
-
-
-def _keep(log: CoalLog, found: CoalDistances, pair: IntArray) -> None:
-    """Keep the distances of the pairs that are judged."""
-    held = pair >= 0
-    log.keep(found.waypoint[held], pair[held], found.distance[held])
 
 
 def _numbers_of_links(problem: PlanningProblem) -> IntArray:

@@ -16,9 +16,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.geometry.row_bounds import coarse_bounds, link_gaps, row_brackets
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
@@ -72,32 +70,6 @@ class CoalDistances:
         return np.maximum(found, 0.0)
 
 
-@dataclass(frozen=True)
-class CoalScene:
-    """Obstacles at rest, as the proof and as Coal see them.
-
-    Args:
-        pieces: Convex pieces for the proof's kernels.
-        shapes: Coal's: links and tool, then the obstacles.
-    """
-
-    pieces: PackedPieces
-    shapes: CoalShapes
-
-    @classmethod
-    def of(
-        cls, robot: RobotModel, problem: PlanningProblem, deadline: Deadline
-    ) -> "CoalScene":
-        """The obstacles of a problem, none of which moves.
-
-        Raises:
-            OutOfTime: If the time is over.
-        """
-        obstacles = problem.scene.obstacles
-        shapes, _ = arm_shapes(robot, (), obstacles, deadline)
-        return cls(problem.packed_obstacles, shapes)
-
-
 def reach_of(problem: PlanningProblem) -> float:
     """Distance up to which pairs are measured at every row; [m].
 
@@ -106,107 +78,61 @@ def reach_of(problem: PlanningProblem) -> float:
     return problem.required_clearance + problem.manipulator.most_radius
 
 
-def coal_distances(
-    robot: RobotModel,
-    problem: PlanningProblem,
-    trajectory: Trajectory,
-    reach: float,
-    travel: float = 0.0,
-    deadline: Deadline = NO_LIMIT,
-    scene: CoalScene | None = None,
-) -> Iterator[CoalDistances]:
-    """Measure the pairs within reach, chunk by chunk, then every pair not yet seen.
-
-    Args:
-        robot: The arm in Pinocchio and Coal.
-        problem: The scene.
-        trajectory: The rows.
-        reach: Measure where the coarse bound is at most this; inf for everything; [m].
-        travel: Look at one row of each stretch in which the joint centres move by this
-            much; 0 for every row; [m].
-        deadline: When to give up.
-        scene: The obstacles, where they are there already.
-
-    Yields:
-        Distances in the order of the rows; last the pairs that were not measured, each
-        at the row where its coarse bound is least; of more than `MANY` obstacles each
-        with the link that is nearest then.
-
-    Raises:
-        OutOfTime: If the time is over.
-    """
-    arm, obstacles = problem.manipulator, problem.scene.obstacles
-    if not obstacles:
-        return
-    ready = scene or CoalScene.of(robot, problem, deadline)
-    every = np.ones((arm.axis_radii.size, len(obstacles)), dtype=np.bool_)
-
-    def bounds(axes: FloatArray) -> FloatArray:
-        return coarse_bounds(ready.pieces, axes, arm.axis_radii)
-
-    near = _Nearness(arm, bounds, every, CHUNK_BOUNDS)
-    for pairs in near.pairs(trajectory, reach, travel, deadline):
-        yield against_obstacles(robot, trajectory, ready, pairs)
-
-
-def link_distances(
-    robot: RobotModel,
-    trajectory: Trajectory,
-    reach: float,
-    deadline: Deadline = NO_LIMIT,
-) -> Iterator[CoalDistances]:
-    """Measure the pairs of links within reach, then every pair not yet seen.
-
-    Args:
-        robot: The arm in Pinocchio and Coal.
-        trajectory: The rows.
-        reach: Measure where the closed form is at most this; inf for everything; [m].
-        deadline: When to give up.
-
-    Yields:
-        Distances in the order of the rows, of a link and one farther out; last the
-        pairs that never came within reach, each at the row where it is nearest.
-
-    Raises:
-        OutOfTime: If the time is over.
-    """
-    arm = robot.manipulator
-    n_axes = arm.axis_radii.size
-    every = np.ones((n_axes, n_axes), dtype=np.bool_)
-
-    def bounds(axes: FloatArray) -> FloatArray:
-        return link_gaps(axes, arm.axis_radii)
-
-    near = _Nearness(arm, bounds, np.triu(every, k=2), CHUNK_GAPS)
-    for pairs in near.pairs(trajectory, reach, 0.0, deadline):
-        yield between_links(robot, trajectory, pairs)
-
-
-def in_turns(pairs: IntArray, deadline: Deadline) -> Iterator[IntArray]:
-    """The same pairs, so many at a time that a deadline is heard in between."""
-    for first in range(0, len(pairs), CHUNK_PAIRS):
-        deadline.check()
-        yield pairs[first : first + CHUNK_PAIRS]
-
-
 @dataclass(frozen=True)
-class _Nearness:
-    """Picks the pairs of a motion that are worth a measurement.
+class Partners:
+    """What links and tool are held against: obstacles at rest, or links farther out.
 
     Args:
-        arm: Its links and tool are the one side.
+        robot: The arm in Pinocchio and Coal.
+        names: Of the partners.
+        shapes: Coal's: links and tool, then what else there is.
+        first: Number of the first partner among the shapes.
+        apart: Which pairs to look at, shape (n_axes, n_partners).
         bounds: Lower bounds of the clearance at ends of links and tool, shape
             (n, n_axes + 1, 3), for each of them and each partner; [m].
-        apart: Which pairs to look at, shape (n_axes, n_partners).
+        brackets: Of links and partners at some of these rows: both bounds; [m].
         held: Bounds held in memory at a time.
     """
 
-    arm: Manipulator
-    bounds: Callable[[FloatArray], FloatArray]
+    robot: RobotModel
+    names: tuple[str, ...]
+    shapes: CoalShapes
+    first: int
     apart: BoolArray
+    bounds: Callable[[FloatArray], FloatArray]
+    brackets: Callable[[FloatArray, Sides], tuple[FloatArray, FloatArray]]
     held: int
 
-    def pairs(
+    def distances(
+        self,
+        trajectory: Trajectory,
+        reach: float,
+        travel: float = 0.0,
+        deadline: Deadline = NO_LIMIT,
+    ) -> Iterator[CoalDistances]:
+        """Measure the pairs within reach, then every pair not yet seen.
+
+        Args:
+            trajectory: The rows.
+            reach: Measure where the coarse bound is at most this; inf for all; [m].
+            travel: Look at one row of each stretch in which the joint centres move by
+                this much; 0 for every row; [m].
+            deadline: When to give up.
+
+        Yields:
+            Distances in the order of the rows; last the pairs that were not measured,
+            each at the row where its coarse bound is least; of more than `MANY`
+            partners each with the link that is nearest then.
+
+        Raises:
+            OutOfTime: If the time is over.
+        """
+        for pairs in self._near(trajectory, reach, travel, deadline):
+            for first in range(0, len(pairs), CHUNK_PAIRS):
+                deadline.check()
+                yield self.measured(trajectory, pairs[first : first + CHUNK_PAIRS])
+
+    def _near(
         self, trajectory: Trajectory, reach: float, travel: float, deadline: Deadline
     ) -> Iterator[IntArray]:
         """(waypoint, link, partner) triples within reach, then one of each other pair.
@@ -214,6 +140,8 @@ class _Nearness:
         Raises:
             OutOfTime: If the time is over.
         """
+        if not self.apart.any():
+            return
         least = np.full(self.apart.shape, np.inf)
         nearest = np.zeros(least.shape, dtype=np.int64)
         seen = ~self.apart
@@ -221,7 +149,7 @@ class _Nearness:
         step = max(1, self.held // least.size)
         for first in range(0, trajectory.n_samples, step):
             deadline.check()
-            axes = _axes(self.arm, trajectory, slice(first, first + step))
+            axes = self._axes(trajectory, slice(first, first + step))
             bounds = self.bounds(axes)
             here = np.argmin(bounds, axis=0)
             value = np.take_along_axis(bounds, here[None], axis=0)[0]
@@ -231,11 +159,79 @@ class _Nearness:
             seen |= within.any(axis=0)
             close = np.argwhere(within)
             close[:, 0] += first
-            yield from in_turns(close, deadline)
+            yield close
         if self.apart.shape[1] > MANY:  # of the far ones the nearest link alone
             seen |= np.arange(len(least))[:, None] != np.argmin(least, axis=0)
-        far = np.argwhere(~seen)
-        yield from in_turns(np.column_stack([nearest[~seen], far]), deadline)
+        yield np.column_stack([nearest[~seen], np.argwhere(~seen)])
+
+    def measured(self, trajectory: Trajectory, pairs: IntArray) -> CoalDistances:
+        """Ask both about (waypoint, link, partner) triples, shape (m, 3)."""
+        rows, place = np.unique(pairs[:, 0], return_inverse=True)
+        sides = Sides(place, pairs[:, 1], pairs[:, 2])
+        lower, upper = self.brackets(self._axes(trajectory, rows), sides)
+        poses = arm_poses(self.robot, _joints(trajectory, rows))
+        placed = sides._replace(other=self.first + sides.other)
+        found = self.shapes.distances(poses, placed)
+        row, link, other = pairs.T
+        return CoalDistances(
+            row, link, other, found.distance, lower, upper, found.near, found.far
+        )
+
+    def _axes(self, trajectory: Trajectory, rows: IntArray | slice) -> FloatArray:
+        """Ends of the links and of the tool at some rows, (m, n_axes + 1, 3); [m]."""
+        arm = self.robot.manipulator
+        centres = joint_centres(arm, *_joints(trajectory, rows))
+        return np.ascontiguousarray(arm.axes(centres))
+
+
+def obstacles_at_rest(
+    robot: RobotModel, problem: PlanningProblem, deadline: Deadline = NO_LIMIT
+) -> Partners:
+    """The obstacles of a problem, none of which moves.
+
+    Raises:
+        OutOfTime: If the time is over.
+    """
+    scene, radii = problem.scene, robot.manipulator.axis_radii
+    pieces = problem.packed_obstacles
+
+    def brackets(axes: FloatArray, sides: Sides) -> tuple[FloatArray, FloatArray]:
+        row, link, obstacle = sides
+        ends = np.stack([axes[row, link], axes[row, link + 1]], axis=1)
+        found = row_brackets(pieces, ends, obstacle, TOLERANCES.bracket_gap)
+        lower, upper = (found - radii[link, None]).T
+        return lower, upper
+
+    return Partners(
+        robot=robot,
+        names=scene.names,
+        shapes=arm_shapes(robot, (), scene.obstacles, deadline)[0],
+        first=radii.size,
+        apart=np.ones((radii.size, len(scene.obstacles)), dtype=np.bool_),
+        bounds=lambda axes: coarse_bounds(pieces, axes, radii),
+        brackets=brackets,
+        held=CHUNK_BOUNDS,
+    )
+
+
+def links_farther_out(robot: RobotModel) -> Partners:
+    """The links and the tool two or more farther from the base."""
+    arm, radii = robot.manipulator, robot.manipulator.axis_radii
+
+    def brackets(axes: FloatArray, sides: Sides) -> tuple[FloatArray, FloatArray]:
+        gaps = link_gaps(axes, radii)[sides.row, sides.one, sides.other]
+        return gaps, gaps
+
+    return Partners(
+        robot=robot,
+        names=tuple(arm.axis_names),
+        shapes=arm_shapes(robot)[0],
+        first=0,
+        apart=np.triu(np.ones((radii.size, radii.size), dtype=np.bool_), k=2),
+        bounds=lambda axes: link_gaps(axes, radii),
+        brackets=brackets,
+        held=CHUNK_GAPS,
+    )
 
 
 class _Moved:
@@ -267,48 +263,7 @@ class _Moved:
         return np.asarray(found)
 
 
-def against_obstacles(
-    robot: RobotModel, trajectory: Trajectory, scene: CoalScene, pairs: IntArray
-) -> CoalDistances:
-    """Ask both about (waypoint, link, obstacle) triples, shape (m, 3)."""
-    rows, place = np.unique(pairs[:, 0], return_inverse=True)
-    link, obstacle, radii = pairs[:, 1], pairs[:, 2], robot.manipulator.axis_radii
-    axes = _axes(robot.manipulator, trajectory, rows)
-    ends = np.stack([axes[place, link], axes[place, link + 1]], axis=1)
-    bounds = row_brackets(scene.pieces, ends, obstacle, TOLERANCES.bracket_gap)
-    bounds -= radii[link, None]
-    poses = arm_poses(robot, _joints(trajectory, rows))
-    found = scene.shapes.distances(poses, Sides(place, link, radii.size + obstacle))
-    lower, upper = bounds.T
-    return CoalDistances(
-        pairs[:, 0], link, obstacle, found.distance, lower, upper, found.near, found.far
-    )
-
-
-def between_links(
-    robot: RobotModel, trajectory: Trajectory, pairs: IntArray
-) -> CoalDistances:
-    """Ask both about (waypoint, link, other link) triples, shape (m, 3)."""
-    rows, place = np.unique(pairs[:, 0], return_inverse=True)
-    link, other = pairs[:, 1], pairs[:, 2]
-    axes = _axes(robot.manipulator, trajectory, rows)
-    gaps = link_gaps(axes, robot.manipulator.axis_radii)[place, link, other]
-    poses, (shapes, _) = arm_poses(robot, _joints(trajectory, rows)), arm_shapes(robot)
-    found = shapes.distances(poses, Sides(place, link, other))
-    return CoalDistances(
-        pairs[:, 0], link, other, found.distance, gaps, gaps, found.near, found.far
-    )
-
-
 def _joints(
     trajectory: Trajectory, rows: IntArray | slice
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     return trajectory.x0[rows], trajectory.alpha[rows], trajectory.theta[rows]
-
-
-def _axes(
-    arm: Manipulator, trajectory: Trajectory, rows: IntArray | slice
-) -> FloatArray:
-    """Ends of the links and of the tool at some rows, shape (m, n_axes + 1, 3); [m]."""
-    centres = joint_centres(arm, *_joints(trajectory, rows))
-    return np.ascontiguousarray(arm.axes(centres))

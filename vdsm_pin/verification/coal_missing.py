@@ -12,7 +12,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.verification.coal_distances import CoalDistances, coal_distances
+from vdsm_pin.verification.coal_distances import CoalDistances, obstacles_at_rest
 from vdsm_pin.verification.robot_model import RobotModel
 
 NEAR: Final = 0.5
@@ -66,7 +66,8 @@ def coal_missing(
         return ()
     reach = problem.required_clearance + NEAR * problem.manipulator.most_radius
     worst: dict[tuple[int, int], Missing] = {}
-    for found in coal_distances(robot, problem, trajectory, reach, deadline=deadline):
+    obstacles = obstacles_at_rest(robot, problem, deadline)
+    for found in obstacles.distances(trajectory, reach, deadline=deadline):
         for k in np.flatnonzero(found.distance < problem.required_clearance):
             if not np.isfinite(found.distance[k]):
                 continue

@@ -14,7 +14,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.refinement import Refinement, plan_and_verify
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.html import rendered
-from vdsm_pin.verification.coal_distances import coal_distances
+from vdsm_pin.verification.coal_distances import obstacles_at_rest
 from vdsm_pin.verification.robot_model import RobotModel, load_robot
 
 PAGE: Final = "explain.html"
@@ -89,7 +89,7 @@ def _checks(robot: RobotModel, found: Refinement, row: int) -> Part:
     centres = robot.joint_centres(one.x0, one.alpha, one.theta)[0]
     error = float(np.linalg.norm(centres - plan.centres[row], axis=1).max())
     rows, names = [], problem.manipulator.axis_names
-    for seen in coal_distances(robot, problem, one, np.inf):
+    for seen in obstacles_at_rest(robot, problem).distances(one, np.inf):
         rows += [
             (
                 names[seen.link[k]],
