@@ -1,11 +1,13 @@
-"""What a verification has besides its checks, as far as there is time for it."""
+"""What to do where a check fails to run, or no time is left for what is wanted."""
 
 from collections.abc import Callable
+from math import nan
 from typing import TypeVar
 
-from vdsm_pin.errors import OutOfTime
+from vdsm_pin.errors import OutOfTime, VdsmError
 from vdsm_pin.progress import step
 from vdsm_pin.time_limit import Deadline
+from vdsm_pin.verification.records import Check, Verdict
 
 T = TypeVar("T")
 
@@ -28,3 +30,15 @@ class Besides:
     def note(self, name: str, deadline: Deadline) -> None:
         """Say that something is missing."""
         self.not_done.append(f"{name}: {OutOfTime(deadline.limit)}")
+
+
+def guarded(
+    name: str, run: Callable[[], Check | tuple[Check, ...]]
+) -> tuple[Check, ...]:
+    """A check's rows; one undecided row where it could not be carried out."""
+    step("%s", name)
+    try:
+        rows = run()
+    except (VdsmError, ArithmeticError) as error:
+        return (Check(name, Verdict.UNDECIDED, 0, nan, nan, "-", f"not done: {error}"),)
+    return rows if isinstance(rows, tuple) else (rows,)

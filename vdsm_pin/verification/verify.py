@@ -2,9 +2,8 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from math import nan
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,18 +12,27 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.winding import Location, Side
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import with_hulls
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.verification import cable_check, pointing
+from vdsm_pin.verification import cable_check, fk, pointing
 from vdsm_pin.verification.approaches import closest_approaches
 from vdsm_pin.verification.arm_counterexamples import find_counterexamples
-from vdsm_pin.verification.besides import Besides
+from vdsm_pin.verification.besides import Besides, guarded
 from vdsm_pin.verification.clearance import (
     ClearanceProof,
     least_clearances,
     prove_clearance,
 )
 from vdsm_pin.verification.clearance_check import check_clearance
+from vdsm_pin.verification.coal_carried import CARRIED, check_coal_carried
+from vdsm_pin.verification.coal_check import (
+    LINKS,
+    OBSTACLES,
+    check_coal_links,
+    check_coal_obstacles,
+)
 from vdsm_pin.verification.coal_distances import reach_of
 from vdsm_pin.verification.coal_log import CoalLog
 from vdsm_pin.verification.enclosed import (
@@ -50,7 +58,7 @@ from vdsm_pin.verification.inside import (
 )
 from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.moving import check_timed
-from vdsm_pin.verification.proved_lowers import LowersSink, ProvedLowers
+from vdsm_pin.verification.proved_lowers import LowersSink
 from vdsm_pin.verification.records import (
     ArmVerification,
     Check,
@@ -58,9 +66,8 @@ from vdsm_pin.verification.records import (
     Counterexample,
 )
 from vdsm_pin.verification.robot_model import RobotModel
-from vdsm_pin.verification.second_opinions import by_coal, by_pinocchio, guarded
-from vdsm_pin.verification.survival import Survival
-from vdsm_pin.verification.task import all_pairs
+from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
+from vdsm_pin.verification.task import ArmPairs, all_pairs
 from vdsm_pin.verification.tip import check_tip
 from vdsm_pin.verification.yes_or_no import is_certified
 
@@ -102,18 +109,24 @@ def verify(
     """
     box = problem.errors.widened(errors or ErrorBox())
     _check_input(problem, trajectory, box)
-    asked, besides = _Asked(problem, trajectory, box, deadline), Besides()
     located = locate_arm(problem, trajectory, box, deadline)
     around = bodies_inside(problem, trajectory, arm_inside(located))
-    swept = _swept(asked, around, sinks, reach)
-    proof, met = swept.proof, _met(asked, swept, besides)
+    asked = _Judgement(problem, trajectory, box, deadline)
+    proof = asked.proved(around, sinks, reach_of(problem) if reach is None else reach)
+    counterexamples = asked.counterexamples(proof)
+    clear = bool(counterexamples) and asked.is_nominally_clear()
+    contacts = asked.contacts(proof)
     if sinks and proof.sent < proof.n_intervals:
-        besides.note(f"clearance.csv from interval {proof.sent} on", deadline)
+        asked.besides.note(f"clearance.csv from interval {proof.sent} on", deadline)
     tip = check_tip(problem, trajectory)
     near_misses = closest_approaches(problem, trajectory, proof, around)
     log = CoalLog(proof.pairs, near_misses, tuple(around))
+    clearance = check_clearance(
+        problem, proof, counterexamples, contacts, deadline, nominal=clear
+    )
     checks = [
-        *by_pinocchio(robot, problem, trajectory, centres, deadline),
+        *guarded(fk.NAME, lambda: fk.check_fk(robot, problem, trajectory, deadline)),
+        *asked.planned(robot, centres),
         *check_limits(problem, trajectory),
         *tip.checks,
         *guarded(
@@ -121,14 +134,14 @@ def verify(
             lambda: pointing.check_pointing(problem, trajectory, deadline, box),
         ),
         *check_inside(located),
-        *enclosed_checks(_clearance_rows(asked, proof, met), problem, around),
-        *by_coal(robot, problem, trajectory, swept.lowers, deadline, log),
+        *enclosed_checks(clearance, problem, around),
+        *asked.by_coal(robot, proof, log),
         *guarded(
             cable_check.NAME,
             lambda: cable_check.check_cables(problem, trajectory, deadline),
         ),
     ]
-    survived = _survived(asked, proof, located, besides) if joint_error else (nan, nan)
+    survived = asked.survived(proof, located) if joint_error else (nan, nan)
     return ArmVerification(
         problem=problem,
         trajectory=trajectory,
@@ -142,18 +155,17 @@ def verify(
         undrawn=tip.undrawn,
         joint_error=survived[0],
         refuted_joint_error=survived[1],
-        counterexamples=met.counterexamples,
-        nominal_clear=met.nominal_clear,
-        not_done=tuple(besides.not_done),
+        counterexamples=counterexamples,
+        nominal_clear=clear,
+        not_done=tuple(asked.besides.not_done),
         time_limit=deadline.limit,
         least=enclosed_least(least_clearances(proof), proof.pairs, problem, around),
         coal=log.rows(),
     )
 
 
-@dataclass(frozen=True)
-class _Asked:
-    """What is judged, and until when.
+class _Judgement:
+    """What is worked out of one motion, and what there was no time for.
 
     Args:
         problem: What is asked.
@@ -162,134 +174,126 @@ class _Asked:
         deadline: When to give up what is left.
     """
 
-    problem: PlanningProblem
-    trajectory: Trajectory
-    errors: ErrorBox
-    deadline: Deadline
+    def __init__(
+        self,
+        problem: PlanningProblem,
+        trajectory: Trajectory,
+        errors: ErrorBox,
+        deadline: Deadline,
+    ) -> None:
+        self.problem, self.trajectory = problem, trajectory
+        self.errors, self.deadline, self.besides = errors, deadline, Besides()
+        self.lowers = LowersSink(problem, trajectory)
+        self.too_close: Noted | None = None
 
-
-class _Swept(NamedTuple):
-    """What was proved of the clearance, and what was heard on the way.
-
-    Args:
-        proof: Of every pair.
-        lowers: Its lower bounds in every interval.
-        too_close: Where pairs come too close; None where not all was heard.
-    """
-
-    proof: ClearanceProof
-    lowers: ProvedLowers
-    too_close: Noted | None
-
-
-def _swept(
-    asked: _Asked,
-    around: Enclosed,
-    sinks: Sequence[ClearanceSink],
-    reach: float | None,
-) -> _Swept:
-    """Prove the clearance; `sinks` and `reach` are those of `verify`."""
-    problem, trajectory = asked.problem, asked.trajectory
-    kept = LowersSink(problem, trajectory)
-    wanted = [EnclosedSink(sink, problem, around) if around else sink for sink in sinks]
-    noted: TooClose | None = None
-    if sinks or kept.fits:
+    def proved(
+        self, around: Enclosed, sinks: Sequence[ClearanceSink], reach: float
+    ) -> ClearanceProof:
+        """The clearance of every pair; `sinks` and `reach` are those of `verify`."""
+        problem, trajectory = self.problem, self.trajectory
+        wanted = [
+            EnclosedSink(one, problem, around) if around else one for one in sinks
+        ]
         noted = TooClose(all_pairs(problem), max(1, trajectory.n_samples - 1))
-        wanted += [kept.keep, noted]
-    near = reach_of(problem) if reach is None else reach
-    near = math.inf if around else near
-    proof = prove_clearance(
-        problem,
-        trajectory,
-        asked.errors,
-        wanted,
-        deadline=asked.deadline,
-        reach=near,
-    )
-    heard = None
-    if noted is not None and proof.sent == proof.n_intervals:
-        heard = noted.noted
-    return _Swept(proof, kept.proved(proof), heard)
+        if sinks or self.lowers.fits:
+            wanted += [self.lowers.keep, noted]
+        proof = prove_clearance(
+            problem,
+            trajectory,
+            self.errors,
+            wanted,
+            deadline=self.deadline,
+            reach=math.inf if around else reach,
+        )
+        if proof.sent == proof.n_intervals:
+            self.too_close = noted.noted
+        return proof
 
+    def counterexamples(self, proof: ClearanceProof) -> tuple[Counterexample, ...]:
+        """Motions within the errors that come too close."""
+        problem, motion, box = self.problem, self.trajectory, self.errors
+        none: tuple[Counterexample, ...] = ()
+        return self.besides.take(
+            "search for counterexamples",
+            lambda: find_counterexamples(problem, motion, box, proof, self.deadline),
+            none,
+        )
 
-class _Met(NamedTuple):
-    """How bodies come too close.
+    def is_nominally_clear(self) -> bool:
+        """Whether the motion without errors is proved clear of everything."""
+        motion = self.problem, self.trajectory, ErrorBox(), self.deadline
 
-    Args:
-        counterexamples: Motions within the errors that do.
-        nominal_clear: Whether the motion without errors is proved clear of everything;
-            asked only where there are some.
-        contacts: When pairs do first.
-    """
+        def is_clear() -> bool:
+            located = locate_arm(*motion)
+            outside = all(one.side is Side.OUTSIDE for one in located.values())
+            return outside and is_certified(*motion)
 
-    counterexamples: tuple[Counterexample, ...]
-    nominal_clear: bool
-    contacts: tuple[FirstContact, ...]
+        name = "proof of the motion without errors"
+        return self.besides.take(name, is_clear, False)
 
+    def contacts(self, proof: ClearanceProof) -> tuple[FirstContact, ...]:
+        """When pairs first come too close."""
+        motion, known = (self.problem, self.trajectory, self.errors), self.too_close
+        nowhere: tuple[FirstContact, ...] = ()
+        return self.besides.take(
+            "first contact",
+            lambda: arm_contacts(*motion, proof, self.deadline, known),
+            nowhere,
+        )
 
-def _met(asked: _Asked, swept: _Swept, besides: Besides) -> _Met:
-    """How bodies come too close, as far as there is time to say."""
-    problem, motion, box = asked.problem, asked.trajectory, asked.errors
-    proof, deadline = swept.proof, asked.deadline
-    none: tuple[Counterexample, ...] = ()
-    found = besides.take(
-        "search for counterexamples",
-        lambda: find_counterexamples(problem, motion, box, proof, deadline),
-        none,
-    )
-    nominal = bool(found) and besides.take(
-        "proof of the motion without errors", lambda: _is_clear(asked), False
-    )
-    nowhere: tuple[FirstContact, ...] = ()
-    contacts = besides.take(
-        "first contact",
-        lambda: arm_contacts(problem, motion, box, proof, deadline, swept.too_close),
-        nowhere,
-    )
-    return _Met(found, nominal, contacts)
+    def planned(
+        self, robot: RobotModel, centres: FloatArray | None
+    ) -> tuple[Check, ...]:
+        """Joint centres by Pinocchio against those planned, where there are any."""
+        if centres is None:
+            return ()
+        motion = robot, self.trajectory, centres, self.deadline
+        return guarded(fk.PLANNED, lambda: fk.check_planned(*motion))
 
+    def by_coal(
+        self, robot: RobotModel, proof: ClearanceProof, log: CoalLog
+    ) -> tuple[Check, ...]:
+        """The second opinions on distances."""
+        asked, deadline = (robot, self.problem, self.trajectory), self.deadline
+        proved = self.lowers.proved(proof)
+        checks = {
+            OBSTACLES: lambda: check_coal_obstacles(*asked, proved, deadline, log),
+            LINKS: lambda: check_coal_links(*asked, deadline, log),
+            CARRIED: lambda: check_coal_carried(*asked, proved, log, deadline),
+        }
+        return tuple(row for name, run in checks.items() for row in guarded(name, run))
 
-def _clearance_rows(
-    asked: _Asked, proof: ClearanceProof, met: _Met
-) -> tuple[Check, ...]:
-    return check_clearance(
-        asked.problem,
-        proof,
-        met.counterexamples,
-        met.contacts,
-        asked.deadline,
-        nominal=met.nominal_clear,
-    )
+    def survived(
+        self, proof: ClearanceProof, located: Mapping[str, Location]
+    ) -> tuple[float, float]:
+        """The largest joint error that is proved, and the smallest found that is lost.
 
-
-def _survived(
-    asked: _Asked,
-    proof: ClearanceProof,
-    located: Mapping[str, Location],
-    besides: Besides,
-) -> tuple[float, float]:
-    """The largest joint error that is proved, and the smallest found that is lost.
-
-    NaN where there was no time; nothing is proved of an arm that may be inside a mesh.
-    """
-    problem, motion, deadline = asked.problem, asked.trajectory, asked.deadline
-    if any(where.side is not Side.OUTSIDE for where in located.values()):
-        return 0.0, nan
-    hulls = unlocated(locate_start(problem, motion))
-    survival = Survival(problem, motion, asked.errors, proof, deadline, hulls)
-    largest = besides.take("largest joint error", survival.largest, nan)
-    if np.isnan(largest):
-        return nan, nan
-    name = "joint error that loses the clearance"
-    return largest, besides.take(name, lambda: survival.refuted(largest), nan)
-
-
-def _is_clear(asked: _Asked) -> bool:
-    """Whether a motion is proved clear of everything, without errors."""
-    problem, trajectory, deadline = asked.problem, asked.trajectory, asked.deadline
-    located = locate_arm(problem, trajectory, ErrorBox(), deadline)
-    outside = all(where.side is Side.OUTSIDE for where in located.values())
-    return outside and is_certified(problem, trajectory, ErrorBox(), deadline)
+        NaN where there was no time; nothing is proved of an arm that may be inside a
+        mesh. Nothing is refuted by a mesh's hull, and nothing survives that may enter
+        it.
+        """
+        if any(where.side is not Side.OUTSIDE for where in located.values()):
+            return 0.0, nan
+        problem, motion, errors = self.problem, self.trajectory, self.errors
+        hulls, hulled = unlocated(locate_start(problem, motion)), problem
+        if hulls:  # else with what the problem keeps packed
+            hulled = replace(problem, scene=with_hulls(problem.scene, hulls))
+        lower = np.append(proof.best[:, LOW], np.inf)  # -1 is no pair
+        least = lower[ArmPairs(problem).number].min(axis=0)
+        least[[name in hulls for name in problem.scene.names]] = -math.inf
+        known = self.deadline, least
+        largest = self.besides.take(
+            "largest joint error",
+            lambda: largest_joint_error(hulled, motion, errors, *known),
+            nan,
+        )
+        if np.isnan(largest):
+            return nan, nan
+        return largest, self.besides.take(
+            "joint error that loses the clearance",
+            lambda: refuted_joint_error(problem, motion, errors, largest, *known),
+            nan,
+        )
 
 
 def _check_input(
