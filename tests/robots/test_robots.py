@@ -126,6 +126,21 @@ def test_without_a_pair_to_check_nothing_is_green(tmp_path: Path) -> None:
     assert bad[0].where.startswith("no pair to check")
 
 
+def test_a_robot_of_which_nothing_moves_is_judged_where_it_stands(
+    tmp_path: Path,
+) -> None:
+    """The ball on the arm, which is locked at a right angle, is 150 mm from the other."""
+    urdf = write(tmp_path, "two.urdf", URDF)
+    lock = {"turn": np.pi / 2, "slide": 0.0}
+    robot = read_robot(urdf, lock=lock)
+    path = read_path(write(tmp_path, "t.csv", "time_s\n0\n1\n"), robot)
+    scene = read_scene(write(tmp_path, "s.yaml", SCENE), 1.0)
+    for required, verdict in ((0.149, "certified"), (0.151, "refuted")):
+        found = verify_robot(Cell(robot, scene, required), path)
+        assert found.verdict.value == verdict
+        assert found.min_clearance == pytest.approx(0.15, abs=1e-9)
+
+
 def test_the_profile_is_the_least_of_each_link_and_obstacle(
     tmp_path: Path, robot: Robot
 ) -> None:

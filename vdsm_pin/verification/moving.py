@@ -160,7 +160,7 @@ def in_short_parts(path: Path, knots: Knots) -> tuple[Path, Knots]:
     """The same motion, its long intervals cut: of short ones less is to be proved."""
     if path.n_samples == 1:
         return path, knots
-    way = np.abs(np.diff(path.controls, axis=1)).sum(axis=1).max(axis=1)
+    way = np.abs(np.diff(path.controls, axis=1)).sum(axis=1).max(axis=1, initial=0.0)
     counts = np.clip(np.ceil(way / PART), 1, MOST_PARTS).astype(np.int64)
     if (counts == 1).all():
         return path, knots
