@@ -120,8 +120,15 @@ def test_pinocchio_reads_joints_alone(
 def test_links_that_are_seen_alone_are_noted(tmp_path: Path) -> None:
     seen = '<visual><geometry><box size="1 1 1"/></geometry></visual></link>'
     text = URDF.replace('<link name="finger"/>', f'<link name="finger">{seen}')
-    (note,) = read_robot(write(tmp_path, "seen.urdf", text)).notes
-    assert note == "links without a collision solid are not judged: 'finger'"
+    odd = (
+        '<link name="arm"><collision_checking><capsule name="c"/></collision_checking>'
+    )
+    text = text.replace('<link name="arm">', odd)
+    notes = read_robot(write(tmp_path, "seen.urdf", text)).notes
+    assert notes == (
+        "links without a collision solid are not judged: 'finger'",
+        "Pinocchio's collision_checking is not read; cylinders have flat ends: 'arm'",
+    )
 
 
 def test_parts_of_a_joint_have_names_of_their_own(tmp_path: Path) -> None:

@@ -78,20 +78,26 @@ def read_robot(
         left_out=left_out,
         base=base,
         solids=solids,
-        notes=(*reader.notes, *_not_solid(document)),
+        notes=(*reader.notes, *_not_judged(document)),
         more_files=(*included, *links.meshes(document)),
         covers=links.covers,
     )
 
 
-def _not_solid(document: ET.Element) -> Iterator[str]:
-    """A note on links that are seen but not judged."""
+def _not_judged(document: ET.Element) -> Iterator[str]:
+    """Notes on links that are seen but not judged, or that Pinocchio takes otherwise."""
     links = [
         link for link in document.findall("link") if link.find("visual") is not None
     ]
     names = [link.get("name", "") for link in links if link.find("collision") is None]
     if names:
         yield f"links without a collision solid are not judged: {listed(names)}"
+    others = [
+        link.get("name", "") for link in document.findall("link[collision_checking]")
+    ]
+    if others:
+        what = "Pinocchio's collision_checking is not read; cylinders have flat ends"
+        yield f"{what}: {listed(others)}"
 
 
 def _bodies(
