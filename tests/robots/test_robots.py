@@ -129,7 +129,7 @@ def test_without_a_pair_to_check_nothing_is_green(tmp_path: Path) -> None:
 def test_a_robot_of_which_nothing_moves_is_judged_where_it_stands(
     tmp_path: Path,
 ) -> None:
-    """The ball on the arm, which is locked at a right angle, is 150 mm from the other."""
+    """The ball on the arm, locked at a right angle, is 150 mm from the other."""
     urdf = write(tmp_path, "two.urdf", URDF)
     lock = {"turn": np.pi / 2, "slide": 0.0}
     robot = read_robot(urdf, lock=lock)

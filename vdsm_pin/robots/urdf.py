@@ -85,7 +85,7 @@ def read_robot(
 
 
 def _not_judged(document: ET.Element) -> Iterator[str]:
-    """Notes on links that are seen but not judged, or that Pinocchio takes otherwise."""
+    """Notes on links that are not judged, or that Pinocchio takes otherwise."""
     links = [
         link for link in document.findall("link") if link.find("visual") is not None
     ]
