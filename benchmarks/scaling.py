@@ -28,7 +28,7 @@ from benchmarks.batch import write_problems
 from benchmarks.common import Results, described, save, surroundings, table
 from vdsm_pin.batch.cluster import LONGEST_ERRAND
 from vdsm_pin.batch.pool import Ended
-from vdsm_pin.batch.task import Done, Task, keeps_files, perform
+from vdsm_pin.batch.task import Done, Settings, Task, perform
 from vdsm_pin.report.columns import write_columns
 from vdsm_pin.report.files import BatchRow
 
@@ -70,7 +70,7 @@ def one_problem(results: Results, folder: Path, count: int) -> BatchRow:
     rows, seconds, sizes, numbers = [], [], [], []
     for file in files:
         aside = folder / "aside" / file.stem
-        task = Task(str(file), "paper", file.stem, folder / "x", aside, False)
+        task = Task(str(file), folder / "x", aside, Settings("paper"))
         start = time.process_time()
         done = perform(task)
         seconds.append(time.process_time() - start)
@@ -87,8 +87,7 @@ def one_problem(results: Results, folder: Path, count: int) -> BatchRow:
     results["its folder, keep all [kB]"] = {
         "median": sorted(sizes)[len(sizes) // 2] / 1e3, "files": float(numbers[-1]),
     }  # fmt: skip
-    none = perform(replace(task, keep="none"))
-    assert not keeps_files("none", none.row)
+    perform(replace(task, settings=Settings("paper", keep="none")))
     left = sum(path.stat().st_size for path in aside.iterdir())
     results["its folder, keep none, or failed where it passed [kB]"] = {
         "median": left / 1e3, "files": float(len(list(aside.iterdir()))),
@@ -156,8 +155,8 @@ def processor_seconds(pid: int) -> float:
 def scheduling(results: Results, folder: Path, row: BatchRow, errands: int) -> None:
     """Processor time of the scheduler for an errand."""
     tasks = tuple(
-        Task(f"problems/small{k:05}.yaml", "paper", f"small{k:05}", folder / f"{k}",
-             folder / f"aside{k}", False)
+        Task(f"problems/small{k:05}.yaml", folder / f"small{k:05}",
+             folder / f"aside{k}", Settings("paper"))
         for k in range(LONGEST_ERRAND)
     )  # fmt: skip
     with scheduler(folder, 2) as (client, pid):

@@ -12,7 +12,7 @@ import pytest
 
 from vdsm_pin import api
 from vdsm_pin.batch.run import OWN, Batch, run_batch
-from vdsm_pin.batch.task import folder_names
+from vdsm_pin.batch.task import Settings, folder_names
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile
 
@@ -156,7 +156,7 @@ def test_two_outputs_do_not_share_a_place(
 
 def test_a_problem_may_have_the_name_of_any_file_of_a_batch(here: Path) -> None:
     (here / "summary.csv.yaml").write_text(PROBLEM)
-    (row,) = run_batch(Batch(("summary.csv.yaml",), here / "out", "fewest"))
+    (row,) = run_batch(Batch(("summary.csv.yaml",), here / "out", Settings("fewest")))
     assert row.outcome == "certified"
     assert (here / "out" / "summary.csv").is_file()
     assert (here / "out" / row.folder / "report.html").is_file()
@@ -177,12 +177,12 @@ def test_names_that_meet_a_hash_stay_apart() -> None:
 
 def test_a_batch_leaves_its_inputs_alone(here: Path) -> None:
     out = here / "out"
-    batch = Batch(("problem.yaml",), out, "fewest")
+    batch = Batch(("problem.yaml",), out, Settings("fewest"))
     run_batch(batch)
     # A file of the batch that is read as a problem.
     shutil.copy("problem.yaml", out / ".lock")
     with pytest.raises(InvalidFile, match="is an input"):
-        run_batch(Batch((str(out / ".lock"),), out, "fewest"))
+        run_batch(Batch((str(out / ".lock"),), out, Settings("fewest")))
     assert (out / ".lock").read_text() == PROBLEM
     # A file beside results that would be replaced.
     (out / "problem" / "notes.txt").write_text("mine")
@@ -203,7 +203,9 @@ def test_long_and_odd_names_have_folders_of_their_own(here: Path) -> None:
     names = ["a" * 230, "b", "summary.csv", os.fsdecode(b"\xff\x1b[31m")]
     for name in names:
         (here / f"{name}.yaml").write_text(PROBLEM)
-    rows = run_batch(Batch(tuple(f"{n}.yaml" for n in names), here / "out", "fewest"))
+    rows = run_batch(
+        Batch(tuple(f"{n}.yaml" for n in names), here / "out", Settings("fewest"))
+    )
     assert [row.outcome for row in rows] == 4 * ["certified"]
     assert len({row.folder for row in rows}) == 4
 
@@ -252,5 +254,5 @@ def test_nothing_takes_the_place_of_a_pipe(
 def test_a_batch_writes_over_no_table_of_others(here: Path) -> None:
     (here / "summary.csv").write_text("mine")
     with pytest.raises(InvalidFile, match="is not a result of a batch"):
-        run_batch(Batch(("problem.yaml",), here, "fewest"))
+        run_batch(Batch(("problem.yaml",), here, Settings("fewest")))
     assert (here / "summary.csv").read_text() == "mine"

@@ -14,6 +14,7 @@ from batch_folders import tree
 from problem_files import NEAR, OUT_OF_REACH, write_problem
 
 from vdsm_pin.batch.run import Batch, run_batch
+from vdsm_pin.batch.task import Settings
 from vdsm_pin.errors import InvalidInput
 
 distributed = pytest.importorskip("distributed")
@@ -77,7 +78,7 @@ def test_a_lost_worker_changes_no_byte(
     problems: Path, scheduler: str, tmp_path: Path
 ) -> None:
     here, there = tmp_path / "here", tmp_path / "there"
-    run_batch(Batch((str(problems),), here, "paper"))
+    run_batch(Batch((str(problems),), here, Settings("paper")))
     workers = [worker(scheduler, tmp_path, "--no-nanny") for _ in range(3)]
     busy = threading.Event()
 
@@ -94,7 +95,9 @@ def test_a_lost_worker_changes_no_byte(
             client.wait_for_workers(3, timeout=PATIENCE)
         killer = threading.Thread(target=kill_one)
         killer.start()
-        rows = run_batch(Batch((str(problems),), there, "paper", scheduler=scheduler))
+        rows = run_batch(
+            Batch((str(problems),), there, Settings("paper"), scheduler=scheduler)
+        )
         killer.join()
         assert busy.is_set()
         assert workers[0].wait() == -signal.SIGKILL
@@ -112,7 +115,12 @@ def test_a_worker_that_may_not_start_processes_is_told_how(
     try:
         with pytest.raises(InvalidInput, match="--no-nanny"):
             run_batch(
-                Batch((str(problems),), tmp_path / "out", "paper", scheduler=scheduler)
+                Batch(
+                    (str(problems),),
+                    tmp_path / "out",
+                    Settings("paper"),
+                    scheduler=scheduler,
+                )
             )
     finally:
         ended(workers)
@@ -123,7 +131,10 @@ def test_no_scheduler_is_a_message(
 ) -> None:
     monkeypatch.setattr("vdsm_pin.batch.cluster._CONNECT", "1s")
     asked = Batch(
-        ("paper/free",), tmp_path / "out", "paper", scheduler="tcp://127.0.0.1:9"
+        ("paper/free",),
+        tmp_path / "out",
+        Settings("paper"),
+        scheduler="tcp://127.0.0.1:9",
     )
     with pytest.raises(InvalidInput, match="no Dask scheduler answers"):
         run_batch(asked)

@@ -9,7 +9,7 @@ import pytest
 from oracles.certificate_cases import certificate_lines
 
 from vdsm_pin.batch.run import Batch, run_batch
-from vdsm_pin.batch.task import CERTIFICATE, Proving
+from vdsm_pin.batch.task import CERTIFICATE, Settings
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.report.files import VerificationFile
@@ -42,10 +42,12 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def asked(folder: Path, **more: object) -> Batch:
-    plans, out = (str(folder / "plans"),), folder / "out"
-    words = {"trajectories": plans, "quiet": True} | more
-    return Batch((str(folder / "cell.yaml"),), out, "fewest", **words)  # type: ignore[arg-type]
+FEWEST = Settings("fewest")
+
+
+def asked(folder: Path, settings: Settings = FEWEST) -> Batch:
+    problems, plans = (str(folder / "cell.yaml"),), (str(folder / "plans"),)
+    return Batch(problems, folder / "out", settings, quiet=True, trajectories=plans)
 
 
 def test_each_motion_gets_a_row_a_page_and_a_test_case(folder: Path) -> None:
@@ -83,7 +85,7 @@ def test_the_problem_beside_the_motions_is_no_motion(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (folder / "plans" / "clear.csv").rename(folder / "clear.csv")
-    (row,) = run_batch(asked(folder, trajectories=(str(folder),), quiet=False))
+    (row,) = run_batch(replace(asked(folder), trajectories=(str(folder),), quiet=False))
     assert (row.folder, row.outcome) == ("cell-clear", "certified")
     said = capsys.readouterr().out
     assert "smallest proved clearance" in said and "not available" not in said
@@ -101,7 +103,10 @@ def test_what_changed_is_done_again(folder: Path) -> None:
     """A motion that is another one now is not taken from the earlier batch."""
     before = {row.folder: row for row in run_batch(asked(folder))}
     (folder / "plans" / "clear.csv").write_text(PLANS["through.csv"])
-    after = {row.folder: row for row in run_batch(asked(folder, resume=True))}
+    after = {
+        row.folder: row
+        for row in run_batch(asked(folder, Settings("fewest", resume=True)))
+    }
     assert after["cell-clear"].outcome == "refuted"
     assert after["cell-through"] == before["cell-through"]
 
@@ -109,23 +114,25 @@ def test_what_changed_is_done_again(folder: Path) -> None:
 @pytest.mark.parametrize(("degrees", "passes"), [(10.0, True), (20.0, False)])
 def test_errors_are_asked_about(folder: Path, degrees: float, passes: bool) -> None:
     """By 18.5 deg more the arm, 30 deg from the ball, comes nearer than 10 mm."""
-    rows = run_batch(asked(folder, proving=Proving(ErrorBox(joint=radians(degrees)))))
+    errors = ErrorBox(joint=radians(degrees))
+    rows = run_batch(asked(folder, Settings("fewest", errors=errors)))
     outcomes = {row.folder: row.outcome for row in rows}
     assert (outcomes["cell-clear"] == "certified") is passes
 
 
 def test_certificates_are_written_under_errors(folder: Path) -> None:
-    both = Proving(ErrorBox(joint=radians(1.0)), certificate=True)
-    rows = {row.folder: row for row in run_batch(asked(folder, proving=both))}
+    errors = ErrorBox(joint=radians(1.0))
+    both = Settings("fewest", errors=errors, certificate=True)
+    rows = {row.folder: row for row in run_batch(asked(folder, both))}
     assert rows["cell-clear"].outcome == "certified"
     lines = certificate_lines(folder / "out" / "cell-clear" / CERTIFICATE)
     assert lines[0]["errors"]["joints_rad"] == {"turn": pytest.approx(radians(1.0))}
 
 
 def test_what_is_missing_is_named(folder: Path) -> None:
-    (row,) = run_batch(asked(folder, trajectories=()))
+    (row,) = run_batch(replace(asked(folder), trajectories=()))
     assert row.outcome == "error"
     assert "expected manipulator" in row.reason
     (folder / "none").mkdir()
     with pytest.raises(InvalidFile, match="holds no trajectory"):
-        run_batch(asked(folder, trajectories=(str(folder / "none"),)))
+        run_batch(replace(asked(folder), trajectories=(str(folder / "none"),)))

@@ -24,8 +24,16 @@ from problem_files import BEHIND_A_WALL, NEAR, OUT_OF_REACH, write_problem
 import vdsm_pin.batch.run as run_module
 import vdsm_pin.batch.task as task_module
 from vdsm_pin.batch.pool import Ended
-from vdsm_pin.batch.run import Batch, Interrupted, expanded, run_batch
-from vdsm_pin.batch.task import MANIFEST, TIMING, Done, Task, folder_names, perform
+from vdsm_pin.batch.run import Batch, Interrupted, expanded, passed_over, run_batch
+from vdsm_pin.batch.task import (
+    MANIFEST,
+    TIMING,
+    Done,
+    Settings,
+    Task,
+    folder_names,
+    perform,
+)
 from vdsm_pin.errors import CannotWrite, InvalidFile, InvalidInput, UnknownName
 from vdsm_pin.report.tables import read_summary
 
@@ -47,7 +55,7 @@ def problems(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def reference(problems: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The batch done once, by one process."""
     folder = tmp_path_factory.mktemp("reference") / "out"
-    run_batch(Batch((str(problems),), folder, "paper"))
+    run_batch(Batch((str(problems),), folder, Settings("paper")))
     return folder
 
 
@@ -88,7 +96,7 @@ def test_a_plan_that_draws_too_little_is_no_pass(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_problem(tmp_path / "wall.yaml", BEHIND_A_WALL)
-    asked = Batch((str(tmp_path / "wall.yaml"),), tmp_path / "out", "fewest")
+    asked = Batch((str(tmp_path / "wall.yaml"),), tmp_path / "out", Settings("fewest"))
     (row,) = run_batch(asked)
     assert row.outcome == "incomplete"
     assert "within the margin of 'wall'" in row.reason
@@ -104,7 +112,9 @@ def test_jobs_and_order_change_no_byte(
     problems: Path, reference: Path, tmp_path: Path
 ) -> None:
     files = [str(problems / f"{name}.yaml") for name in NAMES]
-    run_batch(Batch(tuple(reversed(files)), tmp_path / "out", "paper", jobs=2))
+    run_batch(
+        Batch(tuple(reversed(files)), tmp_path / "out", Settings("paper"), jobs=2)
+    )
     assert tree(tmp_path / "out") == tree(reference)
 
 
@@ -120,7 +130,7 @@ def test_rows_can_be_read_as_they_come(
 
     shown = contextlib.nullcontext(look)
     monkeypatch.setattr("vdsm_pin.batch.run.progress", lambda *_: shown)
-    run_batch(Batch((str(problems),), out, "paper", jobs=2))
+    run_batch(Batch((str(problems),), out, Settings("paper"), jobs=2))
     assert [len(rows) for rows in seen] == [1, 2, 3, 4]
     assert all(later[:-1] == sooner for sooner, later in pairwise(seen))
     assert tree(out) == tree(reference)
@@ -135,7 +145,7 @@ def test_resuming_keeps_what_is_intact_and_mends_the_rest(
     spoilt = out / "other" / "cables.csv"
     spoilt.write_bytes(spoilt.read_bytes().replace(b"1", b"2", 1))
     (out / "summary.csv").unlink()
-    run_batch(Batch((str(problems),), out, "paper", resume=True))
+    run_batch(Batch((str(problems),), out, Settings("paper", resume=True)))
     kept = {line.split()[3] for line in capsys.readouterr().out.splitlines()
             if "(kept)" in line}  # fmt: skip
     assert kept == {"good", "far"}
@@ -178,7 +188,7 @@ def test_what_a_killed_batch_was_writing_is_gone_after_the_next(
     out = tmp_path / "out"
     shutil.copytree(reference, out)
     (out / ".unfinished" / "good").mkdir(parents=True)
-    run_batch(Batch((str(problems),), out, "paper", resume=True))
+    run_batch(Batch((str(problems),), out, Settings("paper", resume=True)))
     assert tree(out) == tree(reference)
 
 
@@ -201,7 +211,7 @@ def test_a_full_disk_ends_the_batch_and_costs_no_earlier_result(
     shutil.copytree(reference, out)
     why = "File too large; 1 of 4 problems are finished, --resume does the rest"
     with pytest.raises(CannotWrite, match=why):
-        run_batch(Batch((str(problems),), out, "paper"))
+        run_batch(Batch((str(problems),), out, Settings("paper")))
     (out / "running.csv").unlink()
     assert tree(out) == tree(reference)
 
@@ -251,13 +261,13 @@ def test_ctrl_c_is_heard_even_where_python_loses_it(
     shown = contextlib.nullcontext(lose)
     monkeypatch.setattr("vdsm_pin.batch.run.progress", lambda *_: shown)
     with pytest.raises(Interrupted, match="1 of 4 problems"):
-        run_batch(Batch((str(problems),), tmp_path / "out", "paper"))
+        run_batch(Batch((str(problems),), tmp_path / "out", Settings("paper")))
     assert len(read_summary(tmp_path / "out" / "summary.csv")) == 1
 
 
 def test_a_time_limit_makes_a_row(problems: Path, tmp_path: Path) -> None:
     file = str(problems / "good.yaml")
-    (row,) = run_batch(Batch((file,), tmp_path, "paper", time_limit=0.01))
+    (row,) = run_batch(Batch((file,), tmp_path, Settings("paper", time_limit=0.01)))
     assert (row.outcome, row.folder) == ("time-limit", "good")
     assert "0.01 s came first" in row.reason
     assert (tmp_path / "good" / "manifest.json").is_file()
@@ -274,8 +284,11 @@ def test_a_worker_that_never_asks_the_clock_ends_by_itself(
         with monkeypatch.context() as changed:
             changed.setattr(task_module, slow, for_ever)
             file, place = str(problems / "good.yaml"), tmp_path / slow
-            aside = place.with_suffix(".part")
-            task = Task(file, "paper", slow, place, aside, False, time_limit=0.05)
+            aside, settings = (
+                place.with_suffix(".part"),
+                Settings("paper", time_limit=0.05),
+            )
+            task = Task(file, place, aside, settings)
             row = perform(task).row
         assert row.outcome == "time-limit"
         assert "0.05 s came first" in row.reason
@@ -288,10 +301,10 @@ def test_what_is_not_a_result_is_never_overwritten(
     (tmp_path / "good").mkdir()
     (tmp_path / "good" / "thesis.txt").write_text("mine")
     with pytest.raises(InvalidFile, match="nothing was overwritten"):
-        run_batch(Batch((str(problems),), tmp_path, "paper"))
+        run_batch(Batch((str(problems),), tmp_path, Settings("paper")))
     assert [p.name for p in tmp_path.iterdir()] == ["good"]
     with pytest.raises(UnknownName, match="strategy"):
-        run_batch(Batch((str(problems),), tmp_path / "x", "luck"))
+        run_batch(Batch((str(problems),), tmp_path / "x", Settings("luck")))
     assert not (tmp_path / "x").exists()
 
 
@@ -299,7 +312,7 @@ def test_two_batches_do_not_share_a_folder(problems: Path, tmp_path: Path) -> No
     with (tmp_path / ".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         with pytest.raises(InvalidInput, match="another batch"):
-            run_batch(Batch((str(problems),), tmp_path, "paper"))
+            run_batch(Batch((str(problems),), tmp_path, Settings("paper")))
 
 
 def test_names_of_folders_depend_on_nothing_but_the_problem(tmp_path: Path) -> None:
@@ -310,6 +323,20 @@ def test_names_of_folders_depend_on_nothing_but_the_problem(tmp_path: Path) -> N
     assert len(set(names.values())) == 5
     assert names == folder_names(tuple(reversed(names)))
     assert all("/" not in n and not n.startswith(".") for n in names.values())
+
+
+def test_folders_in_folders_are_named_not_done(tmp_path: Path) -> None:
+    inner, outer = tmp_path / "inner", str(tmp_path)
+    inner.mkdir()
+    write_problem(tmp_path / "good.yaml", NEAR)
+    assert passed_over((outer,)) == ()
+    write_problem(inner / "other.yaml", NEAR)
+    assert passed_over((outer, "paper/free")) == (str(inner),)
+    assert passed_over((outer, str(inner))) == ()
+    assert expanded((outer,)) == (str(tmp_path / "good.yaml"),)
+    (tmp_path / "good.yaml").unlink()
+    with pytest.raises(InvalidFile, match=r"no \.yaml file; folders in it do: .*inner"):
+        expanded((outer,))
 
 
 def test_folders_and_built_ins_expand_in_order(problems: Path, tmp_path: Path) -> None:
@@ -343,7 +370,7 @@ def test_what_is_not_kept_leaves_its_row(
     problems: Path, reference: Path, tmp_path: Path, keep: str
 ) -> None:
     out = tmp_path / "out"
-    run_batch(Batch((str(problems),), out, "paper", keep=keep))
+    run_batch(Batch((str(problems),), out, Settings("paper", keep=keep)))
     kept = sorted(path.name for path in (out / "good").iterdir())
     assert kept == ["manifest.json", "timing.json"]
     assert read_summary(out / "summary.csv") == read_summary(reference / "summary.csv")

@@ -43,25 +43,20 @@ class _Errand:
     Args:
         tasks: Done one after the other.
         folder: Working directory of the command, which relative paths start from.
-        time_limit: For each problem; None for none; [s].
         versions: What the worker must have installed.
     """
 
     tasks: tuple[Task, ...]
     folder: Path
-    time_limit: float | None
     versions: dict[str, str]
 
 
-def run_on_cluster(
-    tasks: Sequence[Task], address: str, *, time_limit: float | None = None
-) -> Iterator[Ended[Task, Done]]:
+def run_on_cluster(tasks: Sequence[Task], address: str) -> Iterator[Ended[Task, Done]]:
     """Perform the tasks on the workers of a Dask scheduler.
 
     Args:
         tasks: Their folders must be reachable by the workers under the same names.
         address: Such as `tcp://host:8786`.
-        time_limit: For each task; [s].
 
     Yields:
         Each task when it ends, in any order. Its `aside` is where the worker wrote.
@@ -74,7 +69,7 @@ def run_on_cluster(
 
     try:
         threads = sum(client.nthreads().values()) or 1
-        errands = iter(_errands(tasks, threads, time_limit))
+        errands = iter(_errands(tasks, threads))
         first = itertools.islice(errands, threads * _ERRANDS_AHEAD)
         asked = {_send(client, errand): errand for errand in first}
         running = as_completed(list(asked), loop=client.loop)
@@ -103,15 +98,13 @@ def _connected(address: str) -> "Client":
         raise InvalidInput(message) from error
 
 
-def _errands(
-    tasks: Sequence[Task], threads: int, time_limit: float | None
-) -> Iterator[_Errand]:
+def _errands(tasks: Sequence[Task], threads: int) -> Iterator[_Errand]:
     """Long errands for large batches, short ones to share out few problems."""
     share = len(tasks) // (threads * 8)
     size = max(1, min(LONGEST_ERRAND, share))
     folder, ours = Path.cwd(), versions()
     for k in range(0, len(tasks), size):
-        yield _Errand(tuple(tasks[k : k + size]), folder, time_limit, ours)
+        yield _Errand(tuple(tasks[k : k + size]), folder, ours)
 
 
 def _send(client: "Client", errand: _Errand) -> "Future":
@@ -146,7 +139,9 @@ def _run(errand: _Errand) -> list[Ended[Task, Done]]:
     if not hasattr(_ours, "process"):
         _ours.process = WarmProcess(perform)
     process: WarmProcess[Task, Done] = _ours.process
-    return [process.run(_attempt(task), errand.time_limit) for task in errand.tasks]
+    return [
+        process.run(_attempt(task), task.settings.time_limit) for task in errand.tasks
+    ]
 
 
 def _attempt(task: Task) -> Task:

@@ -7,7 +7,7 @@ import signal
 from collections import Counter
 from collections.abc import Iterator, Sequence, Set
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Final
@@ -16,12 +16,11 @@ from vdsm_pin.app.workflow import NO_PLAN, REPORT
 from vdsm_pin.batch.pool import Ended, run_tasks
 from vdsm_pin.batch.progress import progress
 from vdsm_pin.batch.task import (
-    ALL,
     MANIFEST,
     TIMING,
     WRITTEN,
     Done,
-    Proving,
+    Settings,
     Task,
     failed_row,
     folder_names,
@@ -51,9 +50,6 @@ SECONDS: Final = "timing.js"
 _ASIDE: Final = ".unfinished"
 _LOCK: Final = ".lock"
 
-GIVEN: Final = "given"
-"""What a row has for a strategy where the motion was given."""
-
 PROBLEMS: Final = ".yaml", ".yml"
 MOTIONS: Final = ".csv", *PROBLEMS, ".json", ".bag", ".db3", ".mcap"
 """Endings of trajectories."""
@@ -69,13 +65,9 @@ class Batch:
     Args:
         problems: Built-in names, problem files, folders; none means the built-ins.
         folder: Where the results go.
-        strategy: Name of the strategy.
+        settings: How each problem is done.
         jobs: Number of processes.
-        resume: Whether finished and intact results stay.
-        time_limit: For each problem; [s].
         scheduler: Address of a Dask scheduler whose workers do it; None for here.
-        keep: Whose files stay: "all", "failed" (all that did not pass) or "none".
-        proving: What each problem is proved for and written besides.
         quiet: Whether nothing is said of problems that end.
         trajectories: Given motions, files or folders of them, each of which is verified
             for each problem; none to plan.
@@ -83,13 +75,9 @@ class Batch:
 
     problems: tuple[str, ...]
     folder: Path
-    strategy: str
+    settings: Settings
     jobs: int = 1
-    resume: bool = False
-    time_limit: float | None = None
     scheduler: str | None = None
-    keep: str = ALL
-    proving: Proving = field(default_factory=Proving)
     quiet: bool = False
     trajectories: tuple[str, ...] = ()
 
@@ -109,8 +97,8 @@ def run_batch(batch: Batch) -> tuple[BatchRow, ...]:
         CannotWrite: If results cannot be written; earlier ones stay.
         Interrupted: On Ctrl-C or SIGTERM, after everything finished is written down.
     """
-    strategy(batch.strategy)
-    if batch.proving.pdf:
+    strategy(batch.settings.strategy)
+    if batch.settings.pdf:
         find_browser()
     check_output_folder(batch.folder)
     tasks = _tasks(batch)
@@ -158,10 +146,11 @@ def _fresh_aside(folder: Path) -> Iterator[None]:
 def _all_ended(batch: Batch, tasks: list[Task]) -> Iterator[Ended[Task, Done]]:
     """The tasks as they end, here or on a cluster."""
     if batch.scheduler is None:
-        return run_tasks(tasks, perform, jobs=batch.jobs, time_limit=batch.time_limit)
+        limit = batch.settings.time_limit
+        return run_tasks(tasks, perform, jobs=batch.jobs, time_limit=limit)
     from vdsm_pin.batch.cluster import run_on_cluster
 
-    return run_on_cluster(tasks, batch.scheduler, time_limit=batch.time_limit)
+    return run_on_cluster(tasks, batch.scheduler)
 
 
 def expanded(problems: tuple[str, ...]) -> tuple[str, ...]:
@@ -172,14 +161,31 @@ def expanded(problems: tuple[str, ...]) -> tuple[str, ...]:
     """
     found: set[str] = set()
     for name in problems or built_in_names():
-        if not Path(name).is_dir() or name in built_in_names():
+        if not _is_folder(name):
             found.add(name)
             continue
-        inside = [p for p in Path(name).iterdir() if p.suffix.lower() in PROBLEMS]
+        inside = _problem_files(Path(name))
         if not inside:
-            raise InvalidFile(file=name, problem="holds no .yaml file")
-        found.update(str(path) for path in inside)
+            deeper = ", ".join(passed_over((name,)))
+            more = f"; folders in it do: {deeper}" if deeper else ""
+            raise InvalidFile(file=name, problem=f"holds no .yaml file{more}")
+        found.update(map(str, inside))
     return tuple(sorted(found))
+
+
+def passed_over(problems: tuple[str, ...]) -> tuple[str, ...]:
+    """Folders with .yaml files inside of those named, which nobody named."""
+    folders = [Path(name) for name in problems if _is_folder(name)]
+    inside = {sub for folder in folders for sub in folder.iterdir() if sub.is_dir()}
+    return tuple(map(str, sorted(filter(_problem_files, inside - set(folders)))))
+
+
+def _is_folder(name: str) -> bool:
+    return Path(name).is_dir() and name not in built_in_names()
+
+
+def _problem_files(folder: Path) -> list[Path]:
+    return [path for path in folder.iterdir() if path.suffix.lower() in PROBLEMS]
 
 
 def _tasks(batch: Batch) -> list[Task]:
@@ -202,22 +208,9 @@ def _tasks(batch: Batch) -> list[Task]:
     tasks = []
     for job, name in names.items():
         problem, motion = jobs[job]
-        final = batch.folder / name
+        final, aside = batch.folder / name, batch.folder / _ASIDE / name
         _check_replaceable(final)
-        aside = batch.folder / _ASIDE / name
-        task = Task(
-            problem,
-            batch.strategy if motion is None else GIVEN,
-            name,
-            final,
-            aside,
-            batch.resume,
-            batch.keep,
-            batch.time_limit,
-            batch.proving,
-            motion,
-        )
-        tasks.append(task)
+        tasks.append(Task(problem, final, aside, batch.settings, motion))
     return tasks
 
 
@@ -301,7 +294,7 @@ def _settle(ended: Ended[Task, Done]) -> Done:
         done = Done(failed_row(task, ended.outcome, ended.reason), kept=False)
         write_manifest(task, done.row, "")
     if task.final.exists():
-        task.final.rename(task.aside.with_name(f"{task.folder}.replaced"))
+        task.final.rename(task.aside.with_name(f"{task.final.name}.replaced"))
     task.aside.rename(task.final)
     return done
 

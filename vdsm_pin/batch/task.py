@@ -70,28 +70,39 @@ ALL: Final = "all"
 FAILED: Final = "failed"
 """Whose files stay: every problem's, or those of problems that did not pass."""
 
+GIVEN: Final = "given"
+"""What a row has for a strategy where the motion was given."""
+
 
 @dataclass(frozen=True)
-class Proving:
-    """What each problem of a batch is proved for and written besides.
+class Settings:
+    """How each problem of a batch is done.
 
     Args:
+        strategy: Name of the strategy.
+        keep: Which problems keep their files: "all", "failed" (all that did not pass)
+            or "none".
         errors: That every clearance is asked for under, besides the problem's own.
         words: The options of the command line that say so.
         certificate: Whether each certified motion gets its certificate.
         pdf: Whether each report is printed too.
+        resume: Whether a finished and intact folder may stay.
+        time_limit: From when a worker begins; None for none; [s].
     """
 
+    strategy: str
+    keep: str = ALL
     errors: ErrorBox = field(default_factory=ErrorBox)
     words: tuple[str, ...] = ()
     certificate: bool = False
     pdf: bool = False
+    resume: bool = False
+    time_limit: float | None = None
 
-    @property
-    def options(self) -> list[str]:
-        """The options of the command line that ask for it."""
-        more = {"--certificate": self.certificate, "--pdf": self.pdf}
-        return [*self.words, *(name for name, asked in more.items() if asked)]
+    def keeps_files(self, row: BatchRow) -> bool:
+        """Whether the files of a problem stay beside its manifest."""
+        failed = not outcome(row.outcome).passed
+        return self.keep == ALL or (self.keep == FAILED and failed)
 
 
 @dataclass(frozen=True)
@@ -100,38 +111,31 @@ class Task:
 
     Args:
         problem: Built-in name or path, as the user gave it.
-        strategy: Name of the strategy.
-        folder: Name of its folder.
-        final: Where the folder shall be.
+        final: Where its folder shall be.
         aside: Where the worker writes it.
-        resume: Whether a finished and intact folder may stay.
-        keep: Which problems keep their files: "all", "failed" or "none".
-        time_limit: From when a worker begins; None for none; [s].
-        proving: What is proved besides, and written.
+        settings: How it is done.
         trajectory: A given motion, which is verified as it is; None to plan one.
     """
 
     problem: str
-    strategy: str
-    folder: str
     final: Path
     aside: Path
-    resume: bool
-    keep: str = ALL
-    time_limit: float | None = None
-    proving: Proving = field(default_factory=Proving)
+    settings: Settings
     trajectory: str | None = None
 
     @property
-    def settings(self) -> dict[str, str]:
-        """What a finished folder must agree with to be kept."""
-        besides = {name: str(value) for name, value in asdict(self.proving).items()}
-        given = {} if self.trajectory is None else {"trajectory": self.given_sha256}
-        own = {"strategy": self.strategy, "keep": self.keep}
-        return own | besides | given | versions()
+    def strategy(self) -> str:
+        """What the row of a problem has for it."""
+        return self.settings.strategy if self.trajectory is None else GIVEN
 
-    @property
-    def given_sha256(self) -> str:
+    def depends_on(self) -> dict[str, str]:
+        """What a finished folder must agree with to be kept."""
+        found = {name: str(value) for name, value in asdict(self.settings).items()}
+        del found["resume"], found["time_limit"]
+        given = {} if self.trajectory is None else {"trajectory": self._given_sha256()}
+        return found | {"strategy": self.strategy} | given | versions()
+
+    def _given_sha256(self) -> str:
         """Of the given motion; empty where it cannot be read."""
         try:
             return sha256_of_file(Path(self.trajectory or ""))
@@ -141,12 +145,14 @@ class Task:
     @property
     def command(self) -> str:
         """A command that repeats exactly this problem."""
-        words = ["vdsm", "batch", self.problem]
+        words, asked = ["vdsm", "batch", self.problem], self.settings
         if self.trajectory is None:
             words += ["--strategy", self.strategy]
         else:
             words += ["--trajectories", self.trajectory]
-        return shlex.join([*words, *self.proving.options, "--out", "out"])
+        more = {"--certificate": asked.certificate, "--pdf": asked.pdf}
+        words += [*asked.words, *(name for name, wanted in more.items() if wanted)]
+        return shlex.join([*words, "--out", "out"])
 
 
 @dataclass(frozen=True)
@@ -175,7 +181,7 @@ def perform(task: Task) -> Done:
 
 
 def _performed(task: Task) -> Done:
-    started, deadline = time.monotonic(), Deadline.after(task.time_limit)
+    started, deadline = time.monotonic(), Deadline.after(task.settings.time_limit)
     shutil.rmtree(task.aside, ignore_errors=True)
     digest = ""
     try:
@@ -183,7 +189,7 @@ def _performed(task: Task) -> Done:
             problem = _read(task)
             digest = problem.source.sha256 if problem.source else ""
             _check_apart(task, problem)
-            if task.resume:
+            if task.settings.resume:
                 kept = finished(task, digest)
                 if kept is not None:
                     return Done(kept, kept=True)
@@ -199,7 +205,7 @@ def _performed(task: Task) -> Done:
         row = failed_row(task, "error", str(error))
     except Exception as error:  # noqa: BLE001  a batch outlives any one problem
         row = failed_row(task, "error", f"{type(error).__name__}: {error}")
-    if not keeps_files(task.keep, row):
+    if not task.settings.keeps_files(row):
         shutil.rmtree(task.aside, ignore_errors=True)
     elif not row.waypoints:
         _clear(task.aside)
@@ -223,14 +229,14 @@ def _read(task: Task) -> "PlanningProblem | Cell":
         InvalidFile: If it is bad, or asks for a robot what only arms have.
     """
     try:
-        return read_problem(task.problem).under(task.proving.errors)
+        return read_problem(task.problem).under(task.settings.errors)
     except ProblemOfRobot as error:
         refusal = error
     if task.trajectory is None:
         raise refusal
     from vdsm_pin.robots.cell import read_cell
 
-    return read_cell(Path(refusal.file)).under(task.proving.errors)
+    return read_cell(Path(refusal.file)).under(task.settings.errors)
 
 
 def _check_apart(task: Task, problem: "PlanningProblem | Cell") -> None:
@@ -248,16 +254,11 @@ def _check_apart(task: Task, problem: "PlanningProblem | Cell") -> None:
             raise InvalidFile(file=file, problem=why)
 
 
-def keeps_files(keep: str, row: BatchRow) -> bool:
-    """Whether the files of a problem stay beside its manifest."""
-    return keep == ALL or (keep == FAILED and not outcome(row.outcome).passed)
-
-
 def failed_row(task: Task, word: str, reason: str) -> BatchRow:
     """The row of a problem without a verified motion."""
     return BatchRow.model_validate(
         {
-            "folder": task.folder,
+            "folder": task.final.name,
             "problem": printable(task.problem),
             "strategy": task.strategy,
             "outcome": word,
@@ -271,7 +272,7 @@ def write_manifest(task: Task, row: BatchRow, digest: str) -> None:
     task.aside.mkdir(parents=True, exist_ok=True)
     files = {path.name: sha256_of_file(path) for path in sorted(task.aside.iterdir())}
     manifest = ManifestFile(
-        problem_sha256=digest, settings=task.settings, row=row, files=files
+        problem_sha256=digest, settings=task.depends_on(), row=row, files=files
     )
     (task.aside / MANIFEST).write_text(manifest.text(), encoding="utf-8")
 
@@ -287,7 +288,7 @@ def finished(task: Task, digest: str) -> BatchRow | None:
         )
     except (OSError, ValidationError, UnicodeDecodeError):
         return None
-    same = (manifest.problem_sha256, manifest.settings) == (digest, task.settings)
+    same = (manifest.problem_sha256, manifest.settings) == (digest, task.depends_on())
     wanted = manifest.row.outcome not in ("error", TIME_LIMIT)
     return manifest.row if intact and same and wanted else None
 
@@ -331,7 +332,7 @@ def _done(
     task: Task, problem: "PlanningProblem | Cell", deadline: Deadline
 ) -> BatchRow:
     """Plan where no motion is given, verify, and tell."""
-    asked, plan = task.proving, None
+    asked, plan = task.settings, None
     if task.trajectory is None:
         assert isinstance(problem, PlanningProblem)
         plan = plan_to_folder(
@@ -356,7 +357,7 @@ def _done(
         raise OutOfTime(deadline.limit, "a plan was found and proved, but not reported")
     drawing = picture(verified.records)
     (task.aside / PICTURE).write_text(drawing, encoding="utf-8")
-    row = batch_row(task.folder, task.strategy, verified.file)
+    row = batch_row(task.final.name, task.strategy, verified.file)
     # The planner knows why it left something out, the verification does not.
     if plan is not None and plan.verdict == row.outcome == "incomplete":
         return row.model_copy(update={"reason": plan.reason})

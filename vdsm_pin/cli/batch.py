@@ -85,26 +85,36 @@ def batch(
     """
     import json
 
-    from vdsm_pin.batch.run import Batch, Interrupted, run_batch
-    from vdsm_pin.batch.task import Proving
+    from vdsm_pin.batch.run import Batch, Interrupted, passed_over, run_batch
+    from vdsm_pin.batch.task import Settings
     from vdsm_pin.report.words import outcome
+    from vdsm_pin.text import printable
 
     words = errors.words()
     if slide_error_mm != "0":
         words += ("--slide-error-mm", slide_error_mm)
+    settings = Settings(
+        strategy=strategy,
+        keep=keep,
+        errors=errors.box(slide_error_mm),
+        words=words,
+        certificate=certificate,
+        pdf=pdf,
+        resume=resume,
+        time_limit=time_limit,
+    )
     asked = Batch(
         problems=tuple(problems or ()),
         folder=out,
-        strategy=strategy,
+        settings=settings,
         jobs=jobs,
-        resume=resume,
-        time_limit=time_limit,
         scheduler=scheduler,
-        keep=keep,
-        proving=Proving(errors.box(slide_error_mm), words, certificate, pdf),
         quiet=quiet or as_json,
         trajectories=tuple(trajectories or ()),
     )
+    for folder in passed_over(asked.problems):
+        note = "is in a folder that was named, and passed over; name it too to do it"
+        typer.echo(printable(f"note: {folder} {note}"), err=True)
     try:
         rows = run_batch(asked)
     except Interrupted as error:
