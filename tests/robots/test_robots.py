@@ -383,7 +383,7 @@ def test_odd_robots_are_refused_in_a_sentence(
 ODD_ROWS = {
     "turn_rad\n0\n": "no column for joint 'slide', expected slide_m",
     "turn_m,slide_m\n0,0\n": "expected _rad or _deg for this joint",
-    "turn_rad,slide_m\n90,0\n": "is it in degrees?",
+    "turn_rad,slide_m\n90,0\n": "is it in degrees? expected _deg, for any number",
     "turn_deg,slide_m\n0,0\n1.57,0\n": "look like radians",
     "turn_rad,slide_m\n0,x\n": "expected a number",
     "turn_rad,slide_m\n": "has no row",

@@ -358,6 +358,10 @@ def test_a_joint_that_goes_the_long_way_round_is_noted(tmp_path: Path) -> None:
         notes = read_motion(file, robot.joints, values=robot.values).notes
         assert len(notes) == bool(words)
         assert all(f"joint 'turn' turns by {words}" in note for note in notes)
+    file = write(tmp_path, "t.csv", "turn_deg,slide_m\n0,0\n36000,0\n")
+    many = read_motion(file, robot.joints, values=robot.values)
+    assert many.q[1, 0] == pytest.approx(200.0 * np.pi)
+    assert "turns by 36000 deg between" in many.notes[0]
     file = write(tmp_path, "t.csv", "turn_rad,slide_m\n3,0\n-3,0\n")
     limited = read_robot(write(tmp_path, "two.urdf", URDF))
     assert read_motion(file, limited.joints, values=limited.values).notes == ()

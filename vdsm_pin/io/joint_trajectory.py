@@ -38,6 +38,7 @@ class JointTrajectory:
         rates: As q; per [s]. None where not stated.
         changes: As q; per [s^2]. None where not stated.
         notes: What else a reader should know, a sentence each.
+        in_degrees: Joints whose unit the file states as degrees.
     """
 
     names: tuple[str, ...]
@@ -46,6 +47,7 @@ class JointTrajectory:
     rates: FloatArray | None = None
     changes: FloatArray | None = None
     notes: tuple[str, ...] = ()
+    in_degrees: tuple[str, ...] = ()
 
     def of(self, names: Sequence[str]) -> "JointTrajectory":
         """The columns of some of its joints, in their order."""

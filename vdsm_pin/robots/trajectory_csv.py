@@ -73,6 +73,7 @@ def read_csv(
         parts[0],
         parts[1],
         (f"columns that are not read: {listed(unread)}",) if unread else (),
+        tuple(name for name, (_, unit) in stated.items() if unit == "deg"),
     )
 
 

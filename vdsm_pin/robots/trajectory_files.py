@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # whoever reads waypoints alone needs no pieces
     from vdsm_pin.proof.paths import Path
 
 MOST_TURNS: Final = 4.0 * np.pi
-"""An angle beyond this must be in degrees; [rad]."""
+"""An angle beyond this, not stated in degrees, must be in degrees; [rad]."""
 
 ROUNDED: Final = 1e-6
 """How far a joint that stands still may be written elsewhere; [rad], [m]."""
@@ -67,7 +67,8 @@ def read_motion(
         else:
             whole = read_csv(file, joints, values)
     found = _of_joints(file, whole, joints)
-    _check_units(file, found.q, joints)
+    unstated = [joint for joint in joints if joint.name not in whole.in_degrees]
+    _check_units(file, found.of([joint.name for joint in unstated]).q, unstated)
     others = {
         name: whole.q[:, k]
         for k, name in enumerate(whole.names)
@@ -211,8 +212,8 @@ def _check_units(file: File, q: FloatArray, joints: Sequence[RobotJoint]) -> Non
             row = int(np.argmax(np.abs(q[:, k])))
             problem = (
                 f"joint {joint.name!r} turns to {most:.4g} rad at waypoint {row}; "
-                "is it in degrees? expected _deg, or radians"
-                + ("" if limits else ", without limits at most two turns either way")
+                "is it in degrees? expected _deg, for any number of turns, or radians"
+                + ("" if limits else ", at most two turns either way without limits")
             )
             raise InvalidFile(file=file, problem=problem)
 
