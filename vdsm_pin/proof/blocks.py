@@ -4,8 +4,9 @@ import numpy as np
 
 from vdsm_pin.compiled import apart, borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
-from vdsm_pin.proof.broad_phase import BroadPhase, settle_far
+from vdsm_pin.proof.broad_phase import settle_far
 from vdsm_pin.proof.cached_planes import bound_above, bound_below, served
+from vdsm_pin.proof.far_pairs import BroadPhase
 from vdsm_pin.proof.layouts import OWN_POINT, ROW, UP, WIDTH
 from vdsm_pin.proof.packed_tree import Motion
 from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair

@@ -5,10 +5,10 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.proof.blocks import sweep
-from vdsm_pin.proof.broad_phase import BroadPhase, new_broad_phase
 from vdsm_pin.proof.budget import Budget
+from vdsm_pin.proof.far_pairs import BroadPhase, merge_far, new_broad_phase
 from vdsm_pin.proof.layouts import (
     AT_LOWER,
     AT_UPPER,
@@ -16,21 +16,18 @@ from vdsm_pin.proof.layouts import (
     HELD,
     KEY,
     LOW,
-    OTHER,
-    OWN,
     PAIR,
     SLICE,
     TALLY,
     TIME,
-    UP,
 )
 from vdsm_pin.proof.least_bracket import narrow
 from vdsm_pin.proof.packed_tree import Motion
 from vdsm_pin.proof.results import Candidates, Dense, Results
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.search import Witnesses
-from vdsm_pin.proof.terms import CERTIFIED, LINKS, OBSTACLES, UNDECIDED, Task
-from vdsm_pin.proof.witnesses import place_best, place_points
+from vdsm_pin.proof.terms import LINKS, OBSTACLES, UNDECIDED, Task
+from vdsm_pin.proof.witnesses import place_best
 from vdsm_pin.proof.workspace import Workspace, new_workspace
 
 SIDES: Final = 2
@@ -121,9 +118,10 @@ class Proving:
             Whether there was time to judge all; what is not judged is undecided.
         """
         in_time = self.judge(0, self.n_intervals)
-        for group in (OBSTACLES, LINKS):
-            if in_time:
-                self._narrow(group)
+        if in_time:
+            heap = np.zeros((self.budget.candidates + self.budget.slices, SLICE))
+            for group in (OBSTACLES, LINKS):
+                self._narrow(group, heap)
         self.place_witnesses()
         return in_time
 
@@ -134,7 +132,7 @@ class Proving:
             Whether there was time for all.
         """
         in_time = self.sweep(first, last)
-        self._merge_far()
+        merge_far(self.task, self.motion, self.work.ends, self.results, self.broad)
         self._own_up(last - first)
         return in_time
 
@@ -164,40 +162,14 @@ class Proving:
             results.best[left > 0, LOW] = -np.inf
             results.profile[0] = -np.inf
 
-    def _merge_far(self) -> None:
-        """Bring what the broad phase settled to the results of the pairs."""
-        for body in np.flatnonzero(self.broad.settled.any(axis=1)):
-            self._merge_far_of(int(body))
-
-    def _merge_far_of(self, body: int) -> None:
-        """The same of one body; of all at once it would take much memory."""
-        far, task, best = self.broad, self.task, self.results.best
-        obstacle = np.flatnonzero(far.number[body] >= 0)
-        pair, at = far.number[body, obstacle], (body, obstacle)
-        self.results.counts[pair, CERTIFIED] += far.settled[at]
-        better = far.lower[at] < best[pair, LOW]
-        best[pair[better], LOW] = far.lower[at][better]
-        best[pair[better], AT_LOWER] = far.at_lower[at][better]
-        found = np.flatnonzero(far.upper[at] < best[pair, UP])
-        pair, rows = pair[found], far.at_upper[at][found]
-        corner = np.tile(task.bodies.corners[task.bodies.first[body]], (len(rows), 1))
-        frames = np.full(len(rows), task.bodies.frame[body])
-        place = place_points(task.tree, self.motion, rows, frames, corner)
-        point = far.point[:, obstacle[found]].T
-        gap = np.linalg.norm(point - place, axis=1)
-        best[pair, UP] = gap - task.bodies.radius[body] + task.rules.pad
-        best[pair, AT_UPPER], best[pair, TIME] = rows, 0.0
-        best[pair, OWN:OTHER], best[pair, OTHER:] = corner, point
-
-    def _narrow(self, group: int) -> None:
-        """Narrow the least bracket of one group of pairs."""
+    def _narrow(self, group: int, heap: FloatArray) -> None:
+        """Narrow the least bracket of one group of pairs; the heap is working space."""
         task, results = self.task, self.results
         groups = task.pairs.group[: len(task.pairs.rough)]
         mine, order = groups == group, self._candidates(group)
         if not order.size:
             return
         found = _no_witnesses(len(mine))
-        heap = np.zeros((self.budget.candidates + self.budget.slices, SLICE))
         again = results._replace(counts=np.zeros_like(results.counts))
         count = narrow(task, self.motion, self.work, again, order, heap, found)
         if count < 0:

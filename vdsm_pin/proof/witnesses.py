@@ -5,15 +5,12 @@ from math import sqrt
 import numpy as np
 
 from vdsm_pin.compiled import borrowed, compiled
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.layouts import AT_UPPER, OWN, TIME, UP
 from vdsm_pin.proof.packed_tree import (
     Motion,
-    PackedTree,
     Pose,
     interpolate,
-    new_pose,
-    place_tree,
     place_two,
 )
 from vdsm_pin.proof.swept_bodies import Ends, place_point
@@ -92,27 +89,3 @@ def place_best(task: Task, motion: Motion, ends: Ends, best: FloatArray) -> None
         place_two(task.tree, ends.q, frames, ends.bends.steps, ends.start)
         witness_at(mover, ends.start, row[OWN:], places[0], places[1])
         row[OWN:] = places.ravel()
-
-
-@compiled
-def place_points(
-    tree: PackedTree, motion: Motion, rows: IntArray, frames: IntArray, at: FloatArray
-) -> FloatArray:
-    """Points of frames at rows of a motion, in the world's frame.
-
-    Args:
-        tree: The joints.
-        motion: Rows of joint values.
-        rows: Shape (n,).
-        frames: Shape (n,).
-        at: In the frames, shape (n, 3); [m].
-
-    Returns:
-        Shape (n, 3); [m].
-    """
-    tree, motion = borrowed(tree), borrowed(motion)
-    pose, out = new_pose(tree.parent.size + 1), np.zeros((rows.size, 3))
-    for k in range(rows.size):
-        place_tree(tree, motion.knots[rows[k]], pose)
-        place_point(pose, frames[k], at[k], out[k])
-    return out
