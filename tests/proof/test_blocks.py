@@ -26,7 +26,8 @@ from vdsm_pin.proof.packing import pack_task, with_errors
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove, start_proof
 from vdsm_pin.proof.proving import dense_rows
-from vdsm_pin.proof.rows import BLOCK, fill_rows
+from vdsm_pin.proof.row_places import fill_rows
+from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.terms import CERTIFIED, UNDECIDED, Rules, Task, mover_of
 from vdsm_pin.proof.tree import Joint, Kind, Tree
 from vdsm_pin.proof.workspace import new_workspace

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.proof.packed_tree import bound_column, interpolate
+from vdsm_pin.proof.motions import bound_column, interpolate
 from vdsm_pin.proof.paths import Path, cubic_path, quintic_path, together
 
 

@@ -16,10 +16,11 @@ from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.cached_planes import place_disc
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.error_growth import crude_growth
-from vdsm_pin.proof.packed_tree import interpolate, place_tree
+from vdsm_pin.proof.motions import interpolate
+from vdsm_pin.proof.packed_tree import place_tree
 from vdsm_pin.proof.packing import pack_task, with_errors
 from vdsm_pin.proof.paths import Path, cubic_path, quintic_path
-from vdsm_pin.proof.rows import fill_rows
+from vdsm_pin.proof.row_places import fill_rows
 from vdsm_pin.proof.slices import Space
 from vdsm_pin.proof.swept_bodies import load_body
 from vdsm_pin.proof.terms import Rules, Task, mover_of

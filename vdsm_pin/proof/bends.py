@@ -6,12 +6,8 @@ import numpy as np
 
 from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.proof.packed_tree import (
-    PRISMATIC,
-    REVOLUTE,
-    Motion,
-    bound_column,
-)
+from vdsm_pin.proof.motions import Motion, bound_column
+from vdsm_pin.proof.packed_tree import PRISMATIC, REVOLUTE
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.ways import Ways
 

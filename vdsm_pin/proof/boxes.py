@@ -12,7 +12,8 @@ from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.proof.error_growth import crude_growth
-from vdsm_pin.proof.rows import Rows, seen
+from vdsm_pin.proof.row_places import seen
+from vdsm_pin.proof.rows import Rows
 from vdsm_pin.proof.terms import Task
 
 

@@ -22,7 +22,7 @@ from vdsm_pin.proof.far_pairs import (
 )
 from vdsm_pin.proof.pair_sweep import Stretch
 from vdsm_pin.proof.results import Results
-from vdsm_pin.proof.rows import seen
+from vdsm_pin.proof.row_places import seen
 from vdsm_pin.proof.terms import (
     OBSTACLES,
     Task,

@@ -16,9 +16,11 @@ from vdsm_pin.proof.layouts import (
     TIME,
     UP,
 )
-from vdsm_pin.proof.packed_tree import Motion, interpolate, place_two
+from vdsm_pin.proof.motions import Motion, interpolate
+from vdsm_pin.proof.packed_tree import place_two
 from vdsm_pin.proof.results import Dense, Results
-from vdsm_pin.proof.rows import Rows, seen
+from vdsm_pin.proof.row_places import seen
+from vdsm_pin.proof.rows import Rows
 from vdsm_pin.proof.swept_bodies import Ends, place_point
 from vdsm_pin.proof.terms import CERTIFIED, WORLD, Task
 

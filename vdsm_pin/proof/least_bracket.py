@@ -16,10 +16,10 @@ from vdsm_pin.proof.layouts import (
     TIME,
     UP,
 )
-from vdsm_pin.proof.packed_tree import Motion
+from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
 from vdsm_pin.proof.results import Results
-from vdsm_pin.proof.rows import fill_rows
+from vdsm_pin.proof.row_places import fill_rows
 from vdsm_pin.proof.search import Witnesses, tighten
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.workspace import Workspace

@@ -40,9 +40,9 @@ from vdsm_pin.proof.layouts import (
     WHEN,
     WIDTH,
 )
-from vdsm_pin.proof.packed_tree import Motion
+from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.results import Results, note_upper
-from vdsm_pin.proof.rows import seen
+from vdsm_pin.proof.row_places import seen
 from vdsm_pin.proof.search import bound_between, new_witness, resolve
 from vdsm_pin.proof.slices import leaf_bracket, loaded_bound
 from vdsm_pin.proof.swept_bodies import to_body

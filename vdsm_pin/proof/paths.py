@@ -10,7 +10,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.geometry.bernstein import hermite, part, raised, value
-from vdsm_pin.proof.packed_tree import Motion
+from vdsm_pin.proof.motions import Motion
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from vdsm_pin.proof.layouts import (
     TIME,
 )
 from vdsm_pin.proof.least_bracket import narrow
-from vdsm_pin.proof.packed_tree import Motion
+from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.results import Candidates, Dense, Results
 from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.search import Witnesses

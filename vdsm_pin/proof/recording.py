@@ -21,7 +21,7 @@ from vdsm_pin.proof.layouts import (
     SLICE,
     START,
 )
-from vdsm_pin.proof.packed_tree import Motion
+from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.search import bound_between, new_witness, resolve
 from vdsm_pin.proof.slices import leaf_bound, node_bound, plane_bound
 from vdsm_pin.proof.terms import CERTIFIED, Task

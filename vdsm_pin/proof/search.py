@@ -21,7 +21,8 @@ from vdsm_pin.proof.layouts import (
     START,
     WHEN,
 )
-from vdsm_pin.proof.packed_tree import Motion, interpolate, place_two
+from vdsm_pin.proof.motions import Motion, interpolate
+from vdsm_pin.proof.packed_tree import place_two
 from vdsm_pin.proof.slices import Space, slice_bound
 from vdsm_pin.proof.swept_bodies import Ends, to_body
 from vdsm_pin.proof.terms import (

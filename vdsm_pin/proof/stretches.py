@@ -31,7 +31,7 @@ from vdsm_pin.proof.layouts import (
     UP,
     WHEN,
 )
-from vdsm_pin.proof.packed_tree import Motion
+from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import RANK, Proof, start_proof, summed
 from vdsm_pin.proof.proving import dense_rows

@@ -7,12 +7,8 @@ import numpy as np
 from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.layouts import AT_UPPER, OWN, TIME, UP
-from vdsm_pin.proof.packed_tree import (
-    Motion,
-    Pose,
-    interpolate,
-    place_two,
-)
+from vdsm_pin.proof.motions import Motion, interpolate
+from vdsm_pin.proof.packed_tree import Pose, place_two
 from vdsm_pin.proof.swept_bodies import Ends, place_point
 from vdsm_pin.proof.terms import Mover, Task, mover_of
 
