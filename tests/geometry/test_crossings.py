@@ -10,7 +10,7 @@ from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.closed_meshes import SIGNED, SOLID
 from vdsm_pin.geometry.convex import Hull
-from vdsm_pin.geometry.obstacles import encloses
+from vdsm_pin.geometry.mesh_insides import encloses
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.problem.desired_path import DesiredPath

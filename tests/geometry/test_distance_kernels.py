@@ -19,7 +19,7 @@ from vdsm_pin.geometry.kernels import (
     UPPER,
     bracket,
 )
-from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
+from vdsm_pin.geometry.obstacles import new_measuring, obstacle_bracket
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 
@@ -191,12 +191,12 @@ def test_the_hierarchy_finds_the_nearest_of_many_pieces() -> None:
     group: list[Piece] = [Hull(c + rng.uniform(-0.1, 0.1, (3, 3))) for c in centres]
     many, single = pack_pieces([group]), pack_pieces([[piece] for piece in group])
     assert sorted(many.order) == list(range(300))
-    scratch, stack = np.zeros((SCRATCH_ROWS + 2, 3)), np.zeros(STACK, np.int64)
     for _ in range(20):
         ends, body = rng.uniform(-3, 3, (2, 3)), new_body(2, 2, 0)
         body.points[:] = ends
-        out, trial = np.ones(BRACKET + 4), np.zeros(BRACKET + 4)
-        obstacle_bracket(many, 0, body, GOAL, scratch, stack, trial, out)
+        work = new_measuring()
+        obstacle_bracket(many, 0, body, GOAL, work)
+        out = work.out
         each = np.array([measure(single, p, ends)[:2] for p in range(300)])
         if each[:, 1].min() > GOAL:
             assert out[LOWER] == pytest.approx(each[:, 0].min(), abs=2.0 * GOAL)

@@ -7,27 +7,24 @@ import numpy as np
 from vdsm_pin.compiled import apart, borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.bodies import Body, new_body
-from vdsm_pin.geometry.kernels import BRACKET, LOWER, NORMAL, SCRATCH_ROWS
+from vdsm_pin.geometry.kernels import LOWER, NORMAL
+from vdsm_pin.geometry.mesh_insides import encloses, has_inside
 from vdsm_pin.geometry.obstacles import (
-    STACK,
+    Measuring,
     box_distance,
     box_of,
-    encloses,
-    has_inside,
+    new_measuring,
     obstacle_bracket,
 )
 from vdsm_pin.geometry.pieces import PackedPieces
 
 
 class _Work(NamedTuple):
-    """Working space of `obstacle_bracket`, and the last n of each obstacle and link."""
+    """Working space of distances, and the last n of each obstacle and link."""
 
     body: Body
     box: FloatArray
-    scratch: FloatArray
-    stack: IntArray
-    trial: FloatArray
-    out: FloatArray
+    measuring: Measuring
     normals: FloatArray
 
 
@@ -55,11 +52,8 @@ def link_clearances(
     """
     n_samples, n_links = centres.shape[0], centres.shape[1] - 1
     result = np.full((n_samples, n_links), np.inf)
-    work = _Work(
-        new_body(2, 2, 0), np.zeros((2, 3)), np.zeros((SCRATCH_ROWS + 2, 3)),
-        np.zeros(STACK, np.int64), np.zeros(BRACKET + 4), np.zeros(BRACKET + 4),
-        np.ones((pieces.root.size, n_links, 3)),
-    )  # fmt: skip
+    normals = np.ones((pieces.root.size, n_links, 3))
+    work = _Work(new_body(2, 2, 0), np.zeros((2, 3)), new_measuring(), normals)
     _measure(pieces, covers, centres, radius + pad, goal, work, result)
     return result
 
@@ -77,7 +71,7 @@ def _measure(
     """Write what is left of each distance where `off` is taken off it; [m]."""
     apart()
     pieces, work = borrowed(pieces), borrowed(work)
-    body, box, out = work.body, work.box, work.out
+    body, box, out = work.body, work.box, work.measuring.out
     for link in range(result.shape[1]):
         for sample in range(result.shape[0]):
             body.points[:] = centres[sample, link : link + 2]
@@ -87,9 +81,7 @@ def _measure(
                 if box_distance(pieces, pieces.root[o], box[0], box[1]) >= best:
                     continue
                 out[NORMAL : NORMAL + 3] = work.normals[o, link]
-                obstacle_bracket(
-                    pieces, o, body, goal, work.scratch, work.stack, work.trial, out
-                )
+                obstacle_bracket(pieces, o, body, goal, work.measuring)
                 work.normals[o, link] = out[NORMAL : NORMAL + 3]
                 gap = out[LOWER]
                 # Asked first: a call with the whole scene costs more than a link.

@@ -12,8 +12,8 @@ import numpy as np
 from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.bodies import new_body
-from vdsm_pin.geometry.kernels import BRACKET, LOWER, NORMAL, SCRATCH_ROWS, UPPER
-from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
+from vdsm_pin.geometry.kernels import LOWER, UPPER
+from vdsm_pin.geometry.obstacles import new_measuring, obstacle_bracket
 from vdsm_pin.geometry.pieces import HALF_SPACE, PackedPieces
 
 BALLS: Final = 8
@@ -87,15 +87,11 @@ def row_brackets(
     """
     pieces = borrowed(pieces)
     bounds = np.zeros((obstacle.size, 2))
-    scratch = np.zeros((SCRATCH_ROWS + 2, 3))
-    stack = np.zeros(STACK, np.int64)
-    trial, out = np.zeros(BRACKET + 4), np.zeros(BRACKET + 4)
-    body = new_body(2, 2, 0)
-    out[NORMAL] = 1.0
+    body, work = new_body(2, 2, 0), new_measuring()
     for m in range(obstacle.size):
         body.points[:] = ends[m]
-        obstacle_bracket(pieces, obstacle[m], body, goal, scratch, stack, trial, out)
-        bounds[m, 0], bounds[m, 1] = out[LOWER], out[UPPER]
+        obstacle_bracket(pieces, obstacle[m], body, goal, work)
+        bounds[m, 0], bounds[m, 1] = work.out[LOWER], work.out[UPPER]
     return bounds
 
 

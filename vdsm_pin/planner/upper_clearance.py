@@ -9,8 +9,8 @@ from vdsm_pin.arm.manipulator import FEED, Manipulator
 from vdsm_pin.compiled import borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.bodies import new_body
-from vdsm_pin.geometry.kernels import BRACKET, NORMAL, SCRATCH_ROWS, UPPER
-from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
+from vdsm_pin.geometry.kernels import NORMAL, UPPER
+from vdsm_pin.geometry.obstacles import new_measuring, obstacle_bracket
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
@@ -38,18 +38,15 @@ def upper_bounds(
     pieces = borrowed(pieces)
     count = pieces.root.size
     result = np.full((segments.shape[0], count), np.inf)
-    scratch = np.zeros((SCRATCH_ROWS + 2, 3))
-    stack = np.zeros(STACK, np.int64)
-    trial, out = np.zeros(BRACKET + 4), np.zeros(BRACKET + 4)
-    body = new_body(2, 2, 0)
+    body, work = new_body(2, 2, 0), new_measuring()
     for n in range(segments.shape[0]):
         body.points[:] = segments[n]
         for o in range(count):
             if clock() > until:
                 return result
-            out[NORMAL : NORMAL + 3] = 1.0
-            obstacle_bracket(pieces, o, body, GOAL, scratch, stack, trial, out)
-            result[n, o] = out[UPPER]
+            work.out[NORMAL : NORMAL + 3] = 1.0
+            obstacle_bracket(pieces, o, body, GOAL, work)
+            result[n, o] = work.out[UPPER]
     return result
 
 

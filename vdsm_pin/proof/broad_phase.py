@@ -11,7 +11,7 @@ import numpy as np
 
 from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import NORMAL, UPPER
-from vdsm_pin.geometry.obstacles import obstacle_bracket
+from vdsm_pin.geometry.obstacles import Measuring, obstacle_bracket
 from vdsm_pin.proof.boxes import body_box, box_gaps, box_reaches
 from vdsm_pin.proof.cached_planes import place_disc
 from vdsm_pin.proof.far_pairs import (
@@ -52,16 +52,9 @@ def _nearest_upper(task: Task, work: Workspace, broad: BroadPhase, body: int) ->
     place_disc(mover, work.rows, work.runs, 1)
     load_rows(task, mover, work, 0, 0)
     space.out[NORMAL : NORMAL + 3] = 1.0
-    obstacle_bracket(
-        task.pieces,
-        task.pairs.obstacle[pair],
-        space.core,
-        task.rules.goal,
-        space.scratch,
-        space.nodes,
-        space.trial,
-        space.out,
-    )
+    measuring = Measuring(space.scratch, space.nodes, space.trial, space.out)
+    obstacle = task.pairs.obstacle[pair]
+    obstacle_bracket(task.pieces, obstacle, space.core, task.rules.goal, measuring)
     return float(space.out[UPPER] + mover.rise)
 
 

@@ -20,7 +20,7 @@ from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.row_places import fill_rows
-from vdsm_pin.proof.search import Witnesses, tighten
+from vdsm_pin.proof.search import Slicing, Witnesses, tighten
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.workspace import Workspace
 
@@ -113,7 +113,8 @@ def narrow(
         found.instant,
         results.limit[group],
     )
-    count = tighten(task, motion, work.ends, work.space, heap, count, found)
+    slicing = Slicing(task, motion, work.ends, work.space)
+    count = tighten(slicing, heap, count, found)
     for pair in range(found.upper.size):
         if found.upper[pair] < results.best[pair, UP]:
             best = results.best[pair]

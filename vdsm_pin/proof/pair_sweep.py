@@ -43,7 +43,7 @@ from vdsm_pin.proof.layouts import (
 from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.results import Results, note_upper
 from vdsm_pin.proof.row_places import seen
-from vdsm_pin.proof.search import bound_between, new_witness, resolve
+from vdsm_pin.proof.search import Slicing, bound_between, new_witness, resolve
 from vdsm_pin.proof.slices import leaf_bracket, loaded_bound
 from vdsm_pin.proof.swept_bodies import to_body
 from vdsm_pin.proof.terms import CERTIFIED, Mover, Task, finer, mover_of
@@ -170,10 +170,11 @@ def _subdivide(
     """Decide one interval of a block by subdivision; its verdict."""
     apart()
     row, witness = np.zeros(SLICE), new_witness()
-    k, ends, space = stretch.start + local, work.ends, work.space
+    slicing = Slicing(task, motion, work.ends, work.space)
+    k = stretch.start + local
     row[INTERVAL], row[PAIR], row[END] = k, pair, 1.0
     witness.value[KNOWN] = results.best[pair, UP]
-    verdict, count = resolve(task, motion, ends, space, work.heap, row, witness)
+    verdict, count = resolve(slicing, work.heap, row, witness)
     results.tally[SLICES] += count
     lower, upper, time = row[KEY], witness.value[MET], witness.value[WHEN]
     group = task.pairs.group[pair]
@@ -188,7 +189,7 @@ def _subdivide(
     if dense.verdict.shape[0] > 0:
         m = stretch.offset + local
         row[START] = row[END] = time
-        bound_between(task, motion, ends, space, row)
+        bound_between(slicing, row)
         dense.lower[m, pair], dense.upper[m, pair] = lower, upper
         dense.time[m, pair], dense.verdict[m, pair] = time, verdict
         own, other, mover = (
@@ -196,7 +197,7 @@ def _subdivide(
             dense.other[m, pair],
             mover_of(task, pair),
         )
-        witness_at(mover, ends.start, witness.points, own, other)
+        witness_at(mover, work.ends.start, witness.points, own, other)
     work.planes[pair, SUPPORT] = work.planes[pair, HELD_CLEARANCE] = -np.inf
     return verdict
 

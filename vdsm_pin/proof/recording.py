@@ -22,7 +22,7 @@ from vdsm_pin.proof.layouts import (
     START,
 )
 from vdsm_pin.proof.motions import Motion
-from vdsm_pin.proof.search import bound_between, new_witness, resolve
+from vdsm_pin.proof.search import Slicing, bound_between, new_witness, resolve
 from vdsm_pin.proof.slices import leaf_bound, node_bound, plane_bound
 from vdsm_pin.proof.terms import CERTIFIED, Task
 from vdsm_pin.proof.workspace import Workspace
@@ -136,8 +136,7 @@ def _write_ranges(
 
 @compiled
 def _write_slice(
-    task: Task,
-    motion: Motion,
+    slicing: Slicing,
     work: Workspace,
     row: FloatArray,
     records: FloatArray,
@@ -148,7 +147,8 @@ def _write_slice(
     The slice is one that `bound_between` proves.
     """
     apart()
-    bound_between(task, motion, work.ends, work.space, row)
+    task = slicing.task
+    bound_between(slicing, row)
     pair = int(row[PAIR])
     root = task.pieces.root[task.pairs.obstacle[pair]]
     n = work.space.out[NORMAL:NEAR].copy()
@@ -163,8 +163,7 @@ def _write_slice(
 
 @compiled
 def _record_pair(
-    task: Task,
-    motion: Motion,
+    slicing: Slicing,
     work: Workspace,
     row: FloatArray,
     records: FloatArray,
@@ -176,22 +175,20 @@ def _record_pair(
         The new count, -1 without room, and whether the interval is proved.
     """
     apart()
-    pair = int(row[PAIR])
+    task, pair = slicing.task, int(row[PAIR])
     row[START], row[END] = 0.0, 1.0
     work.space.out[NORMAL:NEAR] = work.planes[pair, :3]
-    bound_between(task, motion, work.ends, work.space, row)
+    bound_between(slicing, row)
     work.planes[pair, :3] = work.space.out[NORMAL:NEAR]
     if row[KEY] >= task.pairs.required[pair]:
-        return _write_slice(task, motion, work, row, records, count), True
-    verdict, n_slices = resolve(
-        task, motion, work.ends, work.space, work.heap, row, new_witness()
-    )
+        return _write_slice(slicing, work, row, records, count), True
+    verdict, n_slices = resolve(slicing, work.heap, row, new_witness())
     if verdict != CERTIFIED:
         return count, False
     for k in range(n_slices):
         if count >= 0:
             row[:] = work.heap[k]
-            count = _write_slice(task, motion, work, row, records, count)
+            count = _write_slice(slicing, work, row, records, count)
     return count, True
 
 
@@ -225,13 +222,14 @@ def record(
     work = borrowed(work)
     records = borrowed(records)
     row, count = np.zeros(SLICE), 0
+    slicing = Slicing(task, motion, work.ends, work.space)
     for k in range(first, last):
         before = count
         for pair in range(task.pairs.rough.shape[0]):
             if clock() > task.rules.until:
                 return before, k, -1
             row[INTERVAL], row[PAIR] = k, pair
-            count, proved = _record_pair(task, motion, work, row, records, count)
+            count, proved = _record_pair(slicing, work, row, records, count)
             if not proved:
                 return before, k, pair
             if count < 0:

@@ -38,6 +38,22 @@ SHORTEST: Final = 2.0**-30
 """Shortest slice, in parts of an interval."""
 
 
+class Slicing(NamedTuple):
+    """What slices are bounded with.
+
+    Args:
+        task: The scene, pairs and rules.
+        motion: Rows of joint values.
+        ends: Working space for two configurations.
+        space: Working space of bounds; holds the bracket of the last one.
+    """
+
+    task: Task
+    motion: Motion
+    ends: Ends
+    space: Space
+
+
 class Witness(NamedTuple):
     """The least upper bound met so far, as arrays that compiled code can write.
 
@@ -82,27 +98,24 @@ def new_witness() -> Witness:
 
 
 @compiled
-def bound_between(
-    task: Task, motion: Motion, ends: Ends, space: Space, row: FloatArray
-) -> None:
+def bound_between(slicing: Slicing, row: FloatArray) -> None:
     """Bound a slice and write the result to row[KEY].
 
     Args:
-        task: The scene, pairs and rules.
-        motion: Rows of joint values.
-        ends: Working space for two configurations.
-        space: Working space; holds the bracket on return.
+        slicing: What they are bounded with.
         row: The slice.
     """
     apart()
-    _place(task, motion, ends, row)
+    _place(slicing, row)
+    task, ends, space = slicing.task, slicing.ends, slicing.space
     slice_bound(task, ends, space, int(row[PAIR]), row[END] - row[START])
     row[KEY] = space.out[LOWER]
 
 
 @compiled
-def _place(task: Task, motion: Motion, ends: Ends, row: FloatArray) -> None:
+def _place(slicing: Slicing, row: FloatArray) -> None:
     """A pair's frames at the ends of a slice and how they move between."""
+    task, motion, ends = slicing.task, slicing.motion, slicing.ends
     k, start, end = int(row[INTERVAL]), row[START], row[END]
     way, steps = task.pairs.way[int(row[PAIR])], ends.bends.steps
     frames = task.ways.rest[way], task.ways.frame[way]
@@ -116,20 +129,14 @@ def _place(task: Task, motion: Motion, ends: Ends, row: FloatArray) -> None:
 
 @compiled
 def _bound_towards(
-    task: Task,
-    motion: Motion,
-    ends: Ends,
-    space: Space,
+    slicing: Slicing,
     row: FloatArray,
     aim: float,
 ) -> bool:
     """Bound a slice by the roughest version of its pair that shows if it is enough.
 
     Args:
-        task: The scene, pairs and rules.
-        motion: Rows of joint values.
-        ends: Working space for two configurations.
-        space: Working space; holds the bracket on return.
+        slicing: What they are bounded with.
         row: The slice; row[KEY] is written.
         aim: A bound that is enough; [m].
 
@@ -137,7 +144,8 @@ def _bound_towards(
         Whether the bound is that of the pair itself.
     """
     apart()
-    _place(task, motion, ends, row)
+    _place(slicing, row)
+    task, ends, space = slicing.task, slicing.ends, slicing.space
     pair, h = int(row[PAIR]), row[END] - row[START]
     version = finer(task.pairs, pair, pair)
     while version != pair:
@@ -154,10 +162,7 @@ def _bound_towards(
 
 @compiled
 def examine(
-    task: Task,
-    motion: Motion,
-    ends: Ends,
-    space: Space,
+    slicing: Slicing,
     row: FloatArray,
     t: float,
     witness: Witness,
@@ -167,29 +172,27 @@ def examine(
     It is as low as can be where that is news: below the least one known.
     """
     apart()
+    task, space = slicing.task, slicing.space
     instant = row.copy()
     instant[START] = instant[END] = t
     pair = int(row[PAIR])
     least = min(witness.value[MET], witness.value[KNOWN])
     aim = max(task.pairs.required[pair], least)
-    exact = _bound_towards(task, motion, ends, space, instant, aim)
+    exact = _bound_towards(slicing, instant, aim)
     upper = space.out[UPPER] + task.pairs.rise[pair]
     if upper < witness.value[MET]:
         witness.value[MET], witness.value[WHEN] = upper, t
         for c in range(NEAR, BRACKET):
             witness.points[c - NEAR] = space.out[c]
         own, mover = witness.points[:3], mover_of(task, pair)
-        to_body(mover, ends.start, own)
+        to_body(mover, slicing.ends.start, own)
     if exact:
         witness.value[INSTANT] = min(witness.value[INSTANT], instant[KEY])
 
 
 @compiled
 def split(
-    task: Task,
-    motion: Motion,
-    ends: Ends,
-    space: Space,
+    slicing: Slicing,
     row: FloatArray,
     heap: FloatArray,
     count: int,
@@ -204,21 +207,18 @@ def split(
     middle = 0.5 * (start + end)
     half = row.copy()
     half[END] = middle
-    _bound_towards(task, motion, ends, space, half, aim)
+    _bound_towards(slicing, half, aim)
     half[KEY] = max(half[KEY], row[KEY])
     count = push(heap, count, half)
     half[START], half[END] = middle, end
-    _bound_towards(task, motion, ends, space, half, aim)
+    _bound_towards(slicing, half, aim)
     half[KEY] = max(half[KEY], row[KEY])
     return push(heap, count, half)
 
 
 @compiled
 def resolve(
-    task: Task,
-    motion: Motion,
-    ends: Ends,
-    space: Space,
+    slicing: Slicing,
     heap: FloatArray,
     row: FloatArray,
     witness: Witness,
@@ -226,10 +226,7 @@ def resolve(
     """Decide one pair over one slice of an interval.
 
     Args:
-        task: The scene, pairs and rules.
-        motion: Rows of joint values.
-        ends: Working space for two configurations.
-        space: Working space with a guess of n.
+        slicing: What they are bounded with.
         heap: Working space; its length is the budget. On return its first rows tile
             the slice.
         row: The slice; row[KEY] is the proved bound on return.
@@ -239,11 +236,12 @@ def resolve(
         Verdict and number of slices in the heap.
     """
     apart()
+    task = slicing.task
     required = task.pairs.required[int(row[PAIR])]
     rounding = task.rules.pad + task.rules.goal
-    examine(task, motion, ends, space, row, row[START], witness)
-    examine(task, motion, ends, space, row, row[END], witness)
-    _bound_towards(task, motion, ends, space, row, required)
+    examine(slicing, row, row[START], witness)
+    examine(slicing, row, row[END], witness)
+    _bound_towards(slicing, row, required)
     count = push(heap, 0, row)
     while True:
         if heap[0, KEY] >= required:
@@ -267,18 +265,15 @@ def resolve(
             verdict = UNDECIDED
             break
         middle = 0.5 * (row[START] + row[END])
-        examine(task, motion, ends, space, row, middle, witness)
-        count = split(task, motion, ends, space, row, heap, count, required)
+        examine(slicing, row, middle, witness)
+        count = split(slicing, row, heap, count, required)
     row[KEY] = heap[0, KEY]
     return verdict, count
 
 
 @compiled
 def tighten(
-    task: Task,
-    motion: Motion,
-    ends: Ends,
-    space: Space,
+    slicing: Slicing,
     heap: FloatArray,
     count: int,
     witnesses: Witnesses,
@@ -286,10 +281,7 @@ def tighten(
     """Split the slices of the least bounds until the bracket of the least is narrow.
 
     Args:
-        task: The scene, pairs and rules.
-        motion: Rows of joint values.
-        ends: Working space for two configurations.
-        space: Working space.
+        slicing: What they are bounded with.
         heap: A heap of slices with room for more: the budget.
         count: Slices in it.
         witnesses: Updated.
@@ -298,6 +290,7 @@ def tighten(
         Number of slices in the heap; the first is the least bound.
     """
     apart()
+    task = slicing.task
     row = np.zeros(SLICE)
     least = witnesses.limit
     while count > 0 and count + 2 <= heap.shape[0]:
@@ -312,7 +305,7 @@ def tighten(
         witness = new_witness()
         witness.value[KNOWN] = least
         middle = 0.5 * (row[START] + row[END])
-        examine(task, motion, ends, space, row, middle, witness)
+        examine(slicing, row, middle, witness)
         least = min(least, witness.value[INSTANT])
         pair = int(row[PAIR])
         witnesses.instant[pair] = min(witnesses.instant[pair], witness.value[INSTANT])
@@ -322,5 +315,5 @@ def tighten(
             witnesses.time[pair] = middle
             witnesses.points[pair] = witness.points
         aim = least - task.rules.gap
-        count = split(task, motion, ends, space, row, heap, count, aim)
+        count = split(slicing, row, heap, count, aim)
     return count

@@ -36,7 +36,7 @@ from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import RANK, Proof, start_proof, summed
 from vdsm_pin.proof.proving import dense_rows
 from vdsm_pin.proof.results import Results
-from vdsm_pin.proof.search import new_witness, resolve
+from vdsm_pin.proof.search import Slicing, new_witness, resolve
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.proof.workspace import Workspace
@@ -123,6 +123,7 @@ def _judge_slices(
     """
     task, motion, work = borrowed(task), borrowed(motion), borrowed(work)
     results, row, space = borrowed(results), np.zeros(SLICE), work.space
+    slicing = Slicing(task, motion, work.ends, space)
     for pair in range(results.best.shape[0]):
         best, plane = results.best[pair], work.planes[pair]
         for k in range(slices.shape[0]):
@@ -131,9 +132,7 @@ def _judge_slices(
             witness = new_witness()
             witness.value[KNOWN] = best[UP]
             space.out[NORMAL:NEAR] = plane[:3]
-            verdict, _ = resolve(
-                task, motion, work.ends, space, work.heap, row, witness
-            )
+            verdict, _ = resolve(slicing, work.heap, row, witness)
             plane[:3] = space.out[NORMAL:NEAR]
             results.counts[pair, verdict] += 1
             if row[KEY] < best[LOW]:

@@ -12,8 +12,8 @@ import numpy as np
 from vdsm_pin.compiled import apart, borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import new_body
-from vdsm_pin.geometry.kernels import BRACKET, FAR, NEAR, NORMAL, SCRATCH_ROWS, UPPER
-from vdsm_pin.geometry.obstacles import STACK, obstacle_bracket
+from vdsm_pin.geometry.kernels import BRACKET, FAR, NEAR, UPPER
+from vdsm_pin.geometry.obstacles import new_measuring, obstacle_bracket
 from vdsm_pin.proof.packed_tree import PRISMATIC, REVOLUTE, Pose, new_pose, place_tree
 from vdsm_pin.proof.swept_bodies import load_disc, local_point, place_point
 from vdsm_pin.proof.terms import Mover, Task, mover_of
@@ -88,12 +88,9 @@ def pair_slopes(
     mover = mover_of(task, pair)
     corners, pose = mover.corners.shape[0], new_pose(task.tree.parent.size + 1)
     gaps, slopes = np.zeros(joints.shape[0]), np.zeros(joints.shape)
-    scratch = np.zeros((SCRATCH_ROWS + 2, 3))
-    stack = np.zeros(STACK, np.int64)
-    trial, out = np.zeros(BRACKET + 4), np.zeros(BRACKET + 4)
     near, far = np.zeros(3), np.zeros(3)
-    body = new_body(corners, corners, 0)
-    out[NORMAL] = 1.0
+    body, work = new_body(corners, corners, 0), new_measuring()
+    pieces, obstacle, out = task.pieces, task.pairs.obstacle[pair], work.out
     for m in range(joints.shape[0]):
         place_tree(task.tree, joints[m], pose)
         for k in range(corners):
@@ -101,16 +98,7 @@ def pair_slopes(
             place_point(pose, mover.frame, mover.corners[k], point)
             local_point(pose, mover.rest, point)
         load_disc(mover, pose, body.discs[0])
-        obstacle_bracket(
-            task.pieces,
-            task.pairs.obstacle[pair],
-            body,
-            task.rules.goal,
-            scratch,
-            stack,
-            trial,
-            out,
-        )
+        obstacle_bracket(pieces, obstacle, body, task.rules.goal, work)
         gaps[m] = out[UPPER] - mover.radius
         place_point(pose, mover.rest, out[NEAR:FAR], near)
         place_point(pose, mover.rest, out[FAR:BRACKET], far)

@@ -14,7 +14,8 @@ import numpy as np
 
 from vdsm_pin.compiled import borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
-from vdsm_pin.geometry.obstacles import STACK, encloses, has_inside
+from vdsm_pin.geometry.mesh_insides import encloses, has_inside
+from vdsm_pin.geometry.obstacles import STACK
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.geometry.segments import squared_gap
