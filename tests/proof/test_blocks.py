@@ -12,18 +12,18 @@ from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.boxes import body_box, box_gaps, box_reaches
 from vdsm_pin.proof.budget import Budget
-from vdsm_pin.proof.cached_planes import (
+from vdsm_pin.proof.error_box import ErrorBox
+from vdsm_pin.proof.error_growth import crude_growth, grow_corners, set_direction
+from vdsm_pin.proof.layouts import OWN_POINT, POINT, SUPPORT
+from vdsm_pin.proof.packing import pack_task, with_errors
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.plane_bounds import (
     bound_above,
     bound_below,
     place_disc,
     place_own,
     take_disc,
 )
-from vdsm_pin.proof.error_box import ErrorBox
-from vdsm_pin.proof.error_growth import crude_growth, grow_corners, set_direction
-from vdsm_pin.proof.layouts import OWN_POINT, POINT, SUPPORT
-from vdsm_pin.proof.packing import pack_task, with_errors
-from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove, start_proof
 from vdsm_pin.proof.proving import dense_rows
 from vdsm_pin.proof.row_places import fill_rows

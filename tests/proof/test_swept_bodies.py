@@ -13,13 +13,13 @@ from vdsm_pin.geometry.bodies import body_reach
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.proof.bends import bend_between
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
-from vdsm_pin.proof.cached_planes import place_disc
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.error_growth import crude_growth
 from vdsm_pin.proof.motions import interpolate
 from vdsm_pin.proof.packed_tree import place_tree
 from vdsm_pin.proof.packing import pack_task, with_errors
 from vdsm_pin.proof.paths import Path, cubic_path, quintic_path
+from vdsm_pin.proof.plane_bounds import place_disc
 from vdsm_pin.proof.row_places import fill_rows
 from vdsm_pin.proof.slices import Space
 from vdsm_pin.proof.swept_bodies import load_body

@@ -5,11 +5,12 @@ import numpy as np
 from vdsm_pin.compiled import apart, borrowed, clock, compiled
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.proof.broad_phase import settle_far
-from vdsm_pin.proof.cached_planes import bound_above, bound_below, served
+from vdsm_pin.proof.cached_planes import served
 from vdsm_pin.proof.far_pairs import BroadPhase
 from vdsm_pin.proof.layouts import OWN_POINT, ROW, UP, WIDTH
 from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.pair_sweep import Stretch, sweep_pair
+from vdsm_pin.proof.plane_bounds import bound_above, bound_below
 from vdsm_pin.proof.results import Results, note_block, note_upper
 from vdsm_pin.proof.row_places import fill_rows, seen
 from vdsm_pin.proof.rows import BLOCK

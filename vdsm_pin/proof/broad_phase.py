@@ -13,7 +13,6 @@ from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.kernels import NORMAL, UPPER
 from vdsm_pin.geometry.obstacles import Measuring, obstacle_bracket
 from vdsm_pin.proof.boxes import body_box, box_gaps, box_reaches
-from vdsm_pin.proof.cached_planes import place_disc
 from vdsm_pin.proof.far_pairs import (
     BroadPhase,
     dense_far,
@@ -21,6 +20,7 @@ from vdsm_pin.proof.far_pairs import (
     profile_far,
 )
 from vdsm_pin.proof.pair_sweep import Stretch
+from vdsm_pin.proof.plane_bounds import place_disc
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.row_places import seen
 from vdsm_pin.proof.terms import (

@@ -15,7 +15,7 @@ from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.geometry.kernels import BRACKET, FAR, LOWER, NEAR, NORMAL
 from vdsm_pin.geometry.obstacles import node_support
 from vdsm_pin.proof.cached_clearances import hold
-from vdsm_pin.proof.cached_planes import Demand, place_disc, place_own, try_plane
+from vdsm_pin.proof.cached_planes import Demand, try_plane
 from vdsm_pin.proof.layouts import (
     AT_UPPER,
     END,
@@ -41,6 +41,7 @@ from vdsm_pin.proof.layouts import (
     WIDTH,
 )
 from vdsm_pin.proof.motions import Motion
+from vdsm_pin.proof.plane_bounds import place_disc, place_own
 from vdsm_pin.proof.results import Results, note_upper
 from vdsm_pin.proof.row_places import seen
 from vdsm_pin.proof.search import Slicing, bound_between, new_witness, resolve

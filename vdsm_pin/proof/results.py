@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.proof.cached_planes import Runs
 from vdsm_pin.proof.layouts import (
     AT_LOWER,
     AT_UPPER,
@@ -15,6 +14,7 @@ from vdsm_pin.proof.layouts import (
     TIME,
     UP,
 )
+from vdsm_pin.proof.plane_bounds import Runs
 from vdsm_pin.proof.terms import Task
 
 

@@ -7,9 +7,9 @@ import numpy as np
 from vdsm_pin.compiled import apart, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
-from vdsm_pin.proof.cached_planes import Runs, new_runs
 from vdsm_pin.proof.layouts import HELD_AT, HELD_CLEARANCE, ROW, SLICE, SUPPORT
 from vdsm_pin.proof.packed_tree import REVOLUTE, Pose
+from vdsm_pin.proof.plane_bounds import Runs, new_runs
 from vdsm_pin.proof.rows import BLOCK, DRIFT, TURN, Rows, new_rows, new_tracks
 from vdsm_pin.proof.slices import Space, new_space
 from vdsm_pin.proof.swept_bodies import Ends, load_errors, new_ends

@@ -1,0 +1,179 @@
+"""Solids that stand in files of their own: meshes, point clouds, voxels.
+
+A mesh is one hull per triangle plus, where they close (`geometry/closed_meshes.py`), an
+inside.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct, frozen
+from vdsm_pin.geometry.closed_meshes import ClosedMesh, close_mesh
+from vdsm_pin.geometry.convex import Hull, Hulls
+from vdsm_pin.geometry.primitives import BOX_CORNERS, NamedSolid
+
+
+@dataclass(frozen=True, kw_only=True)
+class FromFile(NamedSolid):
+    """What stands in a file of its own.
+
+    Args:
+        assumed_size: Its size in words where neither its file nor the problem states
+            a unit; else empty.
+        notes: What else its file had, one phrase each.
+    """
+
+    assumed_size: str = ""
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Mesh(FromFile):
+    """Triangles, and the inside of the closed surface that they make.
+
+    Args:
+        name: Unique name.
+        vertices: Shape (n, 3), in the base frame; [m].
+        triangles: Vertex indices, shape (m, 3), m >= 1.
+        solid: Whether the problem says that there is an inside; None where it leaves
+            that to the triangles.
+    """
+
+    vertices: FloatArray
+    triangles: IntArray
+    solid: bool | None = None
+
+    POINTS = ("vertices",)
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check the indices."""
+        super().__post_init__()
+        triangles, count = frozen(self.triangles, np.int64), len(self.vertices)
+        object.__setattr__(self, "triangles", triangles)
+        if not triangles.size or not ((triangles >= 0) & (triangles < count)).all():
+            self._refuse(f"triangles do not index {count} vertices")
+
+    @cached_property
+    def pieces(self) -> Hulls:
+        """One hull per triangle."""
+        return Hulls(self.vertices[self.triangles])
+
+    @property
+    def corners(self) -> FloatArray:
+        """The corners of its triangles, shape (3 m, 3); [m]."""
+        return np.asarray(self.vertices[self.triangles]).reshape(-1, 3)
+
+    @cached_property
+    def closed_mesh(self) -> ClosedMesh:
+        """The closed surface that the triangles make, if they do."""
+        return close_mesh(self.vertices, self.triangles)
+
+    @cached_property
+    def hull(self) -> "ConvexCover":
+        """Its convex hull."""
+        corners = distinct(self.corners, axis=0)
+        return ConvexCover(self.name, (Hull(frozen(corners)),))
+
+    @property
+    def is_surface(self) -> bool:
+        """Whether the problem says that nothing but the surface is meant."""
+        return self.solid is False
+
+    @property
+    def has_inside(self) -> bool:
+        """Whether an inside is asked for, and there is one."""
+        return not self.is_surface and self.closed_mesh.closed
+
+
+@dataclass(frozen=True)
+class ConvexCover:
+    """The convex hull of a mesh: its inside lies within, whatever counts as inside.
+
+    Args:
+        name: The mesh's.
+        pieces: The hull alone.
+    """
+
+    name: str
+    pieces: tuple[Hull]
+
+    @property
+    def reach(self) -> float:
+        """Its largest distance from its frame's origin; [m]."""
+        return float(np.linalg.norm(self.pieces[0].points, axis=1).max())
+
+
+@dataclass(frozen=True)
+class PointCloud(FromFile):
+    """Measured points, each a ball of the scan's error.
+
+    Args:
+        name: Unique name.
+        points: Shape (n, 3), n >= 1; [m].
+        radius: Of the balls; [m].
+    """
+
+    points: FloatArray
+    radius: float
+
+    POINTS, SIZES = ("points",), ("radius",)
+
+    def __post_init__(self) -> None:
+        """Freeze the array and check its shape and the size."""
+        super().__post_init__()
+        self._check_rows("points")
+
+    @cached_property
+    def pieces(self) -> Hulls:
+        """One ball per point."""
+        return Hulls(self.points[:, None], self.radius)
+
+    @property
+    def grown(self) -> float:
+        """The radius; [m]."""
+        return self.radius
+
+
+@dataclass(frozen=True)
+class Voxels(FromFile):
+    """Occupied cells of a grid, each a cuboid; they need not touch.
+
+    Args:
+        name: Unique name.
+        centres: Shape (n, 3), n >= 1; [m].
+        rotation: R_base_grid, shape (3, 3); [-].
+        half_size: Half the edge lengths of a cell, shape (3,); [m].
+    """
+
+    centres: FloatArray
+    rotation: FloatArray
+    half_size: FloatArray
+
+    POINTS, TURNED, SIZES = ("centres",), ("rotation",), ("half_size",)
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays, check their shape and the sizes."""
+        super().__post_init__()
+        self._check_rows("centres")
+
+    @cached_property
+    def pieces(self) -> Hulls:
+        """One cuboid per cell."""
+        return Hulls(self._cells())
+
+    @property
+    def corners(self) -> FloatArray:
+        """The corners of all cells, shape (8 n, 3); [m]."""
+        return self._cells().reshape(-1, 3)
+
+    @property
+    def reach(self) -> float:
+        """Not below that of any corner, without working out all of them; [m]."""
+        far = float(np.linalg.norm(self.centres, axis=1).max())
+        return far + float(np.linalg.norm(self.half_size))
+
+    def _cells(self) -> FloatArray:
+        corners = (BOX_CORNERS * self.half_size) @ self.rotation.T
+        return np.asarray(self.centres[:, None] + corners)

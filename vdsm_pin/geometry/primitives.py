@@ -1,0 +1,278 @@
+"""Solids of few numbers, and the convex pieces that they are made of."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import ClassVar, Final, NoReturn, Self
+
+import numpy as np
+
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
+
+BOX_CORNERS: Final = frozen(
+    [[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]
+)
+"""Corners of the cube [-1, 1]^3, shape (8, 3); [-]."""
+
+
+@dataclass(frozen=True)
+class NamedSolid:
+    """What all solids have in common; each says which of its fields are what.
+
+    Args:
+        name: Unique name.
+    """
+
+    name: str
+
+    POINTS: ClassVar[tuple[str, ...]]
+    """Points, shape (.., 3); [m]."""
+    TURNED: ClassVar[tuple[str, ...]] = ()
+    """What turns with the frame: unit vectors and rotations; [-]."""
+    SIZES: ClassVar[tuple[str, ...]] = ()
+    """Above zero; [m]."""
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays, check that numbers are finite and sizes above zero."""
+        for field in (*self.POINTS, *self.TURNED, *self.SIZES):
+            value = getattr(self, field)
+            if not np.isfinite(np.asarray(value, dtype=float)).all():
+                self._refuse(f"{field} is {value}, expected finite numbers")
+            if np.ndim(value):
+                object.__setattr__(self, field, frozen(value))
+        for field in self.SIZES:
+            value = getattr(self, field)
+            if not (np.asarray(value) > 0.0).all():
+                self._refuse(f"{field} is {value} m, expected above 0")
+
+    def placed(self, pose: FloatArray) -> Self:
+        """It in another frame; `pose` is T_other_frame, shape (4, 4); [m]."""
+        turn, shift = pose[:3, :3], pose[:3, 3]
+        moved = {name: getattr(self, name) @ turn.T + shift for name in self.POINTS}
+        turned = {name: turn @ getattr(self, name) for name in self.TURNED}
+        return replace(self, **moved, **turned)
+
+    @property
+    def corners(self) -> FloatArray:
+        """Points whose hull, grown by `grown`, holds the solid, shape (n, 3); [m].
+
+        Of a half-space the point that it is given by.
+        """
+        return np.asarray(getattr(self, self.POINTS[0])).reshape(-1, 3)
+
+    @property
+    def grown(self) -> float:
+        """What to grow that hull by; [m]."""
+        return 0.0
+
+    @property
+    def reach(self) -> float:
+        """Largest distance of its corners, grown, from its frame's origin; [m]."""
+        return float(np.linalg.norm(self.corners, axis=1).max()) + self.grown
+
+    def _refuse(self, reason: str) -> NoReturn:
+        message = f"obstacle {self.name!r}: {reason}"
+        raise InvalidInput(message)
+
+    def _check_rows(self, field: str) -> None:
+        rows = getattr(self, field)
+        if rows.ndim != 2 or rows.shape[1:] != (3,) or not rows.size:
+            self._refuse(f"{field} have shape {rows.shape}, expected (n, 3)")
+
+
+@dataclass(frozen=True)
+class Sphere(NamedSolid):
+    """A ball.
+
+    Args:
+        name: Unique name.
+        centre: Shape (3,); [m].
+        radius: [m].
+    """
+
+    centre: FloatArray
+    radius: float
+
+    POINTS, SIZES = ("centre",), ("radius",)
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        return (Hull(self.corners, self.radius),)
+
+    @property
+    def grown(self) -> float:
+        """Its radius; [m]."""
+        return self.radius
+
+
+@dataclass(frozen=True)
+class _Axial(NamedSolid):
+    """A solid of revolution."""
+
+    centre: FloatArray
+    axis: FloatArray
+    half_length: float
+    radius: float
+
+    POINTS, TURNED, SIZES = ("centre",), ("axis",), ("radius", "half_length")
+
+    @property
+    def corners(self) -> FloatArray:
+        """The centres of its ends, shape (2, 3); [m]."""
+        offset = self.half_length * self.axis
+        return frozen([self.centre - offset, self.centre + offset])
+
+    @property
+    def grown(self) -> float:
+        """Its radius; [m]."""
+        return self.radius
+
+
+class Capsule(_Axial):
+    """A segment grown by a radius.
+
+    Args:
+        name: Unique name.
+        centre: Shape (3,); [m].
+        axis: Unit vector, shape (3,); [-].
+        half_length: Half the distance between the centres of its ends; [m].
+        radius: [m].
+    """
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        return (Hull(self.corners, self.radius),)
+
+
+class Cylinder(_Axial):
+    """A cylinder with flat ends.
+
+    Args:
+        name: Unique name.
+        centre: Shape (3,); [m].
+        axis: Unit vector, shape (3,); [-].
+        half_length: Half the height; [m].
+        radius: [m].
+    """
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        return (FlatCylinder(self.centre, self.axis, self.half_length, self.radius),)
+
+
+@dataclass(frozen=True)
+class Box(NamedSolid):
+    """A cuboid.
+
+    Args:
+        name: Unique name.
+        centre: Shape (3,); [m].
+        rotation: R_base_box, shape (3, 3); [-].
+        half_size: Half the edge lengths, shape (3,); [m].
+    """
+
+    centre: FloatArray
+    rotation: FloatArray
+    half_size: FloatArray
+
+    POINTS, TURNED, SIZES = ("centre",), ("rotation",), ("half_size",)
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        return (Hull(self.corners),)
+
+    @property
+    def corners(self) -> FloatArray:
+        """Its corners, shape (8, 3); [m]."""
+        return frozen(self.centre + (BOX_CORNERS * self.half_size) @ self.rotation.T)
+
+
+@dataclass(frozen=True)
+class Prism(NamedSolid):
+    """A simple polygon swept along its normal.
+
+    Args:
+        name: Unique name.
+        origin: Origin of the section frame, shape (3,); [m].
+        rotation: R_base_section, shape (3, 3): columns are the section's two in-plane
+            axes and the sweep axis; [-].
+        polygon: Corners in the section plane, shape (n, 2), either sense; [m].
+        span: Where the sweep starts and ends along the sweep axis; [m].
+    """
+
+    origin: FloatArray
+    rotation: FloatArray
+    polygon: FloatArray
+    span: tuple[float, float]
+
+    POINTS, TURNED = ("origin",), ("rotation",)
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and refuse polygons that enclose no simple area."""
+        super().__post_init__()
+        object.__setattr__(self, "polygon", frozen(self.polygon))
+        if not np.isfinite(self.polygon).all() or not np.isfinite(self.span).all():
+            self._refuse("polygon and span have other than finite numbers")
+        if self.polygon.ndim != 2 or self.polygon.shape[0] < 3:
+            self._refuse("polygon needs at least 3 corners")
+        import shapely  # slow to import, and only prisms need it
+
+        shape = shapely.Polygon(self.polygon)
+        if not shape.is_valid or not shape.area > 0.0:
+            self._refuse(f"polygon is not simple ({shapely.is_valid_reason(shape)})")
+        if not self.span[0] < self.span[1]:
+            self._refuse(f"span {self.span} m, expected from < to")
+
+    @cached_property
+    def convex_sections(self) -> tuple[FloatArray, ...]:
+        """The section as convex polygons, each of shape (k, 2); [m]."""
+        import shapely
+
+        shape = shapely.Polygon(self.polygon)
+        if shape.equals(shape.convex_hull):
+            return (frozen(self.polygon),)
+        triangles = shapely.constrained_delaunay_triangles(shape)
+        return tuple(
+            frozen(np.asarray(part.exterior.coords)[:3]) for part in triangles.geoms
+        )
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        return tuple(Hull(self._swept(section)) for section in self.convex_sections)
+
+    @property
+    def corners(self) -> FloatArray:
+        """Its corners, shape (n, 3); [m]."""
+        return self._swept(self.polygon)
+
+    def _swept(self, section: FloatArray) -> FloatArray:
+        """The corners of a section at both ends of the sweep, shape (2 k, 3); [m]."""
+        ends = [np.insert(section, 2, s, axis=1) for s in self.span]
+        return frozen(self.origin + np.vstack(ends) @ self.rotation.T)
+
+
+@dataclass(frozen=True)
+class HalfSpace(NamedSolid):
+    """Everything on one side of a plane: (p - point) . normal <= 0.
+
+    Args:
+        name: Unique name.
+        point: A point of the plane, shape (3,); [m].
+        normal: Unit vector out of the solid, shape (3,); [-].
+    """
+
+    point: FloatArray
+    normal: FloatArray
+
+    POINTS, TURNED = ("point",), ("normal",)
+
+    @cached_property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The convex pieces."""
+        return (HalfSpacePiece(self.normal, float(self.normal @ self.point)),)
