@@ -9,7 +9,7 @@ from vdsm_pin.arm.kinematics import joint_angles, link_angles
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Sphere
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
-from vdsm_pin.planner.fewest.growth import Grown, Population
+from vdsm_pin.planner.fewest.growth import Layers, Population
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, dense_rows
 from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along
@@ -190,44 +190,30 @@ def test_pieces_cut_at_other_knees_have_the_least_room_of_what_they_share() -> N
         np.testing.assert_array_equal(found[row], expected)
 
 
-def grown(task: PlanningProblem, tips: np.ndarray) -> tuple[Judge, Population, Grown]:
-    judge = Judge(task, link_clearance(task), 0.0, 0.0, 2e-3)
-    population = Population(judge, tips, np.random.default_rng(0))
-    return judge, population, population.grow(np.zeros((1, 9, 2)), 0, len(tips) - 1)
-
-
-def lines(tips: np.ndarray, tree: Grown) -> Intervals:
-    """The ways from parents to children; the root is the straight arm at layer 0."""
-    offsets = np.concatenate([tree.offsets, np.zeros((1, 9, 2))])
-    layer = np.append(tree.layer, 0)
-    return Intervals(
-        tips[layer[tree.parent]], tips[tree.layer], offsets[tree.parent], tree.offsets
-    )
-
-
 def test_what_is_grown_passes_an_obstacle_by_ways_that_are_clear() -> None:
     tips = np.linspace([3.126, 0.0, 0.0], [3.126, 0.9, 0.0], 12)
-    task = problem(Sphere("ball", np.array([2.0, 0.5, 0.1]), 0.15))
-    judge, _, tree = grown(task, tips)
-    assert tree.layer[-1] == 11
-    assert judge.clear(lines(tips, tree)).all()
-    assert (np.diff(tree.layer) >= 0).all()
-    assert (tree.parent < np.arange(len(tree.layer))).all()
-
-
-def test_nothing_grows_through_a_rod_though_children_stand_behind_it() -> None:
-    along = np.array([0.0, 0.0, 1.0])
-    task = problem(Cylinder("rod", np.array([2.0, 0.3, 0.0]), along, 3.0, 0.002))
-    tips = np.linspace([3.126, 0.0, 0.0], [3.126, 0.9, 0.0], 6)
-    judge, population, tree = grown(task, tips)
-    assert tree.layer[-1] == 5
-    assert judge.clear(lines(tips, tree)).all()
-    # Where no way is looked at, some children are beyond the rod at one bound.
-    root = np.zeros((1, 9, 2))
-    jumped, _ = population._grown(root, 0, 5, every_connection=False)
-    clear = judge.clear(lines(tips, jumped))
-    assert 0.5 < clear.mean() < 1.0
-    assert len(population._reached(jumped, root, 0).layer) < clear.sum()
+    rod = Cylinder("rod", np.array([2.0, 0.3, 0.0]), np.array([0, 0, 1.0]), 3.0, 0.002)
+    for obstacle in (Sphere("ball", np.array([2.0, 0.5, 0.1]), 0.15), rod):
+        task = problem(obstacle)
+        judge = Judge(task, link_clearance(task), 0.0, 0.0, 2e-3)
+        layers, rng = Layers(tips, np.zeros(12)), np.random.default_rng(0)
+        roots = np.zeros((2, 9, 2))
+        roots[1, 1:-1, 1] = 0.05
+        tree = Population(judge, layers, rng, 150).grow(roots, kept=6)
+        np.testing.assert_array_equal(tree.offsets[:2], roots)
+        assert tree.parent[:2].tolist() == [-1, -1]
+        born = np.arange(2, len(tree.parent))
+        up = tree.parent[born]
+        assert ((up >= 0) & (up < born)).all()
+        assert set(born[:-1]) >= set(up[up >= 2].tolist())
+        steps = tree.layer[born] - tree.layer[up]
+        assert np.isin(steps, [0, 1]).all()
+        assert 1 <= (tree.layer == 11).sum() <= 6
+        np.testing.assert_array_equal(tree.tips, tips[tree.layer])
+        ways = Intervals(
+            tree.tips[up], tree.tips[born], tree.offsets[up], tree.offsets[born]
+        )
+        assert judge.clear(ways).all()
 
 
 def test_a_motion_past_a_limit_is_refused() -> None:

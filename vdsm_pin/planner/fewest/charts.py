@@ -12,7 +12,7 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.fewest.direction_kernels import vary_directions
 from vdsm_pin.planner.fewest.motion import is_directed, standing
-from vdsm_pin.planner.fewest.vary import COPIED, SCALES, vary
+from vdsm_pin.planner.fewest.vary import SCALES, vary
 
 TURNS: Final = (0.02, 0.08, 0.25)
 """Sizes of a turn of links; [rad]."""
@@ -41,7 +41,6 @@ def varied(
     arm: Manipulator,
     shapes: FloatArray,
     moved: FloatArray,
-    kept: BoolArray,
     rng: np.random.Generator,
 ) -> FloatArray:
     """Children of arms, one each; see `vary` and `vary_directions`.
@@ -50,19 +49,18 @@ def varied(
         arm: The arm.
         shapes: Their shape coordinates.
         moved: How far the tip has moved across the rail since, shape (n, 2); [m].
-        kept: Which of them stay as they are, shape (n,).
         rng: Source of chance.
     """
     n = len(shapes)
     if is_directed(shapes):
         scale = rng.choice(np.array(TURNS), n)
         turn = rng.normal(size=(n, 3)) * scale[:, None]
-        kind = np.where(kept, 0.0, rng.random(n))
-        return vary_directions(shapes, rng.random(n), rng.random(n), kind, turn)
+        first, count, kind = rng.random((3, n))
+        return vary_directions(shapes, first, count, kind, turn)
     scale = rng.choice(np.array(SCALES), n) * arm.total_length
-    kind = np.where(kept, 0.5 * COPIED, rng.random(n))
     shift = rng.normal(size=(n, 2)) * scale[:, None]
-    return vary(shapes, arm.stations, moved, rng.random(n), kind, shift)
+    joint, kind = rng.random((2, n))
+    return vary(shapes, arm.stations, moved, joint, kind, shift)
 
 
 def settled(arm: Manipulator, tips: FloatArray, shapes: FloatArray) -> FloatArray:

@@ -1,13 +1,21 @@
 """Grown shapes tied into the graph, where stretches of the path are not drawn."""
 
+from dataclasses import replace
+from typing import Final
+
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct
-from vdsm_pin.planner.fewest.growth import POPULATION, Grown, Population
+from vdsm_pin.planner.fewest.growth import Grown, Layers, Population
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Roadmap, extended
 from vdsm_pin.planner.fewest.sequence import TURN
+
+POPULATION: Final = 150
+"""Arms that live on at a layer."""
+KEPT: Final = 6
+"""Arms at the farthest layer whose ancestors are kept."""
 
 
 def tied_in(
@@ -22,7 +30,7 @@ def tied_in(
     Args:
         judge: Says what is clear.
         roadmap: The graph before.
-        grown: Trees, each rooted in nodes of the graph.
+        grown: Trees, by layers of the path, that begin with their roots.
         roots: For each tree the nodes of its roots.
         weights: What the strategy prefers.
     """
@@ -30,14 +38,13 @@ def tied_in(
     tips, offsets, links = [], [], []
     first = shapes.size
     for tree, nodes in zip(grown, roots, strict=True):
-        ids = first + np.arange(len(tree.layer))
-        root = roadmap.shapes_of(nodes[np.maximum(-1 - tree.parent, 0)])
-        up = np.where(tree.parent >= 0, first + tree.parent, root)
-        links.append(np.column_stack([ids, up, np.full(len(ids), shapes.step)]))
-        tip = route.layers[tree.layer]
-        tips.append(tip)
-        offsets.append(tree.offsets)
-        first += len(ids)
+        more = len(tree.layer) - len(nodes)
+        ids = np.append(roadmap.shapes_of(nodes), first + np.arange(more))
+        up = ids[tree.parent[-more:]]
+        links.append(np.column_stack([ids[-more:], up, np.full(more, shapes.step)]))
+        tips.append(route.layers[tree.layer[-more:]])
+        offsets.append(tree.offsets[-more:])
+        first += more
     every, places = np.concatenate(offsets), np.concatenate(tips)
     links.append(_ties(judge, roadmap, places, every))
     positions = route.tips[places]
@@ -115,7 +122,7 @@ def fill(
     for stretch in np.split(marks, breaks):
         ends = (int(stretch[0]) - 1, int(stretch[-1]))
         crossed = False
-        for first, last in (ends, ends[::-1]):
+        for first, last, step in ((*ends, 1), (*ends[::-1], -1)):
             if crossed:
                 break
             nodes = roadmap.nodes_at(route.layers[first])
@@ -125,10 +132,12 @@ def fill(
             if not len(nodes):
                 continue
             _, offsets = roadmap.poses_of(arm, nodes)
-            population = Population(judge, route.tips[route.layers], rng)
-            tree = population.grow(offsets, first, last)
-            if len(tree.layer):
-                trees.append(tree)
+            number = np.arange(first, last + step, step)
+            tips = route.tips[route.layers[number]]
+            layers = Layers(tips, np.zeros(len(tips)))
+            tree = Population(judge, layers, rng, POPULATION).grow(offsets, kept=KEPT)
+            if len(tree.layer) > len(nodes):
+                trees.append(replace(tree, layer=number[tree.layer]))
                 roots.append(nodes)
-                crossed = bool((tree.layer == last).any())
+                crossed = bool((trees[-1].layer == last).any())
     return tied_in(judge, roadmap, trees, roots, weights) if trees else None

@@ -1,211 +1,296 @@
-"""Shapes with as many knees as it takes, grown along the path where sparse ones end.
+"""Growth: a population of arms follows the tip from layer to layer.
 
-A population of configurations follows the tip from layer to layer. Each child bends one
-joint of its parent a little, adds a knee or takes one away; children that are clear and
-can be reached from their parent live on. Only the ancestors of the few best that came
-farthest enter the graph.
+Each child keeps its parent's shape, and bends a joint a little, adds a knee or takes
+one away (`charts`). Children that are clear and can be reached from their parent live
+on, half of them the best, half by chance. Where few do, the population is varied at
+rest; where none does, it goes back some layers, is varied there and tries again.
 
-Nearly every child can be reached from its parent. So the ways from parents to children
-are first taken for clear and looked at only among those ancestors; where none of the
-best comes through, it is grown again with every way looked at.
+The layers are those of the desired path, from nodes of the roadmap on (`grown_nodes`),
+or those of a route of the tip from the start on (`insertion`). On a route one arm that
+follows it exactly (`follow_the_leader`) is among them as far as it is clear.
 """
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.planner.fewest.charts import coordinates, settled, turned_towards, varied
+from vdsm_pin.planner.fewest.follow_the_leader import led_along
 from vdsm_pin.planner.fewest.judge import Judge
-from vdsm_pin.planner.fewest.motion import Intervals
-from vdsm_pin.planner.fewest.vary import SCALES, vary
+from vdsm_pin.planner.fewest.motion import Intervals, is_directed, standing
+from vdsm_pin.problem.pointing import angles_between
 
-FAMILY = 8
+FAMILY: Final = 8
 """Children tried for each parent."""
-POPULATION = 150
-"""Configurations that live on at a layer."""
-RETRIES = 4
-"""Rounds of change at rest before a population that cannot go on is given up."""
-KEPT = 6
-"""Configurations at the farthest layer whose ancestors are kept."""
-WIDE = 0.5
+RESTS: Final = 4
+"""Rounds of change at rest before a population that dwindles goes back."""
+WIDE: Final = 0.5
 """Room beyond this part of the body's radius is worth nothing more; [-]."""
+AIMED: Final = 0.5
+"""Part of the children that are turned to where the last link shall look; [-]."""
+PULL: Final = 4.0
+"""What an arm is worse for if it looks a radian past where it shall soon; [-]."""
+
+
+@dataclass(frozen=True)
+class Layers:
+    """Where the tip goes.
+
+    Args:
+        tips: Shape (l, 3); [m].
+        play: How far the tip may be from there, 0 on the desired path, shape (l,); [m].
+        aims: Where the last link shall look, shape (l, 3); None for anywhere.
+        pull: How much that counts, 0 to 1: from 1 on it must, shape (l,); [-].
+    """
+
+    tips: FloatArray
+    play: FloatArray
+    aims: FloatArray | None = None
+    pull: FloatArray | None = None
+
+    def pull_at(self, layer: int) -> float:
+        """How much it counts at a layer where the last link looks; [-]."""
+        return 0.0 if self.pull is None else float(self.pull[layer])
+
+    def aims_at(self, layer: int, count: int) -> FloatArray:
+        """Where so many last links shall look at a layer, shape (count, 3)."""
+        assert self.aims is not None
+        return np.broadcast_to(self.aims[layer], (count, 3))
+
+    def asked(self, layer: IntArray) -> FloatArray | None:
+        """Where last links must look at layers, NaN for anywhere, None for all so."""
+        if self.aims is None or self.pull is None:
+            return None
+        return np.where(self.pull[layer, None] >= 1.0, self.aims[layer], np.nan)
 
 
 @dataclass(frozen=True)
 class Grown:
-    """A tree of configurations, parents before their children.
+    """Arms, each reached from its parent, which stands before it.
 
     Args:
         layer: Layer of each, shape (g,).
-        offsets: D_1..D_{N+1} of each, shape (g, N + 1, 2); [m].
-        parent: Number of the parent, or -1 - (root number), shape (g,).
+        tips: Shape (g, 3); [m].
+        offsets: Shape coordinates, shape (g, N + 1, 2) or (g, N, 3).
+        clearances: Shape (g,); [m].
+        parent: Number of the parent, -1 of a root, shape (g,).
     """
 
     layer: IntArray
+    tips: FloatArray
     offsets: FloatArray
+    clearances: FloatArray
     parent: IntArray
 
-    def with_more(self, layer: int, offsets: FloatArray, parent: IntArray) -> "Grown":
-        """The tree with another generation at its end."""
+    def joined(self, other: "Grown") -> "Grown":
+        """These arms, and others whose parents are numbered among all."""
         return Grown(
-            np.append(self.layer, np.full(len(offsets), layer)),
-            np.concatenate([self.offsets, offsets]),
-            np.append(self.parent, parent),
+            np.append(self.layer, other.layer),
+            np.concatenate([self.tips, other.tips]),
+            np.concatenate([self.offsets, other.offsets]),
+            np.append(self.clearances, other.clearances),
+            np.append(self.parent, other.parent),
         )
 
-    def take(self, kept: IntArray) -> "Grown":
-        """Some configurations, in order, whose parents are among them."""
-        rank = np.full(len(self.layer), -1)
-        rank[kept] = np.arange(len(kept))
-        up = self.parent[kept]
-        up = np.where(up < 0, up, rank[np.maximum(up, 0)])
-        return Grown(self.layer[kept], self.offsets[kept], up)
-
     def with_ancestors(self, numbers: IntArray) -> "Grown":
-        """Only these configurations and all their ancestors."""
-        kept: set[int] = set()
+        """Only these arms, all their ancestors and all roots, in order."""
+        kept = self.parent < 0
         for start in numbers.tolist():
             at = start
-            while at >= 0 and at not in kept:
-                kept.add(at)
+            while not kept[at]:
+                kept[at] = True
                 at = int(self.parent[at])
-        return self.take(np.array(sorted(kept), dtype=np.int64))
-
-
-def lacking(judge: Judge, clearances: FloatArray) -> FloatArray:
-    """What clearances [m] lack of what is wanted, 0 for nothing, 1 for all; [-]."""
-    wanted = WIDE * judge.problem.manipulator.most_radius
-    return np.asarray(np.maximum(0.0, 1.0 - (clearances - judge.required) / wanted))
+        # The last entry is the parent's of a root.
+        rank = np.append(np.cumsum(kept) - 1, -1)
+        return Grown(
+            self.layer[kept], self.tips[kept], self.offsets[kept],
+            self.clearances[kept], rank[self.parent[kept]],
+        )  # fmt: skip
 
 
 class Population:
-    """Grows configurations along given tips.
+    """Grows arms along layers of tips.
 
     Args:
         judge: Says what is clear.
-        tips: Tip of each layer, shape (l, 3); [m].
+        layers: Where the tip goes.
         rng: Source of chance.
+        size: Arms that live on at a layer.
+        led: Whether an arm that follows the tips exactly is among them.
     """
 
     def __init__(
-        self, judge: Judge, tips: FloatArray, rng: np.random.Generator
+        self,
+        judge: Judge,
+        layers: Layers,
+        rng: np.random.Generator,
+        size: int,
+        led: bool = False,
     ) -> None:
-        self.judge, self.tips, self.rng = judge, tips, rng
+        self.judge, self.layers, self.rng = judge, layers, rng
+        self.size, self.led, self.arm = size, led, judge.problem.manipulator
 
-    def _children(
-        self, offsets: FloatArray, layer: int, to: int, every_connection: bool
-    ) -> tuple[FloatArray, IntArray]:
-        """Living children at layer `to` and the row of each one's parent."""
-        arm = self.judge.problem.manipulator
-        rows = np.repeat(np.arange(len(offsets)), FAMILY)
-        moved = self.tips[to, 1:] - self.tips[layer, 1:]
-        n = len(rows)
-        scale = self.rng.choice(np.array(SCALES), n) * arm.total_length
-        shift = self.rng.normal(size=(n, 2)) * scale[:, None]
-        born = vary(
-            offsets[rows], arm.stations, np.broadcast_to(moved, (n, 2)).copy(),
-            self.rng.random(n), self.rng.random(n), shift,
-        )  # fmt: skip
-        tips = np.broadcast_to(self.tips[to], (n, 3))
-        clearances, changed, _ = self.judge.look(tips, born)
-        alive = np.flatnonzero(clearances >= self.judge.required)
-        order = self._choice(clearances[alive], changed[alive])
-        picked = alive[order]
-        if not every_connection:
-            return born[picked], rows[picked]
-        lines = Intervals(
-            np.broadcast_to(self.tips[layer], (len(picked), 3)),
-            tips[picked],
-            offsets[rows[picked]],
-            born[picked],
-        )
-        good = self.judge.clear(lines) if len(picked) else np.zeros(0, bool)
-        return born[picked[good]], rows[picked[good]]
-
-    def _choice(self, clearances: FloatArray, changed: IntArray) -> IntArray:
-        """Half the best, half by chance."""
-        if len(clearances) <= POPULATION:
-            return np.arange(len(clearances))
-        lack = lacking(self.judge, clearances)
-        score = changed + 2.0 * lack**2 + self.rng.random(len(clearances))
-        order = np.argsort(score, kind="stable")
-        best, rest = order[: POPULATION // 2], order[POPULATION // 2 :]
-        return np.concatenate(
-            [best, self.rng.permutation(rest)[: POPULATION - len(best)]]
-        )
-
-    def grow(self, offsets: FloatArray, first: int, last: int) -> Grown:
-        """Grow from configurations at layer `first` towards layer `last`.
+    def grow(self, roots: FloatArray, most_returns: int = 0, kept: int = 1) -> Grown:
+        """The arms that come farthest, with their ancestors and all roots.
 
         Args:
-            offsets: Roots at layer `first`, shape (n, N + 1, 2); [m].
-            first: Layer of the roots.
-            last: Layer to reach, before or after.
+            roots: Shape coordinates of arms at the first layer; of one, if led.
+            most_returns: Times the population may go back, each time twice as far.
+            kept: How many of the farthest, the best of them.
+        """
+        tips = np.repeat(self.layers.tips[:1], len(roots), axis=0)
+        none = np.full(len(roots), -1)
+        clearances, _, _ = self.judge.look(tips, roots)
+        self.grown = Grown(1 + none, tips, roots, clearances, none)
+        farthest = np.arange(len(roots))
+        generations, returns = [farthest], 0
+        leader = self._leader() if self.led else farthest[:1]
+        while len(generations) < len(self.layers.tips):
+            layer = len(generations) - 1
+            generation = np.append(
+                self._next(layer, generations[-1]), leader[layer + 1 :][:1]
+            )
+            if len(generation):
+                generations.append(generation)
+                if layer >= self.grown.layer[farthest[0]]:
+                    farthest = generation
+                continue
+            if returns == most_returns:
+                break
+            generations = generations[: len(generations) - min(layer, 2**returns)]
+            for _ in range(2):
+                generations[-1] = self._varied(len(generations) - 1, generations[-1])
+            returns += 1
+        return self.grown.with_ancestors(self._best(farthest, kept))
+
+    def _recorded(
+        self,
+        layer: IntArray,
+        tips: FloatArray,
+        offsets: FloatArray,
+        clearances: FloatArray,
+        parent: IntArray,
+    ) -> IntArray:
+        """Numbers of arms after they are put on record."""
+        before = len(self.grown.layer)
+        born = Grown(layer, tips, offsets, clearances, parent)
+        self.grown = self.grown.joined(born)
+        return before + np.arange(len(layer))
+
+    def _leader(self) -> IntArray:
+        """The arm that follows the tip's route, layer by layer as far as it is clear.
 
         Returns:
-            The few best of those that came farthest, with their ancestors.
+            Its number at each layer, from the root's on.
         """
-        tree = self._best(*self._grown(offsets, first, last, every_connection=False))
-        reached = self._reached(tree, offsets, first)
-        # Those that came farthest stand last.
-        if np.array_equal(reached.layer[-1:], tree.layer[-1:]):
-            return reached
-        return self._best(*self._grown(offsets, first, last, every_connection=True))
+        tips, judge, root = self.layers.tips, self.judge, self.grown
+        centres = standing(self.arm, root.tips, root.offsets)[0]
+        laid = led_along(np.ascontiguousarray(tips), centres, self.arm.link_lengths)
+        fits = np.isfinite(laid).all(axis=(1, 2))
+        layer = np.arange(len(tips) if fits.all() else int(np.argmin(fits)))
+        directed = is_directed(root.offsets)
+        tips, offsets = tips[layer], coordinates(self.arm, laid[layer], directed)
+        offsets[:1] = root.offsets
+        aims = self.layers.asked(layer)
+        clearances, _, _ = judge.look(tips, offsets, aims)
+        clearances[0] = max(clearances[0], root.clearances[0])
+        looking = None if aims is None else np.stack([aims[:-1], aims[1:]], axis=1)
+        lines = Intervals(tips[:-1], tips[1:], offsets[:-1], offsets[1:], looking)
+        need = np.minimum(judge.required, clearances[:-1])
+        good = (clearances[1:] >= judge.required) & judge.clear(lines, need)
+        on = layer[1:][np.logical_and.accumulate(good)]
+        # Nobody else is on record yet but the root.
+        self._recorded(on, tips[on], offsets[on], clearances[on], on - 1)
+        return np.append(0, on)
 
-    def _grown(
-        self, offsets: FloatArray, first: int, last: int, every_connection: bool
-    ) -> tuple[Grown, IntArray]:
-        """All that grew, and the numbers of those that came farthest."""
-        none = np.zeros(0, dtype=np.int64)
-        tree, front = Grown(none, offsets[:0], none), none
-        step = 1 if last > first else -1
-        at, layer, retries = offsets, first, 0
-        numbers = -1 - np.arange(len(offsets))
-        while layer != last and len(at):
-            born, rows = self._children(at, layer, layer + step, every_connection)
-            if len(born) < POPULATION // 10 and retries < RETRIES:
-                retries += 1
-                side, side_rows = self._children(at, layer, layer, every_connection)
-                ids = len(tree.layer) + np.arange(len(side))
-                tree = tree.with_more(layer, side, numbers[side_rows])
-                at = np.concatenate([at, side])
-                numbers = np.concatenate([numbers, ids])
-                if len(at) > 2 * POPULATION:
-                    pick = self.rng.permutation(len(at))[: 2 * POPULATION]
-                    at, numbers = at[pick], numbers[pick]
-                continue
-            if not len(born):
-                break
-            retries = 0
-            layer += step
-            front = len(tree.layer) + np.arange(len(born))
-            tree = tree.with_more(layer, born, numbers[rows])
-            at, numbers = born, front
-        return tree, front
+    def _next(self, layer: int, generation: IntArray) -> IntArray:
+        """The arms of the next layer; none where it is not reached."""
+        for _ in range(RESTS):
+            born = self._children(layer, layer + 1, generation)
+            if len(born) >= self.size // 10:
+                return born
+            generation = self._varied(layer, generation)
+        return self._children(layer, layer + 1, generation)
 
-    def _best(self, tree: Grown, front: IntArray) -> Grown:
-        """The few best of the front with all their ancestors."""
-        if not len(front):
-            return tree.take(front)
-        tips = self.tips[tree.layer[front]]
-        clearances, changed, _ = self.judge.look(tips, tree.offsets[front])
-        lack = lacking(self.judge, clearances)
-        best = np.argsort(changed + lack, kind="stable")[:KEPT]
-        return tree.with_ancestors(front[best])
+    def _varied(self, layer: int, generation: IntArray) -> IntArray:
+        """Arms of a layer and others of the same that can be reached from them."""
+        both = np.append(generation, self._children(layer, layer, generation))
+        if len(both) <= 2 * self.size:
+            return both
+        return both[self.rng.permutation(len(both))[: 2 * self.size]]
 
-    def _reached(self, tree: Grown, roots: FloatArray, first: int) -> Grown:
-        """What of a tree can be reached from its roots, which are at layer `first`."""
-        if not len(tree.layer):
-            return tree
-        # Roots stand at the end, the first one last, where their numbers -1, -2, ...
-        # find them.
-        offsets = np.concatenate([tree.offsets, roots[::-1]])
-        layer = np.append(tree.layer, np.full(len(roots), first))
-        lines = Intervals(
-            self.tips[layer[tree.parent]], self.tips[tree.layer],
-            offsets[tree.parent], tree.offsets,
+    def _children(self, layer: int, to: int, generation: IntArray) -> IntArray:
+        """Living children at a layer."""
+        parents, tips, offsets = self._born(to, generation)
+        required, ends = self.judge.required, np.array([layer, to])
+        asked = self.layers.asked(ends)
+        must = None if asked is None else np.broadcast_to(asked[1], tips.shape)
+        clearances, changed, _ = self.judge.look(tips, offsets, must)
+        alive = np.flatnonzero(clearances >= required)
+        score = changed[alive] + 2.0 * self._lack(clearances[alive]) ** 2
+        picked = alive[self._choice(score + self._off_aim(to, offsets[alive]))]
+        if not len(picked):
+            return picked
+        parents, tips, offsets = parents[picked], tips[picked], offsets[picked]
+        looking = None if asked is None else np.tile(asked, (len(picked), 1, 1))
+        before = self.grown.tips[parents], self.grown.offsets[parents]
+        lines = Intervals(before[0], tips, before[1], offsets, looking)
+        # The start may be closer than the margin asks for.
+        need = np.minimum(required, self.grown.clearances[parents])
+        good = self.judge.clear(lines, need)
+        return self._recorded(
+            np.full(int(good.sum()), to), tips[good], offsets[good],
+            clearances[picked][good], parents[good],
         )  # fmt: skip
-        reached = self.judge.clear(lines)
-        for number, parent in enumerate(tree.parent.tolist()):
-            reached[number] &= parent < 0 or reached[parent]
-        return tree.take(np.flatnonzero(reached))
+
+    def _born(
+        self, to: int, generation: IntArray
+    ) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Children at a layer: number of the parent, tip, offsets."""
+        family = FAMILY
+        if self.led and len(generation):
+            # Openings leave few alive: these have more children.
+            family = max(FAMILY, FAMILY * self.size // (2 * len(generation)))
+        parents = np.repeat(generation, family)
+        n, rng, play = len(parents), self.rng, float(self.layers.play[to])
+        tips = np.repeat(self.layers.tips[to : to + 1], n, axis=0)
+        if play > 0.0:
+            tips += rng.normal(size=(n, 3)) * play / 2.0
+        offsets = self.grown.offsets[parents]
+        moved = tips[:, 1:] - self.grown.tips[parents, 1:]
+        born = varied(self.arm, offsets, moved, rng)
+        if self.layers.pull_at(to) > 0.0:
+            aims = self.layers.aims_at(to, n)
+            born = turned_towards(born, aims, rng.random(n) < AIMED, rng)
+        return parents, tips, settled(self.arm, tips, born)
+
+    def _off_aim(self, layer: int, offsets: FloatArray) -> FloatArray:
+        """What arms are worse for that do not look to where they shall soon."""
+        pull = self.layers.pull_at(layer)
+        if not 0.0 < pull < 1.0:
+            return np.zeros(len(offsets))
+        off = angles_between(offsets[:, -1], self.layers.aims_at(layer, len(offsets)))
+        return np.asarray(PULL * pull * off**2)
+
+    def _lack(self, clearances: FloatArray) -> FloatArray:
+        """What clearances [m] lack of what is wanted, 0 for nothing, 1 for all."""
+        wanted = WIDE * self.arm.most_radius
+        return np.maximum(0.0, 1.0 - (clearances - self.judge.required) / wanted)
+
+    def _choice(self, score: FloatArray) -> IntArray:
+        """Half the best, half by chance."""
+        if len(score) <= self.size:
+            return np.arange(len(score))
+        order = np.argsort(score + self.rng.random(len(score)), kind="stable")
+        best, rest = order[: self.size // 2], order[self.size // 2 :]
+        chosen = self.rng.permutation(rest)[: self.size - len(best)]
+        return np.concatenate([best, chosen])
+
+    def _best(self, generation: IntArray, count: int) -> IntArray:
+        """The few best of a generation."""
+        tips, offsets = self.grown.tips[generation], self.grown.offsets[generation]
+        clearances, changed, _ = self.judge.look(tips, offsets)
+        order = np.argsort(changed + self._lack(clearances), kind="stable")
+        return generation[order[:count]]

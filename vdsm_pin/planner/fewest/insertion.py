@@ -1,8 +1,8 @@
 """Motions in by the openings of a scene, along the path, and out again.
 
-The tip's way from the start to the path is sought alone (`tip_ways`); the arm is grown
-along it and on along the path (`insertion`). Where it gets stuck, it draws back the way
-it came, and goes in again to where it left the path, by another way or in another
+The tip's route from the start to the path is sought alone (`tip_routes`); the arm is
+grown along it and on along the path (`growth`). Where it gets stuck, it draws back the
+way it came, and goes in again to where it left the path, by another route or in another
 posture. What cannot be drawn at all is skipped.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.fewest.broad_phase import BroadPhase
-from vdsm_pin.planner.fewest.insertion_population import Chain, Insertion, Layers
+from vdsm_pin.planner.fewest.growth import Grown, Layers, Population
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
 from vdsm_pin.planner.fewest.motion import Corners, standing
@@ -51,7 +51,7 @@ class _Visit:
 
     first: int
     before: int
-    chain: Chain
+    chain: Grown
     route: FloatArray
 
     @property
@@ -175,8 +175,10 @@ class _Search:
             play[1:before] = PLAY * self.judge.problem.manipulator.most_radius
             tips = np.vstack([route, path[1:]])
             layers = Layers(tips, play, *self._pull(k, before, tips))
-            grown = Insertion(self.judge, layers, self.rng, self.effort.population)
-            chain = grown.grow(self.root, self.effort.returns)
+            population = Population(
+                self.judge, layers, self.rng, self.effort.population, led=True
+            )
+            chain = population.grow(self.root[None], self.effort.returns)
             visit = _Visit(k, before, chain, route)
             if self.farthest is None or visit.come > self.farthest.come:
                 self.farthest = visit
