@@ -342,10 +342,10 @@ class Manipulator:
         if self.tool:
             found[-1] = max(found[-1], self.tool.radius)
         for body in self.bodies:
-            found[body.link - 1] = max(found[body.link - 1], self._reach_of(body))
+            found[body.link - 1] = max(found[body.link - 1], self.reach_of(body))
         return frozen(found)
 
-    def _reach_of(self, body: LinkBody) -> float:
+    def reach_of(self, body: LinkBody) -> float:
         """Largest distance of a body from the axis of its link; [m]."""
         points, grown = body.solid.corners, body.solid.grown
         away = points.copy()

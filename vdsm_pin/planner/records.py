@@ -1,13 +1,13 @@
 """What every strategy returns, and the clearance function it is given."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
 from vdsm_pin.notebook import Summarised
+from vdsm_pin.problem.held import Axes
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 
@@ -91,8 +91,22 @@ Margin: TypeAlias = float | FloatArray
 """What a plan keeps beyond the required clearance: one number, or one for each link and
 obstacle, shape (N, n_obstacles); [m]."""
 
-LinkClearance: TypeAlias = Callable[[FloatArray], FloatArray]
-"""Joint centres (n, m + 1, 3) to proved lower bounds of the clearance between each of m
-links in a row and the nearest obstacle surface (n, m); [m]. Links may be any straight
-pieces, also of no length. Passed in, so that the planner does not import what will
-judge it."""
+
+class LinkClearance(Protocol):
+    """Clearance of straight pieces of an arm from what they are held apart from.
+
+    Passed in, so that the planner does not import what will judge it.
+    """
+
+    def __call__(self, centres: FloatArray, axes: Axes = None, /) -> FloatArray:
+        """Proved lower bounds of the distance between surfaces.
+
+        Args:
+            centres: Ends of m pieces in a row, shape (n, m + 1, 3); pieces may have any
+                length, also none; [m].
+            axes: Which axis each piece is of, of a shape that goes with (n, m).
+
+        Returns:
+            Shape (n, m), infinite without obstacles; [m].
+        """
+        ...

@@ -2,12 +2,11 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 
 from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.errors import InsideUnknown, NoPlanFound, StartBlocked, StartInside
+from vdsm_pin.errors import InsideUnknown, StartBlocked, StartInside
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.geometry.winding import Location, Side, locate
@@ -21,13 +20,6 @@ from vdsm_pin.planner.upper_clearance import (
 )
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene, with_hulls
-
-TOO_NEAR_FOR_PLANNERS: Final = (
-    "at its start the arm is too near an obstacle that ignore_pairs names: they leave "
-    "pairs out of what is judged, and planners keep every link apart from every "
-    "obstacle; vdsm verify judges a motion made elsewhere"
-)
-"""Why there is no plan where what is judged is clear."""
 
 
 def start_centres(problem: PlanningProblem) -> FloatArray:
@@ -49,10 +41,15 @@ def start_centres(problem: PlanningProblem) -> FloatArray:
 
 def _located(problem: PlanningProblem) -> Iterator[tuple[Mesh, Location]]:
     """Where the arm starts as seen from each mesh that may have an inside."""
-    base, radius = start_centres(problem)[0], problem.manipulator.least_radius
-    for mesh in problem.scene.obstacles:
-        if isinstance(mesh, Mesh) and not mesh.is_surface and np.isfinite(base).all():
-            yield mesh, locate(mesh.closed_mesh, base, radius)
+    arm, centres = problem.manipulator, start_centres(problem)
+    axes = arm.axes(centres[None])[0]
+    for o, mesh in enumerate(problem.scene.obstacles):
+        held = problem.held.axes[:, o]
+        if not isinstance(mesh, Mesh) or mesh.is_surface or not held.any():
+            continue
+        first = axes[int(np.argmax(held))]
+        if np.isfinite(first).all():
+            yield mesh, locate(mesh.closed_mesh, first, arm.least_radius)
 
 
 def _check_outside(problem: PlanningProblem) -> None:
@@ -66,9 +63,10 @@ def _check_outside(problem: PlanningProblem) -> None:
 
 def _clear_of_hull(problem: PlanningProblem, mesh: Mesh) -> bool:
     """Whether nothing proves that the start is too near a mesh's convex hull."""
-    centres = start_centres(problem)
+    axes = problem.manipulator.axes(start_centres(problem)[None])[0]
     alone = replace(problem, scene=with_hulls(Scene((mesh,)), [mesh.name]))
-    upper = upper_clearance(alone, np.stack([centres[:-1], centres[1:]], axis=1))
+    upper = upper_clearance(alone, np.stack([axes[:-1], axes[1:]], axis=1))
+    upper = upper[alone.held.axes[:, 0]]
     return bool(upper.min() >= problem.required_clearance)
 
 
@@ -118,7 +116,6 @@ def check_start(problem: PlanningProblem, clearance: LinkClearance) -> None:
 
     Raises:
         StartInside: Where it is inside a mesh.
-        NoPlanFound: Where only pairs that are not judged are too near.
         StartBlocked: With the link or the feed, the obstacle and the clearance
             between them.
         InsideUnknown: Where it is within the convex hull of a mesh whose inside
@@ -130,10 +127,7 @@ def check_start(problem: PlanningProblem, clearance: LinkClearance) -> None:
         return
     _check_outside(problem)
     if not clearance(centres[None]).min() >= required:
-        found = culprit(problem, centres)
-        if not found.clearance < required and problem.manipulator.ignore_pairs:
-            raise NoPlanFound(TOO_NEAR_FOR_PLANNERS)
-        raise _blocked(problem, found)
+        raise _blocked(problem, culprit(problem, centres))
     feed = feed_culprit(problem, centres[0])
     if feed and feed.clearance < required:
         raise _blocked(problem, feed)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.problem.held import Axes
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 
 
@@ -37,6 +38,6 @@ class _Timed:
     clearance: LinkClearance
     deadline: Deadline
 
-    def __call__(self, centres: FloatArray) -> FloatArray:
+    def __call__(self, centres: FloatArray, axes: Axes = None, /) -> FloatArray:
         self.deadline.check()
-        return self.clearance(centres)
+        return self.clearance(centres, axes)

@@ -17,6 +17,10 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
 
+TIP_ONLY: Final = slice(-1, None)
+"""The axis at whose end the tip is."""
+WHOLE_ARM: Final = slice(None)
+"""Every axis."""
 GOAL: Final = TOLERANCES.bracket_gap
 """Width of a bracket at which to stop; [m]."""
 
@@ -73,21 +77,37 @@ def upper_clearance(problem: PlanningProblem, segments: FloatArray) -> FloatArra
     return upper_distances(problem, segments) - problem.manipulator.least_radius
 
 
-def held_from_all(problem: PlanningProblem) -> PlanningProblem:
-    """The problem with those obstacles alone that no body of the arm may touch.
+def held_from(problem: PlanningProblem, axes: slice = WHOLE_ARM) -> PlanningProblem:
+    """The problem with those obstacles alone that all of some axes may not touch.
 
     What is impossible among them is so whatever `ignore_pairs` leaves out.
+
+    Args:
+        problem: Arm and scene.
+        axes: Numbers from 0, links first, then the tool.
     """
-    arm, scene = problem.manipulator, problem.scene
-    left_out = {arm.owner_of(name) for pair in arm.ignore_pairs for name in pair}
-    held = tuple(one for one in scene.obstacles if one.name not in left_out)
-    if len(held) == len(scene.obstacles):
+    held = problem.held.axes[axes].all(axis=0)
+    if held.all():
         return problem  # with what it keeps packed
-    return replace(problem, scene=Scene(held))
+    obstacles = problem.scene.obstacles
+    return replace(
+        problem, scene=Scene(tuple(obstacles[o] for o in np.flatnonzero(held)))
+    )
+
+
+def last_link(problem: PlanningProblem) -> slice:
+    """The axes of the last link and the tool on it."""
+    return slice(problem.manipulator.n_links - 1, None)
 
 
 def nearest(problem: PlanningProblem, place: FloatArray) -> tuple[str, float]:
-    """The obstacle nearest to a point, shape (3,), and how far it is at most; [m]."""
+    """The obstacle nearest to the tip, shape (3,), and how far it is at most; [m].
+
+    Of those that the tip is held apart from; no name and inf without any.
+    """
+    problem = held_from(problem, TIP_ONLY)
+    if not problem.scene.obstacles:
+        return "", np.inf
     (upper,) = upper_distances(problem, np.stack([place, place])[None])
     obstacle = int(np.argmin(upper))
     return problem.scene.obstacles[obstacle].name, float(upper[obstacle])
@@ -119,35 +139,23 @@ class Culprit:
 def culprit(problem: PlanningProblem, centres: FloatArray) -> Culprit:
     """The link nearest to an obstacle, that obstacle, and the clearance between them.
 
-    As `LinkClearance` has it: the tool is part of the last link, and where links carry
-    something, they count as thick as it reaches.
+    As `link_clearance` has it: the tool is part of the last link, and links count as
+    thick as what they carry reaches.
 
     Args:
         problem: Arm and scene.
         centres: Joint centres of one configuration, shape (N + 1, 3); [m].
+
+    Returns:
+        At an infinite clearance where nothing is held apart.
     """
-    arm = problem.manipulator
-    axes, radii = centres, arm.reaches
-    if not arm.bodies:
-        axes, radii = arm.axes(centres[None])[0], arm.axis_radii
+    arm, radii = problem.manipulator, problem.held.radii
+    axes = arm.axes(centres[None])[0]
+    if arm.bodies and problem.held.whole:
+        axes, radii = centres, np.repeat(arm.reaches[:, None], radii.shape[1], axis=1)
     segments = np.stack([axes[:-1], axes[1:]], axis=1)
     links = np.minimum(np.arange(len(segments)) + 1, arm.n_links)
-    distances = upper_distances(problem, segments)
-    for axis, obstacle in np.ndindex(distances.shape if arm.ignore_pairs else (0, 0)):
-        mine = _bodies_along(arm, axis)
-        name = problem.scene.obstacles[obstacle].name
-        if any(arm.ignores(body, name) for body in mine):
-            distances[axis, obstacle] = np.inf
-    return _nearest_of(problem, distances, radii, links)
-
-
-def _bodies_along(arm: Manipulator, axis: int) -> list[str]:
-    """Names of what counts as one with an axis of `culprit`."""
-    names = [arm.axis_names[axis]]
-    if arm.bodies:
-        names += [body.name for body in arm.bodies if body.link == axis + 1]
-        names += arm.axis_names[arm.n_links :] if axis + 1 == arm.n_links else ()
-    return names
+    return _nearest_of(problem, upper_distances(problem, segments), radii, links)
 
 
 def feed_culprit(problem: PlanningProblem, base: FloatArray) -> Culprit | None:
@@ -161,21 +169,20 @@ def feed_culprit(problem: PlanningProblem, base: FloatArray) -> Culprit | None:
         None without a feed or such an obstacle.
     """
     arm = problem.manipulator
-    held = [not arm.ignores(FEED, name) for name in problem.scene.names]
-    if not arm.feed or not any(held):
+    held = np.array([not arm.ignores(FEED, name) for name in problem.scene.names])
+    if not arm.feed or not held.any():
         return None
     rear = base - np.array([arm.feed.length, 0.0, 0.0])
     distances = upper_distances(problem, np.stack([rear, base])[None])
-    distances[:, ~np.array(held)] = np.inf
-    radii, link = np.array([arm.feed.radius]), np.zeros(1, np.int64)
+    radii, link = np.where(held, arm.feed.radius, -np.inf)[None], np.zeros(1, np.int64)
     return _nearest_of(problem, distances, radii, link)
 
 
 def _nearest_of(
     problem: PlanningProblem, distances: FloatArray, radii: FloatArray, links: IntArray
 ) -> Culprit:
-    """The least clearance of axes (n,) to obstacles, their distances (n, m) given."""
-    upper = distances - radii[:, None]
+    """The least clearance of axes to obstacles, distances and radii (n, m) given."""
+    upper = distances - radii
     at = np.unravel_index(int(np.argmin(upper)), upper.shape)
     name = problem.scene.obstacles[int(at[1])].name
     deeper = bool(distances[at] <= GOAL)

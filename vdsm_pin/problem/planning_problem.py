@@ -13,6 +13,7 @@ from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.held import HeldApart
 from vdsm_pin.problem.scaling import Scaling
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
@@ -189,6 +190,11 @@ class PlanningProblem(Summarised):
         from vdsm_pin.geometry.pieces import first_groups
 
         return first_groups(self.packed, len(self.scene.obstacles))
+
+    @cached_property
+    def held(self) -> HeldApart:
+        """What of the arm is held apart from each obstacle."""
+        return HeldApart.of(self.manipulator, self.scene.names)
 
     @property
     def path(self) -> DesiredPath:

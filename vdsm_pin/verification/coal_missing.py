@@ -55,9 +55,9 @@ def coal_missing(
         deadline: When to give up.
 
     Returns:
-        One entry for each link and obstacle that come too near, at their worst row, in
-        the order of links and obstacles. A distance that Coal cannot tell is no reason
-        to move: the proof decides.
+        One entry for each link and obstacle held apart that come too near, at their
+        worst row, in the order of links and obstacles. A distance that Coal cannot tell
+        is no reason to move: the proof decides.
 
     Raises:
         OutOfTime: If the time is over.
@@ -69,7 +69,8 @@ def coal_missing(
     obstacles = obstacles_at_rest(robot, problem, deadline)
     for found in obstacles.distances(trajectory, reach, deadline=deadline):
         for k in np.flatnonzero(found.distance < problem.required_clearance):
-            if not np.isfinite(found.distance[k]):
+            pair = found.link[k], found.other[k]
+            if not np.isfinite(found.distance[k]) or not problem.held.axes[pair]:
                 continue
             one = _missing(found, int(k), problem.manipulator.n_links)
             key = one.link, one.obstacle

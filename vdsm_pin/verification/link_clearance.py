@@ -7,10 +7,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.links import link_clearances
-from vdsm_pin.geometry.pieces import PackedPieces
+from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
+from vdsm_pin.problem.held import Axes
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import covers_of
 from vdsm_pin.proof.budget import rounding_pad
@@ -34,7 +36,7 @@ def arithmetic_pad(problem: PlanningProblem, pieces: PackedPieces) -> float:
     return rounding_pad(float(largest))
 
 
-def link_clearance(problem: PlanningProblem) -> Callable[[FloatArray], FloatArray]:
+def link_clearance(problem: PlanningProblem) -> Callable[..., FloatArray]:
     """A function that measures the clearance of links in this problem's scene.
 
     Args:
@@ -42,11 +44,12 @@ def link_clearance(problem: PlanningProblem) -> Callable[[FloatArray], FloatArra
 
     Returns:
         Joint centres (n, N + 1, 3) to proved lower bounds of the distance between the
-        surface of each link and the nearest obstacle, shape (n, N); negative where they
-        meet (there the sign alone is meant), infinite without obstacles; [m]. The tool
-        counts as part of the last link, and what links carry as if it were round about
-        their axes. Pieces of an arm, of other numbers of links, are taken to be as
-        thick as its thickest part.
+        surface of each link and the nearest obstacle that it is held apart from, shape
+        (n, N); negative where they meet (there the sign alone is meant), infinite
+        without obstacles; [m]. The tool counts as part of the last link, and what links
+        carry as if it were round about their axes. Any other straight pieces of an arm
+        are taken to be as thick as its thickest part; a second argument says which
+        axes they are of (`Axes`).
 
     Raises:
         InvalidInput: If an obstacle moves: nothing of time is known here.
@@ -58,22 +61,68 @@ def link_clearance(problem: PlanningProblem) -> Callable[[FloatArray], FloatArra
             "judges a given one"
         )
         raise InvalidInput(message)
+    if problem.held.whole:
+        return _from_all(problem)
+    return _from_held(problem)
+
+
+def _from_all(problem: PlanningProblem) -> Callable[..., FloatArray]:
+    """The function where every link is held apart from every obstacle."""
     obstacles = problem.scene.obstacles
     pieces = problem.packed_obstacles
     covers, pad = covers_of(obstacles, pieces), arithmetic_pad(problem, pieces)
     arm, goal = problem.manipulator, TOLERANCES.bracket_gap
     alike = arm.least_radius == arm.most_radius
 
-    def clearances(centres: FloatArray) -> FloatArray:
+    def clearances(centres: FloatArray, axes: Axes = None, /) -> FloatArray:
         rows = np.ascontiguousarray(centres, dtype=np.float64)
         if alike or rows.shape[1] != arm.n_links + 1:
             return link_clearances(pieces, covers, rows, arm.most_radius, pad, goal)
         if arm.bodies:
             gaps = link_clearances(pieces, covers, rows, 0.0, pad, goal)
             return np.asarray(gaps - arm.reaches)
-        axes = np.ascontiguousarray(arm.axes(rows))
-        gaps = link_clearances(pieces, covers, axes, 0.0, pad, goal) - arm.axis_radii
-        gaps[:, arm.n_links - 1] = gaps[:, arm.n_links - 1 :].min(axis=1)
-        return gaps[:, : arm.n_links]
+        gaps = link_clearances(pieces, covers, _axes(arm, rows), 0.0, pad, goal)
+        return _by_link(arm, gaps - arm.axis_radii)
+
+    return clearances
+
+
+def _axes(arm: Manipulator, rows: FloatArray) -> FloatArray:
+    return np.ascontiguousarray(arm.axes(rows))
+
+
+def _by_link(arm: Manipulator, gaps: FloatArray) -> FloatArray:
+    """The clearance of each link, shape (n, N), its tool included; [m]."""
+    gaps[:, arm.n_links - 1] = gaps[:, arm.n_links - 1 :].min(axis=1)
+    return gaps[:, : arm.n_links]
+
+
+def _from_held(problem: PlanningProblem) -> Callable[..., FloatArray]:
+    """The function where each group of obstacles is held from some axes only."""
+    arm, goal, groups = problem.manipulator, TOLERANCES.bracket_gap, problem.held.groups
+    pad, packed = arithmetic_pad(problem, problem.packed_obstacles), []
+    for group in groups:
+        obstacles = [problem.scene.obstacles[o] for o in group.obstacles]
+        pieces = pack_pieces([obstacle.pieces for obstacle in obstacles])
+        packed.append((pieces, covers_of(obstacles, pieces)))
+
+    def clearances(centres: FloatArray, axes: Axes = None, /) -> FloatArray:
+        rows = np.ascontiguousarray(centres, dtype=np.float64)
+        shape = len(rows), rows.shape[1] - 1
+        if axes is None and shape[1] == arm.n_links:
+            rows = _axes(arm, rows)
+            least = np.full((len(rows), rows.shape[1] - 1), np.inf)
+            for group, scene in zip(groups, packed, strict=True):
+                gaps = link_clearances(*scene, rows, 0.0, pad, goal) - group.radii
+                np.minimum(least, gaps, out=least)
+            return _by_link(arm, least)
+        ends = np.stack([rows[:, :-1], rows[:, 1:]], axis=2).reshape(-1, 2, 3)
+        number = problem.held.numbers(axes, shape)
+        least = np.full(len(ends), np.inf)
+        for group, scene in zip(groups, packed, strict=True):
+            which, some = group.held(ends, number)
+            gaps = link_clearances(*scene, some, group.radius, pad, goal)[:, 0]
+            least[which] = np.minimum(least[which], gaps)
+        return least.reshape(shape)
 
     return clearances

@@ -12,6 +12,7 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.geometry.solids import HalfSpace
 from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.held import held_pairs
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, solid_of
 from vdsm_pin.proof.bodies import Body, PairTable
@@ -39,14 +40,8 @@ class ArmPairs:
         self.bodies: tuple[ArmBody, ...] = arm_bodies(arm)
         self.between: SelfPairs = self_pairs(arm, self.bodies)
         names = problem.scene.names
-        ignored = [
-            (o, b)
-            for o, name in enumerate(names if arm.ignore_pairs else ())
-            for b, body in enumerate(self.bodies)
-            if arm.ignores(body.name, name)
-        ]
-        held = np.ones((len(names), len(self.bodies)), np.bool_)
-        held[tuple(np.array(ignored, dtype=np.int64).reshape(-1, 2).T)] = False
+        held = held_pairs(arm, self.bodies, names).T
+        ignored = np.argwhere(~held).tolist()
         # Numbers of the body and the obstacle of each pair, obstacle by obstacle.
         self.outer: IntArray = np.argwhere(held)[:, ::-1]
         self.ignored = tuple(

@@ -8,6 +8,7 @@ from scenes_for_fewest import problem
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.mesh_distance import STEP, surfaces_of
+from vdsm_pin.problem.held import Axes
 from vdsm_pin.verification.link_clearance import link_clearance
 
 REACH = 0.3
@@ -83,9 +84,9 @@ def test_the_clearance_function_is_asked_where_a_step_decides() -> None:
     task = problem(RING)
     exact, asked = link_clearance(task), []
 
-    def counted(centres: np.ndarray) -> np.ndarray:
+    def counted(centres: np.ndarray, axes: Axes = None, /) -> np.ndarray:
         asked.append(len(centres))
-        return exact(centres)
+        return exact(centres, axes)
 
     rng = np.random.default_rng(3)
     segments = rng.uniform([1.0, -1.0, -1.0], [3.0, 1.0, 1.0], (2000, 2, 3))

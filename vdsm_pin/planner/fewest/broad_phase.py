@@ -19,6 +19,7 @@ from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.planner.fewest.mesh_distance import STEP, Surfaces, surfaces_of
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.time_limit import deadline_of
+from vdsm_pin.problem.held import Axes, HeldApart, HeldGroup
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -36,6 +37,49 @@ MOST_BOXES = 32
 
 
 @dataclass(frozen=True)
+class Cover:
+    """What bounds the distance to obstacles that the same axes are held apart from.
+
+    Args:
+        boxes: Low and high corners of boxes that cover the obstacles, (b, 2, 3); [m].
+        planes: Outward normals and offsets of the half-spaces, shape (p, 4).
+        surfaces: The meshes, which have no boxes.
+        group: Says which obstacles and axes they are.
+    """
+
+    boxes: FloatArray
+    planes: FloatArray
+    surfaces: Surfaces
+    group: HeldGroup
+
+    @classmethod
+    def of(cls, obstacles: tuple[Obstacle, ...], group: HeldGroup) -> "Cover":
+        """Of a group's obstacles."""
+        solid = tuple(one for one in obstacles if not isinstance(one, Mesh))
+        covers = [_cover(obstacle) for obstacle in solid]
+        flat = [
+            [*piece.normal, piece.offset]
+            for obstacle in solid
+            for piece in obstacle.pieces
+            if isinstance(piece, HalfSpacePiece)
+        ]
+        boxes = np.concatenate([np.zeros((0, 2, 3)), *covers])
+        return cls(boxes, np.array(flat).reshape(-1, 4), surfaces_of(obstacles), group)
+
+    def bounds(
+        self, ends: FloatArray, far: float, floor: float, deadline: Deadline
+    ) -> tuple[FloatArray, FloatArray]:
+        """Bounds from boxes and from meshes, see `BroadPhase`, shape (n,) each; [m]."""
+        radius = self.group.radius
+        enough = far + radius
+        boxes = _box_bounds(ends, self.boxes, self.planes, STRETCHES, enough)
+        # Who asks for what is below 0 asks for what is far, too.
+        most = np.inf if floor == -np.inf else enough
+        mesh = self.surfaces.least(ends, floor + radius, most, deadline)
+        return boxes - radius, mesh - radius
+
+
+@dataclass(frozen=True)
 class BroadPhase:
     """Lower bounds of the clearance, exact where it is small but enough.
 
@@ -43,10 +87,8 @@ class BroadPhase:
 
     Args:
         clearance: The clearance function.
-        boxes: Low and high corners of boxes that cover the obstacles, (b, 2, 3); [m].
-        planes: Outward normals and offsets of the half-spaces, shape (p, 4).
-        surfaces: The meshes, which have no boxes.
-        radius: Radius of the links; [m].
+        covers: Of the obstacles.
+        held: Which axes are held apart from them.
         floor: Clearance below which -inf will do; where that is -inf, all bounds from
             meshes are exact; [m].
         far: A bound from boxes above this is left as it is; [m].
@@ -54,25 +96,24 @@ class BroadPhase:
     """
 
     clearance: LinkClearance
-    boxes: FloatArray
-    planes: FloatArray
-    surfaces: Surfaces
-    radius: float
+    covers: tuple[Cover, ...]
+    held: HeldApart
     floor: float
     far: float
     deadline: Deadline = NO_LIMIT
 
-    def __call__(self, centres: FloatArray) -> FloatArray:
+    def __call__(self, centres: FloatArray, axes: Axes = None, /) -> FloatArray:
         """Joint centres (n, m + 1, 3) to lower bounds (n, m); [m]."""
         self.deadline.check()
+        shape = len(centres), centres.shape[1] - 1
         ends = np.stack([centres[:, :-1], centres[:, 1:]], axis=2).reshape(-1, 2, 3)
-        enough = self.far + self.radius
-        clearances = _box_bounds(ends, self.boxes, self.planes, STRETCHES, enough)
-        clearances -= self.radius
-        low = self.floor + self.radius
-        # Who asks for what is below 0 asks for what is far, too.
-        most = np.inf if self.floor == -np.inf else enough
-        mesh = self.surfaces.least(ends, low, most, self.deadline) - self.radius
+        number = None if self.held.whole else self.held.numbers(axes, shape)
+        clearances, mesh = np.full((2, len(ends)), np.inf)
+        for cover in self.covers:
+            which, some = cover.group.held(ends, number)
+            boxes, surfaces = cover.bounds(some, self.far, self.floor, self.deadline)
+            clearances[which] = np.minimum(clearances[which], boxes)
+            mesh[which] = np.minimum(mesh[which], surfaces)
         # A step below the distance will do, but not where it decides.
         near = clearances < self.far
         near |= mesh < min(self.far, self.floor + STEP)
@@ -82,8 +123,9 @@ class BroadPhase:
             blocked = mesh[asked] < self.floor - STEP
             clearances[asked[blocked]] = -np.inf
             asked = asked[~blocked]
-            clearances[asked] = self.clearance(ends[asked])[:, 0]
-        return clearances.reshape(len(centres), centres.shape[1] - 1)
+            of = None if number is None else number[asked, None]
+            clearances[asked] = self.clearance(ends[asked], of)[:, 0]
+        return clearances.reshape(shape)
 
     def up_to(self, far: float) -> "BroadPhase":
         """The same, exact only below another bound; [m]."""
@@ -93,20 +135,14 @@ class BroadPhase:
 def broad_phase(problem: PlanningProblem, clearance: LinkClearance) -> BroadPhase:
     """The clearance function of a problem with its boxes."""
     obstacles = problem.scene.obstacles
-    solid = tuple(one for one in obstacles if not isinstance(one, Mesh))
-    covers = [_cover(obstacle) for obstacle in solid]
-    flat = [
-        [*piece.normal, piece.offset]
-        for obstacle in solid
-        for piece in obstacle.pieces
-        if isinstance(piece, HalfSpacePiece)
-    ]
+    covers = tuple(
+        Cover.of(tuple(obstacles[o] for o in group.obstacles), group)
+        for group in problem.held.groups
+    )
     return BroadPhase(
         clearance,
-        np.concatenate([np.zeros((0, 2, 3)), *covers]),
-        np.array(flat).reshape(-1, 4),
-        surfaces_of(obstacles),
-        problem.manipulator.most_radius,
+        covers,
+        problem.held,
         problem.required_clearance - TOLERANCES.planned_clearance,
         FAR * problem.manipulator.total_length,
         deadline=deadline_of(clearance),

@@ -29,8 +29,9 @@ from vdsm_pin.planner.impossible.cut_off import narrowest
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.time_limit import deadline_of
 from vdsm_pin.planner.upper_clearance import (
+    TIP_ONLY,
     culprit,
-    held_from_all,
+    held_from,
     named,
     nearest,
     upper_clearance,
@@ -145,7 +146,7 @@ def _cut_off(
     place = _shut(problem, rows.tips[first], deadline)
     words = ""
     if place is not None:
-        problem = held_from_all(problem)
+        problem = held_from(problem, TIP_ONLY)
         clearances = upper_clearance(problem, np.stack([place, place])[None])[0]
         scene, required = problem.scene.obstacles, problem.required_clearance
         near = [o.name for o, r in zip(scene, clearances, strict=True) if r < required]
@@ -162,6 +163,7 @@ def _shut(
     problem: PlanningProblem, tip: FloatArray, deadline: Deadline | None
 ) -> FloatArray | None:
     """Where the widest way to a tip is shut, shape (3,); None where nobody knows."""
+    problem = held_from(problem, TIP_ONLY)
     if deadline is None or not problem.scene.obstacles:
         return None
     try:
@@ -232,6 +234,8 @@ def how_far(
     if not problem.scene.obstacles or not np.isfinite(centres).all():
         return Reached(words, station)
     found = culprit(problem, centres)
+    if found.clearance == np.inf:
+        return Reached(words, station)
     called = named(problem.manipulator, found.link)
     words += (
         f"; {called} of the straight arm there has {found.words} to "
@@ -266,7 +270,7 @@ def notes_of(
     angles = bends_of(centres[on_path])
     changed = (angles > TOLERANCES.changed_angle).sum(axis=1)
     tips = centres[on_path, -1]
-    least = least_changed(problem, clearance, tips)
+    least = least_changed(held_from(problem), clearance, tips)
     if (changed < least).any():
         worst = int(np.flatnonzero(changed < least)[0])
         message = (
@@ -369,7 +373,7 @@ def _closed_by(
         reasons.append("beyond the reach of the arm")
     tips = rows.tips[proof.buried & here]
     if len(tips):
-        problem = held_from_all(problem)
+        problem = held_from(problem, TIP_ONLY)
         bounds = upper_clearance(problem, np.stack([tips, tips], axis=1))
         near = np.flatnonzero(bounds.min(axis=0) < problem.required_clearance)
         names = [repr(problem.scene.obstacles[int(o)].name) for o in near]

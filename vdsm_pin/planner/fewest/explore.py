@@ -34,7 +34,7 @@ from vdsm_pin.planner.fewest.tip_routes import TipSpace
 from vdsm_pin.planner.impossible.bounds import TipProof, prove_tips
 from vdsm_pin.planner.impossible.cut_off import cut_off
 from vdsm_pin.planner.impossible.last_link import hemmed_in
-from vdsm_pin.planner.upper_clearance import held_from_all
+from vdsm_pin.planner.upper_clearance import TIP_ONLY, held_from, last_link
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
@@ -118,7 +118,7 @@ def explore(
     judge = Judge(
         problem, clearance, margin, first.slack * length, first.finest * length
     )
-    proof = prove_tips(held_from_all(problem), clearance, rows.tips)
+    proof = prove_tips(held_from(problem, TIP_ONLY), clearance, rows.tips)
     best = Outcome(judge, None, rows, proof)
     yield best
     if best.proof.closed.all():
@@ -222,10 +222,11 @@ def _proofs(
     open_ = np.flatnonzero(~(outcome.drawn | proof.closed))
     hemmed = np.zeros(len(tips), dtype=np.bool_)
     enough = clearance.up_to(problem.required_clearance)
-    problem = held_from_all(problem)
-    hemmed[open_] = hemmed_in(problem, enough, tips[open_])
+    there = held_from(problem, last_link(problem))
+    hemmed[open_] = hemmed_in(there, enough, tips[open_])
     proof = replace(proof, hemmed_in=hemmed)
     yield proof
+    problem = held_from(problem, TIP_ONLY)
     yield replace(proof, cut_off=cut_off(problem, tips, clearance.deadline))
 
 

@@ -165,10 +165,14 @@ class Judge:
     def _cuts(self, intervals: Intervals) -> BoolArray:
         """Joints at which arms are cut into straight pieces, shape (n, N + 1).
 
-        Links in line between two knees are one piece, unless each keeps its own.
+        Links in line between two knees are one piece, unless each keeps its own, or
+        they are held apart from different obstacles.
         """
         knees = intervals.knees(self.problem.manipulator)
-        return knees if self.kept is None else np.ones_like(knees)
+        if self.kept is not None:
+            return np.ones_like(knees)
+        held = self.problem.held
+        return knees if held.whole else knees | held.cuts
 
     def _states(
         self,
@@ -205,7 +209,8 @@ class Judge:
         clearances[~fine] = -np.inf
         pieces, place = pieces_of(centres, knees, interval, asked & fine[:, None])
         if len(pieces):
-            clearances.ravel()[place] = clearance(pieces)[:, 0]
+            links = (place % asked.shape[1])[:, None]
+            clearances.ravel()[place] = clearance(pieces, links)[:, 0]
         if self.kept is not None:
             clearances -= self.kept
         return centres, clearances

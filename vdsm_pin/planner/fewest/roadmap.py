@@ -179,7 +179,7 @@ def build_roadmap(
             there, axes = aims[node // shapes.size], ends[:, 2] - ends[:, 1]
             looks = pricing.cone.holds(ends[:, 0, 0], axes, there)
             node, ends, bends = node[looks], ends[looks], bends[looks]
-        if kept is not None:
+        if kept is not None or not problem.held.whole:
             ends = link_by_link(ends, arm.stations)
         clearances = _least(clearance, ends, required, kept)
         keep = clearances >= required
@@ -222,7 +222,7 @@ def _least(
     clearances = np.full(len(ends), np.inf)
     rows = np.arange(len(ends))
     for piece in range(ends.shape[1] - 2, -1, -1):
-        values = clearance(ends[rows, piece : piece + 2])[:, 0]
+        values = clearance(ends[rows, piece : piece + 2], piece)[:, 0]
         values = values if kept is None else values - kept[piece]
         clearances[rows] = np.minimum(clearances[rows], values)
         rows = rows[values >= required]

@@ -39,6 +39,7 @@ from vdsm_pin.planner.records import LinkClearance, Margin, Plan
 from vdsm_pin.planner.start import check_start
 from vdsm_pin.planner.time_limit import deadline_of
 from vdsm_pin.problem.desired_path import Blocked
+from vdsm_pin.problem.held import TIP
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -184,7 +185,7 @@ class _Search:
     def _clearance_at_tips(self, plan: Plan) -> float:
         """Least clearance of the tip alone where it draws: no plan has more; [m]."""
         tips = plan.tip_path.points[plan.tip_path.on_path]
-        clearances = self.clearance(np.stack([tips, tips], axis=1))
+        clearances = self.clearance(np.stack([tips, tips], axis=1), TIP)
         return float(clearances.min(initial=np.inf))
 
 

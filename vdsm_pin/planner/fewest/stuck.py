@@ -9,7 +9,14 @@ from vdsm_pin.errors import Reached
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.feasibility import rail_distance
 from vdsm_pin.planner.fewest.pose_kernels import bends_of
-from vdsm_pin.planner.upper_clearance import culprit, named, nearest, upper_distances
+from vdsm_pin.planner.upper_clearance import (
+    TIP_ONLY,
+    culprit,
+    held_from,
+    named,
+    nearest,
+    upper_distances,
+)
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.units import in_mm
 
@@ -56,12 +63,13 @@ def where_stuck(
     """
     parts, link, obstacle = [words], 0, ""
     narrowest: list[float] = []
-    if problem.scene.obstacles:
+    if held_from(problem, TIP_ONLY).scene.obstacles:
         narrow = stuck.route[_opening(problem, stuck)[0]]
         parts.append(_passage(problem, narrow))
+        narrowest = narrow.tolist()
+    if problem.scene.obstacles:
         found = culprit(problem, stuck.centres)
         link, obstacle = found.link, found.obstacle
-        narrowest = narrow.tolist()
     parts.append(_stop(problem, stuck))
     parts.append(f"try {' or '.join(_advice(problem, stuck))}")
     centres = stuck.centres.tolist()
@@ -71,7 +79,8 @@ def where_stuck(
 def _opening(problem: PlanningProblem, stuck: Stuck) -> tuple[int, float]:
     """Number of the narrowest point of the way, and how wide it is there; [m]."""
     points = np.stack([stuck.route, stuck.route], axis=1)
-    distances = upper_distances(problem, points).min(axis=1)
+    problem = held_from(problem, TIP_ONLY)
+    distances = upper_distances(problem, points).min(axis=1, initial=np.inf)
     narrow = int(np.argmin(distances))
     return narrow, 2.0 * float(distances[narrow])
 
@@ -148,6 +157,7 @@ def on_the_path(
         words: What is known besides, told first.
         station: Where along the path the stretch begins; [m].
     """
+    problem = held_from(problem, TIP_ONLY)
     arm, share = problem.manipulator, np.arange(FINER)[:, None, None] / FINER
     between = (1.0 - share) * tips[:-1] + share * tips[1:]
     places = np.concatenate([between.reshape(-1, 3), tips[-1:]])
@@ -177,6 +187,7 @@ def _stop(problem: PlanningProblem, stuck: Stuck) -> str:
         words = f"the arm came all the way in and along the path to {tip}"
     if problem.scene.obstacles:
         found = culprit(problem, stuck.centres)
+    if problem.scene.obstacles and found.clearance < np.inf:
         called = named(problem.manipulator, found.link)
         words += f", where {called} has {found.words} to {found.obstacle!r}"
     return words

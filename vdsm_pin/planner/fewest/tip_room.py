@@ -7,6 +7,7 @@ import numpy as np
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.problem.held import TIP
 
 LEAST: Final = 0.05
 """Cells smaller than this part of the body's radius are not halved; [-]."""
@@ -30,7 +31,7 @@ class TipRoom(NamedTuple):
     def spare(self, points: FloatArray, ends: FloatArray | None = None) -> FloatArray:
         """At points, or on lines from them to ends, (n, 3) each to (n,); [m]."""
         ends = points if ends is None else ends
-        clearances = self.clearance(np.stack([points, ends], axis=1))[:, 0]
+        clearances = self.clearance(np.stack([points, ends], axis=1), TIP)[:, 0]
         return np.asarray(clearances - self.required)
 
     def narrowest(self, route: FloatArray) -> FloatArray:

@@ -41,6 +41,7 @@ from vdsm_pin.planner.feasibility import curled_reach, rail_distance
 from vdsm_pin.planner.fewest.roadmap_kernels import pose_shapes
 from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.upper_clearance import upper_clearance
+from vdsm_pin.problem.held import TIP
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -133,7 +134,7 @@ def prove_tips(
     length = problem.manipulator.total_length + TOLERANCES.joint_centre
     far |= rail_distance(problem.manipulator, tips) > length + problem.tip_tolerance
     points = np.stack([tips, tips], axis=1)
-    buried = clearance(points)[:, 0] < problem.required_clearance
+    buried = clearance(points, TIP)[:, 0] < problem.required_clearance
     near = np.flatnonzero(buried)
     upper = upper_clearance(problem, points[near]).min(axis=1, initial=np.inf)
     # The tip may be a little beside its place, and nearer by as much.

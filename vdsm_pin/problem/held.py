@@ -1,0 +1,164 @@
+"""Which parts of an arm are held apart from which obstacles: all that are not ignored.
+
+An axis is that of a link or of the tool, links first; what a link carries counts as if
+it were round about it. Obstacles that the same axes are held from, by the same radii,
+are one group; without `ignore_pairs` there is one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Final, TypeAlias
+
+import numpy as np
+
+from vdsm_pin.arm.manipulator import Manipulator
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from vdsm_pin.arm.bodies import ArmBody
+
+TIP: Final = -1
+"""Number of the axis at whose end the tip is."""
+
+Axes: TypeAlias = IntArray | int | None
+"""Which axis each straight piece is of, from 0, of a shape that goes with theirs. The
+last link means all of it, the tool included; None: every link in turn, or, of pieces
+that are not as many, whatever is held apart from anything."""
+
+
+def held_pairs(
+    arm: Manipulator, bodies: Sequence["ArmBody"], obstacles: Sequence[str]
+) -> BoolArray:
+    """Which bodies are held apart from which obstacles, (n_bodies, n_obstacles)."""
+    held = np.ones((len(bodies), len(obstacles)), dtype=np.bool_)
+    for b, body in enumerate(bodies if arm.ignore_pairs else ()):
+        held[b] = [not arm.ignores(body.name, name) for name in obstacles]
+    return held
+
+
+@dataclass(frozen=True)
+class HeldGroup:
+    """Obstacles that the same axes are held apart from, by the same radii.
+
+    Args:
+        obstacles: Their numbers in the scene, ascending, shape (k,).
+        radii: How far from each axis the matter reaches that is held apart, -inf where
+            none is, shape (n_axes,); [m].
+        n_links: Number of links.
+        shaft: Part of the last link that is before the tool; [-].
+    """
+
+    obstacles: IntArray
+    radii: FloatArray
+    n_links: int
+    shaft: float
+
+    @property
+    def radius(self) -> float:
+        """The largest of the radii; [m]."""
+        return float(self.radii.max())
+
+    @property
+    def by_link(self) -> BoolArray:
+        """Whether a link, or the tool on it, is held apart, shape (N,)."""
+        held = np.isfinite(self.radii)
+        held[self.n_links - 1] |= held[-1]
+        return np.asarray(held[: self.n_links])
+
+    @property
+    def parted(self) -> bool:
+        """Whether of the last link and its tool one alone is held apart."""
+        last = np.isfinite(self.radii[self.n_links - 1 :])
+        return bool(last.any() and not last.all())
+
+    def held(
+        self, ends: FloatArray, axes: IntArray | None
+    ) -> tuple[IntArray, FloatArray]:
+        """Numbers of the pieces that are held apart, and what of them is.
+
+        Args:
+            ends: Of straight pieces, shape (n, 2, 3); [m].
+            axes: Which axis each is of, shape (n,); None: all are held.
+
+        Returns:
+            Shape (m,) and (m, 2, 3); [m].
+        """
+        if axes is None:
+            return np.arange(len(ends)), ends
+        last = axes == self.n_links - 1
+        held = np.isfinite(self.radii)[axes] | (last & self.by_link[-1])
+        which = np.flatnonzero(held)
+        some = ends[which]
+        if self.parted:
+            last = np.flatnonzero(last[which])
+            joint = some[last, 0] + self.shaft * (some[last, 1] - some[last, 0])
+            some[last, int(np.isfinite(self.radii[self.n_links - 1]))] = joint
+        return which, some
+
+
+@dataclass(frozen=True)
+class HeldApart:
+    """What of an arm is held apart from each obstacle.
+
+    Args:
+        arm: The arm.
+        axes: Whether a link, or the tool, itself is, shape (n_axes, n_obstacles).
+        radii: How far from each axis the matter reaches that is, the bodies that ride
+            on the link included, -inf where none is, of the same shape; [m].
+        whole: Whether links, tool and bodies are held apart from every obstacle.
+    """
+
+    arm: Manipulator
+    axes: BoolArray
+    radii: FloatArray
+    whole: bool
+
+    @classmethod
+    def of(cls, arm: Manipulator, obstacles: Sequence[str]) -> "HeldApart":
+        """By the `ignore_pairs` of an arm and the names of the obstacles."""
+        from vdsm_pin.arm.bodies import arm_bodies  # compiled code, which few need
+
+        bodies = arm_bodies(arm) if arm.ignore_pairs else ()
+        pairs, n_axes = held_pairs(arm, bodies, obstacles), arm.axis_radii.size
+        axes = np.ones((n_axes, len(obstacles)), dtype=np.bool_)
+        axes[: len(pairs)] = pairs[:n_axes]
+        radii = np.where(axes, arm.axis_radii[:, None], -np.inf)
+        for body in arm.bodies:
+            own = [k for k, one in enumerate(bodies) if one.owner == body.name]
+            held = pairs[own].any(axis=0) if own else np.ones(len(obstacles), np.bool_)
+            last = n_axes if body.link == arm.n_links else body.link
+            more = np.where(held, arm.reach_of(body), -np.inf)
+            on = slice(body.link - 1, last)
+            radii[on] = np.maximum(radii[on], more)
+        counted = [one.link > 0 for one in bodies]
+        return cls(arm, axes, radii, bool(pairs[counted].all()))
+
+    def numbers(self, axes: Axes, shape: tuple[int, int]) -> IntArray | None:
+        """The axis of each piece, row after row, shape (n * m,); None for any."""
+        if axes is None and shape[1] == self.arm.n_links:
+            axes = np.arange(shape[1])
+        if axes is None:
+            return None
+        return np.broadcast_to(np.asarray(axes, dtype=np.int64), shape).reshape(-1)
+
+    @cached_property
+    def groups(self) -> tuple[HeldGroup, ...]:
+        """The groups of obstacles that anything of the axes is held apart from."""
+        arm = self.arm
+        shaft = float(arm.axis_spans[arm.n_links - 1, 1] / arm.link_lengths[-1])
+        columns, group = np.unique(self.radii, axis=1, return_inverse=True)
+        return tuple(
+            HeldGroup(np.flatnonzero(group.ravel() == k), column, arm.n_links, shaft)
+            for k, column in enumerate(columns.T)
+            if np.isfinite(column).any()
+        )
+
+    @cached_property
+    def cuts(self) -> BoolArray:
+        """Joints at which pieces end: links there are held differently, (N + 1,)."""
+        cuts = np.zeros(self.arm.n_links + 1, dtype=np.bool_)
+        for one in self.groups:
+            cuts[1:-1] |= one.by_link[1:] != one.by_link[:-1]
+            cuts[-2] |= one.parted
+        return cuts
