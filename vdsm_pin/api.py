@@ -8,8 +8,6 @@
 'certified'
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from pathlib import Path
 from typing import Literal
 
@@ -20,13 +18,15 @@ from vdsm_pin.io import trajectory_file
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.io.problem_file import read_problem as read_problem
 from vdsm_pin.planner.records import Plan
-from vdsm_pin.problem.error_boxes import NOTHING
 from vdsm_pin.problem.error_boxes import ErrorBox as Box
+from vdsm_pin.problem.error_boxes import TypedErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.records import ArmVerification
 from vdsm_pin.verification.robot_model import load_robot
+
+ErrorBox = TypedErrorBox
 
 PYTHON = "from Python"
 """What a report names as command and problem file where there is none."""
@@ -65,44 +65,6 @@ def plan(
 
     deadline, robot = Deadline.after(time_limit), load_robot(problem.manipulator)
     return plan_and_verify(problem, strategy, robot, deadline=deadline).plan
-
-
-class ErrorBox(Box):
-    """How far the real motion may stray from the nominal one.
-
-    Args:
-        joint_deg: Largest error of every joint angle, or one for each joint from the
-            base; [deg].
-        base_mm: Largest displacement of the base in any direction; [mm].
-        base_deg: Largest turn of the base about its origin; [deg].
-        obstacle_mm: Largest displacement of an obstacle's surface; [mm].
-        obstacles_mm: That of single obstacles by their names; [mm].
-        obstacles_deg: Their largest turns, about their middles; [deg].
-
-    Raises:
-        InvalidInput: If a value is negative or not finite.
-
-    Example:
-        >>> ErrorBox(base_mm=2.0).base
-        0.002
-        >>> ErrorBox(obstacles_mm={"crate": 5.0}).of_obstacle("crate").shift
-        0.005
-    """
-
-    def __init__(
-        self,
-        *,
-        joint_deg: float | Sequence[float] = 0.0,
-        base_mm: float = 0.0,
-        base_deg: float = 0.0,
-        obstacle_mm: float = 0.0,
-        obstacles_mm: Mapping[str, float] = NOTHING,
-        obstacles_deg: Mapping[str, float] = NOTHING,
-    ) -> None:
-        """The box in radians and metres."""
-        parts = obstacle_mm, base_deg, obstacles_mm, obstacles_deg
-        box = Box.typed(joint_deg, base_mm, *parts)
-        super().__init__(*(getattr(box, one.name) for one in fields(Box)))
 
 
 def verify(

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from vdsm_pin.cli import app
 from vdsm_pin.errors import Infeasible, InvalidInput
 from vdsm_pin.geometry.solids import Sphere
-from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.error_boxes import TypedErrorBox
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.repair.robot import repair_robot
@@ -76,7 +76,7 @@ def test_errors_are_kept_in_reserve(tmp_path: Path) -> None:
     x, y = tip_at(0.6, 0.3)
     this = asked(tmp_path, (1.1 * x, 1.1 * y, 0.05))
     assert verify_robot(this, Motion(OVER)).verdict == "certified"
-    errors = ErrorBox.typed(joint_deg=0.5, base_mm=20.0, base_deg=0.5)
+    errors = TypedErrorBox(joint_deg=0.5, base_mm=20.0, base_deg=0.5)
     assert verify_robot(this.under(errors), Motion(OVER)).verdict != "certified"
     found = repair_robot(this.under(errors), Motion(OVER))
     assert found.verification.verdict == "certified"

@@ -19,7 +19,6 @@ from vdsm_pin.errors import (
 )
 from vdsm_pin.report.html import write_no_plan
 from vdsm_pin.report.impasse import Impasse, impasse_of
-from vdsm_pin.report.run_record import PlanRun
 
 REACHED = Reached("drew 1 m", 1.25, 3, "ball")
 SOMEWHERE: list[VdsmError] = [
@@ -83,8 +82,8 @@ def test_the_page_says_why_and_claims_a_proof_only_where_there_is_one(
     tmp_path: Path, error: VdsmError
 ) -> None:
     page = tmp_path / "no_plan.html"
-    run = PlanRun("fewest", made_up.RECORD)
-    write_no_plan(page, made_up.problem(), error, run)
+    run = "fewest", made_up.RECORD
+    write_no_plan(page, made_up.problem(), error, *run)
     text = page.read_text(encoding="utf-8")
     assert "<strong>no plan</strong>" in text
     searched = isinstance(error, NoPlanFound | OutOfTime)

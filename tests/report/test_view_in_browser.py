@@ -17,7 +17,6 @@ from vdsm_pin.errors import NoPlanFound, Reached
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.report.facts import verification_file
 from vdsm_pin.report.html import write_no_plan, write_report
-from vdsm_pin.report.run_record import PlanRun
 
 pytestmark = NEEDS_CHROMIUM
 
@@ -291,8 +290,8 @@ def test_a_page_without_a_plan_shows_where_the_search_ended(
 ) -> None:
     path = tmp_path / "no_plan.html"
     error = NoPlanFound("in vain", Reached("drew 1 m", 1.25, 3, "ball"))
-    run = PlanRun("fewest", made_up.RECORD)
-    write_no_plan(path, made_up.problem(), error, run)
+    run = "fewest", made_up.RECORD
+    write_no_plan(path, made_up.problem(), error, *run)
     watched = Watched(browser, path.as_uri(), viewport={"width": 900, "height": 900})
     page = watched.page
     page.wait_for_function("window.vdsm && window.vdsm.view")

@@ -87,7 +87,7 @@ def test_verdicts_are_those_of_solid_angles(seed: int, tmp_path: Path) -> None:
         assert result.closest(1)[0].upper <= 0.0
         np.testing.assert_allclose(result.closest(1)[0].link_point, [0.5, 0, 0])
         clear = next(check for check in result.checks if check.name == OBSTACLES)
-        assert clear.first == 0.0
+        assert clear.first_moment == 0.0
         assert "first too close at waypoint 0: arm and shell" in clear.where
 
 

@@ -11,7 +11,7 @@ from vdsm_pin.certificate_checker import Outcome, check_certificate
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.source import sha256_of_file
-from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.error_boxes import TypedErrorBox
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.repair.robot import repair_robot
@@ -119,7 +119,7 @@ def test_errors_of_a_robot_beside_what_moves_are_covered(tmp_path: Path) -> None
     rng = np.random.default_rng(4)
     rows, times = rng.uniform(-1.0, 1.0, (3, 2)), np.array([0.0, 1.0, 2.0])
     moves, knots = np.array([0.2, 1.4]), rng.uniform(-1.0, 1.0, (2, 3))
-    box = ErrorBox.typed(joint_deg=2.0, obstacle_mm=3.0)
+    box = TypedErrorBox(joint_deg=2.0, obstacle_mm=3.0)
     cell = cell_with(tmp_path, moves, knots).under(box)
     result = verify_robot(cell, Motion(rows, times=times))
     at = np.linspace(0.0, 2.0, 5_001)
@@ -148,7 +148,7 @@ def test_certificates_beside_what_moves(seed: int, tmp_path: Path) -> None:
     file = write(tmp_path, "t.csv", "\n".join(["shoulder_rad,elbow_rad,time_s", *body]))
     cell = cell_with(tmp_path, moves, knots)
     if seed % 2:
-        cell = cell.under(ErrorBox.typed(joint_deg=0.3, base_mm=1.0))
+        cell = cell.under(TypedErrorBox(joint_deg=0.3, base_mm=1.0))
     found = verify_robot(cell, read_path(file, cell.robot))
     assert found.verdict is Verdict.CERTIFIED
     proof, problem = tmp_path / "c", tmp_path / "cell.yaml"
@@ -176,7 +176,7 @@ def test_a_counterexample_beside_what_moves_is_told_in_rows(tmp_path: Path) -> N
     motion = Motion(rows, times=times)
     least = verify_robot(near, motion).least
     asked = replace(near, required_clearance=float(least.lower.min()) - 0.01)
-    result = verify_robot(asked.under(ErrorBox.typed(joint_deg=3.0)), motion)
+    result = verify_robot(asked.under(TypedErrorBox(joint_deg=3.0)), motion)
     (lost,) = result.counterexamples
     assert result.verdict is Verdict.REFUTED
     assert result.nominal_clear

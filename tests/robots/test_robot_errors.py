@@ -16,7 +16,7 @@ from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.geometry.solids import Box, HalfSpace, Sphere
-from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.error_boxes import ErrorBox, TypedErrorBox
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.report.files import VerificationFile
@@ -47,7 +47,7 @@ URDF = """<robot name="two">
     <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
 </robot>
 """
-BOX = ErrorBox.typed(
+BOX = TypedErrorBox(
     joint_deg={"turn": 1.5},
     base_mm=4.0,
     base_deg=0.7,
@@ -217,7 +217,7 @@ def test_each_error_alone_is_covered(robot: Robot) -> None:
 def test_just_beyond_what_is_proved_is_refuted(robot: Robot, seed: int) -> None:
     """By a configuration within the errors, where Coal measures what is told."""
     cell, path = random_cell(robot, np.random.default_rng(seed))
-    errors = ErrorBox.typed(joint_deg=1.5, slide_mm=6.0, base_mm=4.0)
+    errors = TypedErrorBox(joint_deg=1.5, slide_mm=6.0, base_mm=4.0)
     cell, size = replace(cell, errors=errors), [np.radians(1.5), 0.006]
     proved = verify_robot(cell, path).least
     asked = max(0.0, float(proved.lower[:12].min())) + 0.008
@@ -241,7 +241,7 @@ def test_just_beyond_what_is_proved_is_refuted(robot: Robot, seed: int) -> None:
 
 def test_mimic_joints_err_by_their_ratio(robot: Robot) -> None:
     """The finger turns by half of what the joint before it does."""
-    errors = ErrorBox.typed(joint_deg=1.0, slide_mm=2.0)
+    errors = TypedErrorBox(joint_deg=1.0, slide_mm=2.0)
     box = proof_box(robot, Scene(), errors)
     assert box is not None
     expected = [0.0, np.radians(1.0), 0.002, np.radians(0.5)]
@@ -265,7 +265,7 @@ def test_errors_of_what_there_is_not(
 ) -> None:
     cell = random_cell(robot, np.random.default_rng(0))[0]
     with pytest.raises(InvalidInput, match=words):
-        cell.under(ErrorBox.typed(**errors))  # type: ignore[arg-type]
+        cell.under(TypedErrorBox(**errors))  # type: ignore[arg-type]
 
 
 def verified(folder: Path, errors: str, *options: str) -> int:

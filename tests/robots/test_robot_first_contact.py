@@ -48,9 +48,9 @@ def test_a_contact_begins_and_ends_where_the_closed_form_says(
     row = slid(tmp_path, [0.0, 0.2, 0.5, 0.1, 0.1, 0.6, -0.3], required)
     limit, off = ROOM - required, 2e-6
     assert row.verdict is Verdict.REFUTED
-    assert row.first == pytest.approx(1.0 + (limit - 0.2) / 0.3, abs=off)
-    assert row.last == pytest.approx(5.0 + (0.6 - limit) / 0.9, abs=off)
-    assert (row.too_close, row.stretches) == (4, 2)
+    assert row.first_moment == pytest.approx(1.0 + (limit - 0.2) / 0.3, abs=off)
+    assert row.last_moment == pytest.approx(5.0 + (0.6 - limit) / 0.9, abs=off)
+    assert (row.too_close_intervals, row.too_close_stretches) == (4, 2)
     assert "4 intervals in 2 stretches" in row.where
 
 
@@ -58,16 +58,21 @@ def test_a_contact_all_along_begins_with_the_first_row_and_ends_with_the_last(
     tmp_path: Path,
 ) -> None:
     row = slid(tmp_path, [0.5, 0.6, 0.5], 0.0)
-    assert (row.first, row.last, row.too_close, row.stretches) == (0.0, 2.0, 2, 1)
+    assert (
+        row.first_moment,
+        row.last_moment,
+        row.too_close_intervals,
+        row.too_close_stretches,
+    ) == (0.0, 2.0, 2, 1)
     row = slid(tmp_path, [0.5], 0.0)
-    assert (row.first, row.too_close) == (0.0, 1)
+    assert (row.first_moment, row.too_close_intervals) == (0.0, 1)
 
 
 def test_a_clear_motion_has_no_contact(tmp_path: Path) -> None:
     row = slid(tmp_path, [0.0, 0.3, 0.0], 0.05)
     assert row.verdict is Verdict.CERTIFIED
-    assert np.isnan([row.first, row.last]).all()
-    assert row.too_close == 0
+    assert np.isnan([row.first_moment, row.last_moment]).all()
+    assert row.too_close_intervals == 0
 
 
 def test_times_that_count_from_1970_are_halved_as_far_as_they_differ(
@@ -75,8 +80,8 @@ def test_times_that_count_from_1970_are_halved_as_far_as_they_differ(
 ) -> None:
     """A waypoint is a second and its time a multiple of 0.24 us."""
     row = slid(tmp_path, [0.0, 0.6, 0.0], 0.05, start=1.7e9)
-    assert row.first == pytest.approx(0.35 / 0.6, abs=2e-6)
-    assert row.last == pytest.approx(2.0 - 0.35 / 0.6, abs=2e-6)
+    assert row.first_moment == pytest.approx(0.35 / 0.6, abs=2e-6)
+    assert row.last_moment == pytest.approx(2.0 - 0.35 / 0.6, abs=2e-6)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -99,7 +104,7 @@ def test_contacts_beside_what_moves_are_those_of_dense_samples(
     assert close.any() == (row.verdict is Verdict.REFUTED)
     assert close.any()
     (met,) = np.nonzero(close)
-    assert row.first == pytest.approx(moments[met[0]], abs=1e-4)
-    assert row.last == pytest.approx(moments[met[-1]], abs=1e-4)
+    assert row.first_moment == pytest.approx(moments[met[0]], abs=1e-4)
+    assert row.last_moment == pytest.approx(moments[met[-1]], abs=1e-4)
     intervals = np.unique(np.minimum(moments[met].astype(int), 2))
-    assert row.too_close == len(intervals)
+    assert row.too_close_intervals == len(intervals)

@@ -102,8 +102,8 @@ def test_links_that_meet_are_named_at_their_first_moment_and_at_their_worst() ->
     result = verify(problem, motion, load_robot(arm))
     (row,) = [check for check in result.checks if check.name.startswith("clearance")]
     assert row.verdict is Verdict.REFUTED
-    assert moments[lost - 1] - 1e-3 <= row.first <= moments[lost] + 1e-3
-    assert row.first < row.moment
+    assert moments[lost - 1] - 1e-3 <= row.first_moment <= moments[lost] + 1e-3
+    assert row.first_moment < row.moment
     assert "link 1 and link 4; first too close at waypoint" in row.where
 
 
@@ -117,12 +117,12 @@ def test_a_contact_has_its_end_and_its_intervals(n: int) -> None:
         if one.name == "clearance from obstacles"
     )  # fmt: skip
     enters = 0.3407 * (n - 1)
-    assert row.first == pytest.approx(enters, abs=2e-6)
-    assert row.last == pytest.approx(4 * (n - 1) - enters, abs=2e-6)
+    assert row.first_moment == pytest.approx(enters, abs=2e-6)
+    assert row.last_moment == pytest.approx(4 * (n - 1) - enters, abs=2e-6)
     x0 = motion.x0
     above = (np.maximum(x0[:-1], x0[1:]) > 0.3407).sum()
-    assert row.too_close == above
-    assert row.stretches == 2
+    assert row.too_close_intervals == above
+    assert row.too_close_stretches == 2
     assert f"{above} intervals in 2 stretches" in row.where
 
 
@@ -133,7 +133,7 @@ def test_a_motion_that_ends_too_close_is_so_to_its_end() -> None:
     ):
         judged = verify(wall(0.05), motion, load_robot(ARM))
         (row,) = (one for one in judged.checks if "obstacles" in one.name)
-        assert row.stretches == 1
-        assert row.too_close == max(1, motion.n_samples - 1)
-        assert row.last == pytest.approx(last, abs=1e-6)
-        assert row.stretches == 1
+        assert row.too_close_stretches == 1
+        assert row.too_close_intervals == max(1, motion.n_samples - 1)
+        assert row.last_moment == pytest.approx(last, abs=1e-6)
+        assert row.too_close_stretches == 1

@@ -74,7 +74,7 @@ def test_a_ball_meets_a_capsule_when_the_closed_form_says(tmp_path: Path) -> Non
     found = judged(problem, motion_of(STRAIGHT, np.array([0.0, 4.0])))
     assert found.verdict is Verdict.REFUTED
     row = next(c for c in found.checks if c.name == "clearance from obstacles")
-    assert row.first == pytest.approx((1.0 + 1.1) / 4.0, abs=2e-6)
+    assert row.first_moment == pytest.approx((1.0 + 1.1) / 4.0, abs=2e-6)
     assert "ball" in row.where
     assert f"({1.0 + 1.1:.4f} s)" in row.where
 
@@ -134,7 +134,7 @@ def test_a_door_that_opens_in_time_and_one_too_late(tmp_path: Path) -> None:
     assert row.verdict is Verdict.REFUTED
     assert "door" in row.where
     # The tip's cap is at 5 mm from the shut leaf at x = 1475, when it still stands.
-    assert row.first == pytest.approx((1.475 - 0.94) / 0.5 / 3.0, abs=1e-3)
+    assert row.first_moment == pytest.approx((1.475 - 0.94) / 0.5 / 3.0, abs=1e-3)
 
 
 def sliding_door(early_mm: float) -> str:
@@ -173,7 +173,7 @@ def test_a_door_a_tenth_of_a_millimetre_too_early(
     if verdict == "refuted":
         row = next(c for c in found.checks if c.name == "clearance from obstacles")
         begin = float(times[np.flatnonzero(off < least)[0]])
-        assert 10.0 * row.first == pytest.approx(begin, abs=1e-3)
+        assert 10.0 * row.first_moment == pytest.approx(begin, abs=1e-3)
 
 
 # ---- random problems against dense sampling ------------------------------------------

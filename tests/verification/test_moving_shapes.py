@@ -95,9 +95,9 @@ def compare(one: Verification, other: Verification) -> None:
     assert inside[0] == inside[1]
     if a.verdict is Verdict.CERTIFIED:
         assert a.worst == pytest.approx(b.worst, abs=3e-6)
-    if a.verdict is Verdict.REFUTED and a.first == a.first:
-        assert a.first == pytest.approx(b.first, abs=2e-6)
-        assert a.last == pytest.approx(b.last, abs=2e-6)
+    if a.verdict is Verdict.REFUTED and a.first_moment == a.first_moment:
+        assert a.first_moment == pytest.approx(b.first_moment, abs=2e-6)
+        assert a.last_moment == pytest.approx(b.last_moment, abs=2e-6)
     assert one.joint_error == pytest.approx(other.joint_error, abs=3e-5, nan_ok=True)
 
 

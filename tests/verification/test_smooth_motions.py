@@ -108,8 +108,8 @@ def test_a_spline_that_overshoots_between_clear_knots(
     if verdict == "refuted":
         s = np.linspace(0.0, 1.0, 2_000_001)
         near = s[0.6 * s * (1.0 - s) ** 2 > 0.6 * BULGE - 1e-4]
-        assert check.first == pytest.approx(float(near[0]), abs=1e-4)
-        assert check.last == pytest.approx(float(near[-1]), abs=1e-4)
+        assert check.first_moment == pytest.approx(float(near[0]), abs=1e-4)
+        assert check.last_moment == pytest.approx(float(near[-1]), abs=1e-4)
     # Its chord stands still, 88.8 mm farther off.
     still = row(judged(problem, motion_of(q, times)), "clearance from obstacles")
     assert still.verdict is Verdict.CERTIFIED

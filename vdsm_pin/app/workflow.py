@@ -41,7 +41,7 @@ from vdsm_pin.report.folder import (
     staged,
 )
 from vdsm_pin.report.pdf import print_page
-from vdsm_pin.report.run_record import PlanRun, RunRecord, now
+from vdsm_pin.report.run_record import RunRecord, now
 from vdsm_pin.report.tables import (
     ClearanceCsv,
     write_cables,
@@ -164,8 +164,7 @@ def plan_to_folder(
         refinement = plan_and_verify(problem, strategy, robot, deadline=deadline)
     except (Infeasible, OutOfTime) as error:
         with staged(folder) as aside:
-            run = PlanRun(strategy, record)
-            write_no_plan(aside / NO_PLAN, problem, error, run)
+            write_no_plan(aside / NO_PLAN, problem, error, strategy, record)
         error.page = folder / NO_PLAN
         raise
     plan = refinement.plan

@@ -132,7 +132,7 @@ class ErrorOptions(NamedTuple):
             InvalidInput: If one is no number, or negative, or has no name and needs
                 one.
         """
-        from vdsm_pin.problem.error_boxes import ErrorBox
+        from vdsm_pin.problem.error_boxes import TypedErrorBox
 
         shifts = _by_name("--obstacle-error-mm", self.obstacle_error_mm or ())
         turns = _by_name("--obstacle-error-deg", self.obstacle_error_deg or ())
@@ -143,14 +143,14 @@ class ErrorOptions(NamedTuple):
         if isinstance(slide, list):
             message = f"--slide-error-mm is {slide_mm!r}, expected a number or JOINT=MM"
             raise InvalidInput(message)
-        return ErrorBox.typed(
-            _of_joints("--joint-error-deg", self.joint_error_deg),
-            self.base_error_mm,
-            shifts.pop("", 0.0),
-            self.base_error_deg,
-            shifts,
-            turns,
-            slide,
+        return TypedErrorBox(
+            joint_deg=_of_joints("--joint-error-deg", self.joint_error_deg),
+            base_mm=self.base_error_mm,
+            base_deg=self.base_error_deg,
+            obstacle_mm=shifts.pop("", 0.0),
+            obstacles_mm=shifts,
+            obstacles_deg=turns,
+            slide_mm=slide,
         )
 
     def words(self) -> tuple[str, ...]:

@@ -104,58 +104,6 @@ class ErrorBox:
                 )
                 raise InvalidInput(message)
 
-    @classmethod
-    def typed(
-        cls,
-        joint_deg: float | Sequence[float] | Mapping[str, float] = 0.0,
-        base_mm: float = 0.0,
-        obstacle_mm: float = 0.0,
-        base_deg: float = 0.0,
-        obstacles_mm: Mapping[str, float] = NOTHING,
-        obstacles_deg: Mapping[str, float] = NOTHING,
-        slide_mm: float | Mapping[str, float] = 0.0,
-    ) -> "ErrorBox":
-        """The box from degrees and millimetres, as people state them.
-
-        Args:
-            joint_deg: Of every angle, or one for each joint from the base, or of a
-                robot's joints by name; [deg].
-            base_mm: As `base`; [mm].
-            obstacle_mm: As `obstacle`; [mm].
-            base_deg: As `base_turn`; [deg].
-            obstacles_mm: Shifts of single obstacles by their names; [mm].
-            obstacles_deg: Their turns; [deg].
-            slide_mm: Of every joint of a robot that slides, or of some by name; [mm].
-
-        Raises:
-            InvalidInput: If a value is negative or not finite.
-        """
-        turns = joint_deg if isinstance(joint_deg, Mapping) else {}
-        shifts = slide_mm if isinstance(slide_mm, Mapping) else {}
-        plain = 0.0 if isinstance(joint_deg, Mapping) else joint_deg
-        one = plain if isinstance(plain, (int, float)) else 0.0
-        each = () if isinstance(plain, (int, float)) else plain
-        names = dict.fromkeys((*obstacles_mm, *obstacles_deg))
-        return ErrorBox(
-            joint=float(np.deg2rad(one)),
-            base=base_mm / MM_PER_M,
-            obstacle=obstacle_mm / MM_PER_M,
-            base_turn=float(np.deg2rad(base_deg)),
-            joints=tuple((error, error) for error in np.deg2rad(each).tolist()),
-            obstacles=tuple(
-                ObstacleError(
-                    name,
-                    obstacles_mm.get(name, 0.0) / MM_PER_M,
-                    float(np.deg2rad(obstacles_deg.get(name, 0.0))),
-                )
-                for name in names
-            ),
-            slide=0.0 if isinstance(slide_mm, Mapping) else slide_mm / MM_PER_M,
-            named=JointError.of(
-                turns, {name: value / MM_PER_M for name, value in shifts.items()}
-            ),
-        )
-
     def with_joint(self, joint: float) -> "ErrorBox":
         """The same with one error of all joint angles; [rad]."""
         return replace(self.widened(ErrorBox()), joint=joint, joints=())
@@ -213,3 +161,65 @@ class ErrorBox:
 
 PLAIN = ("joint", "base", "obstacle", "base_turn", "slide")
 """The errors that are one number."""
+
+
+class TypedErrorBox(ErrorBox):
+    """How far the real motion may stray from the nominal one, as people state it.
+
+    Args:
+        joint_deg: Largest error of every joint angle, or one for each joint from the
+            base, or of a robot's joints by name; [deg].
+        base_mm: Largest displacement of the base in any direction; [mm].
+        base_deg: Largest turn of the base about its origin; [deg].
+        obstacle_mm: Largest displacement of an obstacle's surface; [mm].
+        obstacles_mm: That of single obstacles by their names; [mm].
+        obstacles_deg: Their largest turns, about their middles; [deg].
+        slide_mm: Of every joint of a robot that slides, or of some by name; [mm].
+
+    Raises:
+        InvalidInput: If a value is negative or not finite.
+
+    Example:
+        >>> TypedErrorBox(base_mm=2.0).base
+        0.002
+        >>> TypedErrorBox(obstacles_mm={"crate": 5.0}).of_obstacle("crate").shift
+        0.005
+    """
+
+    def __init__(
+        self,
+        *,
+        joint_deg: float | Sequence[float] | Mapping[str, float] = 0.0,
+        base_mm: float = 0.0,
+        base_deg: float = 0.0,
+        obstacle_mm: float = 0.0,
+        obstacles_mm: Mapping[str, float] = NOTHING,
+        obstacles_deg: Mapping[str, float] = NOTHING,
+        slide_mm: float | Mapping[str, float] = 0.0,
+    ) -> None:
+        """The box in radians and metres."""
+        turns = joint_deg if isinstance(joint_deg, Mapping) else {}
+        shifts = slide_mm if isinstance(slide_mm, Mapping) else {}
+        plain = 0.0 if isinstance(joint_deg, Mapping) else joint_deg
+        one = plain if isinstance(plain, (int, float)) else 0.0
+        each = () if isinstance(plain, (int, float)) else plain
+        names = dict.fromkeys((*obstacles_mm, *obstacles_deg))
+        super().__init__(
+            joint=float(np.deg2rad(one)),
+            base=base_mm / MM_PER_M,
+            obstacle=obstacle_mm / MM_PER_M,
+            base_turn=float(np.deg2rad(base_deg)),
+            joints=tuple((error, error) for error in np.deg2rad(each).tolist()),
+            obstacles=tuple(
+                ObstacleError(
+                    name,
+                    obstacles_mm.get(name, 0.0) / MM_PER_M,
+                    float(np.deg2rad(obstacles_deg.get(name, 0.0))),
+                )
+                for name in names
+            ),
+            slide=0.0 if isinstance(slide_mm, Mapping) else slide_mm / MM_PER_M,
+            named=JointError.of(
+                turns, {name: value / MM_PER_M for name, value in shifts.items()}
+            ),
+        )

@@ -60,22 +60,12 @@ def in_file_frame(verification: Verification, point: FloatArray) -> Point | None
 
 def check_row(check: Check, time: float | None = None) -> CheckRow:
     """One check as its row, with the time of its moment where that is known; [s]."""
-    return CheckRow(
-        name=check.name,
-        verdict=check.verdict.value,
-        count=check.count,
-        worst=finite(check.worst),
-        limit=finite(check.limit),
-        unit=check.unit,
-        moment=finite(check.moment),
-        time_s=time,
-        first_moment=finite(check.first),
-        last_moment=finite(check.last),
-        too_close_intervals=check.too_close or None,
-        too_close_stretches=check.stretches or None,
-        where=check.where,
-        deeper=check.deeper,
-    )
+    known = asdict(check) | {"verdict": check.verdict.value}
+    for name, value in known.items():
+        missing = name.startswith("too_close") and not value
+        missing |= isinstance(value, float) and not np.isfinite(value)
+        known[name] = None if missing else value
+    return CheckRow(**known, time_s=time)
 
 
 def _both(pair: Pair) -> dict[str, Any]:
@@ -168,18 +158,10 @@ def min_clearance(verification: Verification) -> MinClearance | None:
     index = nearest_to_obstacle(verification)
     if index is None:
         return None
-    row = verification.approaches[index]
-    return MinClearance(
-        lower_m=finite(verification.min_clearance),
-        upper_m=finite(row.upper),
-        moment=row.moment,
-        time_s=verification.time_at(row.moment),
-        link=row.pair.link,
-        body=row.pair.body or None,
-        obstacle=row.pair.obstacle,
-        deeper=row.deeper,
-        coal_m=finite(row.coal),
-    )
+    row = closest_row(verification, verification.approaches[index])
+    known = row.model_dump(include=set(MinClearance.model_fields))
+    least = finite(verification.min_clearance)
+    return MinClearance.model_validate(known | {"lower_m": least})
 
 
 def _own_facts(verification: Verification) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from vdsm_pin.report.inputs import assumption
 from vdsm_pin.report.page_data import impasse_data, report_data, view_data
 from vdsm_pin.report.reason import failing, left_out_words, nearest_to_obstacle
 from vdsm_pin.report.rows import Point
-from vdsm_pin.report.run_record import PlanRun, machine, versions
+from vdsm_pin.report.run_record import RunRecord, machine, versions
 from vdsm_pin.report.scene_rows import scene_rows
 from vdsm_pin.report.thinning import MOST_DRAWN
 from vdsm_pin.report.words import (
@@ -32,6 +32,7 @@ from vdsm_pin.report.words import (
     counted,
     depth,
     errors,
+    finite,
     limit,
     lost,
     measured,
@@ -158,7 +159,7 @@ def write_report(
         obstacles=scene_rows(verification.problem),
         drawn=data.triangles,
         worst=nearest_to_obstacle(verification),
-        failing=failing(verification),
+        first_bad=next((finite(one.moment) for one in failing(verification)), None),
         left_out=left_out_words(file.left_out),
     )
     path.write_text(page, encoding="utf-8")
@@ -189,7 +190,11 @@ def export_page(page: str, asked: str, size: tuple[int, int]) -> str:
 
 
 def write_no_plan(
-    path: Path, problem: PlanningProblem, error: VdsmError, run: PlanRun
+    path: Path,
+    problem: PlanningProblem,
+    error: VdsmError,
+    strategy: str,
+    record: RunRecord,
 ) -> None:
     """The page of a search that ended without a plan: why, how far it came, the arm.
 
@@ -197,7 +202,8 @@ def write_no_plan(
         path: The page.
         problem: What was asked.
         error: What ended the search.
-        run: How it was asked for.
+        strategy: Name of the strategy.
+        record: The run.
     """
     place = impasse_of(problem, error)
     page = rendered(
@@ -207,7 +213,8 @@ def write_no_plan(
         outcome_word=TIME_LIMIT if isinstance(error, OutOfTime) else "infeasible",
         message=str(error),
         searched=isinstance(error, NoPlanFound | OutOfTime),
-        run=run,
+        strategy=strategy,
+        record=record,
         versions=versions(),
         machine=machine(),
         data=impasse_data(problem, place),

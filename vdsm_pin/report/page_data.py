@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -230,7 +230,11 @@ def report_data(verification: Verification) -> PageData:
     obstacles = verification.problem.scene.obstacles
     drawn = [obstacles[k] for k in nearest_obstacles(verification, MOST_DRAWN)]
     scene, motion = _drawn(verification, drawn, shown)
-    marks = [asdict(one) for one in failing(verification) if one.moment is not None]
+    marks = [
+        {"name": one.name, "verdict": one.verdict.value, "moment": one.moment}
+        for one in failing(verification)
+        if np.isfinite(one.moment)
+    ]
     near = [closest_data(verification, row) for row in verification.approaches]
     text = embedded(_page(scene, motion, near) | {"marks": marks, "charts": plots})
     triangles = {solid["name"]: solid["count"] for solid in scene["obstacles"]}

@@ -2,14 +2,19 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Final
 
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.report.rows import LeftOutRow
 from vdsm_pin.report.words import depth, finite, percent, place, quantity
 from vdsm_pin.verification.inside import ARM, LINKS, surfaces
-from vdsm_pin.verification.records import ArmVerification, Verdict, Verification
+from vdsm_pin.verification.records import (
+    ArmVerification,
+    Check,
+    Verdict,
+    Verification,
+)
 
 _PASSED: Final = Verdict.CERTIFIED
 
@@ -20,22 +25,10 @@ def nearest_to_obstacle(verification: Verification) -> int | None:
     return next(near, None)
 
 
-@dataclass(frozen=True)
-class Failing:
-    """A check that did not pass, and when its worst case happens, in waypoints."""
-
-    name: str
-    verdict: str
-    moment: float | None
-
-
-def failing(verification: Verification) -> tuple[Failing, ...]:
+def failing(verification: Verification) -> tuple[Check, ...]:
     """The checks that did not pass: what decides the verdict first."""
     bad = [check for check in verification.checks if check.verdict is not _PASSED]
-    bad.sort(key=lambda check: check.verdict is not verification.verdict)
-    return tuple(
-        Failing(check.name, check.verdict.value, finite(check.moment)) for check in bad
-    )
+    return tuple(sorted(bad, key=lambda one: one.verdict is not verification.verdict))
 
 
 def reason(verification: Verification) -> str:

@@ -58,19 +58,6 @@ class RunRecord:
             object.__setattr__(self, name, printable(getattr(self, name)))
 
 
-@dataclass(frozen=True)
-class PlanRun:
-    """How a plan was asked for, for a page about a search without one.
-
-    Args:
-        strategy: Name of the strategy.
-        record: The run.
-    """
-
-    strategy: str
-    record: RunRecord
-
-
 def now() -> str:
     """The time in UTC to the second, or what SOURCE_DATE_EPOCH says instead."""
     fixed = os.environ.get("SOURCE_DATE_EPOCH", "")

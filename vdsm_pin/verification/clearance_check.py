@@ -161,10 +161,10 @@ def _first(row: Check, contact: FirstContact) -> Check:
     return replace(
         row,
         where=where,
-        first=contact.moment,
-        last=contact.last,
-        too_close=contact.intervals,
-        stretches=contact.stretches,
+        first_moment=contact.moment,
+        last_moment=contact.last,
+        too_close_intervals=contact.intervals,
+        too_close_stretches=contact.stretches,
     )
 
 

@@ -177,10 +177,10 @@ def enclosed_checks(
         worst=worst,
         where="; ".join(f"the arm is inside {name!r}" for name in around),
         moment=0.0,
-        first=0.0,
-        last=nan,
-        too_close=0,
-        stretches=0,
+        first_moment=0.0,
+        last_moment=nan,
+        too_close_intervals=0,
+        too_close_stretches=0,
         deeper=True,
     )
     return refuted, *rows[1:]

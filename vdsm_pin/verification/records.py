@@ -56,10 +56,12 @@ class Check:
             13; NaN where it has no time.
         deeper: Whether `worst` is a depth at which the link's axis meets the body: it
             may be deeper, since no depth beyond the link's radius is measured.
-        first: When the limit is first broken, where that was looked for; NaN else.
-        last: When it is last broken; NaN where that was not looked for.
-        too_close: Of a clearance, the intervals it is lost in; 0 where not counted.
-        stretches: How many runs of neighbours those make.
+        first_moment: When the limit is first broken, where that was looked for; NaN
+            else.
+        last_moment: When it is last broken; NaN where that was not looked for.
+        too_close_intervals: Of a clearance, the intervals it is lost in; 0 where not
+            counted.
+        too_close_stretches: How many runs of neighbours those make.
     """
 
     name: str
@@ -71,10 +73,10 @@ class Check:
     where: str = ""
     moment: float = nan
     deeper: bool = False
-    first: float = nan
-    last: float = nan
-    too_close: int = 0
-    stretches: int = 0
+    first_moment: float = nan
+    last_moment: float = nan
+    too_close_intervals: int = 0
+    too_close_stretches: int = 0
 
 
 def is_deepest(clearance: float, link_radius: float) -> bool:
