@@ -15,6 +15,7 @@ from watched_pages import NEEDS_CHROMIUM, Watched, pixels
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.errors import NoPlanFound, Reached
 from vdsm_pin.problem.scene import Scene
+from vdsm_pin.report.charts import packed
 from vdsm_pin.report.facts import verification_file
 from vdsm_pin.report.html import write_no_plan, write_report
 
@@ -220,6 +221,32 @@ def test_the_read_out_says_what_is_proved_at_the_slider(report: Watched) -> None
         assert shown == pytest.approx(max(lower.min(), 0.0041) * 1000, abs=2e-3)
         told = page.locator("[data-slider]").get_attribute("aria-valuetext")
         assert text in told
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "words"),
+    [
+        (-200.0, -150.0, "link 1 meets ball"),
+        (0.0, 0.0, "link 1 meets ball"),
+        (-200.0, 1.0, "link 1 may meet ball"),
+        (7.0, 8.0, "link 1 from ball: at least 7.000 mm"),
+    ],
+)
+def test_the_read_out_does_not_give_the_depth_of_what_meets(
+    report: Watched, lower: float, upper: float, words: str
+) -> None:
+    charts = [
+        {
+            "id": f"clearance-{kind}",
+            "limits": [{"value": 5.0}],
+            "series": [{"name": name, "values": packed(lower), "upper": packed(upper)}],
+        }
+        for kind, name in (("link", "link 1"), ("obstacle", "ball"))
+    ]
+    script = "charts => new Clearances(charts, { place: () => [0] }).at(0)"
+    told = report.page.evaluate(script, charts)
+    assert told["text"] == words
+    assert told["short"] is (lower < 5.0)
 
 
 def test_plots_run_over_waypoints_or_the_way_of_the_tip(report: Watched) -> None:

@@ -57,13 +57,15 @@ class Clearances {
     this.motion = motion;
     this.required = of("clearance-link").limits[0].value;
     [this.links, this.obstacles] = ["clearance-link", "clearance-obstacle"].map((id) =>
-      of(id).series.map(({ name, values }) => ({ name, values: unpack(values, Float32Array) })));
+      of(id).series.map(({ name, values, upper }) =>
+        ({ name, values: unpack(values, Float32Array), upper: unpack(upper, Float32Array) })));
   }
 
   least(series, k) {
     return series.reduce((best, one) => {
-      const value = one.values[Math.min(k, one.values.length - 1)];
-      return best === null || value < best.value ? { name: one.name, value } : best;
+      const at = Math.min(k, one.values.length - 1);
+      const [value, upper] = [one.values[at], one.upper[at]];
+      return best === null || value < best.value ? { name: one.name, value, upper } : best;
     }, null);
   }
 
@@ -72,7 +74,12 @@ class Clearances {
     const [link, obstacle] = [this.least(this.links, k), this.least(this.obstacles, k)];
     const short = !(link.value >= this.required);
     if (!Number.isFinite(link.value)) return { text: "clearance not known here", short };
-    const from = Math.abs(obstacle.value - link.value) < 1e-3 ? ` from ${obstacle.name}` : "";
+    const known = Math.abs(obstacle.value - link.value) < 1e-3;
+    if (link.value < 0 || link.upper <= 0) {
+      const meets = link.upper <= 0 ? "meets" : "may meet";
+      return { text: `${link.name} ${meets} ${known ? obstacle.name : "an obstacle"}`, short };
+    }
+    const from = known ? ` from ${obstacle.name}` : "";
     return { text: `${link.name}${from}: at least ${lengthText(link.value / 1000)}`, short };
   }
 }
