@@ -231,7 +231,7 @@ def report_data(verification: Verification) -> PageData:
     drawn = [obstacles[k] for k in nearest_obstacles(verification, MOST_DRAWN)]
     scene, motion = _drawn(verification, drawn, shown)
     marks = [
-        {"name": one.name, "verdict": one.verdict.value, "moment": one.moment}
+        {"name": one.name, "verdict": one.verdict.value, "moment": float(one.moment)}
         for one in failing(verification)
         if np.isfinite(one.moment)
     ]

@@ -1,8 +1,8 @@
 """The least clearance of every pair of a cell, and a ball in both where they meet."""
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
-from typing import Final
+from dataclasses import replace
+from typing import Any, Final
 
 import numpy as np
 
@@ -22,8 +22,6 @@ MEETING: Final = 2.0 * TOLERANCES.bracket_gap
 
 BESIDE: Final = (0.0, 0.01, -0.01, 0.05, -0.05)
 """Where a ball in both is looked for, beside the moment at which bodies meet; [-]."""
-
-POINTS: Final = ("link_point", "other_point")
 
 
 def named_pairs(cell: Cell) -> tuple[Pair, ...]:
@@ -94,7 +92,7 @@ def _met(
 ) -> LeastClearances:
     """The same, with the balls in both bodies that are found."""
     near = (least.verdict != CERTIFIED) & (least.upper <= MEETING)
-    changed = {one.name: getattr(least, one.name).copy() for one in fields(least)}
+    changed = dict[int, tuple[Any, ...]]()
     beside = min(1.0, span[1] - span[0]) * np.array(BESIDE)
     for k in np.flatnonzero(near).tolist():
         moment = least.interval[k] + least.time[k]
@@ -106,12 +104,10 @@ def _met(
             bodies = cell.placed(pairs[k], pose)
             radius, centre = common_ball(*bodies, middle, enough)
             if radius > 0.0:
-                found = intervals[at], shares[at], -radius, REFUTED, centre, centre
-                names = "interval", "time", "upper", "verdict", *POINTS
-                for name, value in zip(names, found, strict=True):
-                    changed[name][k] = value
+                when = intervals[at], shares[at], least.lower[k]
+                changed[k] = *when, -radius, REFUTED, centre, centre
                 break
-    return LeastClearances(**changed)
+    return least.with_rows(changed)
 
 
 def told(least: LeastClearances, knots: Knots) -> LeastClearances:

@@ -22,11 +22,11 @@ from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove
-from vdsm_pin.proof.terms import CERTIFIED, REFUTED
+from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import worst_location
-from vdsm_pin.verification.records import ClearanceProfile, LeastClearances, Pair
+from vdsm_pin.verification.records import ClearanceProfile, Pair
 
 
 class Place(NamedTuple):
@@ -126,15 +126,10 @@ def by_mesh(cell: Cell, located: Mapping[int, Place]) -> dict[str, Location]:
     return {name: worst_location(each) for name, each in found.items()}
 
 
-def enclosed(least: LeastClearances, located: Mapping[int, Place]) -> LeastClearances:
-    """The least clearances with meshes as solids: no room for a link inside of one."""
-    changed = {one.name: getattr(least, one.name).copy() for one in fields(least)}
-    for k, one in located.items():
-        if one.where.side is Side.INSIDE:
-            found = 0, 0.0, 0.0, 0.0, REFUTED, one.point, one.point
-            for values, value in zip(changed.values(), found, strict=True):
-                values[k] = value
-    return LeastClearances(**changed)
+def points_inside(located: Mapping[int, Place]) -> dict[int, FloatArray]:
+    """A point of each link that begins inside a mesh, by the number of the pair."""
+    found = located.items()
+    return {k: one.point for k, one in found if one.where.side is Side.INSIDE}
 
 
 def enclosed_contacts(
@@ -143,7 +138,7 @@ def enclosed_contacts(
     located: Mapping[int, Place],
 ) -> tuple[FirstContact, ...]:
     """The first contacts: of a link that begins inside a mesh it is the first row."""
-    inside = [k for k, one in located.items() if one.where.side is Side.INSIDE]
+    inside = list(points_inside(located))
     if not inside:
         return contacts
     between = (one for one in contacts if not one.pair.obstacle)
@@ -155,13 +150,12 @@ def enclosed_profile(
 ) -> ClearanceProfile:
     """The profile with meshes as solids, until links that begin inside may come out."""
     changed = {one.name: getattr(profile, one.name).copy() for one in fields(profile)}
-    for k, one in located.items():
-        if one.where.side is Side.INSIDE:
-            pair, n = cell.pairs[k], len(cell.robot.bodies)
-            met = changed["obstacle_lower"][:, pair.one - n] <= 0.0
-            inside = ~np.logical_or.accumulate(met)
-            for name, column in (("link", pair.other), ("obstacle", pair.one - n)):
-                for side in ("lower", "upper"):
-                    values = changed[f"{name}_{side}"]
-                    values[inside, column] = np.minimum(values[inside, column], 0.0)
+    for k in points_inside(located):
+        pair, n = cell.pairs[k], len(cell.robot.bodies)
+        met = changed["obstacle_lower"][:, pair.one - n] <= 0.0
+        inside = ~np.logical_or.accumulate(met)
+        for name, column in (("link", pair.other), ("obstacle", pair.one - n)):
+            for side in ("lower", "upper"):
+                values = changed[f"{name}_{side}"]
+                values[inside, column] = np.minimum(values[inside, column], 0.0)
     return ClearanceProfile(**changed)

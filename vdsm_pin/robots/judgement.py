@@ -25,10 +25,10 @@ from vdsm_pin.robots.errors import proof_box
 from vdsm_pin.robots.first_contact import robot_contacts
 from vdsm_pin.robots.inside import (
     by_mesh,
-    enclosed,
     enclosed_contacts,
     enclosed_profile,
     locate_links,
+    points_inside,
 )
 from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.robots.rates import largest_of, rate_checks
@@ -41,6 +41,7 @@ from vdsm_pin.verification.clearance import profile_of
 from vdsm_pin.verification.clearance_check import LINKS, Evidence, clearance_checks
 from vdsm_pin.verification.coal_check import Evidence as CoalEvidence
 from vdsm_pin.verification.coal_shapes import disagreement
+from vdsm_pin.verification.enclosed import enclosed_least
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import LINKS as INSIDE
 from vdsm_pin.verification.inside import check_inside
@@ -101,7 +102,7 @@ def verify_robot(
     named = named_pairs(cell)
     proved = least_clearances(cell, cell.pairs, whole, proof)
     coal, measured = _coal(cell, whole, proof, knots)
-    least, besides = enclosed(proved, located), Besides()
+    least, besides = enclosed_least(proved, points_inside(located), 0.0), Besides()
     profile = profile_of(proof.profile, proof.stride, knots, len(robot.bodies))
     none: tuple[Counterexample, ...] = ()
     lost = besides.take(

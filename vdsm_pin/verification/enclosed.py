@@ -6,15 +6,14 @@ reported as minus the link's radius, whatever the depth. That is said of what be
 inside; what reaches out through the surface has its distance from that.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from math import nan
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, frozen
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.verification.inside import Enclosed
 from vdsm_pin.verification.records import (
@@ -111,34 +110,27 @@ def enclosed_profile(
 
 
 def enclosed_least(
-    least: LeastClearances,
-    pairs: Sequence[Pair],
-    problem: PlanningProblem,
-    around: Enclosed,
+    least: LeastClearances, inside: Mapping[int, FloatArray], depth: float
 ) -> LeastClearances:
-    """The least clearances with the meshes around the arm as solids."""
-    numbers = [k for k, pair in enumerate(pairs) if _begins_inside(pair, around)]
-    if not numbers:
-        return least
-    points = [around[pairs[k].obstacle][pairs[k].own] for k in numbers]
-    depth = -problem.manipulator.least_radius
+    """The least clearances with meshes as solids, of an arm or a robot.
 
-    def put(values: FloatArray | IntArray, inside: ArrayLike) -> Any:
-        changed: Any = values.copy()
-        changed[numbers] = inside
-        changed.flags.writeable = False
-        return changed
+    Args:
+        least: What is proved of the surfaces.
+        inside: A point of each pair's body that begins inside the mesh, by the number
+            of the pair, shape (3,); [m].
+        depth: The clearance of such a pair; [m].
+    """
+    rows = {k: (0, 0.0, depth, depth, REFUTED, at, at) for k, at in inside.items()}
+    return least.with_rows(rows) if rows else least
 
-    return replace(
-        least,
-        interval=put(least.interval, 0),
-        time=put(least.time, 0.0),
-        lower=put(least.lower, depth),
-        upper=put(least.upper, depth),
-        verdict=put(least.verdict, REFUTED),
-        link_point=put(least.link_point, points),
-        other_point=put(least.other_point, points),
-    )
+
+def pairs_inside(pairs: Sequence[Pair], around: Enclosed) -> dict[int, FloatArray]:
+    """The pairs of an arm that begin inside, as `enclosed_least` takes them."""
+    return {
+        k: around[pair.obstacle][pair.own]
+        for k, pair in enumerate(pairs)
+        if _begins_inside(pair, around)
+    }
 
 
 def enclosed_approaches(

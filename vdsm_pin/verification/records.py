@@ -1,10 +1,10 @@
 """What a verification returns: verdicts, rows of evidence, brackets."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from math import inf, isfinite, nan
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
@@ -249,6 +249,16 @@ class LeastClearances:
         return LeastClearances(
             *(getattr(self, one.name)[pairs] for one in fields(self))
         )
+
+    def with_rows(self, rows: Mapping[int, Sequence[Any]]) -> "LeastClearances":
+        """The same with others of some pairs, each in the order of the fields."""
+        changed = [getattr(self, one.name).copy() for one in fields(self)]
+        for k, row in rows.items():
+            for values, value in zip(changed, row, strict=True):
+                values[k] = value
+        for values in changed:
+            values.setflags(write=False)
+        return LeastClearances(*changed)
 
 
 ClearanceSink: TypeAlias = Callable[[ClearanceChunk], None]

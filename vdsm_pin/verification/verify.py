@@ -40,6 +40,7 @@ from vdsm_pin.verification.enclosed import (
     enclosed_checks,
     enclosed_least,
     enclosed_profile,
+    pairs_inside,
 )
 from vdsm_pin.verification.first_contact import (
     FirstContact,
@@ -142,6 +143,7 @@ def verify(
         ),
     ]
     survived = asked.survived(proof, located) if joint_error else (nan, nan)
+    inside, depth = pairs_inside(proof.pairs, around), -problem.manipulator.least_radius
     return ArmVerification(
         problem=problem,
         trajectory=trajectory,
@@ -159,7 +161,7 @@ def verify(
         nominal_clear=clear,
         not_done=tuple(asked.besides.not_done),
         time_limit=deadline.limit,
-        least=enclosed_least(least_clearances(proof), proof.pairs, problem, around),
+        least=enclosed_least(least_clearances(proof), inside, depth),
         coal=log.rows(),
     )
 
