@@ -12,7 +12,7 @@ from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.growth import Layers, Population
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, dense_rows
-from vdsm_pin.planner.fewest.pose_kernels import bends_of, clearances_along
+from vdsm_pin.planner.fewest.pose_kernels import bends_of, bow_bounds, clearances_along
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Pricing, build_roadmap
 from vdsm_pin.planner.fewest.roadmap_kernels import pose_shapes
 from vdsm_pin.planner.fewest.route import path_rows, tip_route
@@ -145,6 +145,27 @@ def wandering(task: PlanningProblem, seed: int, count: int) -> Intervals:
         shape.append(int(rng.choice(near)))
     offsets = shapes.offsets(ARM, tips, np.array(shape))
     return Intervals(tips[:-1], tips[1:], offsets[:-1], offsets[1:])
+
+
+def test_joint_centres_bow_out_no_farther_than_their_bounds() -> None:
+    """Also where a link swings past the straight one and the others come back."""
+    rng, share = np.random.default_rng(6), np.linspace(0.0, 1.0, 41)
+    tips = rng.uniform([3.0, -0.4, -0.4], [3.2, 0.4, 0.4], (300, 3))
+    offsets = np.zeros((300, 9, 2))
+    offsets[:, 1:-1] = rng.normal(0.0, 0.02, (300, 7, 2))
+    offsets[1::2, :-1] = offsets[::2, :-1]
+    lines = Intervals(tips[::2], tips[1::2], offsets[::2], offsets[1::2])
+    number = np.repeat(np.arange(150), len(share))
+    places = lines.centres(ARM, number, np.tile(share, 150)).reshape(150, -1, 9, 3)
+    begin, end = places[:, 0], places[:, -1]
+    bounds = np.zeros((150, 9))
+    for row in range(150):
+        bow_bounds(begin[row], end[row], bounds[row])
+    ways = np.linalg.norm(places - begin[:, None], axis=3)
+    ways += np.linalg.norm(places - end[:, None], axis=3)
+    bows = (ways - np.linalg.norm(end - begin, axis=2)[:, None]).max(axis=1) / 2.0
+    assert (bows <= bounds + 1e-12).all()
+    assert (bows[:, 0] / bounds[:, 0]).max() > 0.5
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -7,6 +7,9 @@ import numpy as np
 from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 
+LEANING = 0.3
+"""Part of its length that a link is thought to advance along the rail at least; [-]."""
+
 
 class Lines(NamedTuple):
     """Straight lines in the chart, each an interval."""
@@ -228,6 +231,36 @@ def clearances_along(
 
 
 @compiled
+def bow_bounds(centres: FloatArray, next_centres: FloatArray, bows: FloatArray) -> None:
+    """How far joint centres stray from the straight line between two configurations.
+
+    The tip does not; a link whose projection d goes along a line advances along the
+    rail by a = sqrt(l^2 - d^2), which strays by d'^2 l^2 / 8 a^3 at most. Of directions
+    that go along arcs, and below `LEANING`, it is an estimate.
+
+    Args:
+        centres: Of one configuration, shape (N + 1, 3); [m].
+        next_centres: Of the other; [m].
+        bows: Set to the bounds, the tip's last, shape (N + 1,); [m].
+    """
+    last = centres.shape[0] - 1
+    bows[last] = 0.0
+    for i in range(last - 1, -1, -1):
+        length = turn = 0.0
+        for c in range(3):
+            side = centres[i + 1, c] - centres[i, c]
+            length += side * side
+            if c > 0:
+                turn += (next_centres[i + 1, c] - next_centres[i, c] - side) ** 2
+        a = min(
+            centres[i + 1, 0] - centres[i, 0],
+            next_centres[i + 1, 0] - next_centres[i, 0],
+        )
+        a = max(a, LEANING * np.sqrt(length))
+        bows[i] = bows[i + 1] + turn * length / (8.0 * a**3)
+
+
+@compiled
 def parts_of_pieces(
     begin: Seen,
     end: Seen,
@@ -238,8 +271,9 @@ def parts_of_pieces(
 ) -> IntArray:
     """Into how many parts to cut the way of a piece to see that it is clear.
 
-    No point of a straight piece moves farther than both its ends. The number is what
-    it takes if there is as much clearance on the way as at its ends, as a power of 2.
+    No point of a straight piece moves farther than both its ends, which may bow out on
+    the way (`bow_bounds`). The number is what it takes if there is as much clearance on
+    the way as at its ends, as a power of 2.
 
     Args:
         begin: Configurations where the ways begin.
@@ -257,7 +291,9 @@ def parts_of_pieces(
     finest, long_way, most = cutting
     n_rows, n_links = clearances.shape
     parts = np.zeros((n_rows, n_links), dtype=np.int64)
+    bows = np.zeros(n_links + 1)
     for r in range(n_rows):
+        bow_bounds(centres[r], next_centres[r], bows)
         before = 0.0
         for i in range(n_links + 1):
             if not knees[interval[r], i]:
@@ -265,7 +301,7 @@ def parts_of_pieces(
             square = 0.0
             for c in range(3):
                 square += (next_centres[r, i, c] - centres[r, i, c]) ** 2
-            here = np.sqrt(square)
+            here = np.sqrt(square) + 2.0 * bows[i]
             way, before = max(before, here), here
             if i == 0 or not way > finest:
                 continue
