@@ -12,12 +12,12 @@ from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.growth import Layers, Population
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners, Intervals, dense_rows
+from vdsm_pin.planner.fewest.offset_kernels import mutated_offsets
 from vdsm_pin.planner.fewest.pose_kernels import bends_of, bow_bounds, clearances_along
 from vdsm_pin.planner.fewest.roadmap import CostWeights, Pricing, build_roadmap
 from vdsm_pin.planner.fewest.roadmap_kernels import pose_shapes
 from vdsm_pin.planner.fewest.route import path_rows, tip_route
 from vdsm_pin.planner.fewest.shapes import Shapes, one_knee_shapes
-from vdsm_pin.planner.fewest.vary import vary
 from vdsm_pin.planner.impossible.bounds import prove_tips
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.tolerances import TOLERANCES
@@ -269,7 +269,7 @@ def test_children_differ_from_their_parent_between_two_of_its_knees_only() -> No
                      (ARM.total_length - ARM.stations)
                      / (ARM.total_length - ARM.stations[4]))  # fmt: skip
     parents += hat[:, None] * np.array([0.3, -0.1])
-    children = vary(
+    children = mutated_offsets(
         parents, ARM.stations, np.zeros((n, 2)), rng.random(n), rng.random(n),
         rng.normal(size=(n, 2)) * 0.1,
     )  # fmt: skip

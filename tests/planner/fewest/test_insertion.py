@@ -222,7 +222,7 @@ def test_the_way_through_a_bent_tube_is_one_that_an_arm_can_follow() -> None:
         ]
     ]
     task = bent_tube(-0.2, 0.008, *bends)
-    effort = Insert(population=10, routes=1, returns=2, seed=0, cells=60_000)
+    effort = Insert(population=10, routes=1, backtracks=2, seed=0, cells=60_000)
     judge = judge_of(task)
     space = tip_space(judge, broad_phase(task, link_clearance(task)), effort)
     (route,) = space.routes(task.path.points[0], 1)
@@ -273,10 +273,10 @@ def test_what_is_inserted_keeps_clearance_limits_and_layers() -> None:
     task = two_windows(0.08)
     judge = judge_of(task)
     (route, *_) = space_of(task).routes(task.path.points[0], 1)
-    play = np.full(len(route), 0.02)
-    play[[0, -1]] = 0.0
+    tolerance = np.full(len(route), 0.02)
+    tolerance[[0, -1]] = 0.0
     rng = np.random.default_rng(0)
-    layers = Layers(route, play)
+    layers = Layers(route, tolerance)
     chain = Population(judge, layers, rng, 24, led=True).grow(STRAIGHT, 3)
     assert chain.layer[-1] == len(route) - 1
     assert (np.diff(chain.layer) >= 0).all()
@@ -306,7 +306,7 @@ def test_a_path_behind_a_pipe_is_drawn_in_visits_that_come_home() -> None:
     )
     judge, rows = judge_of(task), path_rows(task.path)
     closed = np.zeros(len(rows.tips), dtype=np.bool_)
-    effort = Insert(population=24, routes=2, returns=3, seed=0)
+    effort = Insert(population=24, routes=2, backtracks=3, seed=0)
     found = insert(judge, space_of(task), rows, closed, effort).found
     assert found is not None
     # Late, one visit is enough, but not none.
@@ -352,7 +352,7 @@ def test_between_directions_the_arm_moves_steadily(
 def test_knees_are_taken_away_and_the_motion_stays_clear() -> None:
     task = two_windows(0.09)
     judge, rows = judge_of(task), path_rows(task.path)
-    effort = Insert(population=10, routes=1, returns=2, seed=0, directed=True)
+    effort = Insert(population=10, routes=1, backtracks=2, seed=0, directed=True)
     closed = np.zeros(len(rows.tips), dtype=np.bool_)
     found = insert(judge, space_of(task), rows, closed, effort).found
     assert found is not None

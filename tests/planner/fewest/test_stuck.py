@@ -126,7 +126,7 @@ def test_a_search_in_vain_tells_where_it_ended(
     tip = task.path.points[-1]
     assert float(rail_distance(arm, tip[None])[0]) < arm.total_length
     clearance = broad_phase(task, link_clearance(task))
-    effort = Insert(population=10, routes=1, returns=1, seed=0)
+    effort = Insert(population=10, routes=1, backtracks=1, seed=0)
     with shown(quiet=0.0):
         *_, outcome = explore(
             task, clearance, 0.0, CostWeights(), Effort((effort,), False)

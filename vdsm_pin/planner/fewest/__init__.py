@@ -15,7 +15,7 @@ Words of these modules:
   tip has it; chart: tip and offsets together, in which motions are straight lines.
 * knee: a joint whose link angle is not zero; shape: the offsets of an arm with few of
   them, at any tip; node: a shape at a tip that keeps limits and clearance.
-* weights: what a strategy prefers among nodes; population: arms that are varied and
+* weights: what a strategy prefers among nodes; population: arms that are mutated and
   selected from layer to layer.
 * start node: the node the motion starts from; connection: a motion off the path; leg: a
   run of nodes that is drawn, or a connection; sequence: all legs.

@@ -1,4 +1,4 @@
-"""The two charts of configurations: how children vary, how centres become numbers.
+"""The two charts of configurations: how arms mutate, how centres become coordinates.
 
 Offsets of the joints' projections hold arms whose links lean ahead, directions of the
 links hold all.
@@ -10,9 +10,9 @@ import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.planner.fewest.direction_kernels import vary_directions
+from vdsm_pin.planner.fewest.direction_kernels import mutated_directions
 from vdsm_pin.planner.fewest.motion import is_directed, standing
-from vdsm_pin.planner.fewest.vary import SCALES, vary
+from vdsm_pin.planner.fewest.offset_kernels import SCALES, mutated_offsets
 
 TURNS: Final = (0.02, 0.08, 0.25)
 """Sizes of a turn of links; [rad]."""
@@ -37,13 +37,13 @@ def coordinates(arm: Manipulator, centres: FloatArray, directed: bool) -> FloatA
     return np.asarray(offsets)
 
 
-def varied(
+def mutated(
     arm: Manipulator,
     shapes: FloatArray,
     moved: FloatArray,
     rng: np.random.Generator,
 ) -> FloatArray:
-    """Children of arms, one each; see `vary` and `vary_directions`.
+    """Children of arms, one each; see `mutated_offsets` and `mutated_directions`.
 
     Args:
         arm: The arm.
@@ -56,11 +56,11 @@ def varied(
         scale = rng.choice(np.array(TURNS), n)
         turn = rng.normal(size=(n, 3)) * scale[:, None]
         first, count, kind = rng.random((3, n))
-        return vary_directions(shapes, first, count, kind, turn)
+        return mutated_directions(shapes, first, count, kind, turn)
     scale = rng.choice(np.array(SCALES), n) * arm.total_length
     shift = rng.normal(size=(n, 2)) * scale[:, None]
     joint, kind = rng.random((2, n))
-    return vary(shapes, arm.stations, moved, joint, kind, shift)
+    return mutated_offsets(shapes, arm.stations, moved, joint, kind, shift)
 
 
 def settled(arm: Manipulator, tips: FloatArray, shapes: FloatArray) -> FloatArray:

@@ -129,7 +129,7 @@ def _on_rail(
 
 
 @compiled
-def vary_directions(
+def mutated_directions(
     axes: FloatArray,
     first: FloatArray,
     count: FloatArray,

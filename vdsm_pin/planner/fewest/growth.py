@@ -2,8 +2,8 @@
 
 Each child keeps its parent's shape, and bends a joint a little, adds a knee or takes
 one away (`charts`). Children that are clear and can be reached from their parent live
-on, half of them the best, half by chance. Where few do, the population is varied at
-rest; where none does, it goes back some layers, is varied there and tries again.
+on, half of them the best, half by chance. Where few do, the population is mutated at
+rest; where none does, it goes back some layers, is mutated there and tries again.
 
 The layers are those of the desired path, from nodes of the roadmap on (`grown_nodes`),
 or those of a route of the tip from the start on (`insertion`). On a route one arm that
@@ -16,21 +16,21 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.planner.fewest.charts import coordinates, settled, turned_towards, varied
+from vdsm_pin.planner.fewest.charts import coordinates, mutated, settled, turned_towards
 from vdsm_pin.planner.fewest.follow_the_leader import led_along
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals, is_directed, standing
 from vdsm_pin.problem.pointing import angles_between
 
-FAMILY: Final = 8
+OFFSPRING: Final = 8
 """Children tried for each parent."""
-RESTS: Final = 4
-"""Rounds of change at rest before a population that dwindles goes back."""
-WIDE: Final = 0.5
+MUTATIONS: Final = 4
+"""Times a population that dwindles is mutated at rest before it goes back."""
+ENOUGH: Final = 0.5
 """Room beyond this part of the body's radius is worth nothing more; [-]."""
 AIMED: Final = 0.5
 """Part of the children that are turned to where the last link shall look; [-]."""
-PULL: Final = 4.0
+AIM_COST: Final = 4.0
 """What an arm is worse for if it looks a radian past where it shall soon; [-]."""
 
 
@@ -40,19 +40,19 @@ class Layers:
 
     Args:
         tips: Shape (l, 3); [m].
-        play: How far the tip may be from there, 0 on the desired path, shape (l,); [m].
+        tolerance: How far the tip may be from there, 0 on the path, shape (l,); [m].
         aims: Where the last link shall look, shape (l, 3); None for anywhere.
-        pull: How much that counts, 0 to 1: from 1 on it must, shape (l,); [-].
+        aim_weight: How much that counts, 0 to 1: from 1 on it must, shape (l,); [-].
     """
 
     tips: FloatArray
-    play: FloatArray
+    tolerance: FloatArray
     aims: FloatArray | None = None
-    pull: FloatArray | None = None
+    aim_weight: FloatArray | None = None
 
-    def pull_at(self, layer: int) -> float:
+    def aim_weight_at(self, layer: int) -> float:
         """How much it counts at a layer where the last link looks; [-]."""
-        return 0.0 if self.pull is None else float(self.pull[layer])
+        return 0.0 if self.aim_weight is None else float(self.aim_weight[layer])
 
     def aims_at(self, layer: int, count: int) -> FloatArray:
         """Where so many last links shall look at a layer, shape (count, 3)."""
@@ -61,9 +61,9 @@ class Layers:
 
     def asked(self, layer: IntArray) -> FloatArray | None:
         """Where last links must look at layers, NaN for anywhere, None for all so."""
-        if self.aims is None or self.pull is None:
+        if self.aims is None or self.aim_weight is None:
             return None
-        return np.where(self.pull[layer, None] >= 1.0, self.aims[layer], np.nan)
+        return np.where(self.aim_weight[layer, None] >= 1.0, self.aims[layer], np.nan)
 
 
 @dataclass(frozen=True)
@@ -132,12 +132,12 @@ class Population:
         self.judge, self.layers, self.rng = judge, layers, rng
         self.size, self.led, self.arm = size, led, judge.problem.manipulator
 
-    def grow(self, roots: FloatArray, most_returns: int = 0, kept: int = 1) -> Grown:
+    def grow(self, roots: FloatArray, most_backtracks: int = 0, kept: int = 1) -> Grown:
         """The arms that come farthest, with their ancestors and all roots.
 
         Args:
             roots: Shape coordinates of arms at the first layer; of one, if led.
-            most_returns: Times the population may go back, each time twice as far.
+            most_backtracks: Times the population may go back, each time twice as far.
             kept: How many of the farthest, the best of them.
         """
         tips = np.repeat(self.layers.tips[:1], len(roots), axis=0)
@@ -145,7 +145,7 @@ class Population:
         clearances, _, _ = self.judge.look(tips, roots)
         self.grown = Grown(1 + none, tips, roots, clearances, none)
         farthest = np.arange(len(roots))
-        generations, returns = [farthest], 0
+        generations, backtracks = [farthest], 0
         leader = self._leader() if self.led else farthest[:1]
         while len(generations) < len(self.layers.tips):
             layer = len(generations) - 1
@@ -157,12 +157,14 @@ class Population:
                 if layer >= self.grown.layer[farthest[0]]:
                     farthest = generation
                 continue
-            if returns == most_returns:
+            if backtracks == most_backtracks:
                 break
-            generations = generations[: len(generations) - min(layer, 2**returns)]
+            generations = generations[: len(generations) - min(layer, 2**backtracks)]
             for _ in range(2):
-                generations[-1] = self._varied(len(generations) - 1, generations[-1])
-            returns += 1
+                generations[-1] = self._mutated_at_rest(
+                    len(generations) - 1, generations[-1]
+                )
+            backtracks += 1
         return self.grown.with_ancestors(self._best(farthest, kept))
 
     def _recorded(
@@ -207,30 +209,30 @@ class Population:
 
     def _next(self, layer: int, generation: IntArray) -> IntArray:
         """The arms of the next layer; none where it is not reached."""
-        for _ in range(RESTS):
-            born = self._children(layer, layer + 1, generation)
+        for _ in range(MUTATIONS):
+            born = self._survivors(layer, layer + 1, generation)
             if len(born) >= self.size // 10:
                 return born
-            generation = self._varied(layer, generation)
-        return self._children(layer, layer + 1, generation)
+            generation = self._mutated_at_rest(layer, generation)
+        return self._survivors(layer, layer + 1, generation)
 
-    def _varied(self, layer: int, generation: IntArray) -> IntArray:
+    def _mutated_at_rest(self, layer: int, generation: IntArray) -> IntArray:
         """Arms of a layer and others of the same that can be reached from them."""
-        both = np.append(generation, self._children(layer, layer, generation))
+        both = np.append(generation, self._survivors(layer, layer, generation))
         if len(both) <= 2 * self.size:
             return both
         return both[self.rng.permutation(len(both))[: 2 * self.size]]
 
-    def _children(self, layer: int, to: int, generation: IntArray) -> IntArray:
+    def _survivors(self, layer: int, to: int, generation: IntArray) -> IntArray:
         """Living children at a layer."""
-        parents, tips, offsets = self._born(to, generation)
+        parents, tips, offsets = self._offspring(to, generation)
         required, ends = self.judge.required, np.array([layer, to])
         asked = self.layers.asked(ends)
         must = None if asked is None else np.broadcast_to(asked[1], tips.shape)
         clearances, changed, _ = self.judge.look(tips, offsets, must)
         alive = np.flatnonzero(clearances >= required)
-        score = changed[alive] + 2.0 * self._lack(clearances[alive]) ** 2
-        picked = alive[self._choice(score + self._off_aim(to, offsets[alive]))]
+        score = changed[alive] + 2.0 * self._clearance_cost(clearances[alive]) ** 2
+        picked = alive[self._selected(score + self._aim_cost(to, offsets[alive]))]
         if not len(picked):
             return picked
         parents, tips, offsets = parents[picked], tips[picked], offsets[picked]
@@ -245,41 +247,41 @@ class Population:
             clearances[picked][good], parents[good],
         )  # fmt: skip
 
-    def _born(
+    def _offspring(
         self, to: int, generation: IntArray
     ) -> tuple[IntArray, FloatArray, FloatArray]:
         """Children at a layer: number of the parent, tip, offsets."""
-        family = FAMILY
+        count = OFFSPRING
         if self.led and len(generation):
             # Openings leave few alive: these have more children.
-            family = max(FAMILY, FAMILY * self.size // (2 * len(generation)))
-        parents = np.repeat(generation, family)
-        n, rng, play = len(parents), self.rng, float(self.layers.play[to])
+            count = max(OFFSPRING, OFFSPRING * self.size // (2 * len(generation)))
+        parents = np.repeat(generation, count)
+        n, rng, tolerance = len(parents), self.rng, float(self.layers.tolerance[to])
         tips = np.repeat(self.layers.tips[to : to + 1], n, axis=0)
-        if play > 0.0:
-            tips += rng.normal(size=(n, 3)) * play / 2.0
+        if tolerance > 0.0:
+            tips += rng.normal(size=(n, 3)) * tolerance / 2.0
         offsets = self.grown.offsets[parents]
         moved = tips[:, 1:] - self.grown.tips[parents, 1:]
-        born = varied(self.arm, offsets, moved, rng)
-        if self.layers.pull_at(to) > 0.0:
+        born = mutated(self.arm, offsets, moved, rng)
+        if self.layers.aim_weight_at(to) > 0.0:
             aims = self.layers.aims_at(to, n)
             born = turned_towards(born, aims, rng.random(n) < AIMED, rng)
         return parents, tips, settled(self.arm, tips, born)
 
-    def _off_aim(self, layer: int, offsets: FloatArray) -> FloatArray:
+    def _aim_cost(self, layer: int, offsets: FloatArray) -> FloatArray:
         """What arms are worse for that do not look to where they shall soon."""
-        pull = self.layers.pull_at(layer)
-        if not 0.0 < pull < 1.0:
+        aim_weight = self.layers.aim_weight_at(layer)
+        if not 0.0 < aim_weight < 1.0:
             return np.zeros(len(offsets))
         off = angles_between(offsets[:, -1], self.layers.aims_at(layer, len(offsets)))
-        return np.asarray(PULL * pull * off**2)
+        return np.asarray(AIM_COST * aim_weight * off**2)
 
-    def _lack(self, clearances: FloatArray) -> FloatArray:
+    def _clearance_cost(self, clearances: FloatArray) -> FloatArray:
         """What clearances [m] lack of what is wanted, 0 for nothing, 1 for all."""
-        wanted = WIDE * self.arm.most_radius
+        wanted = ENOUGH * self.arm.most_radius
         return np.maximum(0.0, 1.0 - (clearances - self.judge.required) / wanted)
 
-    def _choice(self, score: FloatArray) -> IntArray:
+    def _selected(self, score: FloatArray) -> IntArray:
         """Half the best, half by chance."""
         if len(score) <= self.size:
             return np.arange(len(score))
@@ -292,5 +294,5 @@ class Population:
         """The few best of a generation."""
         tips, offsets = self.grown.tips[generation], self.grown.offsets[generation]
         clearances, changed, _ = self.judge.look(tips, offsets)
-        order = np.argsort(changed + self._lack(clearances), kind="stable")
+        order = np.argsort(changed + self._clearance_cost(clearances), kind="stable")
         return generation[order[:count]]

@@ -28,7 +28,7 @@ from vdsm_pin.progress import say
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.units import in_mm
 
-PLAY: Final = 0.3
+TIP_TOLERANCE: Final = 0.3
 """How far the tip may be from its way off the path, over the body's radius; [-]."""
 AHEAD: Final = (3, 8, 20)
 """Layers ahead of a place of the path by way of which it is come to."""
@@ -171,14 +171,16 @@ class _Search:
         path = self.tips[k:end]
         for route in self._routes(path):
             before = len(route) - 1
-            play = np.zeros(before + len(path))
-            play[1:before] = PLAY * self.judge.problem.manipulator.most_radius
+            tolerance = np.zeros(before + len(path))
+            tolerance[1:before] = (
+                TIP_TOLERANCE * self.judge.problem.manipulator.most_radius
+            )
             tips = np.vstack([route, path[1:]])
-            layers = Layers(tips, play, *self._pull(k, before, tips))
+            layers = Layers(tips, tolerance, *self._aims(k, before, tips))
             population = Population(
                 self.judge, layers, self.rng, self.effort.population, led=True
             )
-            chain = population.grow(self.root[None], self.effort.returns)
+            chain = population.grow(self.root[None], self.effort.backtracks)
             visit = _Visit(k, before, chain, route)
             if self.farthest is None or visit.come > self.farthest.come:
                 self.farthest = visit
@@ -195,7 +197,7 @@ class _Search:
                 self.space.avoid(route[min(int(chain.layer[-1]) + 1, before)])
         return best
 
-    def _pull(
+    def _aims(
         self, k: int, before: int, tips: FloatArray
     ) -> tuple[FloatArray | None, FloatArray | None]:
         """Where the last link shall look at layers, and how much that counts.
@@ -210,8 +212,8 @@ class _Search:
             return None, None
         number = np.arange(len(tips))
         stations = self.route.stations[k + np.maximum(number - before, 0)]
-        pull = np.clip(1.0 + (number - before) / TURNING, 0.0, 1.0)
-        return path.aims(tips, stations), pull
+        weight = np.clip(1.0 + (number - before) / TURNING, 0.0, 1.0)
+        return path.aims(tips, stations), weight
 
     def _routes(self, path: FloatArray) -> Iterator[FloatArray]:
         """Ways of the tip to a path's first point, also by way of points after it.

@@ -57,7 +57,7 @@ class Insert(Level):
     Args:
         population: Arms that live on at a tip.
         routes: Largest number of ways of the tip tried from the start to one place.
-        returns: Times a population that is stuck goes back, each time twice as far.
+        backtracks: Times a population that is stuck goes back, each time twice as far.
         seed: Of the source of chance.
         cells: Cells at which the search for a way of the tip ends.
         directed: Whether arms are described by the directions of their links, which may
@@ -66,7 +66,7 @@ class Insert(Level):
 
     population: int
     routes: int
-    returns: int
+    backtracks: int
     seed: int
     cells: int = 300_000
     directed: bool = False
@@ -84,15 +84,15 @@ THOROUGH: Final[tuple[Level, ...]] = (
     Search(rounds=20, back=0.0, grow=1, ease=0.79, around=4),
     Search(rounds=40, back=0.0, grow=2, around=4),
     Search(rounds=20, back=1.0, grow=2),
-    Insert(population=10, routes=1, returns=2, seed=0, cells=60_000),
-    Insert(population=10, routes=2, returns=3, seed=0, cells=60_000, directed=True),
-    Insert(population=30, routes=2, returns=4, seed=1),
-    Insert(population=30, routes=3, returns=4, seed=1, directed=True),
+    Insert(population=10, routes=1, backtracks=2, seed=0, cells=60_000),
+    Insert(population=10, routes=2, backtracks=3, seed=0, cells=60_000, directed=True),
+    Insert(population=30, routes=2, backtracks=4, seed=1),
+    Insert(population=30, routes=3, backtracks=4, seed=1, directed=True),
     Search(rounds=60, back=1.0, grow=3, fine=True),
-    Insert(population=60, routes=4, returns=5, seed=2),
-    Insert(population=60, routes=4, returns=5, seed=2, directed=True),
-    Insert(population=120, routes=6, returns=6, seed=3, fine=True),
-    Insert(population=120, routes=6, returns=6, seed=3, fine=True, directed=True),
+    Insert(population=60, routes=4, backtracks=5, seed=2),
+    Insert(population=60, routes=4, backtracks=5, seed=2, directed=True),
+    Insert(population=120, routes=6, backtracks=6, seed=3, fine=True),
+    Insert(population=120, routes=6, backtracks=6, seed=3, fine=True, directed=True),
 )
 """Each is for what the ones before leave undrawn.
 

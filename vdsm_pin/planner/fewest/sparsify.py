@@ -14,7 +14,7 @@ from vdsm_pin.geometry.arrays import BoolArray, IntArray
 from vdsm_pin.planner.fewest.charts import coordinates
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners, is_directed, standing
-from vdsm_pin.planner.fewest.vary import lined_up
+from vdsm_pin.planner.fewest.offset_kernels import lined_up
 
 ROUNDS: Final = 3
 """Rounds over all joints."""

@@ -60,7 +60,7 @@ def _bent_beside(bent: BoolArray, joint: int) -> tuple[int, int]:
 
 
 @compiled
-def vary(
+def mutated_offsets(
     offsets: FloatArray,
     stations: FloatArray,
     moved: FloatArray,
