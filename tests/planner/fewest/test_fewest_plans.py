@@ -18,6 +18,7 @@ from vdsm_pin.planner.records import Plan
 from vdsm_pin.planner.time_limit import within_time
 from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.held import Axes
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.tolerances import TOLERANCES
@@ -251,12 +252,12 @@ def test_a_time_limit_stops_and_tells_how_far_it_came_and_never_steers() -> None
     np.testing.assert_array_equal(limited.trajectory.joints, free.trajectory.joints)
     calls = 0
 
-    def slow(centres: FloatArray) -> FloatArray:
+    def slow(centres: FloatArray, axes: Axes = None, /) -> FloatArray:
         nonlocal calls
         calls += 1
         if calls > 3:
             raise OutOfTime(0.5)
-        return clearance(centres)
+        return clearance(centres, axes)
 
     with pytest.raises(
         OutOfTime, match=r"limit of 0\.5 s came first; drew 0\.000 mm of 6000\.000 mm"

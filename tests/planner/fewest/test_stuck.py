@@ -14,6 +14,7 @@ from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.explain import refuse
 from vdsm_pin.planner.fewest.explore import explore
 from vdsm_pin.planner.fewest.levels import Effort, Insert
+from vdsm_pin.planner.fewest.narrow_passage import narrowest_passage
 from vdsm_pin.planner.fewest.roadmap import CostWeights
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.stuck import (
@@ -21,12 +22,14 @@ from vdsm_pin.planner.fewest.stuck import (
     at_reach,
     no_way_in,
     on_the_path,
+    too_narrow,
     where_stuck,
 )
 from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle
 from vdsm_pin.progress import shown
+from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.link_clearance import link_clearance
 
 HALF = 0.08
@@ -98,6 +101,22 @@ def test_an_opening_too_narrow_for_the_tip_is_named() -> None:
     told = no_way_in(task, np.array([0.6, 0.0, 0.0]), "", 0.0)
     assert "120.000 mm wide, for a body of 123.000 mm with 3.500 mm" in told.words
     assert told.obstacle.startswith("wall")
+
+
+@pytest.mark.parametrize("half", [0.03, 0.0645])
+def test_the_narrowest_passage_is_measured_though_the_body_does_not_pass(
+    half: float,
+) -> None:
+    """Any way in leads through the window; the tip's ball is as wide as it is high."""
+    task = behind(half)
+    clearance = broad_phase(task, link_clearance(task))
+    tip = task.path.points[0]
+    place = narrowest_passage(task, clearance, tip, NO_LIMIT)
+    assert place is not None
+    room = link_clearance(task)(np.repeat(place[None, None], 2, axis=1))[0, 0]
+    assert room == pytest.approx(half - task.manipulator.most_radius, abs=2e-5)
+    assert too_narrow(task, place)
+    assert narrowest_passage(task, clearance, tip, Deadline(1.0, 0.0)) is None
 
 
 def test_limits_that_are_met_are_named_first() -> None:

@@ -18,9 +18,17 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray
 from vdsm_pin.planner.feasibility import curled_reach, rail_distance
 from vdsm_pin.planner.fewest.explore import Outcome
 from vdsm_pin.planner.fewest.motion import Corners, standing
+from vdsm_pin.planner.fewest.narrow_passage import narrowest_passage
 from vdsm_pin.planner.fewest.pose_kernels import bends_of
 from vdsm_pin.planner.fewest.route import PathRows
-from vdsm_pin.planner.fewest.stuck import at_reach, no_way_in, on_the_path, where_stuck
+from vdsm_pin.planner.fewest.stuck import (
+    at_reach,
+    no_way_in,
+    on_the_path,
+    passage,
+    too_narrow,
+    where_stuck,
+)
 from vdsm_pin.planner.impossible.bounds import (
     TipProof,
     least_changed,
@@ -160,11 +168,11 @@ def _cut_off(
 
 
 def _shut(
-    problem: PlanningProblem, tip: FloatArray, deadline: Deadline | None
+    problem: PlanningProblem, tip: FloatArray, deadline: Deadline
 ) -> FloatArray | None:
     """Where the widest way to a tip is shut, shape (3,); None where nobody knows."""
     problem = held_from(problem, TIP_ONLY)
-    if deadline is None or not problem.scene.obstacles:
+    if not problem.scene.obstacles:
         return None
     try:
         return narrowest(problem, tip, deadline)
@@ -190,15 +198,13 @@ def say_drawn(problem: PlanningProblem, outcome: Outcome) -> None:
     )  # fmt: skip
 
 
-def how_far(
-    problem: PlanningProblem, outcome: Outcome, deadline: Deadline | None = None
-) -> Reached:
+def how_far(problem: PlanningProblem, outcome: Outcome, deadline: Deadline) -> Reached:
     """Where the search came to an end, what stopped it, what to try; not a proof.
 
     Args:
         problem: What was asked.
         outcome: What the search came to.
-        deadline: Until when the narrowest passage may be looked for; None: not at all.
+        deadline: Until when the narrowest passage may be looked for.
     """
     drawn = _drawn(problem, outcome)
     route = None if outcome.found is None else outcome.found.route
@@ -226,9 +232,11 @@ def how_far(
     cause = at_reach(problem, rows, words, station)
     if cause is not None:
         return cause
-    place = _shut(problem, tip, deadline)
-    if place is not None:
+    place = narrowest_passage(problem, outcome.judge.clearance, tip, deadline)
+    if place is not None and too_narrow(problem, place):
         return no_way_in(problem, place, words, station)
+    if place is not None:
+        words += f"; {passage(problem, place)}"
     zero = np.zeros((1, problem.manipulator.n_links + 1, 2))
     centres = standing(problem.manipulator, tip[None], zero)[0]
     if not problem.scene.obstacles or not np.isfinite(centres).all():

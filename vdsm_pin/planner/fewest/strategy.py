@@ -48,6 +48,10 @@ from vdsm_pin.units import in_mm
 
 SEARCHED: Final = 0.6
 """Part of the time after which a search ends that has found something; [-]."""
+TOLD: Final = 0.1
+"""Part of the time that is left to tell what stopped a search; [-]."""
+LAST: Final = 4.0
+"""The largest; [s]."""
 FEWEST: Final = CostWeights()
 CLEAREST: Final = CostWeights(angle=0.2, clearance=0.064, clearance_cost=8.0)
 
@@ -213,10 +217,11 @@ def _plan(
     most = margin + weights.joint_error * float(levers(problem.manipulator)[-1])
     quick = broad_phase(problem, clearance)
     quick = quick.up_to(quick.far + most)
+    early = replace(quick, deadline=_early(quick.deadline))
     best: Outcome | None = None
     try:
         soon = _soon(problem, clearance)
-        for outcome in explore(problem, quick, margin, weights, effort, soon):
+        for outcome in explore(problem, early, margin, weights, effort, soon):
             best = outcome
             say_drawn(problem, best)
             refuse_proved(problem, best)
@@ -224,8 +229,15 @@ def _plan(
         refuse(problem, best)
         return _written(problem, quick, name, weights, best)
     except OutOfTime as ended:
-        reached = "" if best is None else how_far(problem, best)
+        reached = "" if best is None else how_far(problem, best, quick.deadline)
         raise OutOfTime(ended.limit, reached) from None
+
+
+def _early(deadline: Deadline) -> Deadline:
+    """When the search ends, so that there is time to tell what stopped it."""
+    if deadline.end == np.inf:
+        return deadline
+    return Deadline(deadline.limit, deadline.end - min(LAST, TOLD * deadline.limit))
 
 
 def _soon(problem: PlanningProblem, clearance: LinkClearance) -> Deadline:

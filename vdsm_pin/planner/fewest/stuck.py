@@ -65,7 +65,7 @@ def where_stuck(
     narrowest: list[float] = []
     if held_from(problem, TIP_ONLY).scene.obstacles:
         narrow = stuck.route[_opening(problem, stuck)[0]]
-        parts.append(_passage(problem, narrow))
+        parts.append(passage(problem, narrow))
         narrowest = narrow.tolist()
     if problem.scene.obstacles:
         found = culprit(problem, stuck.centres)
@@ -90,7 +90,7 @@ def _needed(problem: PlanningProblem) -> float:
     return 2.0 * (problem.manipulator.most_radius + problem.required_clearance)
 
 
-def _passage(problem: PlanningProblem, place: FloatArray) -> str:
+def passage(problem: PlanningProblem, place: FloatArray) -> str:
     """The narrowest place of the best way, its width and that of the body."""
     name, distance = nearest(problem, place)
     radius = problem.manipulator.most_radius
@@ -99,6 +99,11 @@ def _passage(problem: PlanningProblem, place: FloatArray) -> str:
         f"{in_mm(max(0.0, 2.0 * distance))} wide, for a body of "
         f"{in_mm(2.0 * radius)} with {in_mm(problem.required_clearance)} on either side"
     )
+
+
+def too_narrow(problem: PlanningProblem, place: FloatArray) -> bool:
+    """Whether the body does not pass a place, shape (3,), with its clearance; [m]."""
+    return 2.0 * nearest(problem, place)[1] < _needed(problem)
 
 
 def no_way_in(
@@ -114,7 +119,7 @@ def no_way_in(
     """
     name, _ = nearest(problem, place)
     told = (
-        f"{words}; no way for the tip was found: {_passage(problem, place)}; try a "
+        f"{words}; no way for the tip was found: {passage(problem, place)}; try a "
         "smaller `required_clearance` or a wider opening"
     )
     last = problem.manipulator.n_links
