@@ -141,15 +141,13 @@ class Proving:
         best = self.results.best
         place_best(self.task, self.motion, self.work.ends, best)
 
-    def fresh(self, dense: Dense | None = None) -> "Proving":
-        """The same question with nothing found yet; the planes are carried on.
-
-        Args:
-            dense: Room for the brackets of single intervals; None where nobody asks.
-        """
+    def new_results(self) -> Results:
+        """Where to write what is asked again."""
         n_pairs, columns = len(self.results.best), self.results.profile.shape[1]
-        results = new_results(n_pairs, columns, self.n_intervals, self.budget)
-        results = results if dense is None else results._replace(dense=dense)
+        return new_results(n_pairs, columns, self.n_intervals, self.budget)
+
+    def fresh(self, results: Results) -> "Proving":
+        """The same question with nothing found yet; the planes are carried on."""
         broad = new_broad_phase(self.task, self.broad.number.shape[1])
         return replace(self, results=results, broad=broad)
 

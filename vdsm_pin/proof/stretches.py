@@ -35,10 +35,10 @@ from vdsm_pin.proof.motions import Motion
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import RANK, Proof, start_proof, summed
 from vdsm_pin.proof.proving import dense_rows
-from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.search import Slicing, new_witness, resolve
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.proof.tree import Tree
+from vdsm_pin.proof.witnesses import place_witness
 from vdsm_pin.proof.workspace import Workspace
 
 MOST_BRACKETS: Final = 500_000
@@ -72,15 +72,17 @@ class Stretches:
             low: In knots of the path, as 1.25 is a quarter of the way from 1 to 2.
             high: Not before; both may be one moment.
         """
-        fresh = self._proving.fresh()
+        proving, in_time = self._proving, True
+        results = proving.new_results()
         if low == floor(low) < high == floor(high):
+            fresh = proving.fresh(results)
             in_time = fresh.judge(int(low), int(high))
+            fresh.place_witnesses()
         else:
-            slices, work = _slices(low, high, fresh.n_intervals), fresh.work
-            _judge_slices(fresh.task, fresh.motion, work, fresh.results, slices)
-            in_time = True
-        fresh.place_witnesses()
-        return summed(fresh.results, self._plan, self._table.size, in_time)
+            slices = _slices(low, high, proving.n_intervals)
+            asked = proving.task, proving.motion, proving.work
+            _judge_slices(*asked, results.best, results.counts, slices)
+        return summed(results, self._plan, self._table.size, in_time)
 
     def each(self) -> tuple[IntArray, FloatArray] | None:
         """What is proved of every interval by itself.
@@ -93,7 +95,8 @@ class Stretches:
         if n_intervals * len(owner) > MOST_BRACKETS:
             return None
         dense = dense_rows(n_intervals, len(owner))
-        if not self._proving.fresh(dense).sweep(0, n_intervals):
+        results = self._proving.new_results()._replace(dense=dense)
+        if not self._proving.fresh(results).sweep(0, n_intervals):
             return None
         first = np.searchsorted(owner, np.arange(self._table.size))
         worst = np.maximum.reduceat(RANK[dense.verdict], first, axis=1)
@@ -110,7 +113,12 @@ def _slices(low: float, high: float, n_intervals: int) -> FloatArray:
 
 @compiled
 def _judge_slices(
-    task: Task, motion: Motion, work: Workspace, results: Results, slices: FloatArray
+    task: Task,
+    motion: Motion,
+    work: Workspace,
+    best: FloatArray,
+    counts: IntArray,
+    slices: FloatArray,
 ) -> None:
     """Decide every pair over some slices, each as a whole of its own.
 
@@ -118,27 +126,29 @@ def _judge_slices(
         task: The scene, pairs and rules.
         motion: Rows of joint values.
         work: Working space; what the pairs remember is carried on.
-        results: Counts and best rows are written.
+        best: Least bounds of each pair, nothing found yet, shape (n_pairs, BEST).
+        counts: Slices of each pair by verdict, shape (n_pairs, 3).
         slices: Interval, start and end of each, shape (n, 3).
     """
     task, motion, work = borrowed(task), borrowed(motion), borrowed(work)
-    results, row, space = borrowed(results), np.zeros(SLICE), work.space
+    row, space = np.zeros(SLICE), work.space
     slicing = Slicing(task, motion, work.ends, space)
-    for pair in range(results.best.shape[0]):
-        best, plane = results.best[pair], work.planes[pair]
+    for pair in range(best.shape[0]):
+        least, plane = best[pair], work.planes[pair]
         for k in range(slices.shape[0]):
             row[INTERVAL], row[PAIR] = slices[k, 0], pair
             row[START], row[END] = slices[k, 1], slices[k, 2]
             witness = new_witness()
-            witness.value[KNOWN] = best[UP]
+            witness.value[KNOWN] = least[UP]
             space.out[NORMAL:NEAR] = plane[:3]
             verdict, _ = resolve(slicing, work.heap, row, witness)
             plane[:3] = space.out[NORMAL:NEAR]
-            results.counts[pair, verdict] += 1
-            if row[KEY] < best[LOW]:
-                best[LOW], best[AT_LOWER] = row[KEY], slices[k, 0]
-            if witness.value[MET] < best[UP]:
-                best[UP], best[AT_UPPER] = witness.value[MET], slices[k, 0]
-                best[TIME], best[OWN:] = witness.value[WHEN], witness.points
+            counts[pair, verdict] += 1
+            if row[KEY] < least[LOW]:
+                least[LOW], least[AT_LOWER] = row[KEY], slices[k, 0]
+            if witness.value[MET] < least[UP]:
+                least[UP], least[AT_UPPER] = witness.value[MET], slices[k, 0]
+                least[TIME], least[OWN:] = witness.value[WHEN], witness.points
         # The support that is remembered is of another direction.
         plane[SUPPORT] = plane[HELD_CLEARANCE] = -np.inf
+        place_witness(task, motion, work.ends, pair, least)

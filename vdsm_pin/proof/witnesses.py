@@ -4,9 +4,9 @@ from math import sqrt
 
 import numpy as np
 
-from vdsm_pin.compiled import borrowed, compiled
+from vdsm_pin.compiled import apart, borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.proof.layouts import AT_UPPER, OWN, TIME, UP
+from vdsm_pin.proof.layouts import AT_UPPER, OTHER, OWN, TIME, UP
 from vdsm_pin.proof.motions import Motion, interpolate
 from vdsm_pin.proof.packed_tree import Pose, place_two
 from vdsm_pin.proof.swept_bodies import Ends, place_point
@@ -65,23 +65,32 @@ def witness_at(
 
 
 @compiled
-def place_best(task: Task, motion: Motion, ends: Ends, best: FloatArray) -> None:
-    """Put the witnesses of all pairs on the surfaces, in the world's frame.
+def place_witness(
+    task: Task, motion: Motion, ends: Ends, pair: int, best: FloatArray
+) -> None:
+    """Put the witness of a pair on the surfaces, in the world's frame.
 
     Args:
         task: The scene, bodies and pairs.
         motion: Rows of joint values.
         ends: Working space.
-        best: Best rows with core points; witnesses on return.
+        pair: The pair.
+        best: Its best row with core points; witnesses on return, where there are any.
     """
+    apart()
+    if not best[UP] < np.inf:
+        return
+    mover, own, other = mover_of(task, pair), np.zeros(3), np.zeros(3)
+    interpolate(motion, int(best[AT_UPPER]), best[TIME], ends.q)
+    frames = mover.rest, mover.frame
+    place_two(task.tree, ends.q, frames, ends.bends.steps, ends.start)
+    witness_at(mover, ends.start, best[OWN:], own, other)
+    best[OWN:OTHER], best[OTHER:] = own, other
+
+
+@compiled
+def place_best(task: Task, motion: Motion, ends: Ends, best: FloatArray) -> None:
+    """The same of all pairs, their best rows of shape (n_pairs, BEST)."""
     task, motion, ends = borrowed(task), borrowed(motion), borrowed(ends)
-    places = np.zeros((2, 3))
     for pair in range(best.shape[0]):
-        row, mover = best[pair], mover_of(task, pair)
-        if not row[UP] < np.inf:
-            continue
-        interpolate(motion, int(row[AT_UPPER]), row[TIME], ends.q)
-        frames = mover.rest, mover.frame
-        place_two(task.tree, ends.q, frames, ends.bends.steps, ends.start)
-        witness_at(mover, ends.start, row[OWN:], places[0], places[1])
-        row[OWN:] = places.ravel()
+        place_witness(task, motion, ends, pair, best[pair])
