@@ -26,10 +26,12 @@ from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.records import ArmVerification
 from vdsm_pin.verification.robot_model import load_robot
 
-ErrorBox = TypedErrorBox
-
 PYTHON = "from Python"
 """What a report names as command and problem file where there is none."""
+
+
+class ErrorBox(TypedErrorBox):  # noqa: D101  has that of its base
+    __doc__ = TypedErrorBox.__doc__
 
 
 def plan(

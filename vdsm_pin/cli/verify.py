@@ -35,7 +35,7 @@ commands = family()
 Interpolation = Literal["auto", "linear", "cubic", "quintic"]
 
 
-class Said(NamedTuple):
+class Console(NamedTuple):
     """What goes to the terminal."""
 
     quiet: bool
@@ -106,7 +106,7 @@ def verify(
         "--all-pairs": all_pairs,
         "--interpolation": interpolation != "auto",
     }
-    said = Said(quiet, as_json)
+    console = Console(quiet, as_json)
     deadline = Deadline.after(time_limit)
     box = errors.box(slide_error_mm)
     from vdsm_pin.app.workflow import VerifyOrder
@@ -129,7 +129,7 @@ def verify(
             interpolation=interpolation,
             topic=topic,
         )
-    raise typer.Exit(PASSED if _passes(order, said) else NOT_PASSED)
+    raise typer.Exit(PASSED if _passes(order, console) else NOT_PASSED)
 
 
 def asked_problem(
@@ -178,13 +178,13 @@ def _stated(
     return stated_cell(asked, robot.files(), robot.scene, certificate, motion)
 
 
-def _passes(order: "VerifyOrder", said: Said) -> bool:
+def _passes(order: "VerifyOrder", console: Console) -> bool:
     """Verify a motion, and say what was found."""
     from vdsm_pin.app.workflow import verify_to_folder
     from vdsm_pin.report.terminal import show_verification
     from vdsm_pin.report.words import outcome
 
-    with enforced(order.deadline), said.progress():
+    with enforced(order.deadline), console.progress():
         verified = verify_to_folder(order)
     written: list[tuple[str, str]] = []
     if order.certificate is not None:
@@ -198,9 +198,9 @@ def _passes(order: "VerifyOrder", said: Said) -> bool:
             written.append(("its problem file", str(beside)))
     if order.pdf is not None:
         written.append(("report on paper", str(order.pdf)))
-    if said.as_json:
+    if console.as_json:
         typer.echo(verified.file.text(), nl=False)
-    elif not said.quiet:
+    elif not console.quiet:
         show_verification(verified.file, order.folder, *written)
     complete = order.certificate is None or not verified.no_certificate
     return outcome(verified.file.verdict).passed and complete

@@ -180,9 +180,10 @@ class TypedErrorBox(ErrorBox):
         InvalidInput: If a value is negative or not finite.
 
     Example:
-        >>> TypedErrorBox(base_mm=2.0).base
+        >>> from vdsm_pin import ErrorBox
+        >>> ErrorBox(base_mm=2.0).base
         0.002
-        >>> TypedErrorBox(obstacles_mm={"crate": 5.0}).of_obstacle("crate").shift
+        >>> ErrorBox(obstacles_mm={"crate": 5.0}).of_obstacle("crate").shift
         0.005
     """
 
