@@ -4,6 +4,7 @@ import ast
 import doctest
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -125,6 +126,22 @@ def test_no_certificate_of_what_is_not_certified(tmp_path: Path) -> None:
     with pytest.raises(VerificationFailed, match="refuted"):
         vp.write_certificate(result, tmp_path / "c", file)
     assert not (tmp_path / "c").exists()
+
+
+def test_arguments_of_another_kind_are_refused_in_a_sentence() -> None:
+    problem = vp.read_problem("paper/free")
+    motion = np.zeros((1, 8))
+    still = vp.Trajectory([False], [0.0], [0.0], motion, motion)
+    refused: dict[str, Callable[[], object]] = {
+        "found str": lambda: vp.plan("paper/free"),  # type: ignore[arg-type]
+        "trajectory; found PlanningProblem": lambda: vp.verify(problem, problem),  # type: ignore[arg-type]
+        "expected ErrorBox": lambda: vp.verify(problem, still, errors=1.0),  # type: ignore[arg-type]
+        "limit is nan": lambda: vp.verify(problem, still, time_limit=np.nan),
+        "no rigid motion": lambda: replace(problem, T_world_base=2.0 * np.eye(4)),
+    }
+    for expected, call in refused.items():
+        with pytest.raises(vp.InvalidInput, match=expected):
+            call()
 
 
 def test_results_show_themselves_in_a_few_lines() -> None:

@@ -65,8 +65,21 @@ def plan(
     """
     from vdsm_pin.refinement import plan_and_verify
 
+    _expect(problem, PlanningProblem, "read_problem(path)")
     deadline, robot = Deadline.after(time_limit), load_robot(problem.manipulator)
     return plan_and_verify(problem, strategy, robot, deadline=deadline).plan
+
+
+def _expect(value: object, kind: type, how: str) -> None:
+    """Refuse what is of another kind, and say how one is had.
+
+    Raises:
+        InvalidInput: If it is.
+    """
+    if not isinstance(value, kind):
+        found = type(value).__name__
+        message = f"expected {kind.__name__}, as of {how}; found {found}"
+        raise InvalidInput(message)
 
 
 def verify(
@@ -92,7 +105,8 @@ def verify(
         `verdict`, `min_clearance` in metres, `closest(count)`, `checks`.
 
     Raises:
-        InvalidInput: If the trajectory is of another arm or an error is negative.
+        InvalidInput: If the trajectory is of another arm, an error is negative, or an
+            argument of another kind.
 
     Example:
         >>> problem = read_problem("paper/obs1")
@@ -105,6 +119,9 @@ def verify(
     """
     from vdsm_pin.verification.verify import verify as judge
 
+    _expect(problem, PlanningProblem, "read_problem(path)")
+    _expect(trajectory, Trajectory, "plan(problem).trajectory")
+    _expect(errors or ErrorBox(), Box, "ErrorBox(base_mm=1.0)")
     robot = load_robot(problem.manipulator)
     return judge(
         problem,
@@ -136,6 +153,7 @@ def write_report(result: ArmVerification, path: str | Path) -> None:
     from vdsm_pin.report.html import write_report as write
     from vdsm_pin.report.run_record import RunRecord
 
+    _expect(result, ArmVerification, "verify(problem, trajectory)")
     problem = result.problem
     urdf_sha256 = load_robot(problem.manipulator).urdf_sha256
     record = RunRecord.of(PYTHON, problem.source, urdf_sha256)
@@ -172,6 +190,7 @@ def write_certificate(
     from vdsm_pin.report.folder import check_kept
     from vdsm_pin.verification import certificate_lines, certificate_writer
 
+    _expect(result, ArmVerification, "verify(problem, trajectory)")
     problem, source = result.problem, result.problem.source
     if source is None:
         message = "a certificate is bound to a problem file; this problem has none"

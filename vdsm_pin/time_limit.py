@@ -13,10 +13,10 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from math import inf
+from math import inf, isnan
 from typing import Final
 
-from vdsm_pin.errors import OutOfTime
+from vdsm_pin.errors import InvalidInput, OutOfTime
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,16 @@ class Deadline:
 
     @classmethod
     def after(cls, seconds: float | None) -> "Deadline":
-        """So many seconds from now; None for never."""
+        """So many seconds from now; None for never.
+
+        Raises:
+            InvalidInput: If the seconds are not a number.
+        """
         if seconds is None:
             return cls()
+        if isnan(seconds):
+            message = "the time limit is nan, expected seconds"
+            raise InvalidInput(message)
         return cls(seconds, time.monotonic() + seconds)
 
     @property

@@ -1,5 +1,7 @@
 """Obstacles: what they refuse, and that their pieces are the solid they claim."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import shapely
@@ -84,6 +86,30 @@ def test_the_hull_of_a_mesh_is_that_of_its_triangles() -> None:
 def test_radius_must_be_positive_and_finite(radius: float) -> None:
     with pytest.raises(InvalidInput, match="radius"):
         Sphere("a", np.zeros(3), radius)
+
+
+@pytest.mark.parametrize(
+    ("make", "expected"),
+    [
+        (lambda: HalfSpace("a", UP, 2.0 * UP), "normal is .*, expected a unit vector"),
+        (lambda: Capsule("a", UP, 0.0 * UP, 1.0, 1.0), "axis is .* a unit vector"),
+        (lambda: Cylinder("a", UP, 0.1 * UP, 1.0, 1.0), "axis is .* a unit vector"),
+        (lambda: Box("a", UP, 0.3 * EYE, UP + 1.0), "rotation is .* a rotation"),
+        (lambda: Box("a", UP, np.diag([1.0, 1.0, -1.0]), UP + 1.0), "a rotation"),
+        (lambda: Box("a", UP, EYE, np.array(1.0)), "half_size has shape"),
+        (lambda: Sphere("a", UP[:2], 1.0), r"shape \(2,\), expected \(3,\)"),
+        (lambda: Sphere("a", UP, np.ones(2)), r"radius has shape \(2,\)"),
+        (lambda: Mesh("a", EYE, np.array([[0, 1, 1.5]])), "no whole numbers"),
+        (lambda: Mesh("a", EYE[:, :2], np.array([[0, 1, 2]])), "vertices have shape"),
+        (lambda: Mesh("a", EYE, np.array([0, 1, 2])), "triangles have shape"),
+    ],
+)
+def test_numbers_that_are_another_solid_are_refused(
+    make: Callable[[], Obstacle], expected: str
+) -> None:
+    """A scaled normal scales distances, a scaled rotation makes a smaller box."""
+    with pytest.raises(InvalidInput, match=expected):
+        make()
 
 
 def test_a_self_crossing_polygon_is_refused() -> None:

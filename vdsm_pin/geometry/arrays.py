@@ -1,6 +1,6 @@
 """Array types and the few checked operations everybody needs."""
 
-from typing import Any, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,32 @@ def frozen(value: Any, dtype: type[Any] = np.float64) -> npt.NDArray[Any]:
     array = np.array(value, dtype=dtype, order="C")
     array.setflags(write=False)
     return array
+
+
+ROTATION_ERROR: Final = 1e-9
+"""How far R R^T may be from the identity, and a unit vector's length from 1; [-]."""
+
+
+def is_rotation(turn: FloatArray) -> bool:
+    """Whether a matrix is a rotation, shape (3, 3); whatever is not finite is none."""
+    if turn.shape != (3, 3):
+        return False
+    off = np.abs(turn @ turn.T - np.eye(3)).max()
+    return bool(off <= ROTATION_ERROR and np.linalg.det(turn) > 0.0)
+
+
+def is_rigid(placement: FloatArray) -> bool:
+    """Whether a matrix is a finite rigid motion, shape (4, 4)."""
+    if placement.shape != (4, 4) or not np.isfinite(placement).all():
+        return False
+    last = np.array_equal(placement[3], [0.0, 0.0, 0.0, 1.0])
+    return last and is_rotation(placement[:3, :3])
+
+
+def is_unit(vector: FloatArray) -> bool:
+    """Whether a vector has length 1, shape (3,)."""
+    length = np.linalg.norm(vector)
+    return vector.shape == (3,) and bool(abs(length - 1.0) <= ROTATION_ERROR)
 
 
 def read_only(values: FloatArray) -> FloatArray:

@@ -50,9 +50,13 @@ class Mesh(FromFile):
     def __post_init__(self) -> None:
         """Freeze the arrays and check the indices."""
         super().__post_init__()
+        self._check_rows("vertices")
+        if np.asarray(self.triangles).dtype.kind not in "iu":
+            self._refuse("triangles are no whole numbers")
         triangles, count = frozen(self.triangles, np.int64), len(self.vertices)
         object.__setattr__(self, "triangles", triangles)
-        if not triangles.size or not ((triangles >= 0) & (triangles < count)).all():
+        self._check_rows("triangles")
+        if not ((triangles >= 0) & (triangles < count)).all():
             self._refuse(f"triangles do not index {count} vertices")
 
     @cached_property

@@ -7,13 +7,21 @@ from typing import ClassVar, Final, NoReturn, Self
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, frozen, is_rotation, is_unit
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
 
 BOX_CORNERS: Final = frozen(
     [[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]
 )
 """Corners of the cube [-1, 1]^3, shape (8, 3); [-]."""
+
+
+_SHAPES: Final = (
+    dict.fromkeys(("centre", "origin", "point", "axis", "normal", "half_size"), (3,))
+    | dict.fromkeys(("radius", "half_length"), ())
+    | {"rotation": (3, 3)}
+)
+"""Of the fields of solids that have one shape."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +42,21 @@ class NamedSolid:
     """Above zero; [m]."""
 
     def __post_init__(self) -> None:
-        """Freeze the arrays, check that numbers are finite and sizes above zero."""
+        """Freeze the arrays, check shapes, and that numbers are what they are to be."""
         for field in (*self.POINTS, *self.TURNED, *self.SIZES):
-            value = getattr(self, field)
-            if not np.isfinite(np.asarray(value, dtype=float)).all():
+            value = frozen(getattr(self, field))
+            if not np.isfinite(value).all():
                 self._refuse(f"{field} is {value}, expected finite numbers")
-            if np.ndim(value):
-                object.__setattr__(self, field, frozen(value))
+            shape = _SHAPES.get(field, value.shape)
+            if value.shape != shape:
+                self._refuse(f"{field} has shape {value.shape}, expected {shape}")
+            object.__setattr__(self, field, value if value.ndim else float(value))
+        for field in self.TURNED:
+            value = getattr(self, field)
+            if value.ndim == 1 and not is_unit(value):
+                self._refuse(f"{field} is {value}, expected a unit vector")
+            if value.ndim == 2 and not is_rotation(value):
+                self._refuse(f"{field} is {value.tolist()}, expected a rotation")
         for field in self.SIZES:
             value = getattr(self, field)
             if not (np.asarray(value) > 0.0).all():

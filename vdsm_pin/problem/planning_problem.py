@@ -9,7 +9,7 @@ import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidInput, UnknownName
-from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, frozen, is_rigid
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -96,9 +96,9 @@ class PlanningProblem(Summarised):
             since by more than its errors.
 
     Raises:
-        InvalidInput: If a required clearance is negative, a tolerance or limit not
-            above 0, or one of them not finite, joint values do not fit the arm, or a
-            start or goal stands beside a tip path.
+        InvalidInput: If the pose is no rigid motion, a required clearance is negative,
+            a tolerance or limit not above 0, or one of them not finite, joint values do
+            not fit the arm, or a start or goal stands beside a tip path.
     """
 
     name: str
@@ -119,6 +119,9 @@ class PlanningProblem(Summarised):
     def __post_init__(self) -> None:
         """Freeze the pose and check the values."""
         object.__setattr__(self, "T_world_base", frozen(self.T_world_base))
+        if not is_rigid(self.T_world_base):
+            message = "T_world_base is no rigid motion, shape (4, 4)"
+            raise InvalidInput(message)
         for name in ("required_clearance", "required_self_clearance"):
             value = getattr(self, name)
             if not 0.0 <= value < np.inf:

@@ -22,10 +22,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
-
-ROTATION_ERROR: Final = 1e-9
-"""How far a placement's rotation may be from a rotation, an axis from length 1; [-]."""
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen, is_rigid, is_unit
 
 IDENTITY: Final = frozen(np.eye(4))
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -75,25 +72,15 @@ class Joint:
         axis, placement = frozen(self.axis), frozen(self.placement)
         object.__setattr__(self, "axis", axis)
         object.__setattr__(self, "placement", placement)
-        if axis.shape != (3,) or not abs(np.linalg.norm(axis) - 1.0) <= ROTATION_ERROR:
+        if not is_unit(axis):
             message = f"joint {self.name!r}: axis {self.axis} is no unit vector"
             raise ValueError(message)
-        if not _is_rigid(placement):
+        if not is_rigid(placement):
             message = f"joint {self.name!r}: its placement is no rigid motion"
             raise ValueError(message)
         if not np.isfinite([self.ratio, self.offset]).all():
             message = f"joint {self.name!r}: ratio and offset must be finite"
             raise ValueError(message)
-
-
-def _is_rigid(placement: FloatArray) -> bool:
-    """Whether a matrix is a finite rigid motion, of determinant 1."""
-    if placement.shape != (4, 4) or not np.isfinite(placement).all():
-        return False
-    turn = placement[:3, :3]
-    off = np.abs(turn @ turn.T - np.eye(3)).max()
-    last = np.array_equal(placement[3], [0.0, 0.0, 0.0, 1.0])
-    return bool(off <= ROTATION_ERROR and np.linalg.det(turn) > 0.0 and last)
 
 
 def shifted(x: float, y: float, z: float) -> FloatArray:
