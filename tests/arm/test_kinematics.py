@@ -9,6 +9,8 @@ from vdsm_pin.arm.kinematics import (
     joint_centres,
     link_angles,
     position_angles,
+    straight_joints,
+    tip_jacobian,
 )
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.errors import LinkTooShort
@@ -94,3 +96,26 @@ def test_centres_a_link_length_apart_or_refused_by_name() -> None:
     with pytest.raises(LinkTooShort, match="waypoint 1") as caught:
         joint_angles(HRM8, centres)
     assert caught.value.link in (4, 5)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_tips_jacobian_is_that_of_differences(kind: str) -> None:
+    x0, alpha, theta = samples(kind, 20)
+    found, step = tip_jacobian(HRM8, alpha, theta), 1e-6
+    q = np.concatenate([x0[:, None], np.stack([alpha, theta], 2).reshape(20, -1)], 1)
+
+    def tip(q: np.ndarray) -> np.ndarray:
+        return joint_centres(HRM8, q[:, 0], q[:, 1::2], q[:, 2::2])[:, -1]
+
+    for k, way in enumerate(step * np.eye(q.shape[1])):
+        slope = (tip(q + way) - tip(q - way)) / (2.0 * step)
+        np.testing.assert_allclose(found[:, :, k], slope, rtol=0, atol=1e-8)
+
+
+def test_the_straight_arm_ends_at_its_tip() -> None:
+    for tip in np.random.default_rng(9).uniform(-1.5, 1.5, (50, 3)):
+        q = straight_joints(HRM8, tip)
+        assert not q[3:].any()
+        ends = joint_centres(HRM8, q[:1], q[None, 1::2], q[None, 2::2])[0, [0, -1]]
+        np.testing.assert_allclose(ends[1], tip, rtol=0, atol=1e-12)
+        assert ends[0, 0] < tip[0]

@@ -12,6 +12,7 @@ from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.boxes import body_box, box_gaps, box_reaches
 from vdsm_pin.proof.budget import Budget
+from vdsm_pin.proof.cached_planes import served
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.error_growth import crude_growth, grow_corners, set_direction
 from vdsm_pin.proof.layouts import OWN_POINT, POINT, SUPPORT
@@ -401,6 +402,17 @@ def test_each_pair_owns_up_to_what_it_was_not_judged(
     assert (proving.results.best[left == 0, 0] == 1.0).all()
     expected = -np.inf if left.any() else 1.0
     assert (proving.results.profile[0] == expected).all()
+
+
+def test_a_plane_serves_up_to_the_first_bound_that_is_too_low_or_too_wide() -> None:
+    rng = np.random.default_rng(8)
+    for _ in range(200):
+        lower = rng.normal(0.5, 0.3, 4)
+        upper = lower + rng.choice([0.1, 0.3], 4)
+        slack, width = rng.choice([0.0, 0.2]), 0.15
+        good = (lower >= 0.2) & (upper - lower <= width + slack * upper)
+        first = int(np.argmin([*good, False]))
+        assert served(lower, upper, 0.2, slack, width) == first
 
 
 def test_dense_rows_have_room_for_a_point_on_either_side() -> None:

@@ -14,6 +14,7 @@ from oracles.tree_queries import (
 )
 
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.proof.bodies import Body, Pair
 from vdsm_pin.proof.broad_phase import FEW
 from vdsm_pin.proof.error_box import ErrorBox
@@ -106,6 +107,30 @@ def test_all_at_once_are_judged_as_each_alone(seed: int) -> None:
     assert (again.verdict[limits > np.maximum(met, 0.0)] == REFUTED).all()
     far = (limits < met - 1.9e-3) & (met > 0.0)
     assert (again.verdict[far] == CERTIFIED).all()
+
+
+@pytest.mark.parametrize("corners", [20, 700])
+@pytest.mark.parametrize("seed", range(6))
+def test_many_corners_on_its_axis_leave_a_capsule_what_it_is(
+    seed: int, corners: int
+) -> None:
+    """Bodies that both move, few of whose corners are known before they are asked."""
+    rng = np.random.default_rng([33, seed])
+    tree, bodies, path = random_scene(rng)
+    asked = [Pair(0, 2), Pair(2, 1), Pair(0, 4), Pair(2, 5)]
+    drawn_out = [*(along(body, corners) for body in bodies[:3]), *bodies[3:]]
+    few, many = (prove(tree, b, path, asked) for b in (bodies, drawn_out))
+    holds(many, sampled(tree, bodies, path, asked))
+    assert (many.verdict == few.verdict).all()
+    assert ((many.lower <= few.upper) & (few.lower <= many.upper))[many.lower > 0].all()
+
+
+def along(body: Body, count: int) -> Body:
+    """A ball or capsule whose core has so many corners, evenly spread."""
+    (piece,) = body.pieces
+    shares = np.linspace(0.0, 1.0, count)[:, None]
+    points = piece.points[0] + shares * (piece.points[-1] - piece.points[0])
+    return Body(body.frame, (Hull(points, piece.radius),))
 
 
 @pytest.mark.parametrize("seed", range(8))

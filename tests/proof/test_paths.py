@@ -126,6 +126,7 @@ def test_rows_within_intervals_are_those_at_their_times() -> None:
     np.testing.assert_allclose(
         path.within(intervals, shares), path.at(moments), atol=1e-12
     )
+    np.testing.assert_array_equal(path.at_moments(np.arange(6.0)), path.knots)
     one = Path(path.knots[:1])
     np.testing.assert_array_equal(
         one.within(intervals[:2], shares[:2])[1], one.knots[0]
