@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from oracles.tree_queries import random_tree, unit
 
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import link_gaps, row_brackets
 from vdsm_pin.geometry.solids import Box, Capsule, HalfSpace, Mesh, Sphere
@@ -13,6 +15,10 @@ from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
+from vdsm_pin.proof.bodies import Body, PairTable
+from vdsm_pin.proof.bodies import Pair as BodyPair
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.prover import start_proof
 from vdsm_pin.verification.pair_slopes import pair_slopes
 from vdsm_pin.verification.records import Pair
 from vdsm_pin.verification.task import all_pairs, make_task
@@ -107,3 +113,37 @@ def test_slopes_between_links_are_those_of_differences() -> None:
             np.testing.assert_allclose(slopes[smooth, j], found[smooth], atol=2e-4)
             looked += int(smooth.sum())
     assert looked > 1000
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_slopes_of_a_cylinder_from_a_ball_are_those_of_the_closed_form(
+    seed: int,
+) -> None:
+    """A body with a disc, as links of robots have."""
+    rng = np.random.default_rng([5, seed])
+    tree = random_tree(rng, 4)
+    rod, centre = (
+        FlatCylinder(rng.normal(size=3), unit(rng), 0.3, 0.2),
+        rng.normal(size=3),
+    )
+    bodies = Body(tree.n_frames - 1, (rod,)), Body(0, (Hull(centre[None], 0.05),))
+    path = Path(np.zeros((1, tree.n_columns)))
+    task = start_proof(tree, bodies, path, PairTable.of([BodyPair(0, 1)]))[0].task
+    q = rng.uniform(-1.0, 1.0, (40, tree.n_columns))
+
+    def closed(q: FloatArray) -> FloatArray:
+        T_rod_world = np.linalg.inv(tree.poses(q)[:, -1])
+        away = T_rod_world[:, :3, :3] @ centre + T_rod_world[:, :3, 3] - rod.centre
+        along = away @ rod.axis
+        aside = np.linalg.norm(away - along[:, None] * rod.axis, axis=1)
+        over = np.stack([np.abs(along) - 0.3, aside - 0.2]).clip(min=0.0)
+        return np.asarray(np.hypot(*over) - 0.05)
+
+    gaps, slopes = pair_slopes(task, 0, q)
+    apart = gaps > 0.01
+    assert apart.sum() > 20
+    np.testing.assert_allclose(gaps[apart], closed(q)[apart], atol=1e-8)
+    for j, step in enumerate(STEP * np.eye(tree.n_columns)):
+        found, smooth = differences([closed(q + k * step) for k in (0, 1, -1)])
+        smooth &= apart
+        np.testing.assert_allclose(slopes[smooth, j], found[smooth], atol=2e-4)
