@@ -5,7 +5,6 @@ seal are made to fit again, so that only what is claimed can be wrong.
 """
 
 import copy
-import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,13 +19,11 @@ from oracles.random_robots import MESH, random_urdf
 from oracles.robot_certificates import BASES, CELL, VIRTUAL, Made, cell, text
 
 from vdsm_pin.certificate_checker.balls import SLACK, Rejected
-from vdsm_pin.certificate_checker.robot import Joints, Robot, within
+from vdsm_pin.certificate_checker.robot import Model, within
 from vdsm_pin.certificate_checker.tree import Tree
 from vdsm_pin.cli import main
-from vdsm_pin.robots.cell import robot_of
 from vdsm_pin.robots.files import RobotFiles
-from vdsm_pin.robots.srdf import Srdf
-from vdsm_pin.robots.urdf import read_robot
+from vdsm_pin.robots.urdf import read_robot, robot_of
 
 Rng = np.random.Generator
 
@@ -145,7 +142,7 @@ def test_a_mesh_is_covered_by_as_many_hulls_as_are_asked_for(
     ))  # fmt: skip
 
     def covered(over: list[int] | None) -> list[Any]:
-        return [*Robot._covered(asked, "l", corners, over)]  # type: ignore[arg-type]
+        return [*Model._covered(asked, "l", corners, over)]  # type: ignore[arg-type]
 
     (whole,) = covered(None)
     assert len(whole.points) == 1
@@ -238,9 +235,7 @@ def test_numbers_changed_at_random_are_refused_or_true(tmp_path: Path) -> None:
 def assert_read_alike(files: RobotFiles, rng: Rng) -> None:
     """The checker's tree stands as the package's, which Pinocchio's agrees with."""
     robot = robot_of(files)
-    document = ET.fromstring(robot.text)
-    srdf = None if files.srdf is None else Srdf(files.srdf, document)
-    joints = Joints(files, document, srdf)
+    joints = Model(files, np.eye(4))
     assert joints.moved == list(robot.joints)
     rows = rng.uniform(-2.0, 2.0, (3, len(robot.joints)))
     tree = Tree(joints.joints)

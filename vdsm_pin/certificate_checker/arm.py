@@ -88,7 +88,7 @@ class Arm:
         rates = [x for x in (rows.rates, rows.changes) if x is not None]
         own = Branch(rows.joints, rows.times, rates=rates)
         self.own = Tree(joints), Path(own)
-        self.tree, self.path, self.frames = beside(own, joints, problem.scene)
+        self.tree, self.path, self.frames = beside(own, joints, problem.scene.obstacles)
         self._cover(dict(header["pieces"]), header["joined"])
         self.pairs = [*self._pairs()]
         self.rows = Rows(self, rows)

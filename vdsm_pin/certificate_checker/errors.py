@@ -4,12 +4,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from vdsm_pin.certificate_checker.balls import claim, number
-from vdsm_pin.certificate_checker.solids import Solid
 from vdsm_pin.problem.error_boxes import ErrorBox
 
 
 def grown(
-    stated: Any, asked: ErrorBox, joints: Mapping[str, Any], solids: Sequence[Solid]
+    stated: Any, asked: ErrorBox, joints: Mapping[str, Any], solids: Sequence[Any]
 ) -> list[float]:
     """How far the surface of each obstacle may be off; [m].
 

@@ -15,7 +15,7 @@ from flint import arb, arb_mat
 
 from vdsm_pin.certificate_checker.balls import UP, Ball, claim
 from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Pose, Tree, hung
-from vdsm_pin.problem.scene import Moving, Scene
+from vdsm_pin.problem.scene import Moving
 
 Points: TypeAlias = Sequence[Ball]  # the control points of a column of q
 
@@ -60,10 +60,11 @@ class Branch:
     def __init__(
         self, knots: Any, times: Any, inner: Any = None, rates: Sequence[Any] = ()
     ) -> None:
-        self.knots, self.inner, self.rates = knots, inner, rates
+        self.knots, self.rates = knots, rates
+        self.inner = inner if inner is not None and inner.size else None
         self.timed = times is not None
         self.times = np.arange(float(len(knots))) if times is None else times
-        self.degree = 1 if inner is None else 1 + inner.shape[1]
+        self.degree = 1 if self.inner is None else 1 + inner.shape[1]
         if rates and len(knots) > 1:
             self.degree = 1 + 2 * len(rates)
 
@@ -121,29 +122,27 @@ class Path:
         return [raised(points, self.degree) for points in found]
 
 
-def beside(own: Branch, joints: Sequence[Joint], around: Scene) -> Any:
+def beside(own: Branch, joints: Sequence[Joint], obstacles: Sequence[Any]) -> Any:
     """The tree of joints and of what carries obstacles, its path, obstacles' frames.
 
     Args:
         own: How the joints move.
         joints: They come first, and so do their columns of q.
-        around: The obstacles.
+        obstacles: As they were read, or on carriers of joints and a branch.
     """
-    timed = own.timed or not around.moving
-    claim(timed, "rows beside what moves have no times")
+    moving = [one for one in obstacles if isinstance(one, Moving)]
     branches, first, joints = [own], dict[Any, int](), [*joints]
-    columns = own.knots.shape[1]
-    for carrier in around.carriers:
-        path, first[carrier] = carrier.path, len(joints)
-        joints += hung(carrier.tree.joints, len(joints), columns)
-        columns += path.knots.shape[1]
-        inner = path.inner if path.inner.size else None
-        branches.append(Branch(path.knots, path.times, inner))
-    frames = [
-        first[one.carrier] + one.frame if isinstance(one, Moving) else 0
-        for one in around.obstacles
-    ]
-    return Tree(joints), Path(*branches), frames
+    for one in dict.fromkeys(one.carrier for one in moving):
+        path: Any = one.path
+        columns, first[one] = sum(b.knots.shape[1] for b in branches), len(joints)
+        joints += [hung(each, first[one], columns) for each in one.tree.joints]
+        if not isinstance(path, Branch):
+            path = Branch(path.knots, path.times, path.inner)
+        branches.append(path)
+    timed = all(one.timed for one in (branches if moving else []))
+    claim(timed, "rows beside what moves have no times")
+    at = [first[x.carrier] + x.frame if isinstance(x, Moving) else 0 for x in obstacles]
+    return Tree(joints), Path(*branches), at
 
 
 class Sweep(NamedTuple):

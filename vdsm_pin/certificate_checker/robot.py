@@ -15,14 +15,7 @@ from flint import arb, arb_mat
 from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.certificate_checker.balls import SLACK, Ball, belongs, claim
 from vdsm_pin.certificate_checker.errors import grown
-from vdsm_pin.certificate_checker.motion import (
-    Branch,
-    Path,
-    Points,
-    beside,
-    derivative,
-    part,
-)
+from vdsm_pin.certificate_checker.motion import Branch, Path, beside, derivative, part
 from vdsm_pin.certificate_checker.solids import (
     CUBE,
     Body,
@@ -34,10 +27,11 @@ from vdsm_pin.certificate_checker.solids import (
     named_parts,
     solid,
 )
-from vdsm_pin.certificate_checker.tree import FIXED, SLIDES, TURNS, Joint, Pose
+from vdsm_pin.certificate_checker.tree import FIXED, SLIDES, TURNS, Joint, Pose, Tree
 from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.scene import Carrier, Moving
 from vdsm_pin.robots.files import CellFile, RobotFiles, find_mesh
 from vdsm_pin.robots.joint_limits import Limits, narrowed, read_limits, stated_limits
 from vdsm_pin.robots.model import RobotJoint
@@ -81,18 +75,25 @@ def placed(element: ET.Element) -> list[list[Ball]]:
     return [[*row, arb(shift)] for row, shift in rows]
 
 
-class Joints:
-    """The joints of a URDF as a tree, and which of them a trajectory moves.
+class Model:
+    """The joints of a URDF as a tree, which of them a trajectory moves, and its links.
 
     Args:
         files: Of the robot.
-        document: Its URDF.
-        srdf: Its SRDF, or None.
+        pose: T_world_root, where the root link hangs on the world, shape (4, 4); [m].
     """
 
-    def __init__(self, files: RobotFiles, document: ET.Element, srdf: Any) -> None:
-        self.lock, self.moved = files.lock, list[RobotJoint]()
-        self.group = srdf.group(files.group) if files.group is not None else None
+    def __init__(self, files: RobotFiles, pose: Any) -> None:
+        self.files, self.lock, self.moved = files, files.lock, list[RobotJoint]()
+        text, included = urdf_text(files.urdf, files.package_dirs)
+        validate_urdf(text, geometry_only=True)
+        self.document = document = ET.fromstring(text)
+        meshes = map(self._mesh, document.findall("link/collision/geometry/mesh"))
+        self.more = (*included, *dict.fromkeys(meshes))
+        self.srdf = srdf = Srdf(files.srdf, document) if files.srdf else None
+        group = files.group
+        claim(srdf or group is None, "a group without a SRDF")
+        self.group = None if not srdf or group is None else srdf.group(group)
         self.values = dict[str, tuple[int | None, float, float]]()
         self.elements = {j.attrib["name"]: j for j in document.findall("joint")}
         given = read_limits(files.joint_limits) if files.joint_limits else {}
@@ -106,7 +107,7 @@ class Joints:
             elif len(MOVES[kind]) > 1 or joint.find("mimic") is None:
                 limits = stated_limits(joint, given.get(name, Limits()))
                 self._own(name, kind, limits)
-        self.joints = [Joint(0, FIXED, X, still, (None, 1.0, 0.0))]
+        self.joints = [Joint(0, FIXED, X, pose, (None, 1.0, 0.0))]
         waiting, links = [*self.elements.values()], document.findall("link")
         (root,) = {x.attrib["name"] for x in links} - {end(j, "child") for j in waiting}
         self.frames = {root: self._hang(1, base.name, base.kind, still) if base else 1}
@@ -180,109 +181,38 @@ class Joints:
             if joint.column is not None:
                 joint.err(joint.gain * values[self.moved[joint.column].name], 0.0, 0.0)
 
-
-class Robot:
-    """What the files ask about.
-
-    Args:
-        file: The problem as it was read.
-        header: Of the certificate.
-        trajectory: The file.
-    """
-
-    judged = (
-        "clearances hold under the errors stated, limits of joints and of their rates "
-        "without them"
-    )
-
-    def __init__(
-        self, file: CellFile, header: Mapping[str, Any], trajectory: File
-    ) -> None:
-        self.files, self.rows = file.robot, self
-        text, included = urdf_text(self.files.urdf, self.files.package_dirs)
-        validate_urdf(text, geometry_only=True)
-        document = ET.fromstring(text)
-        meshes = [*map(self._mesh, document.findall("link/collision/geometry/mesh"))]
-        srdf = Srdf(self.files.srdf, document) if self.files.srdf else None
-        self.joints = Joints(self.files, document, srdf)
-        self.place, joints = "header", self.joints.joints
-        size = float(sum(joint.lever for joint in joints)) or 1.0
-        others = {name for name, frame in self.joints.frames.items() if frame != 1}
-        self.scene, of_obstacles = file.scene(size, others)
-        source = file.source((*included, *dict.fromkeys(meshes)), of_obstacles).sha256
-        belongs(header, "errors links topic", source, sha256_of_file(trajectory))
-        own = self._branch(header, trajectory)
-        self.own = Path(own)
-        self.tree, self.path, self.rests = beside(own, joints, self.scene)
-        self.notes = [self.files.solids.words, f"{header['interpolation']} pieces"]
-        self.notes += self.joints.notes
-        self.pairs = [*self._pairs(file, header, document, srdf)]
-
     def _mesh(self, mesh: ET.Element) -> Any:
         name = mesh.attrib["filename"]
         found = find_mesh(name, self.files.urdf, self.files.package_dirs)
         claim(found, f"mesh {name!r} is not found")
         return found
 
-    def _branch(self, header: Mapping[str, Any], trajectory: File) -> Branch:
-        joints = self.joints
-        motion = read_motion(trajectory, joints.moved, header["topic"], joints.values)
-        times, rates = motion.times, [motion.rates, motion.changes]
-        rates = [x for x in rates if x is not None and times is not None]
-        branch = Branch(motion.q, times, rates=rates)
+    def branch(self, trajectory: File, topic: str | None = None) -> Branch:
+        """How a trajectory moves the joints."""
+        motion = read_motion(trajectory, self.moved, topic, self.values)
+        timed = motion.times is not None
+        rates = [x for x in (motion.rates, motion.changes) if timed and x is not None]
+        branch = Branch(motion.q, motion.times, rates=rates)
         claim((np.diff(branch.times) > 0.0).all(), "times do not rise")
-        self.timed = times is not None and len(motion.q) > 1
-        joined = {1: "linear", 3: "cubic", 5: "quintic"}[branch.degree]
-        told = f"interpolation is {header['interpolation']}, the file's is {joined}"
-        claim(header["interpolation"] == joined, told)
         return branch
 
-    def _pairs(
-        self, file: CellFile, header: Any, document: ET.Element, srdf: Srdf | None
-    ) -> Iterator[Pair]:
-        """What the problem holds apart, in order."""
-        things = [solid(one) for one in self.scene.obstacles]
-        asked, stated = file.errors(self.scene), header["errors"]
-        off = grown(stated, asked, self.joints.least_errors(asked), things)
-        self.joints.err(stated)
-        named, told = {one.name: one for one in things}, header["links"]
-        for name, order in header["pieces"].items():
-            named[name].cut(order)
-        links, as_read = dict[str, list[Solid]](), {"order": [], "meshes": list[Any]()}
-        for link in document.findall("link"):
-            covers = told.get(link.attrib["name"], as_read)["meshes"]
-            if parts := named_parts([*self._solids(link, [*covers])]):
-                links[link.attrib["name"]] = parts
-        claim(set(told) <= set(links), "links without solids are told of")
-        (required, own), frames = file.required, self.joints.frames
-        outer = product(zip(things, self.rests, off, strict=True), links.items())
-        for (thing, at, lost), (name, parts) in outer:
-            for each in parts:
-                yield Pair(Body(frames[name], each), thing, at, required, lost)
-        left = srdf.disabled() if srdf else {}
-        every = [*combinations(links, 2)]
-        apart = [both for both in every if self._held(*both, left, srdf)]
-        for one, other in apart:
-            swapped = len(links[other]) < len(links[one])  # the one of fewer moves
-            moves, rests = (other, one) if swapped else (one, other)
-            order = told.get(rests, as_read)["order"]
-            rest = Compound(rests, links[rests], order)
-            for each in links[moves]:
-                yield Pair(Body(frames[moves], each), rest, frames[rests], own, 0.0)
-        self.notes += [f"{len(every) - len(apart)} of {len(every)} link pairs left out"]
-        for mesh in (one for one in things if isinstance(one, Mesh)):
-            self.notes += mesh.notes()
+    def links(self, told: Mapping[str, Any], whose: str = "") -> dict[str, Any]:
+        """Frame and solids of each link that has any, by its name in the header.
 
-    def _held(self, one: str, other: str, left: Any, srdf: Any) -> bool:
-        """Whether two links are held apart."""
-        way = self.tree.way(self.joints.frames[one], self.joints.frames[other])
-        moving = sum(self.tree.joints[k].column is not None for k, _ in way)
-        near = moving == 1 and srdf is None
-        return moving > 0 and not near and frozenset((one, other)) not in left
+        Args:
+            told: The header's links.
+            whose: What their names begin with there.
+        """
+        found = {}
+        for link in self.document.findall("link"):
+            name, frame = whose + link.attrib["name"], self.frames[link.attrib["name"]]
+            covers = told.get(name, {"meshes": []})["meshes"]
+            if parts := named_parts([*self._solids(link, name, [*covers])]):
+                found[name] = frame, parts
+        return found
 
-    def _solids(self, link: ET.Element, covers: list[Any]) -> Iterator[Solid]:
+    def _solids(self, link: ET.Element, name: str, covers: Any) -> Iterator[Solid]:
         """The convex pieces of a link; of each mesh as the certificate has it."""
-        name = link.attrib["name"]
         for collision in link.findall("collision"):
             place = np.array([[*map(float, row)] for row in placed(collision)])
             turn, shift = place[:, :3], place[:, 3]
@@ -324,6 +254,79 @@ class Robot:
         for points in hulls(name, corners, groups):
             yield Solid(name, [points], far)
 
+
+class Robot:
+    """What the files ask about.
+
+    Args:
+        file: The problem as it was read.
+        header: Of the certificate.
+        trajectory: The file.
+    """
+
+    judged = "clearances hold under the errors stated, limits and rates without them"
+
+    def __init__(self, file: CellFile, header: Any, trajectory: File) -> None:
+        self.rows, self.place = self, "header"
+        self.model = model = Model(file.robot, np.eye(4))
+        models = [Model(one.robot, one.pose) for one in file.others]
+        size = float(sum(joint.lever for joint in model.joints)) or 1.0
+        names = {name for name, frame in model.frames.items() if frame != 1}
+        self.scene, of_obstacles = file.scene(size, names)
+        more = (path for one in (model, *models) for path in one.more)
+        source = file.source((*more,), of_obstacles).sha256
+        belongs(header, "errors links topic", source, sha256_of_file(trajectory))
+        own, told = model.branch(trajectory, header["topic"]), header["links"]
+        joined = {1: "linear", 3: "cubic", 5: "quintic"}[own.degree]
+        wrong = f"interpolation is {header['interpolation']}, the file's is {joined}"
+        claim(header["interpolation"] == joined, wrong)
+        self.own, self.timed = Path(own), own.timed and len(own.knots) > 1
+        self.links, obstacles = model.links(told), [*self.scene.obstacles]
+        for one, files in zip(models, file.others, strict=True):
+            rides: Any = Tree(one.joints), one.branch(files.trajectory)
+            carrier = Carrier(*rides)
+            for name, (frame, parts) in one.links(told, f"{files.name}: ").items():
+                whole: Any = Compound(name, parts, told)
+                obstacles.append(Moving(whole, carrier, frame))
+        known = {*self.links, *(one.name for one in obstacles)} >= set(told)
+        claim(known, "links without solids are told of")
+        self.tree, self.path, self.rests = beside(own, model.joints, obstacles)
+        self.notes = [file.robot.solids.words, f"{joined} pieces", *model.notes]
+        self.pairs = [*self._pairs(file, header, [*map(solid, obstacles)])]
+
+    def _pairs(self, file: CellFile, header: Any, things: list[Any]) -> Iterator[Pair]:
+        """What the problem holds apart, in order."""
+        named, stated, links = {x.name: x for x in things}, header["errors"], self.links
+        asked = file.errors(self.scene, named)
+        for name, order in header["pieces"].items():
+            named[name].cut(order)
+        off = grown(stated, asked, self.model.least_errors(asked), things)
+        self.model.err(stated)
+        required, own = file.required
+        every = zip(things, self.rests, off, strict=True)
+        for (thing, at, lost), (frame, parts) in product(every, links.values()):
+            for each in parts:
+                yield Pair(Body(frame, each), thing, at, required, lost)
+        left = self.model.srdf.disabled() if self.model.srdf else {}
+        pairs = [*combinations(links, 2)]
+        apart = [names for names in pairs if self._held(*names, left)]
+        for one, other in apart:
+            both = sorted((one, other), key=lambda name: len(links[name][1]))
+            (frame, parts), (at, whole) = (links[name] for name in both)
+            rest = Compound(both[1], whole, header["links"])  # of more parts
+            for each in parts:
+                yield Pair(Body(frame, each), rest, at, own, 0.0)
+        self.notes += [f"{len(pairs) - len(apart)} of {len(pairs)} link pairs left out"]
+        for mesh in (one for one in things if isinstance(one, Mesh)):
+            self.notes += mesh.notes()
+
+    def _held(self, one: str, other: str, left: Any) -> bool:
+        """Whether two links are held apart."""
+        way = self.tree.way(self.links[one][0], self.links[other][0])
+        moving = sum(self.tree.joints[k].column is not None for k, _ in way)
+        near = moving == 1 and self.model.srdf is None
+        return moving > 0 and not near and frozenset((one, other)) not in left
+
     def check(self, first: Pose) -> None:
         """Check that links begin outside of meshes, and that joints keep their limits.
 
@@ -338,7 +341,7 @@ class Robot:
             if self.timed:
                 step = arb(self.own.times[k + 1]) - arb(self.own.times[k])
             columns = self.own.controls(k)
-            for joint, points in zip(self.joints.moved, columns, strict=True):
+            for joint, points in zip(self.model.moved, columns, strict=True):
                 told = f"joint {joint.name!r} leaves its limits"
                 claim(within(points, joint.lower, joint.upper), told)
                 limits = joint.velocity, joint.acceleration
@@ -365,7 +368,7 @@ def primitive(name: str, points: Any, cover: Any) -> Solid:
     return Solid(name, [corners], far, radius)
 
 
-def within(points: Points, low: float, high: float, halvings: int = HALVINGS) -> bool:
+def within(points: Any, low: float, high: float, halvings: int = HALVINGS) -> bool:
     """Whether a polynomial keeps within limits."""
     slack = SLACK * max(1.0, min(abs(low), abs(high)))
     good = [low - slack <= q <= high + slack for q in points]

@@ -58,10 +58,7 @@ class Solid:
         """Largest distance from the middle of the box around the corners, at most."""
         if self.normal is not None:
             return np.inf
-        points = self.points.reshape(-1, 3)
-        middle = (points.min(axis=0) + points.max(axis=0)) / 2
-        away = np.linalg.norm(points - middle, axis=1).max()
-        return float(away + self.radius + self.disc_radius) * UP
+        return away(self.points.reshape(-1, 3), self.radius + self.disc_radius)
 
     def parts(self, pieces: Any) -> "list[Solid]":
         """The solids of one piece that a body on a link is covered by.
@@ -96,6 +93,12 @@ class Solid:
         claim(sum(map(len, pieces)) <= 3 * len(corners), parts)  # as many as triangles
         claim(boundary(pieces) == boundary([corners]), parts)
         self.points = np.concatenate(self.ends[:, np.array(pieces, dtype=int)], axis=1)
+
+
+def away(points: Any, off: float) -> float:
+    """How far it is from the middle of the box around points (n, 3) beyond them."""
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    return float(np.linalg.norm(points - middle, axis=1).max() + off) * UP
 
 
 def boundary(loops: Iterable[Sequence[int]]) -> dict[tuple[int, int], int]:
@@ -134,13 +137,14 @@ class Compound:
     Args:
         name: Name in the certificate.
         points: The solids.
-        order: A permutation of their numbers, or none at all for 0, 1 and so on.
+        told: By name the certificate's permutation of their numbers, as `order`; none
+            or an empty one for 0, 1 and so on.
     """
 
-    def __init__(self, name: str, points: Sequence[Solid], order: Any = ()) -> None:
-        every = [*range(len(points))]
-        told = f"pieces of {name} do not make up the whole"
-        claim(sorted(order or every) == every, told)
+    def __init__(self, name: str, points: Sequence[Solid], told: Any) -> None:
+        order, every = told.get(name, {"order": ()})["order"], [*range(len(points))]
+        good = sorted(order or every) == every
+        claim(good, f"pieces of {name} do not make up the whole")
         self.name, self.whole = name, True
         self.points: list[Solid] = [points[k] for k in [*order] or every]
         self.normal, self.extent = None, max(one.extent for one in points)
@@ -148,6 +152,11 @@ class Compound:
     def support(self, n: Any, first: int, last: int) -> float:
         """Least n.x over the pieces first..last-1, for a unit n."""
         return min([one.support(n, 0, 1) for one in self.points[first:last]])
+
+    def size(self) -> float:
+        """As of a solid."""
+        points = np.concatenate([one.points[0] for one in self.points])
+        return away(points, max(one.radius + one.disc_radius for one in self.points))
 
 
 class Mesh(Solid):
@@ -186,10 +195,12 @@ class Mesh(Solid):
         return [note for note, holds in told.items() if holds]
 
 
-def solid(obstacle: Any) -> Solid:
+def solid(obstacle: Any) -> Any:
     """The solid of an obstacle as it was read, in the frame that carries it."""
     if isinstance(obstacle, scene.Moving):
         obstacle = obstacle.solid
+    if isinstance(obstacle, Compound):
+        return obstacle
     name = obstacle.name
     match obstacle:
         case solids.Sphere():

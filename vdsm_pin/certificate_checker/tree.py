@@ -4,7 +4,7 @@ A tree is a list of joints, parents first. Joint j, from 0, carries frame j + 1;
 is the world. A frame stands as a pair of its origin and its rotation.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -68,15 +68,14 @@ def frame_of(link: int) -> int:
     return 2 * link + 1
 
 
-def hung(given: Iterable[Any], base: int, columns: int) -> list[Joint]:
-    """Joints as a reader gives them, behind so many others and columns of q."""
-    joints = []
-    for one in given:
-        parent = one.parent + base if one.parent else 0
-        moves = None if one.column is None else one.column + columns
-        more = (moves, one.ratio, one.offset)
-        joints.append(Joint(parent, one.kind.name, one.axis, one.placement, more))
-    return joints
+def hung(one: Any, base: int, columns: int) -> Any:
+    """A joint, as a reader gives it too, behind so many others and columns of q."""
+    if not isinstance(one, Joint):
+        moves = one.column, one.ratio, one.offset
+        one = Joint(one.parent, one.kind.name, one.axis, one.placement, moves)
+    one.parent += base if one.parent else 0
+    one.column = None if one.column is None else one.column + columns
+    return one
 
 
 class Tree:

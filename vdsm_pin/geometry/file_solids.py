@@ -11,7 +11,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct, frozen
 from vdsm_pin.geometry.closed_meshes import ClosedMesh, close_mesh
-from vdsm_pin.geometry.convex import Hull, Hulls
+from vdsm_pin.geometry.convex import FlatCylinder, Hull, Hulls
 from vdsm_pin.geometry.primitives import BOX_CORNERS, NamedSolid
 
 
@@ -93,20 +93,38 @@ class Mesh(FromFile):
 
 @dataclass(frozen=True)
 class ConvexCover:
-    """The convex hull of a mesh: its inside lies within, whatever counts as inside.
+    """Convex pieces that hold a solid: a mesh's hull, or a link of another robot.
 
     Args:
-        name: The mesh's.
-        pieces: The hull alone.
+        name: The solid's.
+        pieces: The hull alone, or all that the link is made of.
     """
 
     name: str
-    pieces: tuple[Hull]
+    pieces: tuple[Hull | FlatCylinder, ...]
+
+    @property
+    def corners(self) -> FloatArray:
+        """Those of its pieces, ends of cylinders among them, shape (n, 3); [m]."""
+        return np.concatenate([_ends(piece) for piece in self.pieces])
+
+    @property
+    def grown(self) -> float:
+        """How far its surface lies off the hull of the corners, at most; [m]."""
+        return max(piece.radius for piece in self.pieces)
 
     @property
     def reach(self) -> float:
-        """Its largest distance from its frame's origin; [m]."""
-        return float(np.linalg.norm(self.pieces[0].points, axis=1).max())
+        """Its largest distance from its frame's origin, at most; [m]."""
+        return float(np.linalg.norm(self.corners, axis=1).max()) + self.grown
+
+
+def _ends(piece: Hull | FlatCylinder) -> FloatArray:
+    """Corners of a hull, or the centres of a cylinder's ends, shape (n, 3); [m]."""
+    if isinstance(piece, Hull):
+        return piece.points
+    along = piece.half_length * piece.axis
+    return np.array([piece.centre - along, piece.centre + along])
 
 
 @dataclass(frozen=True)

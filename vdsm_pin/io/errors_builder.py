@@ -1,10 +1,10 @@
 """The errors of a problem file, of an arm's or of any other robot's."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from vdsm_pin.geometry.solids import HalfSpace
+from vdsm_pin.geometry.solids import HalfSpace, Solid
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.problem_schema import ErrorsModel
 from vdsm_pin.io.yaml_reader import YamlDocument
@@ -13,14 +13,26 @@ from vdsm_pin.problem.scene import Scene, solid_of
 
 
 def build_errors(
-    model: ErrorsModel, frame: Frame, scene: Scene, document: YamlDocument
+    model: ErrorsModel,
+    frame: Frame,
+    scene: Scene,
+    document: YamlDocument,
+    links: Collection[str] = (),
 ) -> ErrorBox:
     """The errors under which every clearance is asked for.
+
+    Args:
+        model: As the file has them.
+        frame: Its unit.
+        scene: The obstacles.
+        document: The file, for messages.
+        links: Names of what counts as obstacles too.
 
     Raises:
         InvalidFile: If they name an obstacle that there is not, or turn a half-space.
     """
-    _check_obstacles(model, scene, document)
+    solids = {one.name: solid_of(one) for one in scene.obstacles}
+    _check_obstacles(model, dict.fromkeys(links) | solids, document)
     joint, slide = model.joint_deg, model.slide
     turns = joint if isinstance(joint, Mapping) else {}
     shifts = slide if isinstance(slide, Mapping) else {}
@@ -46,8 +58,9 @@ def build_errors(
     )
 
 
-def _check_obstacles(model: ErrorsModel, scene: Scene, document: YamlDocument) -> None:
-    kinds = {one.name: solid_of(one) for one in scene.obstacles}
+def _check_obstacles(
+    model: ErrorsModel, kinds: Mapping[str, Solid | None], document: YamlDocument
+) -> None:
     for i, one in enumerate(model.obstacles):
         at = ("errors", "obstacles", i)
         if one.name not in kinds:

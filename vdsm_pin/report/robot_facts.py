@@ -22,6 +22,7 @@ def robot_facts(verification: RobotVerification) -> dict[str, Any]:
     return {
         "notes": (
             *cell.robot.notes,
+            *(note for one in cell.others for note in one.notes),
             *mesh_notes(cell),
             *file_notes(cell),
             *(f"trajectory: {note}" for note in verification.notes),

@@ -9,16 +9,14 @@ from typing import Any, Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
-from vdsm_pin.geometry.solids import Capsule, Cylinder, Sphere
+from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.report.charts import packed, series
 from vdsm_pin.report.moves import quaternion, subdivided
 from vdsm_pin.report.palette import link_colours
-from vdsm_pin.report.solids import FINE, Surface, joined, surface
+from vdsm_pin.report.solids import Surface, joined, piece_surface
 from vdsm_pin.report.thinning import Thinned
-from vdsm_pin.robots.hulls import hull_triangles
 from vdsm_pin.robots.judgement import RobotVerification
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.units import MM_PER_M
@@ -28,9 +26,6 @@ _STEP: Final = np.deg2rad(4.0)
 
 _MOST: Final = 4_000
 """Moments that a page is told besides the rows."""
-
-_SMALLEST: Final = 1e-4
-"""Radius that a corner of a flat body is drawn with at least; [m]."""
 
 _SMOOTH: Final = 8
 """Parts of a smooth piece at least."""
@@ -127,24 +122,7 @@ def _middles(bodies: Sequence[Body]) -> list[FloatArray]:
 
 def _skin(body: Body) -> Surface:
     """Triangles to draw a body with, in the frame of its link."""
-    return joined([_surface(piece) for piece in body.pieces])
-
-
-def _surface(piece: Piece) -> Surface:
-    if isinstance(piece, FlatCylinder):
-        axis, half = piece.axis, piece.half_length
-        return surface(Cylinder("", piece.centre, axis, half, piece.radius), 1.0, FINE)
-    assert isinstance(piece, Hull)  # links have no half-spaces
-    points = piece.points
-    if (hull := hull_triangles(points)) is not None:
-        return Surface(*hull)
-    way = points[-1] - points[0]
-    length = float(np.linalg.norm(way))
-    if len(points) == 2 and length > 0.0:
-        middle, radius = points.mean(axis=0), piece.radius
-        return surface(Capsule("", middle, way / length, length / 2.0, radius), 1.0)
-    radius = max(piece.radius, _SMALLEST)
-    return joined([surface(Sphere("", point, radius), 1.0) for point in points])
+    return joined([piece_surface(piece) for piece in body.pieces])
 
 
 def joint_charts(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from vdsm_pin.geometry.solids import Mesh
+from vdsm_pin.geometry.solids import ConvexCover, Mesh, Solid
 from vdsm_pin.io.source import BLOCK
 from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.problem.scene import Moving, Obstacle, solid_of
@@ -49,8 +49,8 @@ def scene_rows(problem: Problem) -> tuple[SceneRow, ...]:
 
 
 def _row(obstacle: Obstacle, file: Path | None, digests: dict[Path, str]) -> SceneRow:
-    solid = solid_of(obstacle)
-    kind = type(solid).__name__
+    solid: Solid | ConvexCover = solid_of(obstacle)
+    kind = "Link" if isinstance(solid, ConvexCover) else type(solid).__name__
     shape = "".join(f" {c.lower()}" if c.isupper() else c for c in kind).strip()
     shape += ", moving" if isinstance(obstacle, Moving) else ""
     triangles, inside = None, "solid"

@@ -6,10 +6,12 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct
+from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
 from vdsm_pin.geometry.solids import (
     BOX_CORNERS,
     Box,
     Capsule,
+    ConvexCover,
     Cylinder,
     HalfSpace,
     Mesh,
@@ -19,11 +21,13 @@ from vdsm_pin.geometry.solids import (
     Sphere,
     Voxels,
 )
+from vdsm_pin.robots.hulls import hull_triangles
 
 _PAGE_TRIANGLES: Final = 60_000  # of all obstacles of a page: about two megabytes
 _MOST_TRIANGLES: Final = 20_000  # of one drawn mesh
 _LEAST_TRIANGLES: Final = 200  # below, a mesh is no longer recognised
 _ROUNDNESS: Final = ((48, 12), (32, 8), (24, 6), (16, 4), (12, 3))
+_SMALLEST: Final = 1e-4  # radius that a corner of a flat body is drawn with; [m]
 _BOX_FACES: Final = (
     (0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3),
 )  # fmt: skip
@@ -73,7 +77,9 @@ class Surface:
     creased: bool = True
 
 
-def surface(obstacle: Solid, extent: float, fine: Detail = FINE) -> Surface:
+def surface(
+    obstacle: Solid | ConvexCover, extent: float, fine: Detail = FINE
+) -> Surface:
     """The surface of an obstacle.
 
     Args:
@@ -105,6 +111,26 @@ def surface(obstacle: Solid, extent: float, fine: Detail = FINE) -> Surface:
         case Voxels():
             turn, half = obstacle.rotation, obstacle.half_size
             return _cells(obstacle.centres, turn, half, fine.triangles)
+        case ConvexCover():
+            return joined([piece_surface(piece) for piece in obstacle.pieces])
+
+
+def piece_surface(piece: Piece) -> Surface:
+    """The surface of a piece of a link, in its frame; not of a half-space."""
+    if isinstance(piece, FlatCylinder):
+        axis, half = piece.axis, piece.half_length
+        return surface(Cylinder("", piece.centre, axis, half, piece.radius), 1.0, FINE)
+    assert isinstance(piece, Hull)  # links have no half-spaces
+    points = piece.points
+    if (hull := hull_triangles(points)) is not None:
+        return Surface(*hull)
+    way = points[-1] - points[0]
+    length = float(np.linalg.norm(way))
+    if len(points) == 2 and length > 0.0:
+        middle, radius = points.mean(axis=0), piece.radius
+        return surface(Capsule("", middle, way / length, length / 2.0, radius), 1.0)
+    radius = max(piece.radius, _SMALLEST)
+    return joined([surface(Sphere("", point, radius), 1.0) for point in points])
 
 
 def obj_text(solid: Solid) -> str:

@@ -11,9 +11,10 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.solids import ConvexCover, Solid
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import ProblemSource
-from vdsm_pin.problem.scene import Scene, solid_of
+from vdsm_pin.problem.scene import Obstacle, Scene, solid_of
 from vdsm_pin.proof.bodies import Body, Pair
 from vdsm_pin.proof.packed_tree import TreePoses
 from vdsm_pin.proof.tree import Tree
@@ -21,11 +22,12 @@ from vdsm_pin.robots.contacts import Placed
 from vdsm_pin.robots.errors import check_errors
 from vdsm_pin.robots.files import RobotFiles, read_cell_file, source_of
 from vdsm_pin.robots.model import Robot
+from vdsm_pin.robots.other_robots import OtherRobot, read_other
 from vdsm_pin.robots.scene_files import read_scene_with_files
-from vdsm_pin.robots.second_opinion import link_shapes
-from vdsm_pin.robots.urdf import read_robot
+from vdsm_pin.robots.second_opinion import coal_parts, link_shapes
+from vdsm_pin.robots.urdf import robot_of
 from vdsm_pin.units import MM_PER_M
-from vdsm_pin.verification.coal_bodies import coal_bodies
+from vdsm_pin.verification.coal_bodies import CoalObstacle, coal_bodies
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
 from vdsm_pin.verification.moving import frames_beside, tree_beside
 
@@ -46,6 +48,7 @@ class Cell:
         T_world_base: The robot's root link in the frame of the files, (4, 4); [m].
         source: The files it was read from; None for none.
         errors: What every clearance is asked for under.
+        others: Robots whose links are the last obstacles.
 
     Raises:
         InvalidInput: If a clearance is negative or not finite, or errors are of what
@@ -60,6 +63,7 @@ class Cell:
     T_world_base: FloatArray = field(default_factory=lambda: np.eye(4))
     source: ProblemSource | None = None
     errors: ErrorBox = field(default_factory=ErrorBox)
+    others: tuple[OtherRobot, ...] = ()
 
     def __post_init__(self) -> None:
         """Check clearances and errors."""
@@ -113,7 +117,7 @@ class Cell:
     @cached_property
     def coal(self) -> CoalShapes:
         """The bodies as Coal has them."""
-        things = (coal_bodies(solid_of(one)) for one in self.scene.obstacles)
+        things = map(_coal, self.scene.obstacles)
         frames = [body.frame for body in self.bodies]
         return CoalShapes(frames, [*link_shapes(self.robot), *things])
 
@@ -195,6 +199,13 @@ def read_cell(path: Path) -> Cell:
     pose[:3, :3] = file.frame.rotation
     pose[:3, 3] = file.frame.metres(file.model.base.position)
     scene, of_obstacles = file.scene(_size(robot), _others(robot))
+    others = tuple(read_other(file, k) for k in range(len(file.others)))
+    links = (link for one in others for link in one.links)
+    try:
+        scene = Scene((*scene.obstacles, *links))
+    except InvalidInput as error:
+        raise file.document.invalid(("others",), str(error)) from None
+    more = (path for one in others for path in one.robot.more_files)
     cell = Cell(
         robot=robot,
         scene=scene,
@@ -202,7 +213,8 @@ def read_cell(path: Path) -> Cell:
         required_self_clearance=required_self,
         stated_name=file.model.name or "",
         T_world_base=frozen(pose),
-        source=file.source(robot.more_files, of_obstacles),
+        source=file.source((*robot.more_files, *more), of_obstacles),
+        others=others,
     )
     try:
         return cell.under(file.errors(scene))
@@ -210,23 +222,6 @@ def read_cell(path: Path) -> Cell:
         raise
     except InvalidInput as error:
         raise file.document.invalid(("errors",), str(error)) from None
-
-
-def robot_of(files: RobotFiles) -> Robot:
-    """The robot of some files.
-
-    Raises:
-        InvalidInput: If a file is bad or a value makes no sense.
-    """
-    return read_robot(
-        files.urdf,
-        files.srdf,
-        files.package_dirs,
-        files.lock,
-        files.group,
-        files.solids,
-        files.joint_limits,
-    )
 
 
 def locks(words: tuple[str, ...]) -> dict[str, float]:
@@ -251,6 +246,14 @@ def locks(words: tuple[str, ...]) -> dict[str, float]:
 def _others(robot: Robot) -> list[str]:
     """Names of the links besides those that stand as the root link does."""
     return [name for name, frame in robot.frames.items() if frame != ROOT_FRAME]
+
+
+def _coal(obstacle: Obstacle) -> CoalObstacle | None:
+    """An obstacle as Coal has it; None where Coal cannot take a piece of it."""
+    solid: Solid | ConvexCover = solid_of(obstacle)
+    if isinstance(solid, ConvexCover):
+        return coal_parts(solid.pieces)
+    return coal_bodies(solid)
 
 
 def _size(robot: Robot) -> float:

@@ -78,14 +78,17 @@ def write_robot_certificate(
     pieces, n_links = proving.task.pieces, len(cell.robot.bodies)
     # Where each body as it was given stands among those that were packed.
     places = np.argsort(plan.number[: len(bodies)], kind="stable").tolist()
-    obstacles = zip(places[n_links:], cell.scene.obstacles, strict=True)
+    of_obstacles, rest = places[n_links:], cell.scene.obstacles
+    first = len(rest) - sum(len(one.links) for one in cell.others)
+    obstacles = zip(of_obstacles[:first], rest[:first], strict=True)
+    links = places[:n_links] + of_obstacles[first:]
     header = RobotHeaderLine(
         **hashes.told(),
         interpolation=DEGREES[motion.degree],
         pairs=_pairs(plan.bodies[len(bodies) :], plan.bodies, plan.pairs),
         pieces=pieces_of_obstacles(obstacles, pieces),
         errors=_errors(cell, errors),
-        links=_links(cell, places[:n_links], pieces),
+        links=_links(cell, links, pieces),
         topic=topic,
     )
     none = np.zeros(len(pieces.root), np.int64)
@@ -137,12 +140,14 @@ def _links(
 ) -> dict[str, LinkPieces]:
     """Of each link that is not as its URDF says what it is made of."""
     found = {}
-    for k, body in zip(places, cell.robot.bodies, strict=True):
+    robots = [("", cell.robot), *((f"{x.name}: ", x.robot) for x in cell.others)]
+    bodies = [(*one, body) for one in robots for body in one[1].bodies]
+    for k, (whose, robot, body) in zip(places, bodies, strict=True):
         order = pieces.order[pieces.first_piece[k] : pieces.first_piece[k + 1]]
         sorted_ = bool((np.diff(order) != 1).any())
-        covers = () if cell.robot.solids == HULLS else cell.robot.covers.get(body.name)
+        covers = () if robot.solids == HULLS else robot.covers.get(body.name)
         if sorted_ or covers:
-            found[body.name] = LinkPieces(
+            found[whose + body.name] = LinkPieces(
                 order=order.tolist() if sorted_ else [],
                 meshes=[_cover(cover) for cover in covers or ()],
             )

@@ -13,8 +13,8 @@ from typing import Annotated, Final, Literal, TypeAlias
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError
 
-from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import rotation_from_rpy
+from vdsm_pin.errors import InvalidFile, InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray, frozen, rotation_from_rpy
 from vdsm_pin.io.body_schema import MAX_PARTS
 from vdsm_pin.io.errors_builder import build_errors
 from vdsm_pin.io.frames import Frame
@@ -23,8 +23,8 @@ from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.problem_errors import first_error
 from vdsm_pin.io.problem_file import files_of_obstacles
 from vdsm_pin.io.problem_schema import BasePoseModel, ErrorsModel, not_bool
-from vdsm_pin.io.schema_types import FileModel, Name, NotNegative, Number
-from vdsm_pin.io.source import read_text
+from vdsm_pin.io.schema_types import FileModel, FileName, Name, NotNegative, Number
+from vdsm_pin.io.source import check_is_file, read_text
 from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import ProblemSource
@@ -181,6 +181,21 @@ class RobotModel(FileModel):
         )
 
 
+class OtherRobotModel(FileModel):
+    """Another robot, which moves as its own trajectory says."""
+
+    name: Name = Field(description="Its links are `NAME: LINK`, in results and errors.")
+    robot: RobotModel = Field(description="As the one that is judged.")
+    base: BasePoseModel = Field(
+        default=BasePoseModel(),
+        description="Where its root link is, in the frame of this file. Default: at "
+        "the origin.",
+    )
+    trajectory: FileName = Field(
+        description="Its trajectory, with times, relative to this file; no folder."
+    )
+
+
 class CellModel(SceneModel):
     """What a motion of a robot is held to."""
 
@@ -199,6 +214,11 @@ class CellModel(SceneModel):
         description="File of more obstacles, in the frame of the root link: YAML with "
         "obstacles, a PlanningScene of MoveIt, or a world in MJCF.",
     )
+    others: list[OtherRobotModel] = Field(
+        default=[],
+        description="Other robots: each link is an obstacle that moves. Trajectories "
+        "then need times.",
+    )
     required_clearance: NotNegative = Field(
         description="Between the surfaces of links and obstacles [length_unit]."
     )
@@ -210,6 +230,23 @@ class CellModel(SceneModel):
         description="How far joints, base and obstacles may be off. Default: not at "
         "all.",
     )
+
+
+@dataclass(frozen=True)
+class OtherFile:
+    """Another robot of a problem, by files.
+
+    Args:
+        name: Of the robot here.
+        robot: Its files.
+        trajectory: Its motion.
+        pose: T_base_root: its root link as seen from that of the robot, (4, 4); [m].
+    """
+
+    name: str
+    robot: RobotFiles
+    trajectory: Path
+    pose: FloatArray
 
 
 @dataclass(frozen=True)
@@ -237,6 +274,27 @@ class CellFile:
         base = self.model.base
         rotation = rotation_from_rpy(np.radians(base.rpy_deg))
         return Frame(self.model.length_unit, rotation, np.array(base.position))
+
+    @cached_property
+    def others(self) -> tuple[OtherFile, ...]:
+        """The other robots, by files.
+
+        Raises:
+            InvalidFile: If there is no such trajectory.
+        """
+        folder, found = self.path.parent, []
+        for i, model in enumerate(self.model.others):
+            try:
+                check_is_file(folder / model.trajectory)
+            except InvalidFile as error:
+                at, name = ("others", i, "trajectory"), model.trajectory
+                raise self.document.invalid_file(at, name, error) from None
+            pose = np.eye(4)
+            pose[:3, :3] = self.frame.orientation(model.base.rpy_deg)
+            pose[:3, 3] = self.frame.point(model.base.position)
+            files = model.robot.files(folder), folder / model.trajectory
+            found.append(OtherFile(model.name, *files, frozen(pose)))
+        return tuple(found)
 
     @property
     def required(self) -> tuple[float, float]:
@@ -267,18 +325,25 @@ class CellFile:
         except InvalidInput as error:
             raise self.document.invalid(("scene",), str(error)) from None
 
-    def errors(self, scene: Scene) -> ErrorBox:
+    def errors(self, scene: Scene, links: Collection[str] = ()) -> ErrorBox:
         """The errors under which every clearance is asked for.
+
+        Args:
+            scene: The obstacles.
+            links: Names of more: links of other robots, where the scene lacks them.
 
         Raises:
             InvalidFile: If they name an obstacle that there is not.
         """
-        return build_errors(self.model.errors, self.frame, scene, self.document)
+        model, frame = self.model.errors, self.frame
+        return build_errors(model, frame, scene, self.document, links)
 
     def source(self, more: tuple[Path, ...], of_obstacles: Named) -> ProblemSource:
         """All files that it is read from, those of links and obstacles too."""
-        scene = filter(None, [self.model.scene])
-        named = (*more, *(self.path.parent / file for file in scene))
+        names = filter(None, [self.model.scene])
+        scene = (self.path.parent / name for name in names)
+        others = (x for one in self.others for x in (*one.robot.files, one.trajectory))
+        named = (*more, *scene, *others)
         return source_of((self.path, *self.robot.files, *named), of_obstacles)
 
 

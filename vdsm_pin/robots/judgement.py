@@ -136,6 +136,7 @@ def verify_robot(
     )
     checks = [
         _poses(robot, path),
+        *(_poses(one.robot, one.path, f"{one.name}: ") for one in cell.others),
         *_limits(robot, path),
         *rate_checks(robot.joints, path),
         *check_inside(by_mesh(cell, located), INSIDE),
@@ -175,22 +176,23 @@ def _is_clear(cell: Cell, path: Path, deadline: Deadline) -> bool:
     return prove(cell.tree, cell.bodies, path, cell.pairs, budget=budget).is_certified
 
 
-def _poses(robot: Robot, path: Path) -> Check:
+def _poses(robot: Robot, path: Path, whose: str = "") -> Check:
+    """Of another robot under its name, at moments of its own, which are not told."""
     step = -(-len(path.knots) // COMPARED)
     rows = np.arange(0, len(path.knots), step)
     try:
         off = pose_difference(robot, path.knots[rows])
     except VdsmError as error:
         where = f"not done: {error}"
-        return Check(POSES, Verdict.UNDECIDED, 0, nan, POSE_ERROR, "-", where)
+        return Check(whose + POSES, Verdict.UNDECIDED, 0, nan, POSE_ERROR, "-", where)
     k = int(np.argmax(off))
     good = bool((off <= POSE_ERROR).all())
     verdict = Verdict.CERTIFIED if good else Verdict.REFUTED
     where = f"{len(robot.frames)} links at {len(rows)} of {len(path.knots)} waypoints"
     count = len(rows) * len(robot.frames)
-    return Check(
-        POSES, verdict, count, float(off[k]), POSE_ERROR, "-", where, float(rows[k])
-    )
+    found, moment = float(off[k]), nan if whose else float(rows[k])
+    name = whose + POSES
+    return Check(name, verdict, count, found, POSE_ERROR, "-", where, moment)
 
 
 def _limits(robot: Robot, path: Path) -> list[Check]:

@@ -9,7 +9,7 @@ from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.tables import listed
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.tree import Tree
-from vdsm_pin.robots.files import HULLS, Solids
+from vdsm_pin.robots.files import HULLS, RobotFiles, Solids
 from vdsm_pin.robots.joint_limits import read_limits
 from vdsm_pin.robots.joints import JointReader, Moving
 from vdsm_pin.robots.link_solids import LinkReader
@@ -81,6 +81,23 @@ def read_robot(
         notes=(*reader.notes, *_not_judged(document)),
         more_files=(*included, *links.meshes(document)),
         covers=links.covers,
+    )
+
+
+def robot_of(files: RobotFiles) -> Robot:
+    """The robot of some files.
+
+    Raises:
+        InvalidInput: If a file is bad or a value makes no sense.
+    """
+    return read_robot(
+        files.urdf,
+        files.srdf,
+        files.package_dirs,
+        files.lock,
+        files.group,
+        files.solids,
+        files.joint_limits,
     )
 
 

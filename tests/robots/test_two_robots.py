@@ -1,0 +1,202 @@
+"""A second robot beside the one that is judged: closed forms, Coal, swapped roles."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from oracles.certificate_cases import write_cube
+from oracles.random_robots import MESH, random_urdf
+
+from tests.robots.test_robots import write
+from vdsm_pin.certificate_checker import Outcome, check_certificate
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.proof.paths import Path as Motion
+from vdsm_pin.proof.terms import CERTIFIED, REFUTED
+from vdsm_pin.robots.cell import Cell, read_cell
+from vdsm_pin.robots.certificate import write_robot_certificate
+from vdsm_pin.robots.files import HULLS, Solids, read_cell_file
+from vdsm_pin.robots.judgement import POSES, verify_robot
+from vdsm_pin.robots.second_opinion import link_shapes
+from vdsm_pin.robots.trajectory_files import path_text, read_path
+from vdsm_pin.robots.urdf import read_robot
+from vdsm_pin.verification.certificate_lines import Hashes
+from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
+from vdsm_pin.verification.records import Verdict
+
+RADIUS, REQUIRED = {"left": 0.05, "right": 0.08}, 0.01
+BASES = {"left": ([0.0, 0.0, 0.3], [0, 0, 0]), "right": ([0.9, 0.1, 0.3], [0, 0, 180])}
+TIMES = {"left": np.array([0.0, 1.0, 3.0]), "right": np.array([0.25, 1.5, 2.5])}
+
+
+def urdf(radius: float) -> str:
+    """A ball at the end of half a metre that turns about z."""
+    return f"""<robot name="swing"><link name="base"/>
+      <link name="ball"><collision><origin xyz="0.5 0 0"/>
+        <geometry><sphere radius="{radius}"/></geometry></collision></link>
+      <joint name="turn" type="revolute"><parent link="base"/><child link="ball"/>
+        <axis xyz="0 0 1"/><limit lower="-9" upper="9" effort="1" velocity="99"/>
+      </joint></robot>"""
+
+
+def rows_text(q: FloatArray, times: FloatArray) -> str:
+    """A trajectory of one joint."""
+    rows = zip(q.tolist(), times.tolist(), strict=True)
+    return "\n".join(["turn_rad,time_s", *(f"{a!r},{t!r}" for a, t in rows)])
+
+
+def two(folder: Path, q: dict[str, FloatArray], own: str = "left") -> tuple[Cell, Path]:
+    """The problem of one of two swings beside the other, and its trajectory."""
+    for name in BASES:
+        write(folder, f"{name}.urdf", urdf(RADIUS[name]))
+        write(folder, f"{name}.csv", rows_text(q[name], TIMES[name]))
+    other = "right" if own == "left" else "left"
+    bases = {
+        name: f"base: {{position: {place}, rpy_deg: {rpy}}}"
+        for name, (place, rpy) in BASES.items()
+    }
+    text = (
+        "vdsm_problem: 1\nlength_unit: m\n"
+        f"robot: {{urdf: {own}.urdf}}\n{bases[own]}\nrequired_clearance: {REQUIRED}\n"
+        f"others:\n  - {{name: {other}, robot: {{urdf: {other}.urdf}},\n"
+        f"     {bases[other]}, trajectory: {other}.csv}}\n"
+    )
+    return read_cell(write(folder, f"{own}.yaml", text)), folder / f"{own}.csv"
+
+
+def truth(q: dict[str, FloatArray], at: FloatArray) -> FloatArray:
+    """Clearance of both balls at some times; [m]."""
+    centres = []
+    for name, (place, rpy) in BASES.items():
+        angle = np.interp(at, TIMES[name], q[name]) + np.radians(rpy[2])
+        circle = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+        centres.append(0.5 * circle + np.array(place))
+    away = np.linalg.norm(centres[0] - centres[1], axis=1)
+    return np.asarray(away - sum(RADIUS.values()))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_closed_form_and_swapped_roles(seed: int, tmp_path: Path) -> None:
+    rng = np.random.default_rng(seed)
+    q = {name: rng.uniform(-2.5, 2.5, 3) for name in BASES}
+    for own, name in (("left", "right: ball"), ("right", "left: ball")):
+        cell, file = two(tmp_path, q, own)
+        found = verify_robot(cell, read_path(file, cell.robot))
+        start, end = TIMES[own][0], TIMES[own][-1]
+        least = float(truth(q, np.linspace(start, end, 60_001)).min())
+        (near,) = found.approaches
+        assert near.pair.obstacle == name
+        assert near.lower <= max(least, 0.0) + 1e-12
+        assert max(least, 0.0) <= max(near.upper, 0.0) + 1e-4
+        assert found.least.verdict[0] == (CERTIFIED if least >= REQUIRED else REFUTED)
+        time = np.interp(near.interval + near.share, np.arange(3.0), TIMES[own])
+        if least > 0.0:
+            assert near.coal == pytest.approx(float(truth(q, time[None])[0]), abs=1e-6)
+        poses = [check for check in found.checks if check.name.endswith(POSES)]
+        assert [check.verdict for check in poses] == [Verdict.CERTIFIED] * 2
+
+
+def test_swapped_roles_agree_to_the_padding(tmp_path: Path) -> None:
+    q = {"left": np.array([1.0, 0.8, 0.9]), "right": np.array([-0.9, 0.9, 1.4])}
+    for times in TIMES.values():
+        assert truth(q, times).min() > REQUIRED
+    whole = {**TIMES, "right": np.array([0.0, 1.5, 3.0])}
+    found = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(TIMES, "right", whole["right"])
+        for own in BASES:
+            cell, file = two(tmp_path, q, own)
+            found.append(verify_robot(cell, read_path(file, cell.robot)))
+    one, other = found
+    assert one.verdict is other.verdict
+    assert one.least.lower[0] == pytest.approx(other.least.lower[0], abs=1e-9)
+
+
+def test_certificate_is_of_both_trajectories(tmp_path: Path) -> None:
+    """Planes of one motion are no proof beside another one of the second robot."""
+    q = {"left": np.array([1.2, 0.3, 1.2]), "right": np.array([1.0, 0.9, 1.1])}
+    cell, file = two(tmp_path, q)
+    found, proof = verify_robot(cell, read_path(file, cell.robot)), tmp_path / "proof"
+    assert found.verdict is Verdict.CERTIFIED
+
+    def outcome(*, told: bool = True) -> Outcome:
+        if told:
+            source = read_cell_file(tmp_path / "left.yaml").source((), ())
+            hashes = Hashes(source.sha256, sha256_of_file(file))
+            write_robot_certificate(proof, found, hashes)
+        return check_certificate(proof, tmp_path / "left.yaml", file)
+
+    assert outcome().accepted
+    nearer = q | {"right": np.array([1.0, -0.1, 1.1])}
+    assert truth(nearer, np.linspace(0.0, 3.0, 999)).min() < 0.0
+    two(tmp_path, nearer)
+    assert "of another problem file" in outcome(told=False).reason
+    assert "claims" in outcome().reason
+    two(tmp_path, q)
+    write(tmp_path, "right.csv", rows_text(q["right"], TIMES["right"] - 1.0))
+    assert not outcome().accepted
+    write(tmp_path, "right.csv", "turn_rad\n0\n1\n")
+    assert "no times" in outcome().reason
+
+
+def test_what_is_wrong_with_another_robot_is_said(tmp_path: Path) -> None:
+    cell, _ = two(tmp_path, {"left": np.zeros(3), "right": np.zeros(3)})
+    (other,) = cell.others
+    assert all(note.startswith("right: ") for note in other.notes)
+    write(tmp_path, "right.csv", "turn_rad\n0\n1\n")
+    with pytest.raises(InvalidFile, match=r"'right\.csv' has no times, which it needs"):
+        read_cell(tmp_path / "left.yaml")
+    (tmp_path / "right.csv").unlink()
+    with pytest.raises(InvalidFile, match=r"line 8.*does not exist"):
+        read_cell(tmp_path / "left.yaml")
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_pairs_keep_what_dense_samples_by_coal_say(
+    seed: int, tmp_path: Path
+) -> None:
+    """And what is certified the checker accepts, meshes in parts too."""
+    rng, times = np.random.default_rng(seed), np.array([0.0, 1.0, 2.0])
+    robots, motions = [], []
+    write_cube(tmp_path / MESH, 4.0)
+    for name, solids in (("a", HULLS), ("b", Solids("parts", 2))):
+        urdf = write(tmp_path, f"{name}.urdf", random_urdf(rng, 4))
+        robots.append(read_robot(urdf, solids=solids))
+        q = rng.uniform(-0.4, 0.4, (3, len(robots[-1].joints)))
+        motions.append(Motion(q, times=times))
+        write(tmp_path, f"{name}.csv", path_text(motions[-1], robots[-1]))
+    place = [0.12 * seed, 0.2, 0.0]
+    text = (
+        "vdsm_problem: 1\nlength_unit: m\nrobot: {urdf: a.urdf}\n"
+        "required_clearance: 0.001\nothers: [{name: b, trajectory: b.csv,\n"
+        "  robot: {urdf: b.urdf, bodies: parts, parts: 2},\n"
+        f"  base: {{position: {place}, rpy_deg: [0, 0, 90]}}}}]\n"
+    )
+    problem, file = write(tmp_path, "cell.yaml", text), tmp_path / "a.csv"
+    cell = read_cell(problem)
+    found = verify_robot(cell, read_path(file, cell.robot))
+    other = np.eye(4)
+    other[:3, :3], other[:3, 3] = rotation_from_rpy(np.array([0, 0, np.pi / 2])), place
+    at = np.linspace(0.0, 2.0, 400)
+    poses = [r.poses(m.at(at)) for r, m in zip(robots, motions, strict=True)]
+    frames = [body.frame for body in robots[0].bodies]
+    frames += [body.frame + poses[0].shape[1] for body in robots[1].bodies]
+    coal = CoalShapes(frames, [*link_shapes(robots[0]), *link_shapes(robots[1])])
+    placed = np.concatenate([poses[0], other @ poses[1]], axis=1)[:, :, :3]
+    rows, numbers = np.arange(len(at)), [body.name for body in robots[1].bodies]
+    for k, pair in enumerate(found.pairs):
+        if not pair.obstacle:
+            continue
+        one = pair.link - 1
+        both = len(robots[0].bodies) + numbers.index(pair.obstacle.removeprefix("b: "))
+        sides = Sides(rows, np.full(len(at), one), np.full(len(at), both))
+        least = max(float(coal.distances(placed, sides).distance.min()), 0.0)
+        assert found.least.lower[k] <= least + 5e-6
+        assert least <= max(found.least.upper[k], 0.0) + 5e-3
+    if found.verdict is Verdict.CERTIFIED:
+        assert cell.source is not None
+        hashes = Hashes(cell.source.sha256, sha256_of_file(file))
+        write_robot_certificate(tmp_path / "proof", found, hashes)
+        outcome = check_certificate(tmp_path / "proof", problem, file)
+        assert outcome.accepted, outcome.reason
