@@ -195,8 +195,30 @@ def test_what_is_not_done_beside_what_moves_is_said(tmp_path: Path) -> None:
     rows = np.array([[0.0, 0.0], [1.0, 0.0]])
     with pytest.raises(InvalidInput, match="no column 'time_s', but obstacle 'ball'"):
         verify_robot(cell, Motion(rows))
-    with pytest.raises(InvalidInput, match="takes obstacles at rest, but 'ball' moves"):
-        repair_robot(cell, Motion(rows, times=np.array([0.0, 1.0])))
+    with pytest.raises(InvalidInput, match="no column 'time_s', but obstacle 'ball'"):
+        repair_robot(cell, Motion(rows))
+
+
+def test_a_motion_beside_what_moves_is_repaired_in_its_time(tmp_path: Path) -> None:
+    """The ball comes near the tip's circle and leaves; samples keep clear of it."""
+    rows, times = np.array([[0.0, 0.3], [1.2, 0.3]]), np.array([0.0, 2.0])
+    q = np.array([0.6, 0.9])
+    tip = np.array([0.5 * np.cos(q[0]), 0.5 * np.sin(q[0]), 0.0])
+    tip += 0.43 * np.array([np.cos(q[1]), np.sin(q[1]), 0.0])
+    moves, knots = np.array([0.5, 1.0, 1.5]), np.array([1.5, 1.06, 1.5])[:, None] * tip
+    cell = cell_with(tmp_path, moves, knots)
+    motion = Motion(rows, times=times)
+    assert verify_robot(cell, motion).verdict is Verdict.REFUTED
+    found = repair_robot(cell, motion)
+    path = found.verification.trajectory
+    assert found.verification.verdict is Verdict.CERTIFIED
+    assert path.knots[[0, -1]].tolist() == rows.tolist()
+    assert path.own_times[[0, -1]].tolist() == times.tolist()
+    at = np.linspace(0.0, 2.0, 20_001)
+    assert gaps(path.at(at), along(moves, knots, at)).min() >= 0.01
+    moved = np.abs(path.knots - along(times, rows, path.own_times)).max(axis=1)
+    np.testing.assert_allclose(found.moved, moved, atol=1e-12)
+    assert moved.max() < 0.3
 
 
 def test_parts_of_long_intervals_are_told_in_those_of_the_trajectory() -> None:
