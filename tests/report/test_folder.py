@@ -1,12 +1,21 @@
 """Oracle: what is on the disk afterwards."""
 
+import signal
+import subprocess
+import sys
+import threading
 from pathlib import Path
 
 import pytest
 
 from vdsm_pin.errors import CannotWrite, InvalidFile
 from vdsm_pin.io.atomic import write_text
-from vdsm_pin.report.folder import check_output_file, check_output_folder, staged
+from vdsm_pin.report.folder import (
+    check_output_file,
+    check_output_folder,
+    locked,
+    staged,
+)
 
 
 def test_files_arrive_together_and_others_stay(tmp_path: Path) -> None:
@@ -40,6 +49,62 @@ def test_a_folder_where_a_file_must_go_is_an_error(tmp_path: Path) -> None:
         write_text(aside / ("n" * 300), "of a file aside, told by its final name")
     assert told.value.file == str(tmp_path / ("n" * 300))
     assert [p.name for p in tmp_path.iterdir()] == ["a"]
+
+
+FILLS = """
+import sys, time
+from pathlib import Path
+from vdsm_pin.report.folder import staged
+folder = Path(sys.argv[1])
+with staged(folder) as aside:
+    for name in "abc":
+        (aside / name).write_text(sys.argv[2])
+    print("ready", flush=True)
+    sys.stdin.read()
+"""
+
+
+def filling(folder: Path, text: str) -> subprocess.Popen[str]:
+    """A process that has its files ready, and moves them when its input ends."""
+    command = [sys.executable, "-c", FILLS, str(folder), text]
+    pipe = subprocess.PIPE
+    process = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True)
+    assert process.stdout
+    assert process.stdout.readline() == "ready\n"
+    return process
+
+
+def test_what_a_killed_process_left_is_removed_and_a_living_one_is_not_disturbed(
+    tmp_path: Path,
+) -> None:
+    killed, living = filling(tmp_path, "killed"), filling(tmp_path, "living")
+    killed.send_signal(signal.SIGKILL)
+    killed.communicate()
+    assert len(list(tmp_path.iterdir())) == 2
+    with staged(tmp_path) as aside:
+        (aside / "d").write_text("mine")
+        assert len(list(tmp_path.iterdir())) == 2
+    living.communicate("")
+    assert living.returncode == 0
+    texts = {path.name: path.read_text() for path in tmp_path.iterdir()}
+    assert texts == {"a": "living", "b": "living", "c": "living", "d": "mine"}
+
+
+def test_files_of_two_processes_do_not_mix(tmp_path: Path) -> None:
+    """While one moves its files, which takes the folder's lock, another one waits."""
+    with locked(tmp_path):
+        other = threading.Thread(target=fill, args=(tmp_path,))
+        other.start()
+        other.join(0.2)
+        assert other.is_alive()
+        assert not list(tmp_path.iterdir())
+    other.join()
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+def fill(folder: Path) -> None:
+    with staged(folder) as aside:
+        (aside / "a").write_text("a")
 
 
 def test_bad_places_are_refused_before_any_work(tmp_path: Path) -> None:

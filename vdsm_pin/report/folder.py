@@ -1,14 +1,19 @@
 """Result folders: files are written aside and moved in whole, or not at all."""
 
+import fcntl
 import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from typing import Final
 
 from vdsm_pin.errors import CannotWrite, InvalidFile
 from vdsm_pin.io.atomic import check_replaceable, writing
+
+UNFINISHED: Final = ".vdsm-unfinished-"
+"""What the names of temporary folders begin with."""
 
 
 def check_output_folder(folder: Path) -> None:
@@ -77,7 +82,9 @@ def identity(path: Path) -> tuple[int, int] | None:
 def staged(folder: Path, within: Path | None = None) -> Iterator[Path]:
     """A temporary folder whose files move into `folder` when the block succeeds.
 
-    Files of the same name are replaced, each in one step; other files stay.
+    Files of the same name are replaced, each in one step; other files stay. Two
+    processes that fill one folder move their files one after the other, so that these
+    never mix. What a killed process left is removed.
 
     Args:
         folder: Made where missing.
@@ -94,14 +101,44 @@ def staged(folder: Path, within: Path | None = None) -> Iterator[Path]:
     with writing(folder):
         within = within or folder
         within.mkdir(parents=True, exist_ok=True)
-        aside = Path(tempfile.mkdtemp(prefix=".vdsm-", dir=within))
-        try:
-            yield aside
-            for path in sorted(aside.iterdir()):
-                path.replace(folder / path.name)
-        except CannotWrite as error:  # of a file aside, whose place says nothing
-            file = Path(error.file)
-            told = folder / file.name if file.parent == aside else file
-            raise CannotWrite(file=told, reason=error.reason) from error
-        finally:
-            shutil.rmtree(aside, ignore_errors=True)
+        with ExitStack() as stack:
+            with locked(folder):
+                _remove_abandoned(within)
+                aside = Path(tempfile.mkdtemp(prefix=UNFINISHED, dir=within))
+                stack.callback(shutil.rmtree, aside, ignore_errors=True)
+                stack.enter_context(locked(aside))
+            try:
+                yield aside
+                with locked(folder):
+                    for path in sorted(aside.iterdir()):
+                        path.replace(folder / path.name)
+            except CannotWrite as error:  # of a file aside, whose place says nothing
+                file = Path(error.file)
+                told = folder / file.name if file.parent == aside else file
+                raise CannotWrite(file=told, reason=error.reason) from error
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Keep other processes that ask for this lock waiting; it ends with the process."""
+    with _handle(folder) as handle:
+        with suppress(OSError):  # of a file system that has no locks
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+
+
+def _remove_abandoned(within: Path) -> None:
+    """Remove the temporary folders that no living process holds."""
+    for left in within.glob(f"{UNFINISHED}*"):
+        with suppress(OSError), _handle(left) as handle:  # gone by itself, or held
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            shutil.rmtree(left, ignore_errors=True)
+
+
+@contextmanager
+def _handle(folder: Path) -> Iterator[int]:
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        yield handle
+    finally:
+        os.close(handle)
