@@ -15,6 +15,7 @@ import numpy as np
 
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.feed import within_feed
 from vdsm_pin.planner.goals import with_ends, with_path
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.planner.start import with_known_insides
@@ -165,17 +166,19 @@ def _plan_at_rest(
         message = f"strategy {strategy_name!r} does not read ratios, which 'paper' does"
         raise NoPlanFound(message)
     known = with_known_insides(with_path(problem))
+    rail = within_feed(known.problem)
+    notes = (*known.notes, *rail.notes)
     clearance = within_time(link_clearance(known.problem), deadline)
     rounds: list[Round] = []
     margins = np.zeros((problem.manipulator.n_links, len(problem.scene.obstacles)))
     promised = _promised(problem)
     while True:
         try:
-            found = plan_with(known.problem, clearance, margins.copy())
+            found = plan_with(rail.problem, clearance, margins.copy())
             plan = _chosen(problem, found, deadline)
         except (Infeasible, OutOfTime) as error:
             before = [f"before that {_story(rounds)}"] if rounds else []
-            error.args = ("; ".join([*known.notes, str(error), *before]),)
+            error.args = ("; ".join([*notes, str(error), *before]),)
             raise
         adjustments = _by_coal(robot, plan, margins, deadline)
         if adjustments:
@@ -196,11 +199,11 @@ def _plan_at_rest(
         say("planned with a margin of %s; %s", kept, rounds[-1].reason)
         if rounds[-1].verdict in HANDED_OUT:
             story = (_story(rounds),) if len(rounds) > 1 else ()
-            added = (*_unread_scheme(plan), *known.notes, *story)
-            plan = replace(plan, notes=(*plan.notes, *added))
+            told = (*plan.notes, *_unread_scheme(plan), *notes, *story)
+            plan = replace(plan, notes=told)
             return Refinement(plan, verification, tuple(rounds))
         if not adjustments or len(rounds) == MAX_ROUNDS:
-            raise NoPlanFound("; ".join([*known.notes, _story(rounds)]))
+            raise NoPlanFound("; ".join([*notes, _story(rounds)]))
         margins = _raised(problem, margins, adjustments)
 
 
@@ -254,7 +257,9 @@ def _by_proof(
             names.index(near.pair.obstacle), ("proof", near.lower, near.coal),
         )
         for near in verification.approaches
-        if near.pair.obstacle and near.lower < problem.required_clearance
+        if near.pair.link  # the feed goes where x0 goes, and nowhere else
+        and near.pair.obstacle
+        and near.lower < problem.required_clearance
     )  # fmt: skip
 
 

@@ -208,19 +208,22 @@ def test_a_feed_stands_in_every_file(tmp_path: Path, shift: float) -> None:
     assert len(told["counterexamples"]) == bool(shift)
 
 
-def test_a_plan_that_fails_at_the_feed_says_so_in_millimetres(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("bend", [60.0, 5.0])
+def test_a_plan_keeps_the_feed_clear_or_says_what_is_in_its_way(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], bend: float
 ) -> None:
-    # The feed comes there as the arm goes back.
-    beside = ball("post", [-650.0, 0.0, 30.0 + 2.0 + 50.0 - 0.1])
-    asked = problem(obstacles=[beside], feed={"length": 600.0})
-    tip = [sum(asked["manipulator"]["link_lengths"]), 0.0, 0.0]
-    asked["tip_path"] = {"start": tip, "points": [[tip[0] - 100.0, 0.0, 0.0]]}
+    """The rail ends 4.05 mm, sqrt(82² - 81.9²), before the rear meets the post."""
+    beside = ball("post", [-650.0, 0.0, 81.9])
+    asked = problem(obstacles=[beside], feed={"length": 600.0}, max_link_angle_deg=bend)
+    tip = [TOTAL, 0.0, 0.0]
+    asked["tip_path"] = {"start": tip, "points": [[TOTAL - 100.0, 0.0, 0.0]]}
     made = Files(tmp_path, asked, STILL)
-    with pytest.raises(SystemExit):
+    with pytest.raises(SystemExit) as ended:
         main(["plan", str(made.problem), "--out", str(tmp_path / "out")])
-    told = "refuted with 1.900 mm against 2.000 mm (feed and post"
-    assert told in capsys.readouterr().err
+    told = "".join(capsys.readouterr())
+    assert "the feed keeps x0 above -45.95" in told
+    assert ended.value.code == (bend < 60.0)
+    assert ("certified" in told) == (bend == 60.0)
 
 
 def test_forged_certificates_of_bodies_are_rejected(tmp_path: Path) -> None:

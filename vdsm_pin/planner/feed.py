@@ -1,0 +1,79 @@
+"""How far the rail goes until the feed behind the arm is too near an obstacle.
+
+The feed lies along the rail, so that x0 alone says where it is. A motion begins at a
+given x0 and cannot pass a value at which the feed is too near: planners get the rail
+between the nearest of those.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.start import start_centres
+from vdsm_pin.planner.upper_clearance import feed_culprit
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.units import in_mm
+
+STEPS: Final = 500
+"""Most steps towards one end of the rail; [-]."""
+
+LEAST_STEP: Final = 1e-6
+"""The last step, which leads to where the feed is too near; [m]."""
+
+
+@dataclass(frozen=True)
+class ShortenedRail:
+    """A problem with the part of the rail that the feed leaves.
+
+    Args:
+        problem: Its `base_range` is the shorter one.
+        notes: One sentence for each end that moved.
+    """
+
+    problem: PlanningProblem
+    notes: tuple[str, ...]
+
+
+def within_feed(problem: PlanningProblem) -> ShortenedRail:
+    """Shorten the rail to where the feed can come from its start.
+
+    An end moves only to a value at which the feed is proved too near, so that what is
+    proved impossible of the shorter rail is impossible.
+    """
+    arm = problem.manipulator
+    start = start_centres(problem)[0]
+    if not arm.feed or not np.isfinite(start).all():
+        return ShortenedRail(problem, ())
+    ends, notes = list(arm.base_range), []
+    for side, end in enumerate(arm.base_range):
+        found = _last_place(problem, start, end)
+        if found is not None:
+            ends[side], obstacle = found
+            notes.append(
+                f"the feed keeps x0 {('above', 'below')[side]} {in_mm(ends[side])}, "
+                f"for {obstacle!r} (in the base frame)"
+            )
+    shorter = replace(arm, base_range=(ends[0], ends[1]))
+    return ShortenedRail(replace(problem, manipulator=shorter), tuple(notes))
+
+
+def _last_place(
+    problem: PlanningProblem, start: FloatArray, end: float
+) -> tuple[float, str] | None:
+    """The x0 at which the feed is too near, and to what; None if none is on the way.
+
+    The clearance changes by no more than x0 does: it allows steps as long as it is more
+    than required (conservative advancement).
+    """
+    required, towards = problem.required_clearance, float(np.sign(end - start[0]))
+    base = start.copy()
+    for step in range(STEPS):
+        near = feed_culprit(problem, base)
+        if near is None or (end - base[0]) * towards <= 0.0:
+            return None
+        if near.clearance < required:
+            return (float(base[0]), near.obstacle) if step else None
+        base[0] += towards * max(near.clearance - required, LEAST_STEP)
+    return None
