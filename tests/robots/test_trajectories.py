@@ -362,6 +362,8 @@ def test_a_joint_that_goes_the_long_way_round_is_noted(tmp_path: Path) -> None:
     many = read_motion(file, robot.joints, values=robot.values)
     assert many.q[1, 0] == pytest.approx(200.0 * np.pi)
     assert "turns by 36000 deg between" in many.notes[0]
+    again = write(tmp_path, "again.csv", csv_text(many, robot))
+    np.testing.assert_allclose(read_path(again, robot).knots, many.q, rtol=1e-15)
     file = write(tmp_path, "t.csv", "turn_rad,slide_m\n3,0\n-3,0\n")
     limited = read_robot(write(tmp_path, "two.urdf", URDF))
     assert read_motion(file, limited.joints, values=limited.values).notes == ()

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from vdsm_pin.robots.srdf import Base
 
 Values: TypeAlias = Mapping[str, tuple[int | None, float, float]]
 """Of a joint by name: column of q, None where it stands still, ratio and offset."""
+
+MOST_TURNS: Final = 4.0 * np.pi
+"""An angle beyond this, not stated in degrees, must be in degrees; [rad]."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,12 @@ class RobotJoint:
     def unit(self) -> str:
         """Of its values."""
         return "rad" if self.turns else "m"
+
+    @property
+    def most_unstated(self) -> float:
+        """The largest value that is taken for radians, unless degrees are stated."""
+        limits = [2.0 * abs(x) for x in (self.lower, self.upper) if np.isfinite(x)]
+        return max([MOST_TURNS, *limits]) if self.turns else np.inf
 
     @property
     def whose(self) -> str:

@@ -151,9 +151,14 @@ def _check_degrees(file: File, table: FloatArray, columns: Sequence[str]) -> Non
 
 
 def csv_text(motion: JointTrajectory, robot: Robot) -> str:
-    """Waypoints as CSV, which `read_motion` reads back to the same numbers."""
-    heads = [f"{joint.name}_{joint.unit}" for joint in robot.joints]
-    parts = [motion.q]
+    """Waypoints as CSV, which `read_motion` reads back to the same numbers.
+
+    What turns too far to be taken for radians is in degrees, to their last digit.
+    """
+    far = np.abs(motion.q).max(axis=0) > [j.most_unstated for j in robot.joints]
+    units = ["deg" if f else j.unit for f, j in zip(far, robot.joints, strict=True)]
+    heads = [f"{j.name}_{unit}" for j, unit in zip(robot.joints, units, strict=True)]
+    parts = [np.where(far, np.rad2deg(motion.q), motion.q)]
     if motion.times is not None:
         heads.append(TIME)
         parts.append(motion.times[:, None])

@@ -24,9 +24,6 @@ from vdsm_pin.robots.trajectory_csv import csv_text, read_csv
 if TYPE_CHECKING:  # whoever reads waypoints alone needs no pieces
     from vdsm_pin.proof.paths import Path
 
-MOST_TURNS: Final = 4.0 * np.pi
-"""An angle beyond this, not stated in degrees, must be in degrees; [rad]."""
-
 ROUNDED: Final = 1e-6
 """How far a joint that stands still may be written elsewhere; [rad], [m]."""
 
@@ -207,8 +204,8 @@ def _check_units(file: File, q: FloatArray, joints: Sequence[RobotJoint]) -> Non
     """Refuse degrees under the name of radians."""
     for k, joint in enumerate(joints):
         most = float(np.abs(q[:, k]).max())
-        limits = [abs(x) for x in (joint.lower, joint.upper) if np.isfinite(x)]
-        if joint.turns and not most <= max([MOST_TURNS, *(2.0 * x for x in limits)]):
+        if not most <= joint.most_unstated:
+            limits = np.isfinite([joint.lower, joint.upper]).any()
             row = int(np.argmax(np.abs(q[:, k])))
             problem = (
                 f"joint {joint.name!r} turns to {most:.4g} rad at waypoint {row}; "
