@@ -25,7 +25,7 @@ from vdsm_pin.certificate_checker.tree import (
 )
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory
-from vdsm_pin.problem.planning_problem import PlanningProblem as Problem
+from vdsm_pin.problem.planning_problem import PlanningProblem
 
 
 def arm_joints(lengths: list[float], angles: list[float], base: Any) -> list[Joint]:
@@ -71,7 +71,7 @@ class Arm:
     )
 
     def __init__(
-        self, problem: Problem, header: Mapping[str, Any], trajectory: File
+        self, problem: PlanningProblem, header: Mapping[str, Any], trajectory: File
     ) -> None:
         self.problem, self.arm = problem, problem.manipulator
         belongs(header, "errors joined", problem.sha256, sha256_of_file(trajectory))

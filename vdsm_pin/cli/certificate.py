@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from vdsm_pin.cli.options import Problem, examples, family
+from vdsm_pin.cli.options import ProblemArgument, examples, family
 
 commands = family()
 
@@ -19,7 +19,7 @@ def check_certificate(
         Path,
         typer.Argument(metavar="FILE", help="Written by vdsm verify --certificate."),
     ],
-    problem: Problem,
+    problem: ProblemArgument,
     trajectory: Annotated[
         Path,
         typer.Argument(metavar="TRAJECTORY", help="The motion that it is about."),

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from vdsm_pin.cli.options import OutFolder, Problem, examples, family
+from vdsm_pin.cli.options import OutFolder, ProblemArgument, examples, family
 from vdsm_pin.cli.robot import refuse_beside
 
 commands = family()
@@ -30,7 +30,7 @@ class Format(StrEnum):
     )
 )
 def convert(
-    problem: Problem,
+    problem: ProblemArgument,
     out: OutFolder,
     trajectory: Annotated[
         Path | None,

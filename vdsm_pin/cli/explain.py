@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from vdsm_pin.cli.options import OutFolder, Problem, examples, family
+from vdsm_pin.cli.options import OutFolder, ProblemArgument, examples, family
 
 commands = family()
 
@@ -16,7 +16,7 @@ commands = family()
     )
 )
 def explain(
-    problem: Problem,
+    problem: ProblemArgument,
     out: OutFolder,
     waypoint: Annotated[
         int | None,

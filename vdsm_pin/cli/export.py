@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from vdsm_pin.cli.options import Problem, ShownMotion, examples, family
+from vdsm_pin.cli.options import ProblemArgument, ShownMotion, examples, family
 
 commands = family()
 
@@ -18,7 +18,7 @@ commands = family()
     ),
 )
 def export(
-    problem: Problem,
+    problem: ProblemArgument,
     out: Annotated[
         Path,
         typer.Option(metavar="FILE", help=".glb (glTF), .png or .mp4 (needs ffmpeg)."),

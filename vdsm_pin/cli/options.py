@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 PASSED: Final = 0
 NOT_PASSED: Final = 1
 
-Problem = Annotated[
+ProblemArgument = Annotated[
     str, typer.Argument(metavar="PROBLEM", help="A built-in name or a problem file.")
 ]
 OutFolder = Annotated[

@@ -13,7 +13,7 @@ from vdsm_pin.cli.options import (
     ErrorOptions,
     OutFolder,
     PlanningTime,
-    Problem,
+    ProblemArgument,
     Quiet,
     Strategy,
     examples,
@@ -40,7 +40,7 @@ commands = family()
 @grouped
 def plan(
     context: typer.Context,
-    problem: Problem,
+    problem: ProblemArgument,
     out: OutFolder,
     *,
     strategy: Strategy = DEFAULT_STRATEGY,

@@ -9,7 +9,7 @@ from vdsm_pin.cli.options import (
     NOT_PASSED,
     PASSED,
     OutFolder,
-    Problem,
+    ProblemArgument,
     Trajectory,
     examples,
     family,
@@ -24,7 +24,7 @@ commands = family()
     )
 )
 def simulate(
-    problem: Problem,
+    problem: ProblemArgument,
     trajectory: Trajectory,
     out: OutFolder,
     settings: Annotated[

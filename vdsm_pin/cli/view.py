@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from vdsm_pin.cli.options import Problem, ShownMotion, examples, family
+from vdsm_pin.cli.options import ProblemArgument, ShownMotion, examples, family
 
 commands = family()
 
@@ -17,7 +17,7 @@ commands = family()
     ),
 )
 def view(
-    problem: Problem,
+    problem: ProblemArgument,
     trajectory: ShownMotion = None,
     html: Annotated[
         Path | None,

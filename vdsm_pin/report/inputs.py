@@ -9,7 +9,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import solid_of
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.inside import mesh_notes
-from vdsm_pin.verification.records import Problem
+from vdsm_pin.verification.records import AnyProblem
 
 _NAMED: Final = 3
 """Sizes that one line names; the JSON files have all of them."""
@@ -21,7 +21,7 @@ BEHIND: Final = (
 """Where there are obstacles, one may stand in the way of the feed."""
 
 
-def assumed_sizes(problem: Problem) -> tuple[str, ...]:
+def assumed_sizes(problem: AnyProblem) -> tuple[str, ...]:
     """The obstacles whose unit nobody states, with the size they were taken to have."""
     return tuple(
         f"{one.name!r} is {one.assumed_size}"
@@ -49,7 +49,7 @@ def input_notes(problem: PlanningProblem, trajectory: Trajectory) -> tuple[str, 
     return (*notes, *of_time, *file_notes(problem), *of_rows)
 
 
-def file_notes(problem: Problem) -> Iterator[str]:
+def file_notes(problem: AnyProblem) -> Iterator[str]:
     """What the readers of meshes and clouds have to say, a sentence each."""
     solids = map(solid_of, problem.scene.obstacles)
     for one in (solid for solid in solids if isinstance(solid, FromFile)):

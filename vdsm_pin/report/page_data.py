@@ -28,11 +28,11 @@ from vdsm_pin.report.thinning import (
 )
 from vdsm_pin.report.words import finite
 from vdsm_pin.verification.records import (
+    AnyProblem,
     ArmVerification,
     ClosestApproach,
     Counterexample,
     Motion,
-    Problem,
     Verification,
 )
 
@@ -41,7 +41,10 @@ _MOST_BETWEEN: Final = 4_000
 
 
 def obstacle_data(
-    problem: Problem, obstacles: Sequence[Obstacle], trajectory: Motion, extent: float
+    problem: AnyProblem,
+    obstacles: Sequence[Obstacle],
+    trajectory: Motion,
+    extent: float,
 ) -> dict[str, Any]:
     """Some obstacles, and where their frame is; base frame, [m].
 

@@ -9,7 +9,7 @@ from vdsm_pin.geometry.solids import ConvexCover, Mesh, Solid
 from vdsm_pin.io.source import BLOCK
 from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.problem.scene import Moving, Obstacle, solid_of
-from vdsm_pin.verification.records import Problem
+from vdsm_pin.verification.records import AnyProblem
 
 MOST_LISTED: Final = 200
 """Obstacles that a page lists."""
@@ -38,7 +38,7 @@ class SceneRow:
     sha256: str
 
 
-def scene_rows(problem: Problem) -> tuple[SceneRow, ...]:
+def scene_rows(problem: AnyProblem) -> tuple[SceneRow, ...]:
     """The first obstacles of a problem, `MOST_LISTED` at most."""
     source = problem.source
     listed = problem.scene.obstacles[:MOST_LISTED]

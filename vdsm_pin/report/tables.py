@@ -24,11 +24,11 @@ from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.row_text import Form
 from vdsm_pin.verification.coal_rows import NOTHING_MEASURED, CoalIndex
 from vdsm_pin.verification.records import (
+    AnyProblem,
     ArmVerification,
     ClearanceChunk,
     LeastClearances,
     Pair,
-    Problem,
     Verification,
 )
 
@@ -61,7 +61,7 @@ class ClearanceCsv:
     def __init__(
         self,
         path: Path,
-        problem: Problem,
+        problem: AnyProblem,
         n_pairs: int,
         reach: float = math.inf,
     ) -> None:

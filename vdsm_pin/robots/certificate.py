@@ -83,7 +83,7 @@ def write_robot_certificate(
     obstacles = zip(of_obstacles[:first], rest[:first], strict=True)
     links = places[:n_links] + of_obstacles[first:]
     header = RobotHeaderLine(
-        **hashes.told(),
+        **hashes.as_json(),
         interpolation=DEGREES[motion.degree],
         pairs=_pairs(plan.bodies[len(bodies) :], plan.bodies, plan.pairs),
         pieces=pieces_of_obstacles(obstacles, pieces),

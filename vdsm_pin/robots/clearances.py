@@ -110,7 +110,7 @@ def _met(
     return least.with_rows(changed)
 
 
-def told(least: LeastClearances, knots: Knots) -> LeastClearances:
+def least_in_rows(least: LeastClearances, knots: Knots) -> LeastClearances:
     """The same, its moments in intervals of the robot's own path."""
     if knots.are_rows:
         return least

@@ -82,7 +82,7 @@ def _question(cell: Cell, path: Path, k: int, named: Pair) -> Question:
     )
 
 
-def told_all(
+def in_rows(
     found: tuple[Counterexample, ...], knots: Knots
 ) -> tuple[Counterexample, ...]:
     """The same, their moments in intervals of the robot's own path."""

@@ -17,10 +17,10 @@ from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.clearances import (
     MEETING,
     least_clearances,
+    least_in_rows,
     named_pairs,
-    told,
 )
-from vdsm_pin.robots.counterexamples import robot_counterexamples, told_all
+from vdsm_pin.robots.counterexamples import in_rows, robot_counterexamples
 from vdsm_pin.robots.errors import proof_box
 from vdsm_pin.robots.first_contact import robot_contacts
 from vdsm_pin.robots.inside import (
@@ -120,7 +120,7 @@ def verify_robot(
             lambda: robot_contacts(cell, path, named, proved, box, deadline),
             nowhere,
         )
-    lost, least = told_all(lost, knots), told(least, knots)
+    lost, least = in_rows(lost, knots), least_in_rows(least, knots)
     outside = all(one.where.side is Side.OUTSIDE for one in located.values())
     clear = bool(lost) and outside and _is_clear(cell, whole, deadline)
     evidence = Evidence(

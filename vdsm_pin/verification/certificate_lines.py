@@ -71,7 +71,7 @@ class Hashes:
     problem: str
     trajectory: str
 
-    def told(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """What every header says of them and of the writer."""
         return {
             "problem_sha256": self.problem,

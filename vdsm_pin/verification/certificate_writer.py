@@ -73,7 +73,7 @@ def _header(
     problem, trajectory = verification.problem, verification.trajectory
     box = verification.errors
     return HeaderLine(
-        **hashes.told(),
+        **hashes.as_json(),
         errors=ErrorLimits(
             joints_rad=box.angles(trajectory.n_links).ravel().tolist(),
             **errors_beside(box, problem.scene),

@@ -16,11 +16,11 @@ from vdsm_pin.verification.clearance import ClearanceProof, least_clearances
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import surfaces
 from vdsm_pin.verification.records import (
+    AnyProblem,
     Check,
     Counterexample,
     LeastClearances,
     Pair,
-    Problem,
     Verdict,
     is_deepest,
 )
@@ -88,7 +88,7 @@ def check_clearance(
 
 
 def clearance_checks(
-    problem: Problem, evidence: Evidence, late: Deadline | None = None
+    problem: AnyProblem, evidence: Evidence, late: Deadline | None = None
 ) -> tuple[Check, ...]:
     """One row for the obstacles, one for the links among themselves.
 

@@ -18,7 +18,7 @@ from vdsm_pin.verification.clearance import (
     least_clearances,
     prove_clearance,
 )
-from vdsm_pin.verification.records import ClearanceChunk, Motion, Pair, Problem
+from vdsm_pin.verification.records import AnyProblem, ClearanceChunk, Motion, Pair
 from vdsm_pin.verification.task import pack_scene
 
 STRETCH: Final = 64
@@ -116,7 +116,7 @@ class TooClose:
 
 
 def first_contacts(
-    problem: Problem,
+    problem: AnyProblem,
     pairs: Sequence[Pair],
     whole: Judged,
     motion: Motion,

@@ -28,7 +28,7 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
-from vdsm_pin.verification.records import Check, Problem, Verdict, combine
+from vdsm_pin.verification.records import AnyProblem, Check, Verdict, combine
 
 ARM: Final = "arm outside the meshes"
 LINKS: Final = "links outside the meshes"
@@ -237,13 +237,13 @@ def check_inside(located: Mapping[str, Location], name: str = ARM) -> tuple[Chec
     )
 
 
-def surfaces(problem: Problem) -> tuple[str, ...]:
+def surfaces(problem: AnyProblem) -> tuple[str, ...]:
     """Names of the meshes of which only the surface is meant."""
     meshes = (s for s in map(solid_of, problem.scene.obstacles) if isinstance(s, Mesh))
     return tuple(mesh.name for mesh in meshes if mesh.is_surface)
 
 
-def mesh_notes(problem: Problem) -> tuple[str, ...]:
+def mesh_notes(problem: AnyProblem) -> tuple[str, ...]:
     """What a reader must know of the meshes: surfaces only, and gaps that were joined.
 
     Args:

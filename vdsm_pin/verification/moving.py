@@ -124,7 +124,7 @@ class Knots:
         found = self.moments(inner, share) - self.interval(inner)
         return np.minimum(np.maximum(found, 0.0), 1.0)
 
-    def told(self, best: FloatArray) -> FloatArray:
+    def in_rows(self, best: FloatArray) -> FloatArray:
         """Best rows of pairs (`proof.layouts`) in intervals of the trajectory."""
         if self.are_rows:
             return best

@@ -30,7 +30,7 @@ class ProblemProof:
     @property
     def best(self) -> FloatArray:
         """Least bounds of each pair, told in intervals of the trajectory."""
-        return self.knots.told(self.proving.results.best)
+        return self.knots.in_rows(self.proving.results.best)
 
 
 def prove_problem(

@@ -285,7 +285,7 @@ class ClearanceProfile:
     first_interval: IntArray
 
 
-class Problem(Protocol):
+class AnyProblem(Protocol):
     """What the motion of an arm or of any other robot is held to."""
 
     @property
@@ -356,7 +356,7 @@ class Verification(Summarised):
         coal: What Coal measured; None where it was not asked.
     """
 
-    problem: Problem
+    problem: AnyProblem
     trajectory: Motion
     errors: ErrorBox
     pairs: tuple[Pair, ...]
