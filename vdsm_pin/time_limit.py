@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isnan
 from typing import Final
 
@@ -49,6 +49,15 @@ class Deadline:
     def passed(self) -> bool:
         """Whether the time is over."""
         return time.monotonic() > self.end
+
+    @property
+    def left(self) -> float:
+        """The time until then; [s]."""
+        return self.end - time.monotonic()
+
+    def earlier(self, seconds: float) -> "Deadline":
+        """The same limit, which ends so much before."""
+        return replace(self, end=self.end - seconds)
 
     def check(self) -> None:
         """Go on, unless the time is over.

@@ -99,6 +99,15 @@ class ProcessorTime(Deadline):
         """Whether the time is over."""
         return time.process_time() > self.spent or time.monotonic() > self.end
 
+    @property
+    def left(self) -> float:
+        """The time until then; [s]."""
+        return self.spent - time.process_time()
+
+    def earlier(self, seconds: float) -> "ProcessorTime":
+        """The same limit, which ends so much before."""
+        return replace(self, end=self.end - seconds, spent=self.spent - seconds)
+
 
 def by_strategy(
     problem: PlanningProblem, robot: RobotModel, name: str, limit: float

@@ -1,6 +1,5 @@
 """The strategies `fewest`, `clearest`, `sturdiest`: search, smooth, write, explain."""
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
@@ -235,17 +234,15 @@ def _plan(
 
 def _early(deadline: Deadline) -> Deadline:
     """When the search ends, so that there is time to tell what stopped it."""
-    if deadline.end == np.inf:
-        return deadline
-    return Deadline(deadline.limit, deadline.end - min(LAST, TOLD * deadline.limit))
+    return deadline.earlier(min(LAST, TOLD * deadline.limit))
 
 
 def _soon(problem: PlanningProblem, clearance: LinkClearance) -> Deadline:
     """From when on a part of the path will do, so that its proof is in time."""
-    deadline, now = deadline_of(clearance), time.monotonic()
-    if problem.path.blocked is Blocked.FAIL:
+    deadline = deadline_of(clearance)
+    if problem.path.blocked is Blocked.FAIL or deadline.end == np.inf:
         return NO_LIMIT
-    return Deadline(deadline.limit, now + SEARCHED * (deadline.end - now))
+    return deadline.earlier((1.0 - SEARCHED) * deadline.left)
 
 
 def _written(
