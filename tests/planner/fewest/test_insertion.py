@@ -1,5 +1,6 @@
 """Ways in through openings: of the tip, of the arm that follows, of the motion."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -25,7 +26,7 @@ from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.charts import coordinates
 from vdsm_pin.planner.fewest.elastic_band import resampled
-from vdsm_pin.planner.fewest.follow_the_leader import led_along
+from vdsm_pin.planner.fewest.follow_the_leader import followed, led_along
 from vdsm_pin.planner.fewest.growth import Layers, Population
 from vdsm_pin.planner.fewest.insertion import insert, tip_space
 from vdsm_pin.planner.fewest.judge import Judge
@@ -101,6 +102,55 @@ def bent_arms(rng: np.random.Generator, count: int) -> FloatArray:
     """Joint centres of arms bent at every joint, shape (count, N + 1, 3)."""
     alpha, theta = rng.uniform(-0.25, 0.25, (2, count, ARM.n_links))
     return joint_centres(ARM, rng.uniform(-1.0, 1.0, count), alpha, theta)
+
+
+def off_curve(points: FloatArray, curve: FloatArray) -> float:
+    """Largest distance of points from a polyline."""
+    worst = []
+    for p in points:
+        gaps = []
+        for a, b in itertools.pairwise(curve):
+            t = np.clip((p - a) @ (b - a) / max((b - a) @ (b - a), 1e-300), 0.0, 1.0)
+            gaps.append(np.linalg.norm(a + t * (b - a) - p))
+        worst.append(min(gaps))
+    return float(max(worst))
+
+
+def test_arms_that_follow_keep_their_links_and_the_curve() -> None:
+    rng = np.random.default_rng(4)
+    before = bent_arms(rng, 200)
+    ahead = before[:, -1] - before[:, -2]
+    tips = before[:, -1] + 0.2 * ahead + rng.normal(size=(200, 3)) * 0.005
+    after = followed(before, tips, ARM.link_lengths)
+    assert np.isfinite(after).all(axis=(1, 2)).mean() > 0.9
+    for old, tip, new in zip(before, tips, after, strict=True):
+        if not np.isfinite(new).all():
+            continue
+        links = np.linalg.norm(np.diff(new, axis=0), axis=1)
+        np.testing.assert_allclose(links, ARM.link_lengths, atol=1e-12)
+        np.testing.assert_array_equal(new[-1], tip)
+        np.testing.assert_array_equal(new[0, 1:], 0.0)
+        rail = old[0] - np.array([9.0, 0.0, 0.0])
+        curve = np.vstack([rail, old, tip])
+        assert off_curve(new[1:], curve) < 1e-12
+
+
+def test_a_straight_arm_that_follows_along_the_rail_stays_straight() -> None:
+    x = np.append(0.0, np.cumsum(ARM.link_lengths))
+    before = np.stack([x, 0.0 * x, 0.0 * x], axis=1)[None]
+    for step in (0.1, -0.1):
+        move = np.array([step, 0.0, 0.0])
+        after = followed(before, before[:, -1] + move, ARM.link_lengths)
+        np.testing.assert_allclose(after, before + move, atol=1e-12)
+
+
+def test_an_arm_that_cannot_follow_is_not_a_number() -> None:
+    before = bent_arms(np.random.default_rng(5), 1)
+    after = followed(before, before[:, -1] + [0.0, 50.0, 0.0], ARM.link_lengths)
+    assert np.isnan(after).all() or np.isfinite(after).all()
+    # With the last joint far from the rail no first link reaches it.
+    high = before + np.array([0.0, 5.0, 0.0])
+    assert np.isnan(followed(high, high[:, -1], ARM.link_lengths)).all()
 
 
 def test_points_along_a_way_are_even_and_keep_its_ends() -> None:
@@ -264,7 +314,9 @@ def test_a_leader_is_followed_through_a_tube_where_chance_is_lost() -> None:
     layers = Layers(curve.at(marks), np.zeros(len(marks)))
     for exactly in (True, False):
         rng = np.random.default_rng(0)
-        population = Population(judge_of(task), layers, rng, 2, led=exactly)
+        population = Population(
+            judge_of(task), layers, rng, 2, led=0.0 if exactly else None
+        )
         chain = population.grow(STRAIGHT)
         assert (chain.layer[-1] == len(marks) - 1) == exactly
 
@@ -277,7 +329,7 @@ def test_what_is_inserted_keeps_clearance_limits_and_layers() -> None:
     tolerance[[0, -1]] = 0.0
     rng = np.random.default_rng(0)
     layers = Layers(route, tolerance)
-    chain = Population(judge, layers, rng, 24, led=True).grow(STRAIGHT, 3)
+    chain = Population(judge, layers, rng, 24, led=0.0).grow(STRAIGHT, 3)
     assert chain.layer[-1] == len(route) - 1
     assert (np.diff(chain.layer) >= 0).all()
     np.testing.assert_array_equal(chain.tips[[0, -1]], route[[0, -1]])
@@ -293,7 +345,7 @@ def test_nothing_is_inserted_through_a_wall() -> None:
     tips = np.linspace(START, task.path.points[0], 30)
     layers = Layers(tips, np.zeros(30))
     rng = np.random.default_rng(0)
-    chain = Population(judge, layers, rng, 24, led=True).grow(STRAIGHT, 3)
+    chain = Population(judge, layers, rng, 24, led=0.0).grow(STRAIGHT, 3)
     assert chain.tips[-1, 0] < 0.65
 
 

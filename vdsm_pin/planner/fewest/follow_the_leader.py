@@ -70,6 +70,37 @@ def _lay(
 
 
 @compiled
+def followed(centres: FloatArray, tips: FloatArray, lengths: FloatArray) -> FloatArray:
+    """Arms whose joints have moved along the arm's own curve after the tip.
+
+    The curve runs from the new tip over the old joint centres and along the rail. Where
+    the tip draws back, the old tip is left out of it.
+
+    Args:
+        centres: Joint centres before, shape (n, N + 1, 3); [m].
+        tips: Where the tips come to be, shape (n, 3); [m].
+        lengths: Of the links, shape (N,); [m].
+
+    Returns:
+        Joint centres, shape (n, N + 1, 3), NaN where an arm cannot follow; [m].
+    """
+    count = lengths.size
+    result = np.zeros(centres.shape)
+    for r in range(centres.shape[0]):
+        curve = np.zeros((count + 2, 3))
+        ahead = 0.0
+        for i in range(count + 1):
+            curve[i] = centres[r, count - i]
+        curve[count + 1] = curve[count]
+        curve[count + 1, 0] -= 2.0 * lengths.sum() + np.abs(tips[r] - curve[0]).sum()
+        for i in range(3):
+            ahead += (tips[r, i] - curve[0, i]) * (curve[0, i] - curve[1, i])
+        result[r, count] = tips[r]
+        _lay(curve, 0 if ahead >= 0.0 else 1, lengths, result[r])
+    return result
+
+
+@compiled
 def led_along(route: FloatArray, start: FloatArray, lengths: FloatArray) -> FloatArray:
     """The arm at every point of its tip's route, laid on what the tip has run along.
 

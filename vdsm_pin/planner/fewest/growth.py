@@ -7,7 +7,8 @@ rest; where none does, it goes back some layers, is mutated there and tries agai
 
 The layers are those of the desired path, from nodes of the roadmap on (`grown_nodes`),
 or those of a route of the tip from the start on (`insertion`). On a route one arm that
-follows it exactly (`follow_the_leader`) is among them as far as it is clear.
+follows it exactly (`follow_the_leader`) is among them as far as it is clear, and where
+the first tries fail a part of the children follow their parent's own curve.
 """
 
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.planner.fewest.charts import coordinates, mutated, settled, turned_towards
-from vdsm_pin.planner.fewest.follow_the_leader import led_along
+from vdsm_pin.planner.fewest.follow_the_leader import followed, led_along
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Intervals, is_directed, standing
 from vdsm_pin.problem.pointing import angles_between
@@ -28,6 +29,8 @@ MUTATIONS: Final = 4
 """Times a population that dwindles is mutated at rest before it goes back."""
 ENOUGH: Final = 0.5
 """Room beyond this part of the body's radius is worth nothing more; [-]."""
+UNCHANGED: Final = 0.3
+"""Part of the children that follow the leader that are not mutated besides; [-]."""
 AIMED: Final = 0.5
 """Part of the children that are turned to where the last link shall look; [-]."""
 AIM_COST: Final = 4.0
@@ -118,7 +121,9 @@ class Population:
         layers: Where the tip goes.
         rng: Source of chance.
         size: Arms that live on at a layer.
-        led: Whether an arm that follows the tips exactly is among them.
+        led: Part of the children whose joints move on along their parent's own curve;
+            an arm that follows the tips exactly is then among them too. None for
+            neither.
     """
 
     def __init__(
@@ -127,7 +132,7 @@ class Population:
         layers: Layers,
         rng: np.random.Generator,
         size: int,
-        led: bool = False,
+        led: float | None = None,
     ) -> None:
         self.judge, self.layers, self.rng = judge, layers, rng
         self.size, self.led, self.arm = size, led, judge.problem.manipulator
@@ -146,7 +151,7 @@ class Population:
         self.grown = Grown(1 + none, tips, roots, clearances, none)
         farthest = np.arange(len(roots))
         generations, backtracks = [farthest], 0
-        leader = self._leader() if self.led else farthest[:1]
+        leader = farthest[:1] if self.led is None else self._leader()
         while len(generations) < len(self.layers.tips):
             layer = len(generations) - 1
             generation = np.append(
@@ -252,7 +257,7 @@ class Population:
     ) -> tuple[IntArray, FloatArray, FloatArray]:
         """Children at a layer: number of the parent, tip, offsets."""
         count = OFFSPRING
-        if self.led and len(generation):
+        if self.led is not None and len(generation):
             # Openings leave few alive: these have more children.
             count = max(OFFSPRING, OFFSPRING * self.size // (2 * len(generation)))
         parents = np.repeat(generation, count)
@@ -262,11 +267,29 @@ class Population:
             tips += rng.normal(size=(n, 3)) * tolerance / 2.0
         offsets = self.grown.offsets[parents]
         moved = tips[:, 1:] - self.grown.tips[parents, 1:]
+        following = self._follow(offsets, parents, tips)
+        moved[following] = 0.0
         born = mutated(self.arm, offsets, moved, rng)
+        kept = following[rng.random(len(following)) < UNCHANGED]
+        born[kept] = offsets[kept]
         if self.layers.aim_weight_at(to) > 0.0:
             aims = self.layers.aims_at(to, n)
             born = turned_towards(born, aims, rng.random(n) < AIMED, rng)
         return parents, tips, settled(self.arm, tips, born)
+
+    def _follow(
+        self, offsets: FloatArray, parents: IntArray, tips: FloatArray
+    ) -> IntArray:
+        """Let a part of children follow the leader, in place; numbers of these."""
+        if not self.led:
+            return np.zeros(0, np.int64)
+        chosen = np.flatnonzero(self.rng.random(len(tips)) < self.led)
+        before = standing(self.arm, self.grown.tips[parents[chosen]], offsets[chosen])
+        laid = followed(before, tips[chosen], self.arm.link_lengths)
+        fits = np.isfinite(laid).all(axis=(1, 2))
+        chosen = chosen[fits]
+        offsets[chosen] = coordinates(self.arm, laid[fits], is_directed(offsets))
+        return chosen
 
     def _aim_cost(self, layer: int, offsets: FloatArray) -> FloatArray:
         """What arms are worse for that do not look to where they shall soon."""

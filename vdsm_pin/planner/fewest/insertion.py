@@ -178,7 +178,7 @@ class _Search:
             tips = np.vstack([route, path[1:]])
             layers = Layers(tips, tolerance, *self._aims(k, before, tips))
             population = Population(
-                self.judge, layers, self.rng, self.effort.population, led=True
+                self.judge, layers, self.rng, self.effort.population, self.effort.led
             )
             chain = population.grow(self.root[None], self.effort.backtracks)
             visit = _Visit(k, before, chain, route)

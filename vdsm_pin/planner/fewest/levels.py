@@ -59,6 +59,8 @@ class Insert(Level):
         routes: Largest number of ways of the tip tried from the start to one place.
         backtracks: Times a population that is stuck goes back, each time twice as far.
         seed: Of the source of chance.
+        led: Part of the children that follow the leader. They bend more joints, and
+            come through where nobody else does; [-].
         cells: Cells at which the search for a way of the tip ends.
         directed: Whether arms are described by the directions of their links, which may
             lean backwards then, and not by their projections.
@@ -68,6 +70,7 @@ class Insert(Level):
     routes: int
     backtracks: int
     seed: int
+    led: float = 0.0
     cells: int = 300_000
     directed: bool = False
 
@@ -80,19 +83,30 @@ class Insert(Level):
 SEED: Final = 0
 """Seed of the growth of shapes; the same problem gives the same plan."""
 
+LED: Final = 0.4
+"""Part of the children that follow the leader where the first tries fail; [-]."""
+
 THOROUGH: Final[tuple[Level, ...]] = (
     Search(rounds=20, back=0.0, grow=1, ease=0.79, around=4),
     Search(rounds=40, back=0.0, grow=2, around=4),
     Search(rounds=20, back=1.0, grow=2),
     Insert(population=10, routes=1, backtracks=2, seed=0, cells=60_000),
     Insert(population=10, routes=2, backtracks=3, seed=0, cells=60_000, directed=True),
-    Insert(population=30, routes=2, backtracks=4, seed=1),
-    Insert(population=30, routes=3, backtracks=4, seed=1, directed=True),
+    Insert(population=30, routes=2, backtracks=4, seed=1, led=LED),
+    Insert(population=30, routes=3, backtracks=4, seed=1, led=LED, directed=True),
     Search(rounds=60, back=1.0, grow=3, fine=True),
-    Insert(population=60, routes=4, backtracks=5, seed=2),
-    Insert(population=60, routes=4, backtracks=5, seed=2, directed=True),
-    Insert(population=120, routes=6, backtracks=6, seed=3, fine=True),
-    Insert(population=120, routes=6, backtracks=6, seed=3, fine=True, directed=True),
+    Insert(population=60, routes=4, backtracks=5, seed=2, led=LED),
+    Insert(population=60, routes=4, backtracks=5, seed=2, led=LED, directed=True),
+    Insert(population=120, routes=6, backtracks=6, seed=3, led=LED, fine=True),
+    Insert(
+        population=120,
+        routes=6,
+        backtracks=6,
+        seed=3,
+        led=LED,
+        fine=True,
+        directed=True,
+    ),
 )
 """Each is for what the ones before leave undrawn.
 
