@@ -14,6 +14,7 @@ from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
+from vdsm_pin.report.robot_facts import robot_facts
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.certificate import write_robot_certificate
 from vdsm_pin.robots.files import HULLS, Solids, read_cell_file
@@ -95,6 +96,9 @@ def test_closed_form_and_swapped_roles(seed: int, tmp_path: Path) -> None:
             assert near.coal == pytest.approx(float(truth(q, time[None])[0]), abs=1e-6)
         poses = [check for check in found.checks if check.name.endswith(POSES)]
         assert [check.verdict for check in poses] == [Verdict.CERTIFIED] * 2
+        longer = "'left: ball' moves from 0 s to 3 s; judged is the time of the "
+        longer += "trajectory, 0.25 s to 2.5 s"
+        assert (longer in robot_facts(found)["notes"]) == (own == "right")
 
 
 def test_swapped_roles_agree_to_the_padding(tmp_path: Path) -> None:

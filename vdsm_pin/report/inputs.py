@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from vdsm_pin.arm.bodies import convex_cover
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import FromFile, Mesh
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import solid_of
@@ -42,7 +43,7 @@ def assumption(sizes: Sequence[str]) -> str:
 def input_notes(problem: PlanningProblem, trajectory: Trajectory) -> tuple[str, ...]:
     """What the readers have to say and what is behind the base, a sentence each."""
     of_rows = (f"trajectory: {note}" for note in trajectory.notes)
-    of_time = (*_pieces(trajectory), *_longer(problem, trajectory))
+    of_time = (*_pieces(trajectory), *longer_motions(problem, trajectory.times))
     unknown = problem.scene.obstacles and not problem.manipulator.feed
     behind = (BEHIND,) if unknown else ()
     notes = (*behind, *_covers(problem), *mesh_notes(problem))
@@ -67,12 +68,18 @@ def _pieces(trajectory: Trajectory) -> tuple[str, ...]:
     return (text + "judged, not its chords",)
 
 
-def _longer(problem: PlanningProblem, trajectory: Trajectory) -> Iterator[str]:
-    """Obstacles that move on while the arm's motion is over, or has not begun."""
-    if trajectory.times is None:
+def longer_motions(problem: AnyProblem, times: FloatArray | None) -> Iterator[str]:
+    """Obstacles that move on while the motion is over, or has not begun.
+
+    Args:
+        problem: Has the obstacles.
+        times: Of the trajectory's waypoints; [s].
+    """
+    if times is None:
         return
-    begin, end = trajectory.times[0], trajectory.times[-1]
-    for one in problem.scene.moving:
+    begin, end = times[0], times[-1]
+    carried = {id(one.carrier): one for one in reversed(problem.scene.moving)}
+    for one in reversed(carried.values()):
         own = one.carrier.path.own_times
         if own[0] < begin or own[-1] > end:
             yield (

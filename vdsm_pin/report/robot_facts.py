@@ -5,7 +5,7 @@ from typing import Any, Final
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.report.facts import error_box
-from vdsm_pin.report.inputs import file_notes
+from vdsm_pin.report.inputs import file_notes, longer_motions
 from vdsm_pin.report.rows import ErringJointRow, JointRow, LeftOutRow, RobotFacts
 from vdsm_pin.report.words import finite
 from vdsm_pin.robots.cell import Cell
@@ -25,6 +25,7 @@ def robot_facts(verification: RobotVerification) -> dict[str, Any]:
             *(note for one in cell.others for note in one.notes),
             *mesh_notes(cell),
             *file_notes(cell),
+            *longer_motions(cell, path.times),
             *(f"trajectory: {note}" for note in verification.notes),
         ),
         "coverage": None,
