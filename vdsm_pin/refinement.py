@@ -165,20 +165,18 @@ def _plan_at_rest(
     if problem.scaling is not None and strategy_name != "paper":
         message = f"strategy {strategy_name!r} does not read ratios, which 'paper' does"
         raise NoPlanFound(message)
-    known = with_known_insides(with_path(problem))
-    rail = within_feed(known.problem)
-    notes = (*known.notes, *rail.notes)
+    known = within_feed(with_known_insides(with_path(problem)))
     clearance = within_time(link_clearance(known.problem), deadline)
     rounds: list[Round] = []
     margins = np.zeros((problem.manipulator.n_links, len(problem.scene.obstacles)))
     promised = _promised(problem)
     while True:
         try:
-            found = plan_with(rail.problem, clearance, margins.copy())
+            found = plan_with(known.problem, clearance, margins.copy())
             plan = _chosen(problem, found, deadline)
         except (Infeasible, OutOfTime) as error:
             before = [f"before that {_story(rounds)}"] if rounds else []
-            error.args = ("; ".join([*notes, str(error), *before]),)
+            error.args = ("; ".join([*known.notes, str(error), *before]),)
             raise
         adjustments = _by_coal(robot, plan, margins, deadline)
         if adjustments:
@@ -199,11 +197,11 @@ def _plan_at_rest(
         say("planned with a margin of %s; %s", kept, rounds[-1].reason)
         if rounds[-1].verdict in HANDED_OUT:
             story = (_story(rounds),) if len(rounds) > 1 else ()
-            told = (*plan.notes, *_unread_scheme(plan), *notes, *story)
+            told = (*plan.notes, *_unread_scheme(plan), *known.notes, *story)
             plan = replace(plan, notes=told)
             return Refinement(plan, verification, tuple(rounds))
         if not adjustments or len(rounds) == MAX_ROUNDS:
-            raise NoPlanFound("; ".join([*notes, _story(rounds)]))
+            raise NoPlanFound("; ".join([*known.notes, _story(rounds)]))
         margins = _raised(problem, margins, adjustments)
 
 

@@ -325,7 +325,9 @@ def test_names_of_folders_depend_on_nothing_but_the_problem(tmp_path: Path) -> N
     assert all("/" not in n and not n.startswith(".") for n in names.values())
 
 
-def test_folders_in_folders_are_named_not_done(tmp_path: Path) -> None:
+def test_folders_in_folders_are_named_not_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     inner, outer = tmp_path / "inner", str(tmp_path)
     inner.mkdir()
     write_problem(tmp_path / "good.yaml", NEAR)
@@ -337,6 +339,12 @@ def test_folders_in_folders_are_named_not_done(tmp_path: Path) -> None:
     (tmp_path / "good.yaml").unlink()
     with pytest.raises(InvalidFile, match=r"no \.yaml file; folders in it do: .*inner"):
         expanded((outer,))
+
+    def may_not_be_read(_: Path) -> list[Path]:
+        raise PermissionError
+
+    monkeypatch.setattr(run_module, "_problem_files", may_not_be_read)
+    assert passed_over((outer,)) == ()
 
 
 def test_folders_and_built_ins_expand_in_order(problems: Path, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import pytest
 from vdsm_pin.arm.manipulator import Feed, Manipulator, built_in
 from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.planner.feed import within_feed
+from vdsm_pin.planner.records import Prepared
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
@@ -47,7 +48,7 @@ def test_the_rail_ends_where_the_feed_is_too_near(seed: int) -> None:
     spans = [too_near(ball) for ball in balls]
     low = max([-3.0, *(b for a, b in spans if b < 0.0)])
     high = min([3.0, *(a for a, b in spans if 0.0 < a < np.inf)])
-    found = within_feed(asked(arm, tuple(balls)))
+    found = within_feed(Prepared(asked(arm, tuple(balls))))
     ends = found.problem.manipulator.base_range
     assert low - 2e-6 < ends[0] <= low
     assert high <= ends[1] < high + 2e-6
@@ -59,6 +60,6 @@ def test_without_a_feed_or_with_one_that_is_ignored_the_rail_stays() -> None:
     bare = built_in("hrm8")
     ignoring = replace(bare, feed=FEED, ignore_pairs=(("ball", "feed"),))
     for arm in (bare, ignoring):
-        found = within_feed(asked(arm, (ball,)))
+        found = within_feed(Prepared(asked(arm, (ball,))))
         assert found.problem.manipulator.base_range == arm.base_range
         assert not found.notes

@@ -6,7 +6,7 @@ import shutil
 import signal
 from collections import Counter
 from collections.abc import Iterator, Sequence, Set
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -177,7 +177,11 @@ def passed_over(problems: tuple[str, ...]) -> tuple[str, ...]:
     """Folders with .yaml files inside of those named, which nobody named."""
     folders = [Path(name) for name in problems if _is_folder(name)]
     inside = {sub for folder in folders for sub in folder.iterdir() if sub.is_dir()}
-    return tuple(map(str, sorted(filter(_problem_files, inside - set(folders)))))
+    found = []
+    for folder in sorted(inside - set(folders)):
+        with suppress(OSError):  # of one that may not be read, as `lost+found`
+            found += [str(folder)] if _problem_files(folder) else []
+    return tuple(found)
 
 
 def _is_folder(name: str) -> bool:

@@ -5,12 +5,13 @@ given x0 and cannot pass a value at which the feed is too near: planners get the
 between the nearest of those.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.records import Prepared
 from vdsm_pin.planner.start import start_centres
 from vdsm_pin.planner.upper_clearance import feed_culprit
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -23,29 +24,16 @@ LEAST_STEP: Final = 1e-6
 """The last step, which leads to where the feed is too near; [m]."""
 
 
-@dataclass(frozen=True)
-class ShortenedRail:
-    """A problem with the part of the rail that the feed leaves.
-
-    Args:
-        problem: Its `base_range` is the shorter one.
-        notes: One sentence for each end that moved.
-    """
-
-    problem: PlanningProblem
-    notes: tuple[str, ...]
-
-
-def within_feed(problem: PlanningProblem) -> ShortenedRail:
+def within_feed(known: Prepared) -> Prepared:
     """Shorten the rail to where the feed can come from its start.
 
     An end moves only to a value at which the feed is proved too near, so that what is
     proved impossible of the shorter rail is impossible.
     """
-    arm = problem.manipulator
+    problem, arm = known.problem, known.problem.manipulator
     start = start_centres(problem)[0]
     if not arm.feed or not np.isfinite(start).all():
-        return ShortenedRail(problem, ())
+        return known
     ends, notes = list(arm.base_range), []
     for side, end in enumerate(arm.base_range):
         found = _last_place(problem, start, end)
@@ -55,8 +43,11 @@ def within_feed(problem: PlanningProblem) -> ShortenedRail:
                 f"the feed keeps x0 {('above', 'below')[side]} {in_mm(ends[side])}, "
                 f"for {obstacle!r} (in the base frame)"
             )
+    if not notes:
+        return known
     shorter = replace(arm, base_range=(ends[0], ends[1]))
-    return ShortenedRail(replace(problem, manipulator=shorter), tuple(notes))
+    problem = replace(problem, manipulator=shorter)
+    return Prepared(problem, (*known.notes, *notes))
 
 
 def _last_place(

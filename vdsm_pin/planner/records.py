@@ -16,6 +16,19 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
+class Prepared:
+    """A problem as it is planned.
+
+    Args:
+        problem: With what stands for something that was asked.
+        notes: One sentence for each such thing.
+    """
+
+    problem: PlanningProblem
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class TipPath:
     """The route of the tip, waypoint by waypoint (step 4 of the paper).
 

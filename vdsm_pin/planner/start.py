@@ -1,7 +1,7 @@
 """Whether the arm may stand where the problem says that it starts."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from vdsm_pin.errors import InsideUnknown, StartBlocked, StartInside
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.geometry.winding import Location, Side, locate
-from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.planner.records import LinkClearance, Prepared
 from vdsm_pin.planner.upper_clearance import (
     Culprit,
     culprit,
@@ -70,23 +70,10 @@ def _clear_of_hull(problem: PlanningProblem, mesh: Mesh) -> bool:
     return bool(upper.min() >= problem.required_clearance)
 
 
-@dataclass(frozen=True)
-class WithHulls:
-    """A problem as it is planned: hulls stand for meshes without known inside.
+def with_known_insides(problem: PlanningProblem) -> Prepared:
+    """Put hulls in the places of meshes whose inside cannot be told.
 
     Whatever counts as the inside of such a mesh lies in its convex hull.
-
-    Args:
-        problem: With the hulls.
-        notes: One sentence for each.
-    """
-
-    problem: PlanningProblem
-    notes: tuple[str, ...]
-
-
-def with_known_insides(problem: PlanningProblem) -> WithHulls:
-    """Put hulls in the places of meshes whose inside cannot be told.
 
     Raises:
         InsideUnknown: If the start is within one of them.
@@ -101,7 +88,7 @@ def with_known_insides(problem: PlanningProblem) -> WithHulls:
         for name, where in found.items()
     )
     scene = with_hulls(problem.scene, found)
-    return WithHulls(replace(problem, scene=scene) if found else problem, notes)
+    return Prepared(replace(problem, scene=scene) if found else problem, notes)
 
 
 def check_start(problem: PlanningProblem, clearance: LinkClearance) -> None:
