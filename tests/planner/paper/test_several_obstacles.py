@@ -59,6 +59,18 @@ def test_an_obstacle_out_of_the_way_is_left_alone() -> None:
     assert found.plan.steps.avoidance.passed == "rod 1"
 
 
+def test_a_plan_in_part_is_kept_where_both_together_cannot_be_passed() -> None:
+    """Their hull holds the rail; round the prism alone 98 % are drawn."""
+    alone = read_problem("paper/obs2")
+    opposite = rods((-0.9, -0.9, 0.1)).scene.obstacles
+    problem = replace(alone, scene=Scene(alone.scene.obstacles + opposite))
+    found = plan_and_verify(problem, "paper", ROBOT)
+    assert found.verification.verdict is Verdict.CERTIFIED
+    assert found.verification.coverage == pytest.approx(0.983, abs=1e-3)
+    wanted = plan_and_verify(alone, "paper", ROBOT).plan.trajectory
+    np.testing.assert_array_equal(found.plan.trajectory.joints, wanted.joints)
+
+
 def test_an_obstacle_that_is_hit_on_the_way_round_another_is_no_plan() -> None:
     ball = Sphere("ball", np.array([3.126, -0.5, 0.5]), 0.1)  # on the path itself
     near = rods((0.7, 0.6, 0.2)).scene.obstacles[0]

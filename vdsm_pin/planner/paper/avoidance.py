@@ -134,16 +134,20 @@ def avoidances(problem: PlanningProblem, margins: FloatArray) -> Iterator[Avoida
             "rule needs (the strategy 'fewest' takes any shape)"
         )
         raise NoPlanFound(message)
-    refusal: Infeasible | None = None
+    offered, refusal = False, None
     for axis, section in groups:
         try:
-            if axis == "x":
-                yield from along_rail(problem, section, margins)
-            else:
-                yield from across_rail(problem, section, axis, margins)
+            found = (
+                along_rail(problem, section, margins)
+                if axis == "x"
+                else across_rail(problem, section, axis, margins)
+            )
+            for avoidance in found:
+                offered = True
+                yield avoidance
         except Infeasible as error:
             refusal = refusal or error
-    if refusal is not None:
+    if not offered and refusal is not None:
         raise refusal
 
 
