@@ -25,6 +25,7 @@
 Messages say what, where, how much and against what; the same facts are attributes.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -99,11 +100,13 @@ class InconsistentCables(InvalidInput):
     ) -> None:
         self.waypoint, self.link = waypoint, link
         self.residual, self.tolerance = residual, tolerance
-        message = (
-            f"waypoint {waypoint}: the cable lengths of link {link} fit no joint "
-            f"angles; the nearest leave {residual * MM_PER_M:.3e} mm (tolerance "
-            f"{tolerance * MM_PER_M:.1e} mm)"
-        )
+        self.problem = f"the cable lengths of link {link} fit no joint angles"
+        if math.isfinite(residual):
+            self.problem += (
+                f"; the nearest leave {residual * MM_PER_M:.3g} mm, expected "
+                f"{tolerance * MM_PER_M:.1e} mm at most"
+            )
+        message = f"waypoint {waypoint}: {self.problem}"
         super().__init__(message)
 
 

@@ -91,9 +91,25 @@ def test_centres_that_fit_no_posture_are_refused_by_line(
 def test_cables_that_contradict_each_other_are_refused_by_line(tmp_path: Path) -> None:
     given = motion(6, 8, np.random.default_rng(0))
     write_cables(tmp_path / "l.csv", FREE, given)
-    bad = changed(tmp_path / "l.csv", 2, "l3b_m", "0.9")
-    with pytest.raises(InvalidFile, match="line 4: the cable lengths of link 3 fit no"):
+    bad = changed(tmp_path / "l.csv", 2, "l3b_m", "1.46")
+    said = r"line 4: the cable lengths of link 3 fit no joint angles; the nearest leave"
+    with pytest.raises(InvalidFile, match=said):
         read_cables(bad, FREE)
+    bad = changed(tmp_path / "l.csv", 2, "l3b_m", "0.9")  # Newton's method diverges
+    with pytest.raises(InvalidFile, match=r"link 3 fit no joint angles$"):
+        read_cables(bad, FREE)
+
+
+def test_columns_that_are_not_read_are_noted(tmp_path: Path) -> None:
+    given = motion(6, 8, np.random.default_rng(0))
+    for write, read in (write_centres, read_centres), (write_cables, read_cables):
+        write(tmp_path / "a.csv", FREE, given)
+        assert read(tmp_path / "a.csv", FREE).notes == ()
+        head, *rows = (tmp_path / "a.csv").read_text(encoding="utf-8").splitlines()
+        text = "\n".join([f"{head},time_s", *(f"{row},1" for row in rows), ""])
+        (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+        notes = read(tmp_path / "a.csv", FREE).notes
+        assert notes == ("columns that are not read: 'time_s'",)
 
 
 def test_a_file_without_the_path_claims_to_draw_nothing(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import typer
 
 from vdsm_pin.cli.options import OutFolder, ProblemArgument, examples, family
 from vdsm_pin.cli.robot import refuse_beside
+from vdsm_pin.text import printable
 
 commands = family()
 
@@ -26,7 +27,7 @@ class Format(StrEnum):
         "vdsm convert paper/obs1 --trajectory out/obs1/trajectory.csv --out out/all",
         "vdsm convert paper/obs1 --trajectory out/obs1/trajectory.csv --also mcap "
         "--out out/ros",
-        "vdsm convert mine.yaml --cables measured.csv --out out/mine",
+        "vdsm convert mine.yaml --cables cables.csv --out out/mine",
     )
 )
 def convert(
@@ -65,5 +66,8 @@ def convert(
         refuse_beside("a robot", {"--centres": centres, "--cables": cables})
         count = convert_robot(read_cell(Path(error.file)), given.file, out, more)
     else:
-        count = convert_to_folder(asked, given, out, more).n_samples
+        motion = convert_to_folder(asked, given, out, more)
+        count = motion.n_samples
+        for note in motion.notes:
+            typer.echo(printable(f"note: {note}"))
     typer.echo(f"wrote {count} waypoints to {out}")

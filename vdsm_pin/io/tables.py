@@ -122,6 +122,17 @@ class Table:
             return f", but {near[0][:40]!r}; expected in {unit}"
         return f"; found {listed(self.ignored)}" if self.ignored else ""
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What of the file was left out, once all is read; one phrase each."""
+        notes = []
+        if self.ignored:
+            notes.append(f"columns that are not read: {listed(self.ignored)}")
+        if self.open_ended:
+            end = "the last row has no line end; its last number is read as it is"
+            notes.append(end)
+        return tuple(notes)
+
     def all_rows(self) -> FloatArray:
         """The wanted columns, shape (n, n_columns), n >= 1.
 

@@ -23,7 +23,7 @@ from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.io.source import check_is_file, readable
-from vdsm_pin.io.tables import CHUNK_ROWS, Table, listed, open_text
+from vdsm_pin.io.tables import CHUNK_ROWS, Table, open_text
 from vdsm_pin.io.waypoint_rows import LENGTH, PLACE, WAYPOINT, Waypoints, read_waypoints
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
@@ -142,10 +142,6 @@ def _read(
     rows = read_waypoints(table)
     _check_values(rows)
     whole = rows.rows
-    notes = [f"columns that are not read: {listed(table.ignored)}"]
-    notes = notes if table.ignored else []
-    if table.open_ended:
-        notes.append("the last row has no line end; its last number is read as it is")
     n, first = len(columns), [found.index(names[0]) for names in smooth]
     further = [whole[:, k : k + n - 3] for k in first] + [None, None]
     return Trajectory.of_joints(
@@ -155,7 +151,7 @@ def _read(
         whole[:, found.index(TIME)] if TIME in found else None,
         further[0],
         further[1],
-        tuple(notes),
+        table.notes,
     )
 
 

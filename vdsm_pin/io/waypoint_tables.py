@@ -50,7 +50,7 @@ def read_centres(path: Path, problem: PlanningProblem) -> Trajectory:
             apart, or the first one is not on the rail. Names the line.
     """
     arm, pose = problem.manipulator, problem.T_world_base
-    table = _read(path, centre_columns(arm.n_links))
+    table, notes = _read(path, centre_columns(arm.n_links))
     points = table[:, 3:].reshape(len(table), arm.n_links + 1, 3)
     centres = np.ascontiguousarray((points - pose[:3, 3]) @ pose[:3, :3])
     off = np.hypot(centres[:, 0, 1], centres[:, 0, 2])
@@ -67,7 +67,8 @@ def read_centres(path: Path, problem: PlanningProblem) -> Trajectory:
             f"length of link {error.link}, {length:.6f} mm"
         )
         raise _bad_row(path, error.waypoint, problem_said) from None
-    return _motion(table, centres[:, 0, 0], alpha, theta)
+    place = table[:, 1] != 0.0, table[:, 2]
+    return Trajectory(*place, centres[:, 0, 0], alpha, theta, notes)
 
 
 def read_cables(path: Path, problem: PlanningProblem) -> Trajectory:
@@ -82,22 +83,18 @@ def read_cables(path: Path, problem: PlanningProblem) -> Trajectory:
             the line.
     """
     arm = problem.manipulator
-    table = _read(path, cable_columns(arm.n_links))
+    table, notes = _read(path, cable_columns(arm.n_links))
     lengths = table[:, 4:].reshape(len(table), arm.n_links, 3)
     try:
         alpha, theta = angles_from_cables(arm, np.ascontiguousarray(lengths))
     except InconsistentCables as error:
-        problem_said = (
-            f"the cable lengths of link {error.link} fit no joint angles; the nearest "
-            f"leave {error.residual * MM_PER_M:.3g} mm, expected "
-            f"{error.tolerance * MM_PER_M:.1e} mm at most"
-        )
-        raise _bad_row(path, error.waypoint, problem_said) from None
-    return _motion(table, table[:, 3], alpha, theta)
+        raise _bad_row(path, error.waypoint, error.problem) from None
+    place = table[:, 1] != 0.0, table[:, 2]
+    return Trajectory(*place, table[:, 3], alpha, theta, notes)
 
 
-def _read(path: Path, columns: tuple[str, ...]) -> FloatArray:
-    """All rows: waypoint, on_path, path_m, then the columns, shape (n, 3 + m).
+def _read(path: Path, columns: tuple[str, ...]) -> tuple[FloatArray, tuple[str, ...]]:
+    """All rows: waypoint, on_path, path_m, then the columns, shape (n, 3 + m); notes.
 
     Raises:
         InvalidFile: If the file breaks its contract.
@@ -107,21 +104,14 @@ def _read(path: Path, columns: tuple[str, ...]) -> FloatArray:
         missing = set(PLACE) - set(Table(path, text, (WAYPOINT, *columns)).ignored)
         places = () if len(missing) == len(PLACE) else PLACE
         text.seek(0)
-        table = read_waypoints(Table(path, text, (WAYPOINT, *places, *columns)))
+        found = Table(path, text, (WAYPOINT, *places, *columns))
+        table = read_waypoints(found)
     for name in columns:
         near = np.abs(table[name]) <= TOLERANCES.scene_extent
         table.check(name, near, LENGTH)
-    return table.rows if places else np.insert(table.rows, [1, 1], 0.0, axis=1)
+    rows = table.rows if places else np.insert(table.rows, [1, 1], 0.0, axis=1)
+    return rows, found.notes
 
 
 def _bad_row(path: Path, row: int, problem: str) -> InvalidFile:
     return InvalidFile(file=path, where=f"line {row + 2}", problem=problem)
-
-
-def _motion(
-    table: FloatArray,
-    x0: FloatArray,
-    alpha: FloatArray,
-    theta: FloatArray,
-) -> Trajectory:
-    return Trajectory(table[:, 1] != 0.0, table[:, 2], x0, alpha, theta)

@@ -75,7 +75,7 @@ def test_an_obstacle_that_is_hit_on_the_way_round_another_is_no_plan() -> None:
     ball = Sphere("ball", np.array([3.126, -0.5, 0.5]), 0.1)  # on the path itself
     near = rods((0.7, 0.6, 0.2)).scene.obstacles[0]
     problem = replace(FREE, scene=Scene((near, ball)))
-    with pytest.raises(NoPlanFound, match=r"come within .* of an obstacle"):
+    with pytest.raises(NoPlanFound, match=r"round .rod 1. the links meet an obstacle"):
         plan_and_verify(problem, "paper", ROBOT)
 
 

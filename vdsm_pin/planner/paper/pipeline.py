@@ -134,7 +134,7 @@ def _best_motion(
                 kept = straight.clearance(motion.centres)
             kept += reserve
             grazing = min(grazing, problem.required_clearance - kept)
-            _refuse_touch(problem, kept)
+            _refuse_touch(problem, kept, avoidance.passed)
         except Infeasible as error:
             reason = reason or error
             continue
@@ -184,20 +184,23 @@ def _motion(problem: PlanningProblem, avoidance: Avoidance, route: Route) -> Pap
 
 def _refuse_scaled(problem: PlanningProblem, clearance: float) -> None:
     message = (
-        f"with the ratios that are asked for the links come within {in_mm(clearance)} "
-        f"of an obstacle, {in_mm(problem.required_clearance)} are required; the "
+        f"with the ratios that are asked for {_too_near(problem, clearance)}; the "
         "paper's rule goes round obstacles with constant ratios about the rail only"
     )
     raise NoPlanFound(message)
 
 
-def _refuse_touch(problem: PlanningProblem, clearance: float) -> None:
+def _refuse_touch(problem: PlanningProblem, clearance: float, passed: str) -> None:
     if not clearance >= problem.required_clearance:
-        message = (
-            f"the links come within {in_mm(clearance)} of an obstacle, "
-            f"{in_mm(problem.required_clearance)} are required"
-        )
+        message = f"on the way round {passed!r} {_too_near(problem, clearance)}"
         raise NoPlanFound(message)
+
+
+def _too_near(problem: PlanningProblem, clearance: float) -> str:
+    """In words; of a clearance below 0 the sign alone is meant."""
+    near = f"come within {in_mm(clearance)} of" if clearance > 0.0 else "meet"
+    needed = in_mm(problem.required_clearance)
+    return f"the links {near} an obstacle, {needed} are required"
 
 
 def _refuse_gaps(problem: PlanningProblem, motion: PaperSteps) -> None:
