@@ -104,6 +104,10 @@ def test_limits_that_are_not_stated_are_noted(tmp_path: Path, urdf: Path) -> Non
     write(tmp_path, "joint_limits.yaml", LIMITS.replace("0.5", "-0.5"))
     with pytest.raises(InvalidFile, match="expected above 0"):
         read_limits(limits)
+    for word in ("yes", "1", "'true'"):
+        write(tmp_path, "joint_limits.yaml", LIMITS.replace("true", word))
+        with pytest.raises(InvalidFile, match="expected true or false"):
+            read_limits(limits)
 
 
 def test_pinocchio_reads_joints_alone(

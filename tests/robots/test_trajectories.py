@@ -1,5 +1,6 @@
 """Trajectories of robots in every format: the same numbers back, limits of rates."""
 
+import itertools
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -10,9 +11,10 @@ import pytest
 from tests.robots.test_robots import CELL, SCENE, URDF, mutated, write
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile, VdsmError
+from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.io import bags
 from vdsm_pin.io.bags import read_bag, write_bag
-from vdsm_pin.io.joint_trajectory import JointTrajectory, text_of
+from vdsm_pin.io.joint_trajectory import JointTrajectory, of_message, text_of
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.trajectory import Trajectory
@@ -165,10 +167,65 @@ def test_joints_of_several_degrees_turn_about_z(tmp_path: Path) -> None:
         read_motion(write(tmp_path, "t.json", high), robot.joints)
 
 
+@pytest.mark.parametrize("tilt", [0.0, 1.2, 0.5 * np.pi, 0.5 * np.pi - 1e-12, -1e-9])
+def test_quaternions_turn_as_their_roll_pitch_and_yaw(tilt: float) -> None:
+    """Oracle: Rodrigues' products; where the pitch is 90 deg too, which has no yaw."""
+    half = np.linspace(-1.5, 1.5, 7) / 2.0
+    for sign, a, b in itertools.product((1.0, -1.0), half, half):
+        turned = np.array([1.0, 0.0, 0.0, 0.0])  # w, x, y, z
+        for axis, angle in ((3, a), (2, sign * tilt / 2.0), (1, b)):
+            about = np.eye(4)[0] * np.cos(angle) + np.eye(4)[axis] * np.sin(angle)
+            w, v = turned[0], turned[1:]
+            turned = np.array(
+                [
+                    w * about[0] - v @ about[1:],
+                    *(w * about[1:] + about[0] * v + np.cross(v, about[1:])),
+                ]
+            )
+        pose = {
+            "translation": dict.fromkeys("xyz", 0.0),
+            "rotation": dict(zip("wxyz", turned.tolist(), strict=True)),
+        }
+        message = {"joint_names": ["f"], "points": [{"transforms": [pose]}]}
+        found = of_message(Path("t"), {"multi_dof_joint_trajectory": message})
+        rows = rotation_from_rpy(found.q[0, :2:-1])
+        w, v = turned[0], turned[1:]
+        for row, unit in zip(rows.T, np.eye(3), strict=True):
+            expected = unit + 2.0 * np.cross(v, np.cross(v, unit) + w * unit)
+            np.testing.assert_allclose(row, expected, rtol=0, atol=2e-15)
+
+
+POINT = '{{"positions": [{}, 0], {}"time_from_start": {}}}'
+
+
+@pytest.mark.parametrize(
+    ("rates", "time", "said"),
+    [
+        ('"velocities": [0, 1], ', 0, "velocities, expected times too"),
+        ('"accelerations": [0, 1], ', 1, "accelerations, expected velocities and"),
+        ('"velocities": [0, 0], ', 0, None),
+        ('"velocities": [0, 0], "accelerations": [0, 1], ', 1, None),
+    ],
+)
+def test_rates_without_what_they_need_are_refused(
+    tmp_path: Path, robot: Robot, rates: str, time: int, said: str | None
+) -> None:
+    """As of a table: straight lines would be judged, which no controller runs."""
+    points = ", ".join(POINT.format(k, rates, k * time) for k in range(2))
+    text = f'{{"joint_names": ["turn", "slide"], "points": [{points}]}}'
+    file = write(tmp_path, "t.json", text)
+    if said is None:
+        assert len(read_path(file, robot).knots) == 2
+        return
+    with pytest.raises(InvalidFile, match=said):
+        read_path(file, robot)
+
+
 ODD = {
     "turn_rad,slide_m,turn_velocity_rad_s\n0,0,0\n": "no column slide_velocity_m_s",
     "turn_rad,slide_m,turn_velocity_m_s,slide_velocity_m_s\n": "expected _rad or _deg",
     "turn_rad,slide_m,turn_velocity_rad_s,slide_velocity_m_s\n": "expected time_s",
+    "turn_rad,slide_m,turn_velocity_rad_s,turn_velocity_deg_s\n": "expected one of",
     "turn_rad,slide_m,time_s\n0,0,1\n0,0,1\n": "line 3: time is 1 s after 1 s",
     "turn_rad,slide_m,time_s\n0,0,1\n0,0,2\n0,0,1.5\n": "line 4: time is 1.5 s after 2",
 }

@@ -14,6 +14,7 @@ from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
+from vdsm_pin.report.page_data import report_data
 from vdsm_pin.report.robot_facts import robot_facts
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.certificate import write_robot_certificate
@@ -99,6 +100,22 @@ def test_closed_form_and_swapped_roles(seed: int, tmp_path: Path) -> None:
         longer = "'left: ball' moves from 0 s to 3 s; judged is the time of the "
         longer += "trajectory, 0.25 s to 2.5 s"
         assert (longer in robot_facts(found)["notes"]) == (own == "right")
+
+
+def test_another_robot_may_stand_still(tmp_path: Path) -> None:
+    """Of which no joint moves: judged as an obstacle at rest, and drawn."""
+    q = {"left": np.array([1.0, 1.3, 1.2]), "right": np.zeros(3)}
+    _, file = two(tmp_path, q)
+    write(tmp_path, "right.csv", "time_s\n0\n1\n2\n")
+    text = (tmp_path / "left.yaml").read_text()
+    locked = "{urdf: right.urdf, lock: {turn: 0}}"
+    cell = read_cell(
+        write(tmp_path, "left.yaml", text.replace("{urdf: right.urdf}", locked))
+    )
+    found = verify_robot(cell, read_path(file, cell.robot))
+    least = truth(q, np.linspace(0.0, 3.0, 9_001)).min()
+    assert found.approaches[0].lower <= least <= found.approaches[0].upper + 1e-9
+    assert "right: ball" in report_data(found).text
 
 
 def test_swapped_roles_agree_to_the_padding(tmp_path: Path) -> None:

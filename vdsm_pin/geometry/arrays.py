@@ -94,3 +94,10 @@ def rotation_from_rpy(rpy: FloatArray) -> FloatArray:
             [-sp, cp * sr, cp * cr],
         ]
     )
+
+
+def rotation_from_quaternion(quaternion: FloatArray) -> FloatArray:
+    """Rotation matrix of a quaternion (x, y, z, w) of length 1, shape (3, 3); [-]."""
+    x, y, z, w = quaternion
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + 2.0 * (w * cross + cross @ cross))

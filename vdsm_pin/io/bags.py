@@ -126,13 +126,13 @@ def _states(messages: list[Any]) -> dict[str, Any]:
     first = None
     for message in messages:
         stamp = message.header.stamp
-        time = stamp.sec + 1e-9 * stamp.nanosec
+        time = 1_000_000_000 * stamp.sec + stamp.nanosec  # [ns]
         first = time if first is None else first
         position = dict(zip(message.name, message.position.tolist(), strict=False))
         points.append(
             {
                 "positions": [position.get(name) for name in names],
-                "time_from_start": time - first,
+                "time_from_start": (time - first) / 1e9,
             }
         )
     return {"joint_names": names, "points": points}

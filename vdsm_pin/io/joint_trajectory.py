@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from vdsm_pin.errors import InvalidFile
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, rotation_from_quaternion
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import read_yaml
 from vdsm_pin.problem.trajectory import MAX_ROWS
@@ -131,7 +131,16 @@ def _single(file: Path, message: dict[str, Any]) -> JointTrajectory:
         raise InvalidFile(file=file, where="points[0]", problem="has no positions")
     rates = _values(file, points, "velocities", len(names))
     changes = _values(file, points, "accelerations", len(names))
-    return JointTrajectory(names, q, _times(file, points), rates, changes)
+    times = _times(file, points)
+    for key, values, needs in (
+        ("velocities", rates, "times"),
+        ("accelerations", changes, "velocities and times"),
+    ):
+        lacks = times is None or (values is changes and rates is None)
+        if values is not None and values.any() and len(q) > 1 and lacks:
+            problem = f"has {key}, expected {needs} too"
+            raise InvalidFile(file=file, where="points", problem=problem)
+    return JointTrajectory(names, q, times, rates, changes)
 
 
 def _values(file: Path, points: list[Any], key: str, count: int) -> FloatArray | None:
@@ -230,11 +239,12 @@ def _transform(file: Path, where: str, transform: Any) -> FloatArray:
     if not abs(length - 1.0) <= UNIT_NORM:
         problem = f"rotation has length {length:g}, expected 1"
         raise InvalidFile(file=file, where=where, problem=problem)
-    x, y, z, w = quaternion / length
-    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    sine = 2.0 * (w * y - z * x)
-    pitch = np.arctan2(sine, np.sqrt(max(0.0, 1.0 - sine * sine)))
-    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    turn = rotation_from_quaternion(quaternion / length)
+    yaw = np.arctan2(turn[1, 0], turn[0, 0])
+    c, s = np.cos(yaw), np.sin(yaw)
+    # About what yaw leaves: where the pitch is 90 deg, yaw is any, and roll fits it.
+    pitch = np.arctan2(-turn[2, 0], c * turn[0, 0] + s * turn[1, 0])
+    roll = np.arctan2(s * turn[0, 2] - c * turn[1, 2], c * turn[1, 1] - s * turn[0, 1])
     return np.array([*found[:3], yaw, pitch, roll])
 
 

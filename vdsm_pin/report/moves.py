@@ -57,7 +57,7 @@ def told_moments(obstacle: Moving, trajectory: Motion) -> FloatArray:
         return np.zeros(1)
     inside = path.own_times[(path.own_times > times[0]) & (path.own_times < times[-1])]
     knots = np.unique(np.concatenate([times[:1], inside, times[-1:]]))
-    steps = np.abs(np.diff(path.at(knots), axis=0)).max(axis=1)
+    steps = np.abs(np.diff(path.at(knots), axis=0)).max(axis=1, initial=0.0)
     parts = np.ceil(steps / _TURN).clip(1, max(1, _MOST // len(steps))).astype(int)
     if path.degree > 1:
         parts = np.maximum(parts, 8)

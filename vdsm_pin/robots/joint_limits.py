@@ -146,7 +146,7 @@ def read_limits(path: Path) -> dict[str, Limits]:
 def _limits(joint: Place) -> Limits:
     found = Limits(velocity=_most(joint, "velocity"))
     found = replace(found, acceleration=_most(joint, "acceleration"))
-    if joint.get("has_position_limits", default=False).value is True:
+    if _has(joint, "position"):
         low, high = joint["min_position"].number(), joint["max_position"].number()
         if not low <= high:
             problem = f"has min_position {low:g} above max_position {high:g}"
@@ -157,10 +157,19 @@ def _limits(joint: Place) -> Limits:
 
 def _most(joint: Place, kind: str) -> float:
     """The largest velocity or acceleration; inf where there is none."""
-    if joint.get(f"has_{kind}_limits", default=False).value is not True:
+    if not _has(joint, kind):
         return np.inf
     most = joint[f"max_{kind}"]
     if not most.number() > 0.0:
         problem = f"is {most.value}, expected above 0"
         raise most.invalid(problem)
     return most.number()
+
+
+def _has(joint: Place, kind: str) -> bool:
+    """Whether limits of a kind are stated; `yes` and 1 are neither true nor false."""
+    has = joint.get(f"has_{kind}_limits", default=False)
+    if not isinstance(has.value, bool):
+        problem = f"is {has.value!r}, expected true or false"
+        raise has.invalid(problem)
+    return has.value

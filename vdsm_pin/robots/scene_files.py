@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, rotation_from_quaternion
 from vdsm_pin.geometry.solids import Box, Cylinder, HalfSpace, Mesh, Sphere
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.motion_schema import MovableModel
@@ -227,9 +227,7 @@ def _pose(pose: Place) -> FloatArray:
     if not abs(length - 1.0) <= UNIT_NORM:
         problem = f"has an orientation of length {length:g}, expected 1"
         raise pose.invalid(problem)
-    x, y, z, w = quaternion / length
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    placement[:3, :3] += 2.0 * (w * cross + cross @ cross)
+    placement[:3, :3] = rotation_from_quaternion(quaternion / length)
     return placement
 
 

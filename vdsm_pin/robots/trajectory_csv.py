@@ -121,11 +121,14 @@ def _smooth_columns(
     file: File, names: Sequence[str], joints: Sequence[RobotJoint], what: str, per: str
 ) -> list[str]:
     """Names of the velocities or accelerations of all joints, or none at all."""
-    found = {
-        m[1]: (name, m[3])
-        for name in names
-        if (m := _SMOOTH.fullmatch(name)) and (m[2], m[4]) == (what, per)
-    }
+    found: Stated = {}
+    for name in names:
+        m = _SMOOTH.fullmatch(name)
+        if m and (m[2], m[4]) == (what, per):
+            if m[1] in found:
+                problem = f"has {name!r} and {found[m[1]][0]!r}, expected one of them"
+                raise InvalidFile(file=file, where="line 1", problem=problem)
+            found[m[1]] = name, m[3]
     mine = [joint for joint in joints if joint.name in found]
     for joint in joints if mine else []:
         if joint.name not in found:
