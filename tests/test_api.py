@@ -110,6 +110,11 @@ def test_a_certificate_is_of_the_files_that_were_verified(tmp_path: Path) -> Non
     with pytest.raises(vp.InvalidInput, match="another motion"):
         vp.write_certificate(result, certificate, file)
 
+    late = replace(plan.trajectory, times=np.arange(plan.trajectory.n_samples) + 1.0)
+    vp.write_trajectory(file, late)
+    with pytest.raises(vp.InvalidInput, match="another motion"):
+        vp.write_certificate(result, certificate, file)
+
     changed = replace(problem, required_clearance=0.5)
     assert changed.source is None  # it stands in no file
     with pytest.raises(vp.InvalidInput, match="this problem has none"):

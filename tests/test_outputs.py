@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from vdsm_pin import api
+from vdsm_pin.app import workflow
 from vdsm_pin.batch.run import OWN, Batch, run_batch
 from vdsm_pin.batch.task import Settings, folder_names
 from vdsm_pin.cli import main
@@ -142,6 +143,25 @@ def test_no_file_of_a_folder_is_an_input(
     assert run(*verify) == 2
     assert capsys.readouterr().err.count("is an input") == 2
     assert (here / "part.stl").read_text() == PART
+
+
+def test_a_trajectory_that_changes_meanwhile_gets_no_result(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its hash would be of a motion that nobody judged."""
+
+    def judged(*given: object, **more: object) -> object:
+        found = verify(*given, **more)
+        (here / "motion.csv").write_text("x0_m\n0\n")
+        return found
+
+    verify = workflow.verify
+    monkeypatch.setattr(workflow, "verify", judged)
+    words = ["problem.yaml", "--trajectory", "motion.csv", "--out", "out"]
+    assert run("verify", *words, "--certificate", "proof") == 2
+    assert "motion.csv: changed while it was worked on" in capsys.readouterr().err
+    assert not any((here / "out").iterdir())
+    assert not (here / "proof").exists()
 
 
 def test_two_outputs_do_not_share_a_place(

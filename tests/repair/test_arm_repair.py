@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from vdsm_pin.app import repair as app_repair
+from vdsm_pin.app.workflow import Verified, VerifyOrder
 from vdsm_pin.arm.kinematics import joint_centres, tip_jacobian
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.cli import app
@@ -22,6 +24,7 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.repair.arm import repair_arm
+from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.coal_distances import obstacles_at_rest
 from vdsm_pin.verification.robot_model import load_robot
 
@@ -141,3 +144,21 @@ def test_command_repairs_what_it_is_given(tmp_path: Path) -> None:
     np.testing.assert_allclose([one["moved"] for one in waypoints], moved, atol=1e-9)
     verdict = json.loads((out / "verification.json").read_text())["verdict"]
     assert verdict == "certified"
+
+
+def test_a_repaired_motion_that_is_not_proved_as_written_is_no_success(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where the time ends between finding it and verifying what was written."""
+    given, verify = tmp_path / "t.csv", app_repair.verify_to_folder
+    write_trajectory(given, planned("paper/free")[1])
+
+    def late(order: VerifyOrder) -> Verified:
+        return verify(replace(order, deadline=Deadline.after(0.0)))
+
+    monkeypatch.setattr(app_repair, "verify_to_folder", late)
+    words = ["repair", "paper/free", "--trajectory", str(given), "--out"]
+    ended = CliRunner().invoke(app, [*words, str(tmp_path / "o")], obj="vdsm repair")
+    assert ended.exit_code == 1
+    assert isinstance(ended.exception, Infeasible)
+    assert "the repaired motion, as written" in str(ended.exception)

@@ -8,12 +8,18 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 
 from vdsm_pin import __version__
 from vdsm_pin.app.workflow import JUDGED, TRAJECTORY, VerifyOrder, verify_to_folder
-from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.errors import Infeasible
+from vdsm_pin.io.source import (
+    check_is_file_or_bag,
+    check_unchanged,
+    sha256_of_file,
+)
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.repair.arm import repair_arm
 from vdsm_pin.repair.rounds import Repaired
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
+from vdsm_pin.verification.records import Verdict
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -38,15 +44,19 @@ def repair_to_folder(order: VerifyOrder, pinned: tuple[int, ...] = ()) -> Found:
 
     Raises:
         InvalidInput: If a file is bad or the folder cannot be written.
-        Infeasible: If no certified motion was found near the given one.
+        Infeasible: If no certified motion was found near the given one, or the one
+            found is not certified as it was written, as where the time is over.
     """
     inputs = [*order.problem.files, order.trajectory]
     check_output_folder(order.folder)
+    check_is_file_or_bag(order.trajectory)
+    digest = sha256_of_file(order.trajectory)
     check_kept([order.folder / n for n in (TRAJECTORY, REPAIR, *JUDGED)], inputs)
     if isinstance(order.problem, PlanningProblem):
         found, write = _of_arm(order, order.problem, pinned)
     else:
         found, write = _of_robot(order, order.problem, pinned)
+    check_unchanged(order.trajectory, digest)
     rows = zip(found.given.tolist(), found.moved.tolist(), strict=True)
     content = {
         "vdsm_repair": 1,
@@ -62,9 +72,12 @@ def repair_to_folder(order: VerifyOrder, pinned: tuple[int, ...] = ()) -> Found:
         write(aside / TRAJECTORY)
         (aside / REPAIR).write_text(json.dumps(content, indent=1) + "\n", "utf-8")
     written = order.folder / TRAJECTORY
-    verify_to_folder(
+    verified = verify_to_folder(
         replace(order, trajectory=written, topic=None, interpolation="auto")
     )
+    if verified.records.verdict is not Verdict.CERTIFIED:
+        message = f"{written}: the repaired motion, as written: {verified.file.reason}"
+        raise Infeasible(message)
     return found
 
 

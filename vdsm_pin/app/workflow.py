@@ -20,7 +20,11 @@ from vdsm_pin.errors import (
     OutOfTime,
     VerificationFailed,
 )
-from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.io.source import (
+    check_is_file_or_bag,
+    check_unchanged,
+    sha256_of_file,
+)
 from vdsm_pin.io.trajectory_file import (
     Interpolation,
     read_trajectory,
@@ -210,10 +214,12 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
     from vdsm_pin.report.html import write_report
 
     _check_outputs(order)
+    check_is_file_or_bag(order.trajectory)
+    digest = sha256_of_file(order.trajectory)
     judged = _judgement(order)
     with staged(order.folder) as aside:
         urdf, verification = judged(aside)
-        digest = sha256_of_file(order.trajectory)
+        check_unchanged(order.trajectory, digest)
         source = order.problem.source
         record = RunRecord.of(order.command, source, urdf, digest, order.date)
         file = verification_file(verification, record)

@@ -227,6 +227,18 @@ def sha256_of_file(path: Path) -> str:
     return digest.hexdigest()
 
 
+def check_unchanged(path: Path, digest: str) -> None:
+    """Refuse a file that is another one than when work on it began.
+
+    Raises:
+        InvalidFile: If its SHA-256 is another one now.
+    """
+    with readable(path):
+        same = sha256_of_file(path) == digest
+    if not same:
+        raise InvalidFile(file=path, problem="changed while it was worked on")
+
+
 def sha256_of(parts: Iterable[bytes]) -> str:
     """SHA-256 of byte strings one after the other, in hexadecimal."""
     digest = hashlib.sha256()

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.io.source import check_is_file, check_unchanged, sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -118,11 +118,12 @@ def simulate_to_folder(order: SimulationOrder) -> SimulationFile:
             "nothing could be said of its clearance"
         )
         raise InvalidInput(message)
+    check_is_file(order.trajectory)
+    digest = sha256_of_file(order.trajectory)
     planned = read_trajectory(order.trajectory, problem.manipulator, "linear")
     found = simulate(problem.manipulator, planned, order.settings)
-    file = summary(
-        problem, planned, found, order.settings, sha256_of_file(order.trajectory)
-    )
+    file = summary(problem, planned, found, order.settings, digest)
+    check_unchanged(order.trajectory, digest)
     with staged(order.folder) as aside:
         write_trajectory(aside / EXECUTED, found.trajectory)
         _write_record(aside / RECORD, found)
