@@ -144,10 +144,11 @@ class ClearanceCsv:
             rows.upper,
             rows.verdict,
         ]
-        points = [
-            point @ self._rotation + self._shift
-            for point in (rows.link_point, rows.other_point)
-        ]
+        with np.errstate(invalid="ignore"):  # points of pairs without evidence
+            points = [
+                point @ self._rotation + self._shift
+                for point in (rows.link_point, rows.other_point)
+            ]
         return np.column_stack([*columns, *points]).astype(np.float64)
 
 
