@@ -13,9 +13,11 @@ from vdsm_pin.app.explanation.cross import DIRECTIONS, crosses
 from vdsm_pin.app.explanation.folder import explain_to_folder
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.errors import InvalidInput, NoPlanFound
+from vdsm_pin.geometry.solids import Cylinder
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.planner.paper.along_rail import AlongRail
 from vdsm_pin.planner.paper.steps import PaperSteps
+from vdsm_pin.problem.scene import Scene
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.verification.robot_model import load_robot
 
@@ -79,6 +81,31 @@ def test_a_page_has_every_step_and_asks_nobody(name: str, tmp_path: Path) -> Non
     pictures = etree.HTML(text).xpath("//section//svg[@role='img']")
     assert len(pictures) >= 6
     assert all(picture.xpath("title/text()") for picture in pictures)
+
+
+def test_nothing_is_drawn_outside_of_its_picture(tmp_path: Path) -> None:
+    """Three rods are gone round together: crossings far off."""
+    along, free = np.array([1.0, 0.0, 0.0]), read_problem("paper/free")
+    rods = [
+        Cylinder(f"rod {y}", np.array([1.5, y, z]), along, 9.0, radius)
+        for y, z, radius in (
+            (0.36, 0.156, 0.08),
+            (0.17, -0.96, 0.11),
+            (0.41, -0.23, 0.198),
+        )
+    ]
+    asked = replace(free, scene=Scene(tuple(rods)))
+    page, _ = explain_to_folder(asked, None, tmp_path)
+    document = etree.HTML(page.read_text(encoding="utf-8"))
+    pictures = document.xpath("//section//svg[@role='img'][polyline[@class='path']]")
+    assert len(document.xpath("//polyline[@class='cross']")) > 6
+    for picture in pictures:
+        size = np.array([float(picture.get("width")), float(picture.get("height"))])
+        lines = " ".join(picture.xpath("polyline/@points")).split()
+        points = np.array([line.split(",") for line in lines], dtype=float)
+        dots = picture.xpath("circle/@cx"), picture.xpath("circle/@cy")
+        points = np.vstack([points, np.array(dots, dtype=float).T])
+        assert ((points >= 0.0) & (points <= size)).all(), picture.get("aria-label")
 
 
 def test_what_cannot_be_explained_is_refused(tmp_path: Path) -> None:

@@ -93,7 +93,8 @@ class Canvas:
                 self.line(ends, "grid", width=0.6)
                 x, y = self._place(ends[0])
                 at = (x, y + 14, "middle") if axis == 0 else (x - 6, y + 4, "end")
-                self._word(*at, f"{k * step * MM_PER_M:.0f}", "tick")
+                tick = f"{k * step * MM_PER_M:.0f}".replace("-", "−")
+                self._word(*at, tick, "tick")
             far = [[high[0], low[1]], [low[0], high[1]]][axis]
             x, y = self._place(np.array(far))
             shift, anchor = [(30.0, "end"), (-10.0, "start")][axis]

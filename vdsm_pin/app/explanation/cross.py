@@ -18,6 +18,13 @@ NAMES: Final = "up", "down", "right", "left"
 """The same in words."""
 
 
+JOINED: Final = 1e-9
+"""Points this near are one; [m]."""
+
+ARC_POINTS: Final = 24
+"""Of a way along a circle."""
+
+
 @dataclass(frozen=True)
 class Cross:
     """How one joint gets its place in the projection (Eq. 8-10).
@@ -50,15 +57,22 @@ class Cross:
         return int(np.argmin(np.linalg.norm(self.points - self.former, axis=1)))
 
     @property
+    def way(self) -> FloatArray:
+        """From P'_i to P_i: on the circle about P_1 or straight, shape (n, 2); [m]."""
+        ends = np.stack([self.proportional, self.place])
+        radii = np.linalg.norm(ends, axis=1)
+        if not abs(radii[1] - radii[0]) < JOINED:
+            return ends
+        begin, end = np.unwrap(np.arctan2(ends[:, 1], ends[:, 0]))
+        turns = np.linspace(begin, end, ARC_POINTS)
+        return np.asarray(radii[0] * np.column_stack([np.cos(turns), np.sin(turns)]))
+
+    @property
     def taken(self) -> str:
         """Which point became P_i."""
         gaps = np.linalg.norm(self.points - self.place, axis=1)
         best = int(np.argmin(gaps))
         return NAMES[best] if gaps[best] < JOINED else "on another line"
-
-
-JOINED: Final = 1e-9
-"""Points this near are one; [m]."""
 
 
 def crosses(

@@ -43,12 +43,20 @@ def canvas(
     moment: Moment,
     view: tuple[int, int],
     regions: Sequence[DangerRegion] = (),
+    more: Sequence[FloatArray] = (),
 ) -> Canvas:
-    """Obstacles, danger regions and the desired path, seen in a view."""
+    """Obstacles, danger regions and the desired path, seen in a view.
+
+    Args:
+        moment: The plan at its waypoint.
+        view: The two coordinates seen.
+        regions: Danger regions.
+        more: Points that must be inside too, shape (n, 2) each; [m].
+    """
     path, centres = moment.plan.problem.path, moment.steps.centres
     corners = path.corners[:, list(view)]
     shown = [corners, centres[moment.row][:, list(view)], path.start[None, list(view)]]
-    made = Canvas(np.concatenate(shown), *("xyz"[k] for k in view))
+    made = Canvas(np.concatenate([*shown, *more]), *("xyz"[k] for k in view))
     for body in shadows(moment, view):
         made.area(body, "obstacle")
     for region in regions:
@@ -67,21 +75,36 @@ def chain(made: Canvas, arm: Manipulator, points: FloatArray, letter: str) -> No
         made.dot(point, "joint", name(letter, i + 1), beside)
 
 
-def cross_picture(moment: Moment, one: Cross, regions: Sequence[DangerRegion]) -> str:
+def cross_pictures(
+    moment: Moment, crosses: Sequence[Cross], region: DangerRegion
+) -> tuple[str, ...]:
+    """Every cross that moves a joint, in one scale."""
+    moved = [one for one in crosses if one.moved]
+    places = [one.points for one in moved]
+    return tuple(
+        _cross_picture(
+            moment,
+            one,
+            canvas(moment, VIEWS["y"], [region, one.region], places),
+        )
+        for one in moved
+    )
+
+
+def _cross_picture(moment: Moment, one: Cross, made: Canvas) -> str:
     """P'_i on the ray to P_{i+1}, the cross, its four points, P_i."""
     arm, planar = moment.plan.problem.manipulator, moment.planar
-    made = canvas(moment, VIEWS["y"], [*regions, one.region])
     i = one.joint
     made.line(np.stack([planar[0], planar[i]]), "ray")
     colours = link_colours(arm.n_links)
     for j in range(i - 1, arm.n_links):
         made.line(planar[j : j + 2], "link", colours[j], 3.0)
-    if one.moved:
-        for k in (0, 2):
-            made.line(one.points[k : k + 2], "cross")
-        for k, point in enumerate(one.points):
-            made.dot(point, "nearest" if k == one.nearest else "crossing")
-        made.dot(one.proportional, "wanted", name("P′", i), (-7.0, -7.0))
+    for k in (0, 2):
+        made.line(one.points[k : k + 2], "cross")
+    for k, point in enumerate(one.points):
+        made.dot(point, "nearest" if k == one.nearest else "crossing")
+    made.line(one.way, "cross")
+    made.dot(one.proportional, "wanted", name("P′", i), (-7.0, -7.0))
     made.dot(one.former, "former", "before", (-9.0, 4.0))
     made.dot(planar[i], "joint", name("P", i + 1), (8.0, 5.0))
     made.dot(one.place, "taken", name("P", i), (4.0, -9.0))

@@ -89,11 +89,11 @@ def route_step(moment: Moment) -> Part:
     """Step 4 (4.2)."""
     problem, route = moment.plan.problem, moment.steps.route
     tips = route.tip_path
-    region = _tip_region(moment)
-    made = pictures.canvas(moment, pictures.VIEWS["y"], region)
-    made.line(tips.points[:, 1:], "route")
-    made.dot(tips.points[0, 1:], "former", "start")
-    made.dot(tips.points[moment.row, 1:], "taken", f"waypoint {moment.row}")
+    region, way = _tip_region(moment), tips.points[:, 1:]
+    made = pictures.canvas(moment, pictures.VIEWS["y"], region, [way])
+    made.line(way, "route")
+    made.dot(way[0], "former", "start")
+    made.dot(way[moment.row], "taken", f"waypoint {moment.row}")
     along = in_mm(float(tips.path_m[moment.row]))
     drawing = bool(tips.on_path[moment.row])
     state = f"draws the path, {along} along it"
@@ -114,7 +114,7 @@ def route_step(moment: Moment) -> Part:
             "The arm passes the obstacle, on the side of the "
             f"{turn} polar angle about P₁."
         )
-    words += route.notes
+    words += [f"{note[:1].upper()}{note[1:]}." for note in route.notes]
     picture = made.svg("route of the tip, danger region of the tip")
     return Part(
         "Step 4: the path of the tip", "section 4.2", tuple(words), (), (picture,)
@@ -140,11 +140,7 @@ def joints_step(moment: Moment) -> Part:
             source,
             _cross_words(found, not rule.direction.any()),
             (_cross_table(moment, found),),
-            tuple(
-                pictures.cross_picture(moment, one, [avoidance.forbidden])
-                for one in found
-                if one.moved
-            ),
+            pictures.cross_pictures(moment, found, avoidance.forbidden),
         )
     if isinstance(avoidance, AcrossRail) and (moment.planar != moment.reference).any():
         return _bend_part(moment, avoidance, title, source)
@@ -189,7 +185,7 @@ def _cross_table(moment: Moment, found: tuple[Cross, ...]) -> Table:
             )
         )
     head = ("", "kᵢ,ᵢ₊₁", "P′ᵢ", "before", "up", "down", "right", "left",
-            "nearest to before", "taken", "Pᵢ")  # fmt: skip
+            "nearest", "taken", "Pᵢ")  # fmt: skip
     return table(head, rows)
 
 
@@ -200,7 +196,9 @@ def _bend_part(moment: Moment, rule: AcrossRail, title: str, source: str) -> Par
     pictures.chain(made, arm, moment.centres[:, seen], "O")
     first = rule.bends[0] - 1
     move = moment.planar[first] - moment.reference[first]
-    joints = " and ".join(str(joint) for joint in rule.bends)
+    joints = f"Joint {rule.bends[0]} moves"
+    if len(rule.bends) > 1:
+        joints = f"Joints {rule.bends[0]} and {rule.bends[1]} move"
     rows = [
         (name("P", i + 1), at(moment.reference[i]), at(moment.planar[i]))
         for i in range(arm.n_links + 1)
@@ -210,7 +208,7 @@ def _bend_part(moment: Moment, rule: AcrossRail, title: str, source: str) -> Par
         title,
         source,
         (
-            f"The obstacle lies across the rail. Joint {joints} moves by "
+            f"The obstacle lies across the rail. {joints} by "
             f"{mm(float(move[rule.axis]))} mm in {letter}, as little as keeps the "
             "links out of the danger region; the joints before it follow in "
             "proportion to P₁, those after it in proportion to the tip.",
