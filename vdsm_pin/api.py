@@ -66,6 +66,7 @@ def plan(
     from vdsm_pin.refinement import plan_and_verify
 
     _expect(problem, PlanningProblem, "read_problem(path)")
+    _expect(strategy, str, "'fewest'")
     deadline, robot = Deadline.after(time_limit), load_robot(problem.manipulator)
     return plan_and_verify(problem, strategy, robot, deadline=deadline).plan
 

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import inf, isnan
+from numbers import Real
 from typing import Final
 
 from vdsm_pin.errors import InvalidInput, OutOfTime
@@ -40,8 +41,8 @@ class Deadline:
         """
         if seconds is None:
             return cls()
-        if isnan(seconds):
-            message = "the time limit is nan, expected seconds"
+        if not isinstance(seconds, Real) or isnan(seconds):
+            message = f"the time limit is {seconds}, expected seconds"
             raise InvalidInput(message)
         return cls(seconds, time.monotonic() + seconds)
 

@@ -117,7 +117,9 @@ def record(root: Path, modules: list[str], tests: list[str]) -> None:
     without = [
         f"-pno:{name}" for name in ("cacheprovider", "xdist", "hypothesispytest")
     ]
-    words = ["-q", *without, "-m", "not slow"]
+    # A traceback of a test that is ended may lack a line, which pytest's own printing
+    # does not expect.
+    words = ["-q", "--tb=native", *without, "-m", "not slow"]
     status = pytest.main([*words, *tests], plugins=[recorder])
     running.stop()
     if status not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED):

@@ -99,7 +99,7 @@ def test_radius_must_be_positive_and_finite(radius: float) -> None:
         (lambda: Box("a", UP, EYE, np.array(1.0)), "half_size has shape"),
         (lambda: Sphere("a", UP[:2], 1.0), r"shape \(2,\), expected \(3,\)"),
         (lambda: Sphere("a", UP, np.ones(2)), r"radius has shape \(2,\)"),
-        (lambda: Mesh("a", EYE, np.array([[0, 1, 1.5]])), "no whole numbers"),
+        (lambda: Mesh("a", EYE, np.array([[0, 1, 1.5]])), "expected whole numbers"),
         (lambda: Mesh("a", EYE[:, :2], np.array([[0, 1, 2]])), "vertices have shape"),
         (lambda: Mesh("a", EYE, np.array([0, 1, 2])), "triangles have shape"),
     ],

@@ -9,7 +9,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput, UnknownName
-from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, check_numbers, freeze, frozen
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, Mesh, Prism, Sphere
 from vdsm_pin.units import MM_PER_M
 
@@ -46,16 +46,20 @@ class CableLayout:
 
     def __post_init__(self) -> None:
         """Freeze the array and refuse impossible sizes."""
-        object.__setattr__(self, "hole_angles", frozen(self.hole_angles))
-        if not self.hole_radius > 0.0:
+        freeze(self, "hole_angles")
+        check_numbers(self, "hole_radius", "half_gap")
+        if not 0.0 < self.hole_radius < np.inf:
             message = f"hole_radius is {self.hole_radius} m, expected above 0"
             raise InvalidInput(message)
-        if not self.half_gap > 0.0:
+        if not 0.0 < self.half_gap < np.inf:
             message = f"half_gap is {self.half_gap} m, expected above 0"
             raise InvalidInput(message)
         if self.hole_angles.ndim != 2 or self.hole_angles.shape[1] != 3:
             shape = self.hole_angles.shape
             message = f"hole_angles has shape {shape}, expected (N, 3)"
+            raise InvalidInput(message)
+        if not np.isfinite(self.hole_angles).all():
+            message = "hole_angles has a value that is not finite"
             raise InvalidInput(message)
 
 
@@ -91,6 +95,7 @@ class _Extension:
 
     def __post_init__(self) -> None:
         """Refuse impossible sizes."""
+        check_numbers(self, "length", "radius")
         for name in ("length", "radius"):
             if not 0.0 < getattr(self, name) <= MAX_LENGTH:
                 value, kind = getattr(self, name), type(self).__name__.lower()
@@ -169,7 +174,8 @@ class Manipulator:
 
     def __post_init__(self) -> None:
         """Freeze the arrays and refuse impossible arms."""
-        object.__setattr__(self, "link_lengths", frozen(self.link_lengths))
+        freeze(self, "link_lengths", "radii", "base_range")
+        check_numbers(self, "link_radius", "max_link_angle", "max_joint_angle")
         lengths = self.link_lengths
         if lengths.ndim != 1 or not 2 <= lengths.size <= MAX_LINKS:
             known = f"2 to {MAX_LINKS} lengths"
@@ -188,10 +194,12 @@ class Manipulator:
                 value = np.rad2deg(getattr(self, name))
                 message = f"{name} is {value} deg, expected above 0 and below 90"
                 raise InvalidInput(message)
-        low, high = self.base_range
-        if not (np.isfinite(low) and np.isfinite(high) and low <= high):
-            message = f"base_range is {self.base_range} m, expected low <= high"
+        ends = np.asarray(self.base_range)
+        finite = ends.shape == (2,) and np.isfinite(ends).all()
+        if not (finite and ends[0] <= ends[1]):
+            message = f"base_range is {ends.tolist()} m, expected low <= high"
             raise InvalidInput(message)
+        object.__setattr__(self, "base_range", tuple(ends.tolist()))
         if self.cables.hole_angles.shape[0] != lengths.size:
             count = self.cables.hole_angles.shape[0]
             message = f"hole_angles has {count} rows, expected {lengths.size}"
@@ -202,7 +210,6 @@ class Manipulator:
     def _check_radii(self) -> None:
         if self.radii is None:
             return
-        object.__setattr__(self, "radii", frozen(self.radii))
         radii = self.radii
         if radii.shape != (self.n_links,) or not (radii > 0.0).all():
             known = f"{self.n_links} values above 0"

@@ -1,9 +1,14 @@
 """Array types and the few checked operations everybody needs."""
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, Final, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+
+from vdsm_pin.errors import InvalidInput
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.int64]
@@ -12,14 +17,114 @@ ByteArray: TypeAlias = npt.NDArray[np.uint8]
 
 
 def frozen(value: Any, dtype: type[Any] = np.float64) -> npt.NDArray[Any]:
-    """A read-only C-ordered copy of an array-like value; itself where it is one."""
+    """A read-only C-ordered copy of an array-like value; itself where it is one.
+
+    Raises:
+        InvalidInput: If that would change it: masked values, complex numbers, text,
+            times, nothing, or fractions where whole numbers are meant.
+    """
     if isinstance(value, np.ndarray) and value.dtype == dtype:
         flags = value.flags
         if flags.owndata and flags.c_contiguous and not flags.writeable:
             return value
+    if type(value) is not np.ndarray or value.dtype != dtype:
+        value, kind = _plain(value), np.dtype(dtype).kind
+        if value.dtype.kind in _KINDS or not _fits(value, kind):
+            lost = _KINDS.get(value.dtype.kind, "other numbers")
+            message = f"has {lost}, expected {_EXPECTED[kind]}"
+            raise InvalidInput(message)
     array = np.array(value, dtype=dtype, order="C")
     array.setflags(write=False)
     return array
+
+
+_EXPECTED: Final = {"b": "0 or 1", "i": "whole numbers", "u": "bytes", "f": "numbers"}
+_KINDS: Final = {"c": "complex numbers", "U": "text", "S": "text", "M": "times",
+                 "m": "times", "V": "records"}  # fmt: skip
+
+
+def _plain(value: Any) -> npt.NDArray[Any]:
+    """An array-like value as an array, of numbers where it is of objects."""
+    if _masked(value):
+        message = "has masked values, expected all of them"
+        raise InvalidInput(message)
+    try:
+        found = np.asarray(value)
+        if found.dtype.kind == "O":
+            if any(isinstance(one, str | bytes | None) for one in found.flat):
+                message = "has text or nothing among its values, expected numbers"
+                raise InvalidInput(message)
+            found = found.astype(np.float64)
+    except (TypeError, ValueError) as error:
+        message = f"is no array of numbers: {error}"
+        raise InvalidInput(message) from None
+    return found
+
+
+def _fits(found: npt.NDArray[Any], kind: str) -> bool:
+    """Whether numbers may be kept as this kind, none of them changed but rounded."""
+    if kind == "b":
+        return bool(((found == 0) | (found == 1)).all())
+    if kind == "f" or found.dtype.kind != "f":
+        return True
+    return bool((np.isfinite(found) & (np.floor(found) == found)).all())
+
+
+def _masked(value: Any) -> bool:
+    """Whether any entry is masked; nothing is where no array with a mask was made."""
+    if type(value) is np.ndarray or "numpy.ma" not in sys.modules:
+        return False
+    if isinstance(value, list | tuple):
+        return any(map(_masked, value))
+    return isinstance(value, np.ma.MaskedArray) and bool(np.ma.is_masked(value))
+
+
+def number(value: Any) -> float:
+    """A real number.
+
+    Raises:
+        InvalidInput: If it is anything else.
+    """
+    found = frozen(value)
+    if found.ndim:
+        message = f"has shape {found.shape}, expected one number"
+        raise InvalidInput(message)
+    return float(found)
+
+
+@contextmanager
+def called(name: str) -> Iterator[None]:
+    """Begin what is said of a refused value with its name."""
+    try:
+        yield
+    except InvalidInput as error:
+        message = f"{name} {error}"
+        raise InvalidInput(message) from None
+
+
+def freeze(record: Any, *names: str, dtype: type[Any] = np.float64) -> None:
+    """Make fields of a frozen record read-only arrays; those that are None stay so.
+
+    Raises:
+        InvalidInput: As `frozen`, with the field's name.
+    """
+    for name in names:
+        if (value := getattr(record, name)) is not None:
+            with called(f"{type(record).__name__}: {name}"):
+                object.__setattr__(record, name, frozen(value, dtype))
+
+
+def check_numbers(record: Any, *names: str) -> None:
+    """Make fields of a frozen record floats.
+
+    Raises:
+        InvalidInput: As `number`, with the field's name.
+    """
+    for name in names:
+        value = getattr(record, name)
+        if type(value) is not float:
+            with called(f"{type(record).__name__}: {name}"):
+                object.__setattr__(record, name, number(value))
 
 
 ROTATION_ERROR: Final = 1e-9

@@ -51,10 +51,8 @@ class Mesh(FromFile):
         """Freeze the arrays and check the indices."""
         super().__post_init__()
         self._check_rows("vertices")
-        if np.asarray(self.triangles).dtype.kind not in "iu":
-            self._refuse("triangles are no whole numbers")
-        triangles, count = frozen(self.triangles, np.int64), len(self.vertices)
-        object.__setattr__(self, "triangles", triangles)
+        self._freeze("triangles", np.int64)
+        triangles, count = self.triangles, len(self.vertices)
         self._check_rows("triangles")
         if not ((triangles >= 0) & (triangles < count)).all():
             self._refuse(f"triangles do not index {count} vertices")

@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, Final, NoReturn, Self
+from typing import Any, ClassVar, Final, NoReturn, Self
 
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, frozen, is_rotation, is_unit
+from vdsm_pin.geometry.arrays import FloatArray, called, frozen, is_rotation, is_unit
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
 
 BOX_CORNERS: Final = frozen(
@@ -44,13 +44,15 @@ class NamedSolid:
     def __post_init__(self) -> None:
         """Freeze the arrays, check shapes, and that numbers are what they are to be."""
         for field in (*self.POINTS, *self.TURNED, *self.SIZES):
-            value = frozen(getattr(self, field))
+            self._freeze(field)
+            value = getattr(self, field)
             if not np.isfinite(value).all():
                 self._refuse(f"{field} is {value}, expected finite numbers")
             shape = _SHAPES.get(field, value.shape)
             if value.shape != shape:
                 self._refuse(f"{field} has shape {value.shape}, expected {shape}")
-            object.__setattr__(self, field, value if value.ndim else float(value))
+            if not value.ndim:
+                object.__setattr__(self, field, float(value))
         for field in self.TURNED:
             value = getattr(self, field)
             if value.ndim == 1 and not is_unit(value):
@@ -90,6 +92,10 @@ class NamedSolid:
     def _refuse(self, reason: str) -> NoReturn:
         message = f"obstacle {self.name!r}: {reason}"
         raise InvalidInput(message)
+
+    def _freeze(self, field: str, dtype: type[Any] = np.float64) -> None:
+        with called(f"obstacle {self.name!r}: {field}"):
+            object.__setattr__(self, field, frozen(getattr(self, field), dtype))
 
     def _check_rows(self, field: str) -> None:
         rows = getattr(self, field)
@@ -231,7 +237,7 @@ class Prism(NamedSolid):
     def __post_init__(self) -> None:
         """Freeze the arrays and refuse polygons that enclose no simple area."""
         super().__post_init__()
-        object.__setattr__(self, "polygon", frozen(self.polygon))
+        self._freeze("polygon")
         if not np.isfinite(self.polygon).all() or not np.isfinite(self.span).all():
             self._refuse("polygon and span have other than finite numbers")
         if self.polygon.ndim != 2 or self.polygon.shape[0] < 3:

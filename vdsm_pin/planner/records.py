@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 from vdsm_pin.arm.cables import cable_lengths
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, freeze
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.problem.held import Axes
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -44,8 +44,8 @@ class TipPath:
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name, dtype in (("points", float), ("on_path", bool), ("path_m", float)):
-            object.__setattr__(self, name, frozen(getattr(self, name), dtype))
+        freeze(self, "points", "path_m")
+        freeze(self, "on_path", dtype=bool)
 
 
 @dataclass(frozen=True, repr=False)

@@ -7,7 +7,13 @@ from functools import cached_property
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, frozen, running_sums
+from vdsm_pin.geometry.arrays import (
+    FloatArray,
+    check_numbers,
+    freeze,
+    frozen,
+    running_sums,
+)
 from vdsm_pin.problem.pointing import Pointing
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -79,14 +85,12 @@ class DesiredPath:
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check the values."""
-        object.__setattr__(self, "start", frozen(self.start))
-        object.__setattr__(self, "points", frozen(self.points))
-        object.__setattr__(self, "insertion", frozen(self.insertion))
-        if self.insertion.shape[1:] != (3,) or not np.isfinite(self.insertion).all():
-            message = "tip_path.insertion is not a list of points"
+        freeze(self, "start", "points", "insertion", "start_joints")
+        check_numbers(self, "spacing", "retreat", "required_coverage")
+        shape = self.insertion.shape
+        if len(shape) != 2 or shape[1] != 3 or not np.isfinite(self.insertion).all():
+            message = f"tip_path.insertion has shape {shape}, expected (k, 3), finite"
             raise InvalidInput(message)
-        if self.start_joints is not None:
-            object.__setattr__(self, "start_joints", frozen(self.start_joints))
         if self.start.shape != (3,) or not np.isfinite(self.start).all():
             message = (
                 f"tip_path.start is {self.start.tolist()}, expected 3 finite numbers"

@@ -3,13 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
+from numbers import Real
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import FloatArray, called, check_numbers, frozen, number
 from vdsm_pin.units import MM_PER_M
 
 JointErrors = tuple[tuple[float, float], ...]
@@ -93,12 +94,13 @@ class ErrorBox:
 
     def __post_init__(self) -> None:
         """Refuse what is no error."""
+        check_numbers(self, *PLAIN)
         values = [("joint", e) for pair in self.joints for e in pair]
         values += [("obstacle", e) for o in self.obstacles for e in (o.shift, o.turn)]
         values += [(repr(j.name), e) for j in self.named for e in (j.turn, j.shift)]
         values += [(name, getattr(self, name)) for name in PLAIN]
         for name, value in values:
-            if not 0.0 <= value < np.inf:
+            if not (isinstance(value, Real) and 0.0 <= value < np.inf):
                 message = (
                     f"{name.replace('_', ' ')} error is {value}, expected 0 or more"
                 )
@@ -199,28 +201,41 @@ class TypedErrorBox(ErrorBox):
         slide_mm: float | Mapping[str, float] = 0.0,
     ) -> None:
         """The box in radians and metres."""
-        turns = joint_deg if isinstance(joint_deg, Mapping) else {}
-        shifts = slide_mm if isinstance(slide_mm, Mapping) else {}
-        plain = 0.0 if isinstance(joint_deg, Mapping) else joint_deg
-        one = plain if isinstance(plain, (int, float)) else 0.0
-        each = () if isinstance(plain, (int, float)) else plain
-        names = dict.fromkeys((*obstacles_mm, *obstacles_deg))
+        joints, slides = isinstance(joint_deg, Mapping), isinstance(slide_mm, Mapping)
+        turns = _by_name("joint_deg", joint_deg if joints else NOTHING)
+        shifts = _by_name("slide_mm", slide_mm if slides else NOTHING)
+        away = _by_name("obstacles_mm", obstacles_mm)
+        turned = _by_name("obstacles_deg", obstacles_deg)
+        with called("ErrorBox: joint_deg"):
+            angles = np.deg2rad(frozen(0.0 if joints else joint_deg))
         super().__init__(
-            joint=float(np.deg2rad(one)),
-            base=base_mm / MM_PER_M,
-            obstacle=obstacle_mm / MM_PER_M,
-            base_turn=float(np.deg2rad(base_deg)),
-            joints=tuple((error, error) for error in np.deg2rad(each).tolist()),
+            joint=0.0 if angles.ndim else float(angles),
+            base=_plain("base_mm", base_mm) / MM_PER_M,
+            obstacle=_plain("obstacle_mm", obstacle_mm) / MM_PER_M,
+            base_turn=float(np.deg2rad(_plain("base_deg", base_deg))),
+            joints=tuple((e, e) for e in (angles.tolist() if angles.ndim else ())),
             obstacles=tuple(
                 ObstacleError(
                     name,
-                    obstacles_mm.get(name, 0.0) / MM_PER_M,
-                    float(np.deg2rad(obstacles_deg.get(name, 0.0))),
+                    away.get(name, 0.0) / MM_PER_M,
+                    float(np.deg2rad(turned.get(name, 0.0))),
                 )
-                for name in names
+                for name in dict.fromkeys((*away, *turned))
             ),
-            slide=0.0 if isinstance(slide_mm, Mapping) else slide_mm / MM_PER_M,
+            slide=0.0 if slides else _plain("slide_mm", slide_mm) / MM_PER_M,
             named=JointError.of(
                 turns, {name: value / MM_PER_M for name, value in shifts.items()}
             ),
         )
+
+
+def _plain(name: str, value: object) -> float:
+    with called(f"ErrorBox: {name}"):
+        return number(value)
+
+
+def _by_name(name: str, values: object) -> dict[str, float]:
+    if not isinstance(values, Mapping):
+        message = f"ErrorBox: {name} is {values!r}, expected numbers by name"
+        raise InvalidInput(message)
+    return {key: _plain(f"{name}[{key!r}]", value) for key, value in values.items()}

@@ -9,7 +9,7 @@ import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidInput, UnknownName
-from vdsm_pin.geometry.arrays import FloatArray, frozen, is_rigid
+from vdsm_pin.geometry.arrays import FloatArray, check_numbers, freeze, is_rigid
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -62,9 +62,7 @@ class Posture:
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        object.__setattr__(self, "tip", frozen(self.tip))
-        if self.joints is not None:
-            object.__setattr__(self, "joints", frozen(self.joints))
+        freeze(self, "tip", "joints")
 
 
 @dataclass(frozen=True, repr=False)
@@ -118,7 +116,11 @@ class PlanningProblem(Summarised):
 
     def __post_init__(self) -> None:
         """Freeze the pose and check the values."""
-        object.__setattr__(self, "T_world_base", frozen(self.T_world_base))
+        freeze(self, "T_world_base")
+        check_numbers(self, "required_clearance", "required_self_clearance")
+        check_numbers(self, "tip_tolerance")
+        if self.max_row_change is not None:
+            check_numbers(self, "max_row_change")
         if not is_rigid(self.T_world_base):
             message = "T_world_base is no rigid motion, shape (4, 4)"
             raise InvalidInput(message)

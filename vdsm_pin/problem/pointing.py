@@ -7,7 +7,13 @@ import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
+from vdsm_pin.geometry.arrays import (
+    BoolArray,
+    FloatArray,
+    check_numbers,
+    freeze,
+    frozen,
+)
 from vdsm_pin.problem.error_boxes import ErrorBox
 
 WIDEST: Final = np.pi / 2.0
@@ -38,17 +44,20 @@ class Pointing:
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check the values."""
+        freeze(self, "target", "directions")
+        check_numbers(self, "cone")
         if not 0.0 < self.cone < WIDEST:
             message = f"pointing cone is {self.cone} rad, expected above 0, below pi/2"
             raise InvalidInput(message)
         if (self.target is None) == (self.directions is None):
             message = "pointing needs a target or directions, one of the two"
             raise InvalidInput(message)
-        if self.target is not None:
-            object.__setattr__(self, "target", frozen(self.target))
-            if self.target.shape != (3,) or not np.isfinite(self.target).all():
-                message = "pointing target is not three finite numbers"
-                raise InvalidInput(message)
+        target = self.target
+        if target is not None and not (
+            target.shape == (3,) and np.isfinite(target).all()
+        ):
+            message = "pointing target is not three finite numbers"
+            raise InvalidInput(message)
         if self.directions is not None:
             sizes = np.linalg.norm(self.directions, axis=-1, keepdims=True)
             if not (np.isfinite(sizes).all() and (sizes > 0.0).all()):

@@ -6,7 +6,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput, NoPlanFound
-from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, freeze
 from vdsm_pin.units import in_mm
 
 
@@ -25,7 +25,7 @@ class OtherRatios:
 
     def __post_init__(self) -> None:
         """Freeze the ratios and check them."""
-        object.__setattr__(self, "values", frozen(self.values))
+        freeze(self, "values")
         if self.values.ndim != 1 or not np.isfinite(self.values).all():
             message = f"ratios are {self.values.tolist()}, expected finite numbers"
             raise InvalidInput(message)
@@ -69,7 +69,7 @@ class ScalingCentre:
 
     def __post_init__(self) -> None:
         """Freeze the centre and check it."""
-        object.__setattr__(self, "centre", frozen(self.centre))
+        freeze(self, "centre")
         if self.centre.shape != (2,) or not np.isfinite(self.centre).all():
             found = self.centre.tolist()
             message = f"the scaling centre is {found}, expected 2 finite numbers"

@@ -8,13 +8,16 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry import bernstein
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, frozen
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, freeze, frozen
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
 
 MAX_ROWS: Final = 5_000_000
 """Largest number of rows of one trajectory."""
+
+NUMBERS: Final = ("path_m", "x0", "alpha", "theta")
+"""Fields of a trajectory that hold numbers of every row."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -52,9 +55,8 @@ class Trajectory(Summarised):
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check their shapes."""
-        object.__setattr__(self, "on_path", frozen(self.on_path, np.bool_))
-        for name in ("path_m", "x0", "alpha", "theta"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
+        freeze(self, "on_path", dtype=np.bool_)
+        freeze(self, *NUMBERS, "times", "rates", "changes")
         n, shape = self.x0.size, self.alpha.shape
         if n == 0:
             message = "a trajectory needs at least one row"
@@ -68,7 +70,7 @@ class Trajectory(Summarised):
         ):
             message = f"trajectory arrays disagree: x0 {self.x0.shape}, alpha {shape}"
             raise InvalidInput(message)
-        for name in ("path_m", "x0", "alpha", "theta"):
+        for name in NUMBERS:
             if not np.isfinite(getattr(self, name)).all():
                 message = f"trajectory has a value of {name} that is not finite"
                 raise InvalidInput(message)
@@ -78,7 +80,7 @@ class Trajectory(Summarised):
         self._check_motion()
 
     def _check_motion(self) -> None:
-        """Freeze and check what is known of the motion between the rows.
+        """Check what is known of the motion between the rows.
 
         Raises:
             InvalidInput: If it does not fit the rows.
@@ -86,10 +88,8 @@ class Trajectory(Summarised):
         n, width = self.n_samples, 1 + 2 * self.n_links
         shapes = {"times": (n,), "rates": (n, width), "changes": (n, width)}
         for name, shape in shapes.items():
-            if (given := getattr(self, name)) is None:
+            if (values := getattr(self, name)) is None:
                 continue
-            values = frozen(given)
-            object.__setattr__(self, name, values)
             if values.shape != shape or not np.isfinite(values).all():
                 message = (
                     f"trajectory has {name} of shape {values.shape}, expected {shape}, "
@@ -121,6 +121,7 @@ class Trajectory(Summarised):
 
         Without `on_path` it draws nothing, without `path_m` it is at 0 m of the path.
         """
+        joints = frozen(joints)
         nothing = np.zeros(len(joints))
         return cls(
             nothing.astype(np.bool_) if on_path is None else on_path,

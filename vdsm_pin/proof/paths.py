@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, freeze, frozen
 from vdsm_pin.geometry.bernstein import hermite, part, raised, value
 from vdsm_pin.proof.motions import Motion
 
@@ -34,7 +34,8 @@ class Path:
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check their shapes."""
-        knots, inner = frozen(self.knots), frozen(self.inner)
+        freeze(self, "knots", "inner", "times")
+        knots, inner = self.knots, self.inner
         if knots.ndim != 2 or not len(knots):
             message = f"knots have shape {knots.shape}, expected (n_rows, n_columns)"
             raise ValueError(message)
@@ -50,8 +51,7 @@ class Path:
             message = "a path has a value that is not finite"
             raise ValueError(message)
         if self.times is not None:
-            object.__setattr__(self, "times", frozen(_rising(self.times, len(knots))))
-        object.__setattr__(self, "knots", knots)
+            _check_rising(self.times, len(knots))
         object.__setattr__(self, "inner", inner)
 
     @property
@@ -172,20 +172,18 @@ class Path:
         return Motion(self.knots, self.inner)
 
 
-def _rising(times: FloatArray, n_rows: int) -> FloatArray:
-    """Times of so many rows.
+def _check_rising(times: FloatArray, n_rows: int) -> None:
+    """Check the times of so many rows.
 
     Raises:
         ValueError: If they do not rise, or there are more or fewer.
     """
-    found = np.asarray(times, dtype=np.float64)
-    if found.shape != (n_rows,) or not np.isfinite(found).all():
-        message = f"times have shape {found.shape}, expected ({n_rows},), all finite"
+    if times.shape != (n_rows,) or not np.isfinite(times).all():
+        message = f"times have shape {times.shape}, expected ({n_rows},), all finite"
         raise ValueError(message)
-    if not (np.diff(found) > 0.0).all():
+    if not (np.diff(times) > 0.0).all():
         message = "times must rise from knot to knot"
         raise ValueError(message)
-    return found
 
 
 def _resampled(path: Path, times: FloatArray, degree: int) -> FloatArray:
@@ -240,8 +238,7 @@ def cubic_path(q: FloatArray, rates: FloatArray, times: FloatArray) -> Path:
         rates: Their rates, the same shape; per [s].
         times: Of the knots, rising, shape (n_rows,); [s].
     """
-    q, rates = _checked(q, rates, times)
-    return Path(q, hermite(q, rates, None, times), times)
+    return _smooth(times, q, rates=rates)
 
 
 def quintic_path(
@@ -255,25 +252,21 @@ def quintic_path(
         changes: Their accelerations, the same shape; per [s^2].
         times: Of the knots, rising, shape (n_rows,); [s].
     """
-    q, rates = _checked(q, rates, times)
-    changes = np.asarray(changes, dtype=np.float64)
-    if changes.shape != q.shape:
-        message = f"accelerations have shape {changes.shape}, expected {q.shape}"
-        raise ValueError(message)
-    return Path(q, hermite(q, rates, changes, times), times)
+    return _smooth(times, q, rates=rates, accelerations=changes)
 
 
-def _checked(
-    q: FloatArray, rates: FloatArray, times: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Arrays of the same shape.
+def _smooth(times: FloatArray, q: FloatArray, **derivatives: FloatArray) -> Path:
+    """Pieces by the derivatives at the knots, in their order.
 
     Raises:
         ValueError: If shapes disagree or times do not rise.
     """
-    q, rates = np.asarray(q, dtype=np.float64), np.asarray(rates, dtype=np.float64)
-    if rates.shape != q.shape:
-        message = f"rates have shape {rates.shape}, expected {q.shape}"
-        raise ValueError(message)
-    _rising(times, len(q))
-    return q, rates
+    q, times = frozen(q), frozen(times)
+    given = {name: frozen(values) for name, values in derivatives.items()}
+    for name, values in given.items():
+        if values.shape != q.shape:
+            message = f"{name} have shape {values.shape}, expected {q.shape}"
+            raise ValueError(message)
+    _check_rising(times, len(q))
+    inner = hermite(q, given["rates"], given.get("accelerations"), times)
+    return Path(q, inner, times)

@@ -22,7 +22,14 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen, is_rigid, is_unit
+from vdsm_pin.geometry.arrays import (
+    FloatArray,
+    IntArray,
+    freeze,
+    frozen,
+    is_rigid,
+    is_unit,
+)
 
 IDENTITY: Final = frozen(np.eye(4))
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -69,13 +76,11 @@ class Joint:
 
     def __post_init__(self) -> None:
         """Refuse what is no joint."""
-        axis, placement = frozen(self.axis), frozen(self.placement)
-        object.__setattr__(self, "axis", axis)
-        object.__setattr__(self, "placement", placement)
-        if not is_unit(axis):
+        freeze(self, "axis", "placement")
+        if not is_unit(np.asarray(self.axis)):
             message = f"joint {self.name!r}: axis {self.axis} is no unit vector"
             raise ValueError(message)
-        if not is_rigid(placement):
+        if not is_rigid(self.placement):
             message = f"joint {self.name!r}: its placement is no rigid motion"
             raise ValueError(message)
         if not np.isfinite([self.ratio, self.offset]).all():

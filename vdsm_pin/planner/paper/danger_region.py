@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen, read_only
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, freeze, frozen, read_only
 from vdsm_pin.planner.paper.region_kernels import (
     Core,
     core_distances,
@@ -45,7 +45,7 @@ class DangerRegion:
 
     def __post_init__(self) -> None:
         """Freeze the array."""
-        object.__setattr__(self, "corners", frozen(self.corners))
+        freeze(self, "corners")
 
     @cached_property
     def centre(self) -> FloatArray:

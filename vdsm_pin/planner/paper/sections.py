@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 import shapely
 
-from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, freeze
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, Prism
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle
@@ -44,7 +44,7 @@ class Section:
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        object.__setattr__(self, "points", frozen(self.points))
+        freeze(self, "points")
 
     @cached_property
     def centre(self) -> FloatArray:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, freeze
 from vdsm_pin.planner.records import TipPath
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.tolerances import TOLERANCES
@@ -35,8 +35,8 @@ class Route:
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        object.__setattr__(self, "side", frozen(self.side, np.int64))
-        object.__setattr__(self, "undrawn", frozen(self.undrawn))
+        freeze(self, "side", dtype=np.int64)
+        freeze(self, "undrawn")
 
     @property
     def missing(self) -> float:
