@@ -102,6 +102,14 @@ def test_nothing_is_requested_and_nothing_fails(report: Watched) -> None:
     assert report.errors == []
 
 
+def test_no_name_of_a_curve_is_cut(report: Watched) -> None:
+    cut = """[...document.querySelectorAll(".legend .name")].filter((name) =>
+      name.scrollWidth > name.clientWidth || name.scrollHeight > name.clientHeight)
+      .map((name) => name.textContent)"""
+    assert report.page.locator(".legend .name").count() > 40
+    assert report.page.evaluate(cut) == []
+
+
 def test_the_arm_is_seen_in_its_colours(report: Watched) -> None:
     seen = pixels(report.page)
     assert len(np.unique((seen * 255).astype(int), axis=0)) > 500

@@ -15,8 +15,15 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.report.facts import verification_file
 from vdsm_pin.report.html import write_report
 from vdsm_pin.report.run_record import now
-from vdsm_pin.report.scene_rows import CHANGED, MOST_LISTED, SceneRow, scene_rows
+from vdsm_pin.report.scene_rows import (
+    CHANGED,
+    MOST_LISTED,
+    SceneRow,
+    scene_rows,
+    scene_words,
+)
 
+EXAMPLES = Path(__file__).parents[2] / "examples"
 TETRAHEDRON = """\
 v 1 2 1
 v 1.2 2 1
@@ -103,3 +110,9 @@ def test_the_date_can_be_fixed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert now() == "1970-01-02 00:00:00 UTC"
     monkeypatch.delenv("SOURCE_DATE_EPOCH")
     assert now() > "2024"
+
+
+def test_links_of_another_arm_are_not_counted_as_obstacles() -> None:
+    scene = read_problem(EXAMPLES / "two_arms" / "cell.yaml").scene
+    assert scene_words(scene) == "0 obstacles and 1 other robot of 4 links"
+    assert scene_words(scene.at_rest) == "0 obstacles"

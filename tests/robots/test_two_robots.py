@@ -16,6 +16,7 @@ from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.report.page_data import report_data
 from vdsm_pin.report.robot_facts import robot_facts
+from vdsm_pin.report.scene_rows import scene_words
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.certificate import write_robot_certificate
 from vdsm_pin.robots.files import HULLS, Solids, read_cell_file
@@ -130,6 +131,7 @@ def test_swapped_roles_agree_to_the_padding(tmp_path: Path) -> None:
             cell, file = two(tmp_path, q, own)
             found.append(verify_robot(cell, read_path(file, cell.robot)))
     one, other = found
+    assert "1 other robot of" in scene_words(one.problem.scene)
     assert one.verdict is other.verdict
     assert one.least.lower[0] == pytest.approx(other.least.lower[0], abs=1e-9)
 

@@ -51,7 +51,7 @@ class OtherArms:
             known = self.document, self.frame, self.folder, self.digest
             arm = ArmBuilder(*known, (*at, "manipulator")).build(model.manipulator)
             motion = self._motion(model, arm, at)
-            carrier = _carrier(arm, motion, self._pose(model))
+            carrier = _carrier(model.name, arm, motion, self._pose(model))
             for link, solid in (*arm.rods, *arm.carried):
                 named = replace(solid, name=f"{model.name}: {solid.name}")
                 found.append(Moving(named, carrier, link_frame(link)))
@@ -80,10 +80,12 @@ class OtherArms:
         return pose
 
 
-def _carrier(arm: Manipulator, motion: Trajectory, pose: FloatArray) -> Carrier:
+def _carrier(
+    name: str, arm: Manipulator, motion: Trajectory, pose: FloatArray
+) -> Carrier:
     from vdsm_pin.proof.paths import Path as Motion  # compiled code, which few need
 
     joints = list(arm_tree(arm).joints)
     joints[RAIL] = replace(joints[RAIL], placement=pose)
     path = Motion(motion.joints, motion.inner, motion.times)
-    return Carrier(Tree(tuple(joints)), path)
+    return Carrier(Tree(tuple(joints)), path, name)

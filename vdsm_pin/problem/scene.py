@@ -26,10 +26,12 @@ class Carrier:
     Args:
         tree: The joints, hung on the base's frame.
         path: How they move, with times; at rest before and after.
+        robot: Name of the other robot that it is; empty for what only moves.
     """
 
     tree: Tree
     path: "Path"
+    robot: str = ""
 
     def poses(self, times: FloatArray) -> FloatArray:
         """T_base_frame of all frames at some times (m,), (m, n_frames, 4, 4); [m]."""

@@ -23,7 +23,7 @@ from vdsm_pin.report.page_data import impasse_data, report_data, view_data
 from vdsm_pin.report.reason import failing, left_out_words, nearest_to_obstacle
 from vdsm_pin.report.rows import Point
 from vdsm_pin.report.run_record import RunRecord, machine, versions
-from vdsm_pin.report.scene_rows import scene_rows
+from vdsm_pin.report.scene_rows import scene_rows, scene_words
 from vdsm_pin.report.thinning import MOST_DRAWN
 from vdsm_pin.report.words import (
     MISSING,
@@ -82,7 +82,8 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     filters = [quantity, depth, limit, percent, errors, outcome, measured, survived,
-               lost, counted, term, place, assumption, point, css_text]  # fmt: skip
+               lost, counted, term, place, assumption, point, css_text,
+               scene_words]  # fmt: skip
     environment.filters |= {one.__name__: one for one in filters}
     environment.globals |= {
         "asset": _asset,

@@ -8,7 +8,8 @@ from typing import Final
 from vdsm_pin.geometry.solids import ConvexCover, Mesh, Solid
 from vdsm_pin.io.source import BLOCK
 from vdsm_pin.problem.planning_problem import ProblemSource
-from vdsm_pin.problem.scene import Moving, Obstacle, solid_of
+from vdsm_pin.problem.scene import Moving, Obstacle, Scene, solid_of
+from vdsm_pin.report.words import counted
 from vdsm_pin.verification.records import AnyProblem
 
 MOST_LISTED: Final = 200
@@ -36,6 +37,16 @@ class SceneRow:
     triangles: int | None
     inside: str
     sha256: str
+
+
+def scene_words(scene: Scene) -> str:
+    """What stands around a robot: "2 obstacles and 1 other robot of 4 links"."""
+    links = [one.carrier.robot for one in scene.moving if one.carrier.robot]
+    words = [counted(len(scene.obstacles) - len(links), "obstacle")]
+    if links:
+        robots = counted(len(set(links)), "other robot")
+        words.append(f"{robots} of {counted(len(links), 'link')}")
+    return " and ".join(words)
 
 
 def scene_rows(problem: AnyProblem) -> tuple[SceneRow, ...]:

@@ -59,7 +59,7 @@ def read_other(file: CellFile, number: int) -> OtherRobot:
         raise file.document.invalid(("others", number, "trajectory"), problem)
     base, *joints = robot.tree.joints
     tree = Tree((replace(base, placement=one.pose), *joints))
-    links = tuple(_links(one.name, robot, Carrier(tree, path)))
+    links = tuple(_links(one.name, robot, Carrier(tree, path, one.name)))
     said = (HELD, *robot.notes, *(f"trajectory: {note}" for note in motion.notes))
     notes = tuple(f"{one.name}: {note}" for note in said)
     return OtherRobot(one.name, robot, path, links, notes)

@@ -4,6 +4,7 @@
 
 const SVG = "http://www.w3.org/2000/svg";
 const MOST_CHIPS = 60; // more names than that help nobody
+const LONG_NAME = 26; // letters of a name in the legend; longer ones are broken
 const TICK_GAP = 13;
 const NARROW = window.innerWidth <= 700; // a plot is as wide as its figures stay legible
 const FRAME = { width: NARROW ? 420 : 640, height: 232, left: 58, right: 14, top: 12, bottom: 34 };
@@ -233,8 +234,10 @@ class Plot {
 
   legend(figure) {
     const list = figure.querySelector("[data-legend]");
-    const wide = this.chart.unit === " mm" || this.series.some(({ name }) => name.length > 4);
-    list.classList.toggle("wide", wide);
+    const [name, value] = [this.series.map((one) => one.name),
+      [this.lowest, this.highest].map((extreme) => this.text(extreme))]
+      .map((texts) => Math.max(...texts.map((text) => text.length)));
+    list.style.setProperty("--chip", `${Math.min(name, LONG_NAME) + value}ch`);
     list.classList.toggle("long", this.series.length > 24);
     if (this.series.length > MOST_CHIPS) {
       const note = list.appendChild(document.createElement("p"));
