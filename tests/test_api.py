@@ -18,6 +18,8 @@ from vdsm_pin import api
 from vdsm_pin.arm.manipulator import paper_hole_angles
 from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.errors import VerificationFailed
+from vdsm_pin.problem.error_boxes import ErrorBox as Box
+from vdsm_pin.problem.error_boxes import ObstacleError
 
 
 def test_every_name_is_there_and_is_what_type_checkers_see() -> None:
@@ -216,3 +218,25 @@ def test_a_motion_without_a_path_says_nothing_of_drawing() -> None:
     task = replace(judged.problem, tip_path=None)
     judged = replace(judged, problem=task, coverage=float("nan"))
     assert "drawn" not in repr(judged)
+
+
+def test_what_is_handed_over_once_stays() -> None:
+    """Generators were empty after they had been checked: nothing was in the way."""
+    ball, name = vp.Sphere("s", [1.0, 0.0, 0.0], 0.1), ObstacleError("s", 0.1)
+    assert vp.Scene(one for one in [ball]).names == ("s",)
+    arm = replace(vp.built_in("hrm8"), bodies=(vp.LinkBody(1, b) for b in [ball]))
+    assert arm.body_names[-1] == "s"
+    assert Box(obstacles=(one for one in [name])).of_obstacle("s").shift == 0.1
+    given = [ball]
+    scene = vp.Scene(given)
+    given.clear()
+    assert len(scene.obstacles) == 1
+    half = vp.HalfSpace("h", np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    with pytest.raises(vp.InvalidInput, match="a HalfSpace rides on no link"):
+        vp.LinkBody(1, half)
+    with pytest.raises(vp.InvalidInput, match=r"link is 1\.5"):
+        vp.LinkBody(1.5, ball)
+    with pytest.raises(vp.InvalidInput, match="span 2 ends"):
+        vp.Prism("p", np.zeros(3), np.eye(3), np.eye(3)[:, :2], (0.0, 1.0, 9.0))
+    for number in (np.float32(0.1), np.array(0.1), np.float64(0.1)):
+        assert vp.ErrorBox(joint_deg=number).joint == np.deg2rad(float(number))

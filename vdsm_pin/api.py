@@ -122,7 +122,8 @@ def verify(
 
     _expect(problem, PlanningProblem, "read_problem(path)")
     _expect(trajectory, Trajectory, "plan(problem).trajectory")
-    _expect(errors or ErrorBox(), Box, "ErrorBox(base_mm=1.0)")
+    if errors is not None:
+        _expect(errors, Box, "ErrorBox(base_mm=1.0)")
     robot = load_robot(problem.manipulator)
     return judge(
         problem,

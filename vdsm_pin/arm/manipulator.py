@@ -134,6 +134,18 @@ class LinkBody:
         """The solid's."""
         return self.solid.name
 
+    def __post_init__(self) -> None:
+        """Refuse what rides on no link, or is no solid that can."""
+        if not isinstance(self.solid, BodySolid):
+            kind = type(self.solid).__name__
+            message = f"a {kind} rides on no link, expected one of {BodySolid}"
+            raise InvalidInput(message)
+        for field in ("link", "parts"):
+            value = getattr(self, field)
+            if not isinstance(value, (int, np.integer)):
+                message = f"body {self.name!r}: {field} is {value!r}, expected a number"
+                raise InvalidInput(message)
+
 
 @dataclass(frozen=True)
 class Manipulator:
@@ -223,6 +235,8 @@ class Manipulator:
             raise InvalidInput(message)
 
     def _check_bodies(self) -> None:
+        for field in ("bodies", "ignore_pairs"):
+            object.__setattr__(self, field, tuple(getattr(self, field)))
         last = float(self.link_lengths[-1])
         if self.tool and not self.tool.length < last:
             message = f"tool: length is {self.tool.length} m, expected below {last}"

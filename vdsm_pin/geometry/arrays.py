@@ -23,7 +23,7 @@ def frozen(value: Any, dtype: type[Any] = np.float64) -> npt.NDArray[Any]:
         InvalidInput: If that would change it: masked values, complex numbers, text,
             times, nothing, or fractions where whole numbers are meant.
     """
-    if isinstance(value, np.ndarray) and value.dtype == dtype:
+    if type(value) is np.ndarray and value.dtype == dtype:
         flags = value.flags
         if flags.owndata and flags.c_contiguous and not flags.writeable:
             return value

@@ -238,10 +238,11 @@ class Prism(NamedSolid):
         """Freeze the arrays and refuse polygons that enclose no simple area."""
         super().__post_init__()
         self._freeze("polygon")
+        object.__setattr__(self, "span", tuple(frozen(self.span).tolist()))
         if not np.isfinite(self.polygon).all() or not np.isfinite(self.span).all():
             self._refuse("polygon and span have other than finite numbers")
-        if self.polygon.ndim != 2 or self.polygon.shape[0] < 3:
-            self._refuse("polygon needs at least 3 corners")
+        if self.polygon.shape != (max(len(self.polygon), 3), 2) or len(self.span) != 2:
+            self._refuse("polygon needs at least 3 corners of 2 numbers, span 2 ends")
         import shapely  # slow to import, and only prisms need it
 
         shape = shapely.Polygon(self.polygon)

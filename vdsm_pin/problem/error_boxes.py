@@ -94,6 +94,8 @@ class ErrorBox:
 
     def __post_init__(self) -> None:
         """Refuse what is no error."""
+        for field in ("joints", "obstacles", "named"):
+            object.__setattr__(self, field, tuple(getattr(self, field)))
         check_numbers(self, *PLAIN)
         values = [("joint", e) for pair in self.joints for e in pair]
         values += [("obstacle", e) for o in self.obstacles for e in (o.shift, o.turn)]

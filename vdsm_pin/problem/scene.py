@@ -112,6 +112,7 @@ class Scene:
 
     def __post_init__(self) -> None:
         """Refuse duplicate names, and what distances are not proved for."""
+        object.__setattr__(self, "obstacles", tuple(self.obstacles))
         for obstacle in self.obstacles:
             if not (reach := reach_of(obstacle)) <= TOLERANCES.scene_extent:
                 message = (
