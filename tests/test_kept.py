@@ -56,6 +56,18 @@ def test_nothing_is_read_from_a_folder_that_others_can_write(folder: Path) -> No
     assert kept.read("name") == b"one"
 
 
+@pytest.mark.skipif(os.getuid() != 0, reason="gives a folder to another user")
+def test_nothing_is_read_from_a_folder_of_another_user(folder: Path) -> None:
+    kept.keep("name", b"one")
+    os.mkfifo(folder / "endless")  # to open it would wait for ever
+    os.chown(folder, 65534, -1)
+    assert kept.read("name") is None
+    assert kept.read("endless") is None
+    kept.keep("name", b"two")
+    os.chown(folder, 0, -1)
+    assert kept.read("name") == b"one"
+
+
 @given(data=st.data())
 def test_every_damage_is_noticed(
     data: st.DataObject, tmp_path_factory: pytest.TempPathFactory
@@ -128,6 +140,8 @@ def test_damage_in_one_folder_does_not_hide_another(
 def test_user_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert list(kept.folders())[1] == tmp_path / "vdsm_pin"
+    monkeypatch.setenv("XDG_CACHE_HOME", "beside/the/command")
+    assert list(kept.folders())[1] == Path.home() / ".cache" / "vdsm_pin"
     monkeypatch.delenv("XDG_CACHE_HOME")
     assert list(kept.folders())[1] == Path.home() / ".cache" / "vdsm_pin"
 

@@ -20,9 +20,10 @@ PLANNED: Final = "planned"
 def folders() -> Iterator[Path]:
     """Where files are looked for, and written in the first that can be."""
     yield Path(__file__).parent / "__pycache__" / "kept"
-    cache = os.environ.get("XDG_CACHE_HOME")
+    cache = Path(os.environ.get("XDG_CACHE_HOME", ""))
     with suppress(RuntimeError):  # a user without a home, as in many containers
-        yield (Path(cache) if cache else Path.home() / ".cache") / "vdsm_pin"
+        # A path that is not absolute does not count, says the specification.
+        yield (cache if cache.is_absolute() else Path.home() / ".cache") / "vdsm_pin"
 
 
 def functions(folder: Path) -> int:
@@ -45,12 +46,11 @@ def read(name: str) -> bytes | None:
     """What was kept under a name; None if there is nothing, or nothing whole."""
     for folder in folders():
         try:
+            if not _only_ours(folder):
+                _say(f"{folder} is passed over: other users can write there")
+                continue
             content = (folder / name).read_bytes()
-            trusted = _only_ours(folder)
         except OSError:
-            continue
-        if not trusted:
-            _say(f"{folder} is passed over: other users can write there")
             continue
         size = _DIGEST().digest_size
         if _DIGEST(content[size:]).digest() == content[:size]:

@@ -1,5 +1,6 @@
 """Oracle: what is on the disk afterwards."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -44,11 +45,59 @@ def test_a_folder_where_a_file_must_go_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "a").mkdir()
     with pytest.raises(CannotWrite) as told, staged(tmp_path) as aside:
         (aside / "a").write_text("new")
-    assert str(told.value) == f"{tmp_path}: cannot be written: Is a directory"
+    assert str(told.value) == f"{tmp_path / 'a'}: cannot be written: Is a directory"
     with pytest.raises(CannotWrite) as told, staged(tmp_path) as aside:
         write_text(aside / ("n" * 300), "of a file aside, told by its final name")
     assert told.value.file == str(tmp_path / ("n" * 300))
     assert [p.name for p in tmp_path.iterdir()] == ["a"]
+
+
+STRANGER = """
+import os, sys
+from pathlib import Path
+from vdsm_pin.errors import InvalidFile
+from vdsm_pin.report.folder import check_output_folder, staged
+closed, free, shared = map(Path, sys.argv[1:])
+os.setgid(65534)
+os.setuid(65534)
+for work in (
+    lambda: check_output_folder(closed),
+    lambda: check_output_folder(closed / "in" / "it"),
+    lambda: staged(closed).__enter__(),
+):
+    try:
+        work()
+    except InvalidFile as error:
+        print(error)
+for folder in (free, shared):
+    try:
+        with staged(folder) as aside:
+            (aside / "a").write_text("new")
+    except InvalidFile as error:
+        print(error)
+"""
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="becomes another user")
+def test_folders_of_other_users(tmp_path: Path) -> None:
+    for parent in (tmp_path, *tmp_path.parents):
+        if parent.stat().st_mode & 0o005 != 0o005:  # as pytest makes them
+            parent.chmod(0o755)
+    closed, free, shared = (tmp_path / name for name in ("closed", "free", "shared"))
+    for folder, mode in ((closed, 0o755), (free, 0o777), (shared, 0o1777)):
+        folder.mkdir()
+        folder.chmod(mode)
+        (folder / "a").write_text("old")
+    words = [sys.executable, "-c", STRANGER, closed, free, shared]
+    ended = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert ended.stdout.splitlines() == [
+        *[f"{closed}: is not writable"] * 3,
+        f"{shared / 'a'}: cannot be written: Operation not permitted",
+    ]
+    assert (free / "a").read_text() == "new"
+    assert (closed / "a").read_text() == (shared / "a").read_text() == "old"
+    for folder in (closed, free, shared):
+        assert [path.name for path in folder.iterdir()] == ["a"]
 
 
 FILLS = """

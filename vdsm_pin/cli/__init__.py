@@ -91,7 +91,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except BrokenPipeError:
         nobody_reads()
     except OSError as error:
-        fail(error, BAD_INPUT)
+        where, why = error.filename, error.strerror or error
+        fail(OSError(f"{where}: {why}" if where else str(why)), BAD_INPUT)
     except ImportError as error:
         if (error.name or "").startswith("vdsm_pin"):
             raise

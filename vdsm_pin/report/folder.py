@@ -111,7 +111,8 @@ def staged(folder: Path, within: Path | None = None) -> Iterator[Path]:
                 yield aside
                 with locked(folder):
                     for path in sorted(aside.iterdir()):
-                        path.replace(folder / path.name)
+                        with writing(folder / path.name):  # another user's, perhaps
+                            path.replace(folder / path.name)
             except CannotWrite as error:  # of a file aside, whose place says nothing
                 file = Path(error.file)
                 told = folder / file.name if file.parent == aside else file
