@@ -11,6 +11,7 @@ import yaml
 from oracles.certificate_cases import certificate_lines, write_cube
 from oracles.certificate_oracle import sealed, sha256
 
+from vdsm_pin.api import write_report
 from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.errors import InvalidFile
@@ -19,6 +20,7 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.report.reason import reason
 from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.records import Verdict, Verification
@@ -219,8 +221,13 @@ def test_pairs_are_left_out_by_name_and_unknown_names_refused(tmp_path: Path) ->
     rows = motion_in(tmp_path, sliding(0.0))
     arm = {"bodies": [CAMERA], "ignore_pairs": [["camera", "post"]]}
     problem = problem_in(tmp_path, arm, [inside])
-    assert judged(problem, rows)[1].verdict is Verdict.CERTIFIED
-    assert check_certificate(certified(problem, rows), problem, rows).accepted
+    found = judged(problem, rows)[1]
+    assert found.verdict is Verdict.CERTIFIED
+    left_out = "from every obstacle (the problem leaves out 'camera and post'), "
+    assert left_out in reason(found)
+    accepted = check_certificate(certified(problem, rows), problem, rows)
+    assert accepted.accepted
+    assert "camera and post left out" in accepted.notes
     for pair, words in (
         (["camera", "pots"], "'pots'"),
         (["post", "post"], "not a body"),
@@ -230,6 +237,21 @@ def test_pairs_are_left_out_by_name_and_unknown_names_refused(tmp_path: Path) ->
         with pytest.raises(InvalidFile, match="ignore_pairs") as error:
             read_problem(problem)
         assert words in str(error.value)
+
+
+def test_an_arm_that_is_held_apart_from_nothing_is_told_so(tmp_path: Path) -> None:
+    """It stands in the obstacle, which is there; two links are no pair either."""
+    pairs = [["link 1", "post"], ["link 2", "post"]]
+    arm = {"link_lengths": [0.5, 0.4], "ignore_pairs": pairs}
+    rows = motion_in(tmp_path, np.zeros((1, 5)))
+    problem = problem_in(tmp_path, arm, [BALL | {"center": [0.5, 0.0, 0.0]}])
+    _, found = judged(problem, rows)
+    assert found.verdict is Verdict.CERTIFIED
+    assert "no obstacle is held apart (the problem leaves out" in reason(found)
+    write_report(found, tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "no obstacle is held apart" in page
+    assert "there is no obstacle" not in page
 
 
 def test_bad_bodies_are_refused_with_their_place(tmp_path: Path) -> None:

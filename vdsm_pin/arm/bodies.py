@@ -67,6 +67,10 @@ class ArmBody:
         return self.piece.radius if isinstance(self.piece, Hull) else 0.0
 
 
+BY_FILE = "left out by the problem file"
+"""Why two things are not held apart that `ignore_pairs` names."""
+
+
 @dataclass(frozen=True)
 class LeftOut:
     """Two bodies, or a body and an obstacle, that nobody holds apart, and why."""
@@ -191,5 +195,5 @@ def _reason(arm: Manipulator, near: ArmBody, far: ArmBody) -> str:
         if gap <= near.ball + far.ball:
             return f"meet at joint {far.link} in every pose"
     if arm.ignores(near.name, far.name):
-        return "left out by the problem file"
+        return BY_FILE
     return ""

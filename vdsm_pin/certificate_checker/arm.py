@@ -93,6 +93,7 @@ class Arm:
         self.pairs = [*self._pairs()]
         self.rows = Rows(self, rows)
         self.notes = [note for mesh in self.meshes.values() for note in mesh.notes()]
+        self.notes += [f"{a} and {b} left out" for a, b in self.arm.ignore_pairs]
         self.notes.append(f"{joined} pieces join the rows")
 
     def _asked(self) -> list[float]:

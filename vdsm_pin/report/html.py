@@ -162,6 +162,7 @@ def write_report(
         worst=nearest_to_obstacle(verification),
         first_bad=next((finite(one.moment) for one in failing(verification)), None),
         left_out=left_out_words(file.left_out),
+        held=any(pair.obstacle for pair in verification.pairs),
     )
     path.write_text(page, encoding="utf-8")
 

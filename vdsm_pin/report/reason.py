@@ -5,7 +5,9 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Final
 
+from vdsm_pin.io.tables import listed
 from vdsm_pin.planner.records import Plan
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.report.rows import LeftOutRow
 from vdsm_pin.report.words import depth, finite, percent, place, quantity
 from vdsm_pin.verification.inside import ARM, LINKS, surfaces
@@ -15,6 +17,7 @@ from vdsm_pin.verification.records import (
     Verdict,
     Verification,
 )
+from vdsm_pin.verification.task import ArmPairs
 
 _PASSED: Final = Verdict.CERTIFIED
 
@@ -95,21 +98,33 @@ def _certified_sentence(verification: Verification) -> str:
         if verification.problem.tip_path is not None:
             share = percent(verification.coverage)
             drawn = f"; {share} of the desired path is drawn"
+    problem, but = verification.problem, _not_held(verification)
     if smallest == math.inf:
+        none = "held apart" if problem.scene.obstacles else "there"
         return (
-            f"All {count} checks passed over the whole motion; no obstacle is there"
-            f"{drawn}."
+            f"All {count} checks passed over the whole motion; no obstacle is {none}"
+            f"{but}{drawn}."
         )
-    problem = verification.problem
     required = quantity(problem.required_clearance, "m")
     box = asdict(verification.errors)
     errors = ", with any error of the error box," if any(box.values()) else ""
     return (
         f"All {count} checks passed; at every instant of the motion{errors} the {who} "
-        f"keeps at least {quantity(smallest, 'm')} from every obstacle, "
+        f"keeps at least {quantity(smallest, 'm')} from every obstacle{but}, "
         f"{required} are required{drawn}."
         + "".join(f" {name!r} is a surface only." for name in surfaces(problem))
     )
+
+
+def _not_held(verification: Verification) -> str:
+    """Which obstacles some part of the arm is not held apart from, by its problem."""
+    problem = verification.problem
+    if not isinstance(problem, PlanningProblem) or not problem.manipulator.ignore_pairs:
+        return ""
+    if not (ignored := ArmPairs(problem).ignored):
+        return ""
+    names = listed([f"{one.body} and {one.other}" for one in ignored])
+    return f" (the problem leaves out {names})"
 
 
 def left_out_words(rows: Sequence[LeftOutRow]) -> str:

@@ -229,9 +229,10 @@ def _answers(
             log.keep(found.waypoint[judged], pair[judged], found.distance[judged])
         if asked.proved is not None:
             # Where bodies meet only the sign counts.
-            lower = asked.proved.at(found.waypoint, pair)
-            below = lower - np.maximum(found.distance, 0.0)
-            excess = np.maximum(excess, np.where(judged, below, -np.inf))
+            lower = asked.proved.at(found.waypoint[judged], pair[judged])
+            below = lower - np.maximum(found.distance[judged], 0.0)
+            excess = excess.copy()
+            excess[judged] = np.maximum(excess[judged], below)
         yield found, found.waypoint.astype(np.float64), excess
 
 

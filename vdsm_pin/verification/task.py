@@ -5,7 +5,14 @@ from functools import cached_property
 
 import numpy as np
 
-from vdsm_pin.arm.bodies import ArmBody, LeftOut, SelfPairs, arm_bodies, self_pairs
+from vdsm_pin.arm.bodies import (
+    BY_FILE,
+    ArmBody,
+    LeftOut,
+    SelfPairs,
+    arm_bodies,
+    self_pairs,
+)
 from vdsm_pin.arm.tree import RAIL, arm_tree, link_frame
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
@@ -45,7 +52,7 @@ class ArmPairs:
         # Numbers of the body and the obstacle of each pair, obstacle by obstacle.
         self.outer: IntArray = np.argwhere(held)[:, ::-1]
         self.ignored = tuple(
-            LeftOut(body, names[o], "left out by the problem file")
+            LeftOut(body, names[o], BY_FILE)
             for o, body in dict.fromkeys((o, self.bodies[b].owner) for o, b in ignored)
             if arm.ignores(body, names[o])
         )
