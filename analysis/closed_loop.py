@@ -38,7 +38,11 @@ SWEEPS = (
     ("mass of the links [kg/m]", "bodies", "mass_per_length_kg_m", (2.0, 4.0, 8.0)),
     ("EA of a cable [N]", "cables", "stiffness_ea_n", (1.5e5, 3.5e5, 6.0e5)),
     ("Coulomb friction [Nm]", "bodies", "joint_friction_nm", (0.0, 0.2, 1.0)),
-    ("pretension [N]", "cables", "pretension_n", (30.0, 100.0, 300.0)),
+    ("pretension [N]", "cables", "pretension_n", (30.0, 100.0, 300.0, 1000.0)),
+    ("what the PID is on", "controller", "regulates", ("angles", "lengths")),
+    ("proportional gain [-]", "controller", "proportional", (0.1, 0.2, 0.4)),
+    ("integral gain [1/s]", "controller", "integral_per_s", (0.0, 0.5, 1.0)),
+    ("gravity feed-forward", "controller", "gravity_feed_forward", (True, False)),
 )
 """Assumptions that are varied one at a time, on obs3 by the paper's rule."""
 
@@ -89,10 +93,9 @@ def sweep() -> list[dict[str, str]]:
             file = run("obs3", "paper", Settings(**{part: changed})).file
             found = row("obs3", "paper", file)
             kept = [*list(found)[3:6], *list(found)[7:]]
-            rows.append(
-                {"assumption": name, "value": f"{value:g}"}
-                | {k: found[k] for k in kept}
-            )
+            said = f"{value:g}" if isinstance(value, float) else str(value)
+            kept_cells = {k: found[k] for k in kept}
+            rows.append({"assumption": name, "value": said} | kept_cells)
             print(rows[-1], flush=True)
     return rows
 

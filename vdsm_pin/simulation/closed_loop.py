@@ -2,7 +2,7 @@
 
 Commands are our cable lengths: the controller corrects the planned angles by a PID of
 the measured error, the cable kinematics turns them into lengths, and the tensions that
-gravity asks for are taken off as stretch.
+gravity asks for are taken off as stretch. Or it corrects the lengths themselves.
 """
 
 from dataclasses import dataclass
@@ -149,25 +149,32 @@ class _Loop:
     def run(self) -> Simulation:
         """Step the plant, its motors and the controller to the end of the plan."""
         settings, data = self._settings, self._data
-        period, lag = settings.controller.period_s, settings.controller.derivative_lag_s
+        control = settings.controller
+        period, lag = control.period_s, control.derivative_lag_s
+        most = settings.motors.largest_rate_m_s * period
         substeps = max(1, round(period / settings.step_s))
         count = int(np.ceil((self._row_times[-1] + SETTLE) / period)) + 1
         times = frozen(period * np.arange(count))
         planned = self._planned(times)
         every = max(1, round(settings.record_s / period))
         data.qpos[:] = planned[0]
-        integral, smoothed = np.zeros((2, planned.shape[1] - 1))
+        self._mujoco.mj_fwdPosition(self._model, data)  # how long the cables are
+        integral = smoothed = np.zeros(1)
         paid = self._rest(planned[0, 1:], 0.0)
         data.act[:] = paid
         rows, tensions = [], []
         for k in range(count):
-            error = planned[k, 1:] - self._measured()
-            integral += period * error
-            turning = (error - smoothed) / lag
-            smoothed += min(1.0, period / lag) * (error - smoothed)
-            paid = self._commanded(
-                times[k], planned[k], (error, integral, turning), paid
+            error = self._error(planned[k, 1:])
+            integral = integral + period * error
+            rate = (error - smoothed) / lag
+            smoothed = smoothed + min(1.0, period / lag) * (error - smoothed)
+            correction = (
+                control.proportional * error
+                + control.integral_per_s * integral
+                + control.derivative_s * rate
             )
+            wanted = self._corrected(planned[k, 1:], correction, float(times[k]))
+            paid = paid + np.clip(wanted - paid, -most, most)
             data.ctrl[0], data.ctrl[1:] = planned[k, 0], paid
             data.qfrc_applied[:] = self._kicks(float(times[k]))
             self._mujoco.mj_step(self._model, data, substeps)
@@ -176,41 +183,39 @@ class _Loop:
                 raise VerificationFailed(message)
             if k % every == 0:
                 rows.append((k, data.qpos.copy()))
-                tensions.append(-data.actuator_force[1:])
+                tensions.append(0.0 - data.actuator_force[1:])
         return self._recorded(frozen(times + period), rows, tensions)
 
-    def _measured(self) -> FloatArray:
-        """What the encoders say, shape (2N,); [rad]."""
+    def _error(self, planned: FloatArray) -> FloatArray:
+        """Planned less measured angles (2N,) or cable lengths (3N,); [rad], [m]."""
         sensors, angles = self._settings.sensors, self._data.qpos[1:]
+        if self._by_length:
+            noise = sensors.length_noise_m * self._rng.normal(size=len(self._ends))
+            wanted = self._statics.lengths(planned[None])[0] - self._ends
+            return np.asarray(wanted - (self._data.ten_length + noise))
         noisy = angles + np.deg2rad(sensors.noise_deg) * self._rng.normal(
             size=angles.size
         )
         grain = np.deg2rad(sensors.resolution_deg)
-        return np.asarray(np.round(noisy / grain) * grain if grain > 0.0 else noisy)
+        seen = np.round(noisy / grain) * grain if grain > 0.0 else noisy
+        return np.asarray(planned - seen)
+
+    @property
+    def _by_length(self) -> bool:
+        return self._settings.controller.regulates == "lengths"
+
+    def _corrected(
+        self, planned: FloatArray, correction: FloatArray, time: float
+    ) -> FloatArray:
+        """What the motors should have paid out, shape (3N,); [m]."""
+        if self._by_length:
+            return self._rest(planned, time) + correction
+        return self._rest(planned + correction, time)
 
     def _rest(self, angles: FloatArray, time: float) -> FloatArray:
         """Lengths to pay out for these angles under the tensions of a time; [m]."""
         lengths = self._statics.lengths(angles[None])[0] - self._ends
         return np.asarray(lengths - self._feed_forward(time) / self._stiffness)
-
-    def _commanded(
-        self,
-        time: float,
-        planned: FloatArray,
-        terms: tuple[FloatArray, FloatArray, FloatArray],
-        before: FloatArray,
-    ) -> FloatArray:
-        """What the motors are told to pay out, within their rate; shape (3N,); [m]."""
-        error, integral, turning = terms
-        control, motors = self._settings.controller, self._settings.motors
-        aimed = planned[1:] + (
-            control.proportional * error
-            + control.integral_per_s * integral
-            + control.derivative_s * turning
-        )
-        wanted = self._rest(aimed, time)
-        most = motors.largest_rate_m_s * control.period_s
-        return before + np.clip(wanted - before, -most, most)
 
     def _kicks(self, time: float) -> FloatArray:
         """Disturbing torques at a time, shape (1 + 2N,); [N m]."""

@@ -69,25 +69,35 @@ class Motors(Part):
 
 
 class Sensors(Part):
-    """Joint encoders."""
+    """Encoders of the joints, and of the cables."""
 
     resolution_deg: NotNegative = Field(default=360.0 / 2**16, description="16 bits")
     noise_deg: NotNegative = Field(default=0.005, description="standard deviation")
+    length_noise_m: NotNegative = Field(
+        default=1e-5,
+        description="of a cable's length, where that is regulated; assumed",
+    )
 
 
 class Controller(Part):
-    """PID on the joint angles; its output goes through the cable kinematics.
+    """PID on the joint angles or on the cable lengths.
 
+    Angles commanded go through the cable kinematics; lengths are commanded as they are.
     The gains are those with which a kicked arm comes to rest; with no derivative it
     swings up.
     """
 
+    regulates: Literal["angles", "lengths"] = Field(
+        default="angles", description="joint angles, or lengths of the taut cables"
+    )
     period_s: Positive = Field(default=0.005, description="200 Hz; assumed")
     proportional: NotNegative = Field(
-        default=0.2, description="radians commanded per radian of error"
+        default=0.2, description="commanded per radian, or metre, of error"
     )
     integral_per_s: NotNegative = Field(default=0.5, description="the same, per second")
-    derivative_s: NotNegative = Field(default=0.015, description="per radian a second")
+    derivative_s: NotNegative = Field(
+        default=0.015, description="the same, of its rate"
+    )
     derivative_lag_s: Positive = Field(
         default=0.02, description="first-order filter of the derivative"
     )
