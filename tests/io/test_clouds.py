@@ -282,6 +282,8 @@ BAD = {
     "c.xyz": (b"1 2 3\n1 b 3\n", "line 2: found '1 b 3', expected 3 numbers"),
     "d.xyz": (b"1,5 2,5 3,5\n", "has commas inside numbers"),
     "e.csv": (b"1,5;2,5;3,5\n", "has commas inside numbers"),
+    "f.csv": (b"x,y,z\n1,5,0,3,2,1\n", "line 2: has another number of commas"),
+    "g.csv": (b"0,0,3\n1,5,0,3\n", "line 2: has another number of commas"),
     "f.xyz": (b"# nothing\n", "has no point"),
     "g.xyz": (b"1 2 inf\n", "point 1: has a coordinate that is not a number"),
     "h.xyz": (b"nan nan nan\n", "has no point"),

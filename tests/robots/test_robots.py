@@ -515,3 +515,12 @@ def test_a_base_moves_the_robot_in_the_scene(tmp_path: Path) -> None:
         (ball,) = read_cell(write(tmp_path, "cell.yaml", text)).scene.obstacles
         assert isinstance(ball, Sphere)
         np.testing.assert_allclose(ball.centre, center, atol=1e-12)
+
+
+def test_whole_turns_of_a_base_are_taken_off_exactly(tmp_path: Path) -> None:
+    write(tmp_path, "two.urdf", URDF)
+    poses = []
+    for yaw in (90.0, 90.0 + 360.0 * 2**31):
+        text = CELL + SCENE + f"base: {{position: [0, 0, 1], rpy_deg: [0, 0, {yaw}]}}\n"
+        poses.append(read_cell(write(tmp_path, "cell.yaml", text)).T_world_base)
+    np.testing.assert_array_equal(*poses)

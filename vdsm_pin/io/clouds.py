@@ -104,7 +104,11 @@ def _npy(stream: MeshStream) -> FloatArray:
 def _text(stream: MeshStream) -> FloatArray:
     """Lines that begin with x y z; others stand behind # or // or are blank."""
     data = stream.content.read()
-    if not (b"," in data and _DECIMAL_COMMA.search(data)):
+    odd = b"," in data and (
+        _DECIMAL_COMMA.search(data) is not None
+        or len({line.count(b",") for line in io.BytesIO(data)} - {0}) > 1
+    )
+    if not odd:
         plain = data.replace(b",", b" ").replace(b";", b" ")
         with suppress(ValueError, UserWarning), warnings.catch_warnings():
             warnings.simplefilter("error")  # where there is no line of numbers
@@ -119,14 +123,19 @@ def _text(stream: MeshStream) -> FloatArray:
 
 def _line_by_line(stream: MeshStream, data: bytes) -> FloatArray:
     """The same where a line is odd: the first may be the number of points, or names."""
-    rows = []
-    for number, line in enumerate(data.decode("latin-1").splitlines(), 1):
-        words = _BETWEEN.split(line.partition("#")[0].partition("//")[0].strip())
+    rows, commas = [], set[int]()
+    for number, whole in enumerate(data.decode("latin-1").splitlines(), 1):
+        line = whole.partition("#")[0].partition("//")[0].strip()
+        words = _BETWEEN.split(line)
         mixed = "," in line and _DECIMAL_COMMA.search(line.encode())
         if mixed:
             problem = "has commas inside numbers, expected decimal points"
             raise stream.invalid(problem, line=number)
         title = number == 1 and (len(words) == 1 or words[0][:1].isalpha())
+        commas |= {line.count(",")} - {0}
+        if len(commas) > 1:
+            problem = "has another number of commas than lines before it"
+            raise stream.invalid(problem, line=number)
         if title:
             _check_title(stream, [word.strip('"').lower() for word in words])
         elif words != [""]:

@@ -17,7 +17,7 @@ from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, frozen, rotation_from_rpy
 from vdsm_pin.io.body_schema import MAX_PARTS
 from vdsm_pin.io.errors_builder import build_errors
-from vdsm_pin.io.frames import Frame
+from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.motion_schema import MovableModel
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.problem_errors import first_error
@@ -272,7 +272,7 @@ class CellFile:
     def frame(self) -> Frame:
         """Unit of the file and pose of the root link."""
         base = self.model.base
-        rotation = rotation_from_rpy(np.radians(base.rpy_deg))
+        rotation = rotation_from_rpy(radians(base.rpy_deg))
         return Frame(self.model.length_unit, rotation, np.array(base.position))
 
     @cached_property
