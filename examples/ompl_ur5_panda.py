@@ -1,7 +1,5 @@
 """OMPL samples a UR5's and a Panda's meshes; the proof judges hulls of their parts."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import coal
@@ -9,10 +7,12 @@ import numpy as np
 import pinocchio as pin
 from ompl import base, geometric, util
 
+import vdsm_pin as vp
+
 SHARE = Path(pin.__file__).parents[4] / "share"
 UR5 = ("ur", "ur5_robot", "ur5", [-1.2, -1.0, 1.4, -0.4, 0, 0])
 PANDA = ("panda", "panda", "panda", [-0.9, 0.4, 0, -1.8, 0, 2.2, 0.8])
-POST = "{name: post, shape: box, center: [0.5, 0, 0.4], size: [0.03, 0.03, 0.8]}"
+POST = vp.Box("post", np.array([0.5, 0, 0.4]), np.eye(3), np.array([0.015, 0.015, 0.4]))
 util.setLogLevel(util.LogLevel.LOG_NONE)
 util.RNG.setSeed(1)
 
@@ -46,15 +46,15 @@ def planned(model: pin.Model, urdf: str, srdf: str, start: list[float]) -> np.nd
     return np.array([[state[k] for k in range(n)] for state in states])
 
 
-Path("scene.yaml").write_text(f"length_unit: m\nobstacles: [{POST}]\n")
 for family, urdf, name, start in (UR5, PANDA):
     folder = SHARE / "example-robot-data" / "robots" / f"{family}_description"
     files = f"{folder}/urdf/{urdf}.urdf", f"{folder}/srdf/{name}.srdf"
     model = pin.buildModelFromUrdf(files[0])
     rows = planned(model, *files, start)
-    head = ",".join(f"{joint}_rad" for joint in [*model.names][1 : len(start) + 1])
-    np.savetxt(f"{name}.csv", rows, "%.17g", ",", header=head, comments="")
-    command = f"-m vdsm_pin verify --urdf {files[0]} --srdf {files[1]} --bodies parts "
-    command += f"--package-dir {SHARE} --scene scene.yaml --trajectory {name}.csv "
-    command += f"--out {name}_out" + " --lock panda_finger_joint1=0" * (name == "panda")
-    subprocess.run([sys.executable, *command.split()], check=False)
+    lock = {"panda_finger_joint1": 0.0} if name == "panda" else {}
+    robot = vp.RobotFiles(*files, (SHARE,), lock, solids=vp.MeshCover("parts"))
+    cell = vp.cell_of(robot, vp.Scene((POST,)))
+    joints = tuple(model.names)[1 : len(start) + 1]
+    result = vp.verify(cell, vp.JointTrajectory(joints, rows))
+    print(result)
+    vp.write_report(result, f"{name}.html")

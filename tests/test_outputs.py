@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from vdsm_pin import api
-from vdsm_pin.app import workflow
+from vdsm_pin.app import subjects
 from vdsm_pin.batch.run import OWN, Batch, run_batch
 from vdsm_pin.batch.task import Settings, folder_names
 from vdsm_pin.cli import main
@@ -155,8 +155,8 @@ def test_a_trajectory_that_changes_meanwhile_gets_no_result(
         (here / "motion.csv").write_text("x0_m\n0\n")
         return found
 
-    verify = workflow.verify
-    monkeypatch.setattr(workflow, "verify", judged)
+    verify = subjects.verify
+    monkeypatch.setattr(subjects, "verify", judged)
     words = ["problem.yaml", "--trajectory", "motion.csv", "--out", "out"]
     assert run("verify", *words, "--certificate", "proof") == 2
     assert "motion.csv: changed while it was worked on" in capsys.readouterr().err

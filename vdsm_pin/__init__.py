@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         plan,
         read_problem,
         read_trajectory,
+        repair_trajectory,
         verify,
         write_certificate,
         write_report,
@@ -42,9 +43,12 @@ if TYPE_CHECKING:
         Sphere,
     )
     from vdsm_pin.problem.desired_path import DesiredPath
+    from vdsm_pin.problem.joint_trajectory import JointTrajectory
     from vdsm_pin.problem.planning_problem import PlanningProblem as Problem
     from vdsm_pin.problem.scene import Scene
     from vdsm_pin.problem.trajectory import Trajectory
+    from vdsm_pin.robots.cell import Cell, cell_of, read_cell
+    from vdsm_pin.robots.files import MeshCover, RobotFiles
     from vdsm_pin.verification.records import Verdict
 
 __version__ = "0.2.0"
@@ -53,6 +57,7 @@ __all__ = [
     "Box",
     "CableLayout",
     "Capsule",
+    "Cell",
     "Cylinder",
     "DesiredPath",
     "ErrorBox",
@@ -60,11 +65,14 @@ __all__ = [
     "HalfSpace",
     "Infeasible",
     "InvalidInput",
+    "JointTrajectory",
     "LinkBody",
     "Manipulator",
     "Mesh",
+    "MeshCover",
     "Prism",
     "Problem",
+    "RobotFiles",
     "Scene",
     "Sphere",
     "Tool",
@@ -72,9 +80,12 @@ __all__ = [
     "VdsmError",
     "Verdict",
     "built_in",
+    "cell_of",
     "plan",
+    "read_cell",
     "read_problem",
     "read_trajectory",
+    "repair_trajectory",
     "verify",
     "write_certificate",
     "write_report",
@@ -90,8 +101,11 @@ _HOMES: Final = {
         *("Box", "Capsule", "Cylinder", "HalfSpace", "Mesh", "Prism", "Sphere"),
     ),
     "problem.desired_path": ("DesiredPath",),
+    "problem.joint_trajectory": ("JointTrajectory",),
     "problem.scene": ("Scene",),
     "problem.trajectory": ("Trajectory",),
+    "robots.cell": ("Cell", "cell_of", "read_cell"),
+    "robots.files": ("MeshCover", "RobotFiles"),
     "verification.records": ("Verdict",),
 }
 """Where names live that are not in `api`."""

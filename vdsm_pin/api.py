@@ -1,4 +1,4 @@
-"""The package from Python: plan, verify, write down. `import vdsm_pin` has all of it.
+"""The package from Python: plan, verify, repair, write. `import vdsm_pin` has it all.
 
 >>> import vdsm_pin as vp
 >>> problem = vp.read_problem("paper/free")
@@ -8,23 +8,38 @@
 'certified'
 """
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Any, overload
 
-import numpy as np
-
+from vdsm_pin.app.subjects import (
+    NO_TERMS,
+    Asked,
+    Motion,
+    Subject,
+    Terms,
+    expect,
+    subject_of,
+)
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.io import trajectory_file
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.io.problem_file import read_problem as read_problem
+from vdsm_pin.io.trajectory_file import Interpolation
+from vdsm_pin.io.trajectory_file import write_trajectory as write_arm_trajectory
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.error_boxes import ErrorBox as Box
 from vdsm_pin.problem.error_boxes import TypedErrorBox
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import Deadline
-from vdsm_pin.verification.records import ArmVerification
+from vdsm_pin.verification.records import ArmVerification, Verification
 from vdsm_pin.verification.robot_model import load_robot
+
+if TYPE_CHECKING:  # few need robots or repair
+    from vdsm_pin.repair.rounds import Repaired
+    from vdsm_pin.robots.cell import Cell
+    from vdsm_pin.robots.judgement import RobotVerification
 
 PYTHON = "from Python"
 """What a report names as command and problem file where there is none."""
@@ -40,7 +55,7 @@ def plan(
     *,
     time_limit: float | None = None,
 ) -> Plan:
-    """Plan a motion and have it verified.
+    """Plan a motion of a snake arm and have it verified.
 
     Args:
         problem: What is asked.
@@ -65,24 +80,13 @@ def plan(
     """
     from vdsm_pin.refinement import plan_and_verify
 
-    _expect(problem, PlanningProblem, "read_problem(path)")
-    _expect(strategy, str, "'fewest'")
+    expect(problem, PlanningProblem, "read_problem(path)")
+    expect(strategy, str, "'fewest'")
     deadline, robot = Deadline.after(time_limit), load_robot(problem.manipulator)
     return plan_and_verify(problem, strategy, robot, deadline=deadline).plan
 
 
-def _expect(value: object, kind: type, how: str) -> None:
-    """Refuse what is of another kind, and say how one is had.
-
-    Raises:
-        InvalidInput: If it is.
-    """
-    if not isinstance(value, kind):
-        found = type(value).__name__
-        message = f"expected {kind.__name__}, as of {how}; found {found}"
-        raise InvalidInput(message)
-
-
+@overload
 def verify(
     problem: PlanningProblem,
     trajectory: Trajectory,
@@ -90,23 +94,45 @@ def verify(
     errors: Box | None = None,
     joint_error: bool = False,
     time_limit: float | None = None,
-) -> ArmVerification:
+) -> ArmVerification: ...
+
+
+@overload
+def verify(
+    problem: "Cell",
+    trajectory: JointTrajectory,
+    *,
+    errors: Box | None = None,
+    time_limit: float | None = None,
+) -> "RobotVerification": ...
+
+
+def verify(
+    problem: Asked,
+    trajectory: Motion,
+    *,
+    errors: Box | None = None,
+    joint_error: bool = False,
+    time_limit: float | None = None,
+) -> Verification:
     """Judge a trajectory over continuous time, whoever made it.
 
     Args:
-        problem: What is asked.
+        problem: What is asked of a snake arm, or of any other robot.
         trajectory: Rows of joint values, joined by straight lines in joint space, or
-            by smooth pieces where it has velocities.
+            by smooth pieces where it has velocities: a `Trajectory` of an arm, a
+            `JointTrajectory` of any other robot.
         errors: The clearance is proved for every motion within it, and within the
             errors that the problem states.
-        joint_error: Whether to look for the largest joint error that is certified.
+        joint_error: Whether to look for the largest joint error that is certified; of
+            arms alone.
         time_limit: What is not judged by then is undecided; None for none; [s].
 
     Returns:
         `verdict`, `min_clearance` in metres, `closest(count)`, `checks`.
 
     Raises:
-        InvalidInput: If the trajectory is of another arm, an error is negative, or an
+        InvalidInput: If the trajectory is of another robot, an error is negative, or an
             argument of another kind.
 
     Example:
@@ -118,24 +144,85 @@ def verify(
         >>> result.closest(1)[0].pair.obstacle
         'pillar'
     """
-    from vdsm_pin.verification.verify import verify as judge
+    subject = _subject(problem, Terms(Deadline.after(time_limit)), errors)
+    if joint_error and not isinstance(problem, PlanningProblem):
+        message = "joint_error is looked for of snake arms alone"
+        raise InvalidInput(message)
+    return subject.judge(subject.checked(trajectory), joint_error=joint_error)
 
-    _expect(problem, PlanningProblem, "read_problem(path)")
-    _expect(trajectory, Trajectory, "plan(problem).trajectory")
+
+def _subject(
+    problem: Any, terms: Terms = NO_TERMS, errors: Box | None = None
+) -> Subject:
+    """A problem under errors, with how its motions are handled.
+
+    Raises:
+        InvalidInput: If it is none, or the errors are none.
+    """
+    if not isinstance(problem, PlanningProblem):
+        from vdsm_pin.robots.cell import Cell
+
+        expect(problem, Cell, "read_cell(path); or a Problem, as of read_problem(path)")
     if errors is not None:
-        _expect(errors, Box, "ErrorBox(base_mm=1.0)")
-    robot = load_robot(problem.manipulator)
-    return judge(
-        problem,
-        trajectory,
-        robot,
-        errors=errors,
-        joint_error=joint_error,
-        deadline=Deadline.after(time_limit),
-    )
+        problem = problem.under(expect(errors, Box, "ErrorBox(base_mm=1.0)"))
+    return subject_of(problem, terms)
 
 
-def write_report(result: ArmVerification, path: str | Path) -> None:
+@overload
+def repair_trajectory(
+    problem: PlanningProblem,
+    trajectory: Trajectory,
+    pinned: Sequence[int] = (),
+    *,
+    time_limit: float | None = None,
+) -> "Repaired[ArmVerification]": ...
+
+
+@overload
+def repair_trajectory(
+    problem: "Cell",
+    trajectory: JointTrajectory,
+    pinned: Sequence[int] = (),
+    *,
+    time_limit: float | None = None,
+) -> "Repaired[RobotVerification]": ...
+
+
+def repair_trajectory(
+    problem: Asked,
+    trajectory: Motion,
+    pinned: Sequence[int] = (),
+    *,
+    time_limit: float | None = None,
+) -> "Repaired[Any]":
+    """A certified trajectory near one that is not.
+
+    Args:
+        problem: What is asked of a snake arm, or of any other robot.
+        trajectory: Straight lines between rows of joint values.
+        pinned: Numbers of rows, from 0, that stay besides the first and the last.
+        time_limit: When to give up; None for never; [s].
+
+    Returns:
+        `verification`, certified, whose `trajectory` (of a robot: `motion`) was found;
+        `given`, the number of the row that each of its rows was, -1 for a new one;
+        `moved`, how far each was moved, shape (n_rows,); [rad], [m].
+
+    Raises:
+        Infeasible: If none was found; the message says why and where.
+        InvalidInput: If the trajectory is of another robot, or has no such row.
+
+    Example:
+        >>> problem = read_problem("paper/obs1")
+        >>> found = repair_trajectory(problem, plan(problem).trajectory)
+        >>> float(found.moved.max())
+        0.0
+    """
+    subject = _subject(problem, Terms(Deadline.after(time_limit)))
+    return subject.repair(subject.checked(trajectory), tuple(pinned))
+
+
+def write_report(result: Verification, path: str | Path) -> None:
     """Write the report page of a verification: one file that works offline.
 
     Args:
@@ -155,25 +242,38 @@ def write_report(result: ArmVerification, path: str | Path) -> None:
     from vdsm_pin.report.html import write_report as write
     from vdsm_pin.report.run_record import RunRecord
 
-    _expect(result, ArmVerification, "verify(problem, trajectory)")
-    problem = result.problem
-    urdf_sha256 = load_robot(problem.manipulator).urdf_sha256
-    record = RunRecord.of(PYTHON, problem.source, urdf_sha256)
-    check_kept([Path(path)], problem.files)
+    subject, source = _judged(result), result.problem.source
+    record = RunRecord.of(PYTHON, source, subject.urdf_sha256)
+    check_kept([Path(path)], () if source is None else source.files)
     with atomic_path(path) as temporary:
         write(temporary, result, verification_file(result, record))
 
 
+def _judged(result: Any, terms: Terms = NO_TERMS) -> Subject:
+    """What a verification is of.
+
+    Raises:
+        InvalidInput: If it is none.
+    """
+    expect(result, Verification, "verify(problem, trajectory)")
+    return _subject(result.problem, terms)
+
+
 def write_certificate(
-    result: ArmVerification, path: str | Path, trajectory: str | Path
+    result: Verification,
+    path: str | Path,
+    trajectory: str | Path,
+    *,
+    topic: str | None = None,
 ) -> None:
     """Write the proof of a certified motion, for `vdsm check-certificate`.
 
     Args:
         result: What `verify` returned, of a problem that was read from a file.
         path: The certificate; it appears whole or not at all.
-        trajectory: The file that holds `result.trajectory`, to whose bytes the
+        trajectory: The file that holds the motion that was judged, to whose bytes the
             certificate is bound; `write_trajectory` writes it.
+        topic: Of the motion, in a bag.
 
     Raises:
         InvalidInput: If the problem has no file, or the trajectory file holds another
@@ -190,48 +290,61 @@ def write_certificate(
     """
     from vdsm_pin.io.source import sha256_of_file
     from vdsm_pin.report.folder import check_kept
-    from vdsm_pin.verification import certificate_lines, certificate_writer
+    from vdsm_pin.verification.certificate_lines import Hashes
 
-    _expect(result, ArmVerification, "verify(problem, trajectory)")
-    problem, source = result.problem, result.problem.source
-    if source is None:
+    joined: Interpolation = "auto"
+    if isinstance(result, ArmVerification):
+        joined = result.trajectory.interpolation
+    subject = _judged(result, Terms(interpolation=joined, topic=topic))
+    file, source = Path(trajectory), result.problem.source
+    if source is None or not source.is_whole:
         message = "a certificate is bound to a problem file; this problem has none"
         raise InvalidInput(message)
-    joined = result.trajectory.interpolation
-    if not _same(read_trajectory(trajectory, problem, joined), result.trajectory):
+    if not subject.is_of(result, subject.read(file)):
         message = f"{trajectory}: is another motion than the verified one"
         raise InvalidInput(message)
-    check_kept([Path(path)], [*source.files, Path(trajectory)])
-    hashes = certificate_lines.Hashes(
-        problem=source.sha256,
-        trajectory=sha256_of_file(Path(trajectory)),
-    )
-    certificate_writer.write_certificate(Path(path), result, hashes)
+    check_kept([Path(path)], [*source.files, file])
+    hashes = Hashes(problem=source.sha256, trajectory=sha256_of_file(file))
+    subject.certify(Path(path), result, hashes)
 
 
-def _same(one: Trajectory, other: Trajectory) -> bool:
-    """Whether two motions are the same: rows, when they are passed, what joins them."""
-    parts = ("on_path", "path_m", "joints", "times", "rates", "changes")
-    both = ((getattr(one, name), getattr(other, name)) for name in parts)
-    return all(a is b or np.array_equal(a, b) for a, b in both)
+@overload
+def read_trajectory(
+    path: str | Path,
+    problem: PlanningProblem,
+    interpolation: Interpolation = "auto",
+) -> Trajectory: ...
+
+
+@overload
+def read_trajectory(
+    path: str | Path, problem: "Cell", *, topic: str | None = None
+) -> JointTrajectory: ...
 
 
 def read_trajectory(
     path: str | Path,
-    problem: PlanningProblem,
-    interpolation: Literal["linear", "cubic", "quintic", "auto"] = "auto",
-) -> Trajectory:
-    """The trajectory of a CSV file (docs/files.md).
+    problem: Asked,
+    interpolation: Interpolation = "auto",
+    *,
+    topic: str | None = None,
+) -> Motion:
+    """The trajectory of a file: CSV, of robots messages and bags too (docs/files.md).
 
     Args:
         path: The file.
-        problem: Whose arm moves.
-        interpolation: What joins the rows: straight lines, cubic pieces by the file's
-            velocities, quintic ones by its accelerations too, or what it has columns
-            for.
+        problem: Whose arm or robot moves.
+        interpolation: What joins the rows of an arm's: straight lines, cubic pieces by
+            the file's velocities, quintic ones by its accelerations too, or what it has
+            columns for.
+        topic: Of a robot's motion, in a bag.
+
+    Returns:
+        A `Trajectory` of an arm, a `JointTrajectory` of any other robot; its `notes`
+        say what was not read.
 
     Raises:
-        InvalidFile: If the file breaks its contract or is of another arm.
+        InvalidFile: If the file breaks its contract or is of another robot.
 
     Example:
         >>> problem = read_problem("paper/free")
@@ -239,17 +352,28 @@ def read_trajectory(
         >>> read_trajectory("out/api/t.csv", problem).n_links
         8
     """
-    return trajectory_file.read_trajectory(path, problem.manipulator, interpolation)
+    terms = Terms(interpolation=interpolation, topic=topic)
+    motion: Motion = _subject(problem, terms).read(Path(path))
+    return motion
 
 
-def write_trajectory(path: str | Path, trajectory: Trajectory) -> None:
+def write_trajectory(
+    path: str | Path, trajectory: Motion, problem: "Asked | None" = None
+) -> None:
     """Write a trajectory as CSV, with digits that read back as the same doubles.
 
     Args:
         path: The file; it appears whole or not at all.
         trajectory: What to write.
+        problem: Of a robot's trajectory: its joints have the units.
 
     Raises:
+        InvalidInput: If it is of a robot, and no problem is given.
         InvalidFile: If the file cannot be written.
     """
-    trajectory_file.write_trajectory(path, trajectory)
+    if problem is None:
+        how = "plan(problem).trajectory; or with problem=, of a robot"
+        write_arm_trajectory(path, expect(trajectory, Trajectory, how))
+    else:
+        subject = _subject(problem)
+        subject.write(Path(path), subject.checked(trajectory))

@@ -10,7 +10,7 @@ from vdsm_pin.errors import InvalidFile, InvalidInput, VdsmError
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
 from vdsm_pin.robots.cell import cell_of
-from vdsm_pin.robots.files import RobotFiles, Solids, solids_of
+from vdsm_pin.robots.files import MeshCover, RobotFiles, solids_of
 from vdsm_pin.robots.joint_limits import read_limits
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.second_opinion import link_shapes, pose_difference
@@ -165,7 +165,7 @@ def test_covers_of_a_mesh_hold_all_of_it(tmp_path: Path) -> None:
     points = np.vstack([points, points + np.array([0.6, 0.1, 0.05])])
     points += np.array([1.0, 0.0, 0.0])
     far = []
-    for solids in (Solids(), Solids("parts", 2), Solids("primitives")):
+    for solids in (MeshCover(), MeshCover("parts", 2), MeshCover("primitives")):
         robot = read_robot(urdf, solids=solids)
         (arm,) = [body for body in robot.bodies if body.name == "arm"]
         ends = np.repeat(points[:, None], 2, axis=1)

@@ -14,9 +14,10 @@ from vdsm_pin.errors import InvalidFile, VdsmError
 from vdsm_pin.geometry.arrays import rotation_from_rpy
 from vdsm_pin.io import bags
 from vdsm_pin.io.bags import read_bag, write_bag
-from vdsm_pin.io.joint_trajectory import JointTrajectory, of_message, text_of
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
+from vdsm_pin.io.trajectory_messages import of_message, text_of
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.paths import cubic_path, quintic_path
 from vdsm_pin.robots.model import Robot, RobotJoint
@@ -202,7 +203,7 @@ POINT = '{{"positions": [{}, 0], {}"time_from_start": {}}}'
     ("rates", "time", "said"),
     [
         ('"velocities": [0, 1], ', 0, "velocities, expected times too"),
-        ('"accelerations": [0, 1], ', 1, "accelerations, expected velocities and"),
+        ('"accelerations": [0, 1], ', 1, "accelerations, expected velocities too"),
         ('"velocities": [0, 0], ', 0, None),
         ('"velocities": [0, 0], "accelerations": [0, 1], ', 1, None),
     ],

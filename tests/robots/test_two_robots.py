@@ -19,7 +19,7 @@ from vdsm_pin.report.robot_facts import robot_facts
 from vdsm_pin.report.scene_rows import scene_words
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.certificate import write_robot_certificate
-from vdsm_pin.robots.files import HULLS, Solids, read_cell_file
+from vdsm_pin.robots.files import HULLS, MeshCover, read_cell_file
 from vdsm_pin.robots.judgement import POSES, verify_robot
 from vdsm_pin.robots.second_opinion import link_shapes
 from vdsm_pin.robots.trajectory_files import path_text, read_path
@@ -183,7 +183,7 @@ def test_random_pairs_keep_what_dense_samples_by_coal_say(
     rng, times = np.random.default_rng(seed), np.array([0.0, 1.0, 2.0])
     robots, motions = [], []
     write_cube(tmp_path / MESH, 4.0)
-    for name, solids in (("a", HULLS), ("b", Solids("parts", 2))):
+    for name, solids in (("a", HULLS), ("b", MeshCover("parts", 2))):
         urdf = write(tmp_path, f"{name}.urdf", random_urdf(rng, 4))
         robots.append(read_robot(urdf, solids=solids))
         q = rng.uniform(-0.4, 0.4, (3, len(robots[-1].joints)))

@@ -4,16 +4,23 @@ Nothing is judged here: problems are read, planned, verified and written down.
 """
 
 import math
-from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, replace
-from functools import partial
-from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Any, Final
 
 from pydantic import ValidationError
 
+from vdsm_pin.app.subjects import (
+    CABLES,
+    CENTRES,
+    LINK_ANGLES,
+    NO_TERMS,
+    Asked,
+    Subject,
+    Terms,
+    subject_of,
+)
 from vdsm_pin.errors import (
     Infeasible,
     InvalidFile,
@@ -25,16 +32,9 @@ from vdsm_pin.io.source import (
     check_unchanged,
     sha256_of_file,
 )
-from vdsm_pin.io.trajectory_file import (
-    Interpolation,
-    read_trajectory,
-    write_trajectory,
-)
+from vdsm_pin.io.trajectory_file import write_trajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import Scene
-from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import step
-from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.report.browser import find_browser
 from vdsm_pin.report.facts import plan_file, verification_file
 from vdsm_pin.report.files import PlanFile, VerificationFile
@@ -50,27 +50,16 @@ from vdsm_pin.report.tables import (
     ClearanceCsv,
     write_cables,
     write_centres,
-    write_link_angles,
 )
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.verification.coal_distances import reach_of
-from vdsm_pin.verification.moving import untimed
-from vdsm_pin.verification.records import ArmVerification, Verdict, Verification
-from vdsm_pin.verification.robot_model import RobotModel, load_robot
-from vdsm_pin.verification.task import ArmPairs
-from vdsm_pin.verification.verify import verify
-
-if TYPE_CHECKING:  # whoever verifies an arm needs no robots
-    from vdsm_pin.robots.cell import Cell
+from vdsm_pin.verification.records import Verdict, Verification
+from vdsm_pin.verification.robot_model import load_robot
 
 TRAJECTORY: Final = "trajectory.csv"
 PLAN: Final = "plan.json"
 VERIFICATION: Final = "verification.json"
 REPORT: Final = "report.html"
 CLEARANCE: Final = "clearance.csv"
-LINK_ANGLES: Final = "link_angles.csv"
-CABLES: Final = "cables.csv"
-CENTRES: Final = "centres.csv"
 
 NO_PLAN: Final = "no_plan.html"
 
@@ -92,25 +81,21 @@ class VerifyOrder:
         command: The exact command line, for the report.
         certificate: Where the certificate of a certified motion goes; None for none.
         pdf: Where the report on paper goes; None for none.
-        deadline: When to give up what is left; it is then undecided.
+        terms: When what is left is undecided, and how the trajectory file is read.
         date: When, for the report; None where files shall not tell.
-        interpolation: What joins the rows of the trajectory file.
-        topic: Of a robot's trajectory, in a bag.
         all_pairs: Whether clearance.csv has every pair at every interval, not the near
             ones and the least of each alone.
     """
 
-    problem: "PlanningProblem | Cell"
+    problem: Asked
     trajectory: Path
     folder: Path
     command: str
     certificate: Path | None = None
     pdf: Path | None = None
-    deadline: Deadline = NO_LIMIT
+    terms: Terms = NO_TERMS
     all_pairs: bool = False
     date: str | None = None
-    interpolation: Interpolation = "auto"
-    topic: str | None = None
 
 
 @dataclass(frozen=True)
@@ -216,94 +201,35 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
     _check_outputs(order)
     check_is_file_or_bag(order.trajectory)
     digest = sha256_of_file(order.trajectory)
-    judged = _judgement(order)
+    subject = subject_of(order.problem, order.terms)
+    motion = subject.read(order.trajectory)
     with staged(order.folder) as aside:
-        urdf, verification = judged(aside)
+        verification = _judged(order, subject, motion, aside)
         check_unchanged(order.trajectory, digest)
-        source = order.problem.source
+        source, urdf = order.problem.source, subject.urdf_sha256
         record = RunRecord.of(order.command, source, urdf, digest, order.date)
         file = verification_file(verification, record)
         (aside / VERIFICATION).write_text(file.text(), encoding="utf-8")
         write_report(aside / REPORT, verification, file, planned_by(order.trajectory))
         # Last inside: a certificate that cannot be written leaves no half of a result.
-        missing = _certify(order, verification, record)
+        missing = _certify(order, subject, verification, record)
     if order.pdf is not None:
         print_page(order.folder / REPORT, order.pdf)
     return Verified(file, verification, missing)
 
 
-def _judgement(order: VerifyOrder) -> Callable[[Path], tuple[str, Verification]]:
-    """What judges the motion, which is read before anything is written."""
-    problem = order.problem
-    if not isinstance(problem, PlanningProblem):
-        from vdsm_pin.robots.trajectory_files import path_of, read_motion
-
-        file, robot = order.trajectory, problem.robot
-        motion = read_motion(file, robot.joints, order.topic, robot.values)
-        path = path_of(file, motion)
-        _check_times(order, problem.scene, path)
-        return partial(_judge_robot, order, problem, path, motion.notes)
-    arm = problem.manipulator
-    trajectory = read_trajectory(order.trajectory, arm, order.interpolation)
-    _check_times(order, problem.scene, trajectory)
-    return partial(_judge_arm, order, problem, load_robot(arm), trajectory)
-
-
-def _check_times(order: VerifyOrder, scene: Scene, motion: Trajectory | Motion) -> None:
-    """Refuse rows without times beside what moves.
-
-    Raises:
-        InvalidFile: If they have none.
-    """
-    if why := untimed(scene, motion):
-        raise InvalidFile(file=order.trajectory, where="line 1", problem=why)
-
-
-def _judge_arm(
-    order: VerifyOrder,
-    problem: PlanningProblem,
-    robot: RobotModel,
-    trajectory: Trajectory,
-    aside: Path,
-) -> tuple[str, Verification]:
-    """The SHA-256 of the arm's URDF and the judgement; its tables stand aside."""
-    reach = math.inf if order.all_pairs else reach_of(problem)
-    table = ClearanceCsv(aside / CLEARANCE, problem, ArmPairs(problem).size, reach)
+def _judged(
+    order: VerifyOrder, subject: Subject, motion: Any, aside: Path
+) -> Verification:
+    """The judgement, whose tables stand aside."""
+    reach = math.inf if order.all_pairs else subject.near
+    table = ClearanceCsv(aside / CLEARANCE, order.problem, subject.n_pairs, reach)
     with closing(table) as clearance:
-        verification = verify(
-            problem,
-            trajectory,
-            robot,
-            sinks=(clearance,),
-            joint_error=True,
-            deadline=order.deadline,
-            reach=reach,
-        )
+        verification = subject.judge(motion, (clearance,), reach, joint_error=True)
         clearance.write(verification)
     step("writing the results")
-    write_link_angles(aside / LINK_ANGLES, verification)
-    write_centres(aside / CENTRES, problem, trajectory)
-    write_cables(aside / CABLES, problem, trajectory)
-    return robot.urdf_sha256, verification
-
-
-def _judge_robot(
-    order: VerifyOrder,
-    cell: "Cell",
-    motion: Motion,
-    notes: tuple[str, ...],
-    aside: Path,
-) -> tuple[str, Verification]:
-    """The same of any other robot."""
-    from vdsm_pin.robots.judgement import verify_robot
-
-    verification = verify_robot(cell, motion, order.deadline)
-    verification = replace(verification, notes=notes)
-    step("writing the results")
-    table = ClearanceCsv(aside / CLEARANCE, cell, len(verification.pairs))
-    with closing(table) as clearance:
-        clearance.write(verification)
-    return sha256(cell.robot.text.encode()).hexdigest(), verification
+    subject.write_tables(aside, verification)
+    return verification
 
 
 def _check_outputs(order: VerifyOrder) -> None:
@@ -330,28 +256,19 @@ def planned_by(trajectory: Path) -> PlanFile | None:
     return plan if same else None
 
 
-def _certify(order: VerifyOrder, verification: Verification, record: RunRecord) -> str:
+def _certify(
+    order: VerifyOrder, subject: Subject, verification: Verification, record: RunRecord
+) -> str:
     """Write the proof down, or say why not."""
     if order.certificate is None:
         return "not asked for"
     if verification.verdict is not Verdict.CERTIFIED:
         return "no proof"
-    # Imported by those who ask for one: its schema takes a while to build.
     from vdsm_pin.verification.certificate_lines import Hashes
 
     hashes = Hashes(record.problem_sha256, record.trajectory_sha256)
     try:
-        if isinstance(verification, ArmVerification):
-            from vdsm_pin.verification.certificate_writer import write_certificate
-
-            write_certificate(order.certificate, verification, hashes, order.deadline)
-        else:
-            from vdsm_pin.robots.certificate import write_robot_certificate
-            from vdsm_pin.robots.judgement import RobotVerification
-
-            assert isinstance(verification, RobotVerification)
-            more = hashes, order.topic, order.deadline
-            write_robot_certificate(order.certificate, verification, *more)
+        subject.certify(order.certificate, verification, hashes)
     except (OutOfTime, VerificationFailed) as error:
         return str(error)
     return ""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 from pydantic import ValidationError
 
+from vdsm_pin.app.subjects import Terms
 from vdsm_pin.app.workflow import (
     JUDGED,
     NO_PLAN,
@@ -345,7 +346,7 @@ def _done(
         task.command,
         certificate=task.aside / CERTIFICATE if asked.certificate else None,
         pdf=task.aside / PDF if asked.pdf else None,
-        deadline=deadline,
+        terms=Terms(deadline),
     )
     verified = verify_to_folder(order)
     certified = verified.records.verdict is Verdict.CERTIFIED

@@ -109,6 +109,7 @@ def verify(
     console = Console(quiet, as_json)
     deadline = Deadline.after(time_limit)
     box = errors.box(slide_error_mm)
+    from vdsm_pin.app.subjects import Terms
     from vdsm_pin.app.workflow import VerifyOrder
     from vdsm_pin.report.run_record import now
 
@@ -123,11 +124,9 @@ def verify(
             command=context.obj,
             certificate=certificate,
             pdf=pdf,
-            deadline=deadline,
+            terms=Terms(deadline, interpolation, topic),
             all_pairs=all_pairs,
             date=now(),
-            interpolation=interpolation,
-            topic=topic,
         )
     raise typer.Exit(PASSED if _passes(order, console) else NOT_PASSED)
 
@@ -184,7 +183,7 @@ def _passes(order: "VerifyOrder", console: Console) -> bool:
     from vdsm_pin.report.terminal import show_verification
     from vdsm_pin.report.words import outcome
 
-    with enforced(order.deadline), console.progress():
+    with enforced(order.terms.deadline), console.progress():
         verified = verify_to_folder(order)
     written: list[tuple[str, str]] = []
     if order.certificate is not None:

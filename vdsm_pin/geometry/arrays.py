@@ -1,7 +1,7 @@
 """Array types and the few checked operations everybody needs."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Final, TypeAlias
 
@@ -125,6 +125,12 @@ def check_numbers(record: Any, *names: str) -> None:
         if type(value) is not float:
             with called(f"{type(record).__name__}: {name}"):
                 object.__setattr__(record, name, number(value))
+
+
+def same_arrays(one: object, other: object, names: Sequence[str]) -> bool:
+    """Whether arrays of two values, by their names, are the same; None is one too."""
+    pairs = ((getattr(one, name), getattr(other, name)) for name in names)
+    return all(a is b or np.array_equal(a, b) for a, b in pairs)
 
 
 ROTATION_ERROR: Final = 1e-9

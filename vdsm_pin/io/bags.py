@@ -7,7 +7,8 @@ from typing import Any, Final
 import numpy as np
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
-from vdsm_pin.io.joint_trajectory import JointTrajectory, message_of, of_message
+from vdsm_pin.io.trajectory_messages import message_of, of_message
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 
 ENDINGS: Final = (".bag", ".mcap", ".db3")
 PLANS: Final = (

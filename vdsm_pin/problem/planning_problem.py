@@ -33,12 +33,15 @@ class ProblemSource:
         named: The files it names: the arm's URDF, then meshes in the order of the
             obstacles.
         of_obstacles: Names of the obstacles that have a file of their own, with it.
+        is_whole: Whether `path` is a problem file, which asks all that is asked; else
+            it is the URDF of a robot that was named by itself.
     """
 
     path: Path
     sha256: str
     named: tuple[Path, ...] = ()
     of_obstacles: tuple[tuple[str, Path], ...] = ()
+    is_whole: bool = True
 
     @property
     def files(self) -> tuple[Path, ...]:

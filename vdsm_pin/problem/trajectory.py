@@ -8,7 +8,14 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry import bernstein
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, freeze, frozen
+from vdsm_pin.geometry.arrays import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    freeze,
+    frozen,
+    same_arrays,
+)
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
@@ -18,6 +25,9 @@ MAX_ROWS: Final = 5_000_000
 
 NUMBERS: Final = ("path_m", "x0", "alpha", "theta")
 """Fields of a trajectory that hold numbers of every row."""
+
+BETWEEN: Final = ("times", "rates", "changes")
+"""Those that tell what lies between them; None where not known."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -56,7 +66,7 @@ class Trajectory(Summarised):
     def __post_init__(self) -> None:
         """Freeze the arrays and check their shapes."""
         freeze(self, "on_path", dtype=np.bool_)
-        freeze(self, *NUMBERS, "times", "rates", "changes")
+        freeze(self, *NUMBERS, *BETWEEN)
         n, shape = self.x0.size, self.alpha.shape
         if n == 0:
             message = "a trajectory needs at least one row"
@@ -155,6 +165,10 @@ class Trajectory(Summarised):
         rows[:, 0], rows[:, 1::2], rows[:, 2::2] = self.x0, self.alpha, self.theta
         rows.setflags(write=False)
         return rows
+
+    def same_as(self, other: "Trajectory") -> bool:
+        """Whether all numbers are the same; notes do not count."""
+        return same_arrays(self, other, ("on_path", *NUMBERS, *BETWEEN))
 
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Its size and what it moves."""

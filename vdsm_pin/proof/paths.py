@@ -8,7 +8,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, freeze, frozen
+from vdsm_pin.geometry.arrays import (
+    FloatArray,
+    IntArray,
+    freeze,
+    frozen,
+    same_arrays,
+)
 from vdsm_pin.geometry.bernstein import hermite, part, raised, value
 from vdsm_pin.proof.motions import Motion
 
@@ -166,6 +172,10 @@ class Path:
         knots[:-1][place == 0] = self.knots[:-1]
         moments = np.append(k + low, float(len(counts)))
         return Path(knots, controls[:, 1:-1], self.times_at(moments))
+
+    def same_as(self, other: "Path") -> bool:
+        """Whether all numbers are the same."""
+        return same_arrays(self, other, ("knots", "inner", "times"))
 
     def packed(self) -> Motion:
         """The same for compiled code."""

@@ -26,7 +26,7 @@ def robot_facts(verification: RobotVerification) -> dict[str, Any]:
             *mesh_notes(cell),
             *file_notes(cell),
             *longer_motions(cell, path.times),
-            *(f"trajectory: {note}" for note in verification.notes),
+            *(f"trajectory: {note}" for note in _said(verification)),
         ),
         "coverage": None,
         "path_length_m": None,
@@ -38,6 +38,11 @@ def robot_facts(verification: RobotVerification) -> dict[str, Any]:
         ),
         "motion": _motion(cell, path),
     }
+
+
+def _said(verification: RobotVerification) -> tuple[str, ...]:
+    """What the reader of the trajectory has to say."""
+    return () if verification.motion is None else verification.motion.notes
 
 
 def _motion(cell: Cell, path: Path) -> RobotFacts:

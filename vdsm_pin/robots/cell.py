@@ -10,8 +10,9 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, frozen, is_rigid
 from vdsm_pin.geometry.solids import ConvexCover, Solid
+from vdsm_pin.notebook import Summarised
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.problem.scene import Obstacle, Scene, solid_of
@@ -20,13 +21,13 @@ from vdsm_pin.proof.packed_tree import TreePoses
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.contacts import Placed
 from vdsm_pin.robots.errors import check_errors
-from vdsm_pin.robots.files import RobotFiles, read_cell_file, source_of
+from vdsm_pin.robots.files import Named, RobotFiles, read_cell_file, source_of
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.other_robots import OtherRobot, read_other
 from vdsm_pin.robots.scene_files import read_scene_with_files
 from vdsm_pin.robots.second_opinion import coal_parts, link_shapes
 from vdsm_pin.robots.urdf import robot_of
-from vdsm_pin.units import MM_PER_M
+from vdsm_pin.units import MM_PER_M, in_mm
 from vdsm_pin.verification.coal_bodies import CoalObstacle, coal_bodies
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
 from vdsm_pin.verification.moving import frames_beside, tree_beside
@@ -35,8 +36,8 @@ ROOT_FRAME: Final = 1
 """The frame that obstacles stand in: of the root link, where it does not move."""
 
 
-@dataclass(frozen=True, eq=False)
-class Cell:
+@dataclass(frozen=True, eq=False, repr=False)
+class Cell(Summarised):
     """A robot among its obstacles, and what its motions are held to.
 
     Args:
@@ -46,13 +47,14 @@ class Cell:
         required_self_clearance: Least clearance between links that are held apart; [m].
         stated_name: Of the problem; empty for the robot's.
         T_world_base: The robot's root link in the frame of the files, (4, 4); [m].
-        source: The files it was read from; None for none.
         errors: What every clearance is asked for under.
         others: Robots whose links are the last obstacles.
+        source: The files it was read from; None where it was changed since by more than
+            its errors.
 
     Raises:
-        InvalidInput: If a clearance is negative or not finite, or errors are of what
-            there is not.
+        InvalidInput: If a clearance is negative or not finite, the pose is no rigid
+            motion, or errors are of what there is not.
     """
 
     robot: Robot
@@ -61,12 +63,15 @@ class Cell:
     required_self_clearance: float = 0.0
     stated_name: str = ""
     T_world_base: FloatArray = field(default_factory=lambda: np.eye(4))
-    source: ProblemSource | None = None
     errors: ErrorBox = field(default_factory=ErrorBox)
     others: tuple[OtherRobot, ...] = ()
+    source: ProblemSource | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
-        """Check clearances and errors."""
+        """Check clearances, pose and errors."""
+        if not is_rigid(self.T_world_base):
+            message = "T_world_base is no rigid motion, shape (4, 4)"
+            raise InvalidInput(message)
         check_errors(self.robot, self.scene, self.errors)
         for value in (self.required_clearance, self.required_self_clearance):
             if not 0.0 <= value < inf:
@@ -150,7 +155,26 @@ class Cell:
         Raises:
             InvalidInput: If they are of what there is not.
         """
-        return replace(self, errors=self.errors.widened(errors))
+        widened = self.errors.widened(errors)
+        return replace(self, errors=widened).read_from(self.source)
+
+    def read_from(self, source: ProblemSource | None) -> "Cell":
+        """The same, known to stand in these files."""
+        same = replace(self)
+        object.__setattr__(same, "source", source)
+        return same
+
+    def summary(self) -> tuple[tuple[str, str], ...]:
+        """Robot, scene and what is required."""
+        joints = ", ".join(joint.name for joint in self.robot.joints[:8])
+        return (
+            ("name", self.name),
+            ("robot", f"{self.robot.name}, {len(self.robot.bodies)} links with solids"),
+            ("moves", joints or "nothing"),
+            ("obstacles", ", ".join(self.scene.names[:8]) or "none"),
+            ("required clearance", in_mm(self.required_clearance)),
+            ("file", str(self.source.path) if self.source else "changed in Python"),
+        )
 
     def names(self, pair: Pair) -> str:
         """Both bodies of a pair in words, a link first."""
@@ -160,39 +184,47 @@ class Cell:
 
 
 def cell_of(
-    files: RobotFiles,
-    scene: Path | None = None,
-    required: float = 0.0,
-    required_self: float = 0.0,
+    robot: RobotFiles,
+    scene: str | Path | Scene | None = None,
+    required_clearance: float = 0.0,
+    required_self_clearance: float = 0.0,
 ) -> Cell:
-    """The cell of files that are named one by one.
+    """A robot of files that are named one by one, among obstacles.
 
     Args:
-        files: Of the robot.
-        scene: The obstacles; None for none.
-        required: Least clearance from obstacles; [m].
-        required_self: Least clearance between links; [m].
+        robot: Its files.
+        scene: The file of the obstacles, or the obstacles, in the frame of the root
+            link; None for none.
+        required_clearance: Least clearance from obstacles; [m].
+        required_self_clearance: Least clearance between links; [m].
 
     Raises:
         InvalidInput: If a file is bad or a value makes no sense.
     """
-    robot = robot_of(files)
-    named = (*files.files, *robot.more_files)
-    if scene is None:
-        source = source_of(named, ())
-        return Cell(robot, Scene(), required, required_self, source=source)
-    solids, of_files = read_scene_with_files(scene, _size(robot), _others(robot))
-    source = source_of((*named, scene), of_files)
-    return Cell(robot, solids, required, required_self, source=source)
+    read = robot_of(robot)
+    required = required_clearance, required_self_clearance
+    named = (*robot.files, *read.more_files)
+    of_files: Named = ()
+    if scene is None or isinstance(scene, Scene):
+        solids = scene or Scene()
+    else:
+        file = Path(scene)
+        solids, of_files = read_scene_with_files(file, _size(read), _others(read))
+        named = (*named, file)
+    source = replace(source_of(named, of_files), is_whole=False)
+    return Cell(read, solids, *required).read_from(source)
 
 
-def read_cell(path: Path) -> Cell:
-    """The cell of a problem file with `robot` in place of `manipulator`.
+def read_cell(path: str | Path) -> Cell:
+    """The robot of a problem file with `robot` in place of `manipulator`.
+
+    Args:
+        path: The file.
 
     Raises:
         InvalidFile: If the file or one that it names breaks its contract.
     """
-    file = read_cell_file(path)
+    file = read_cell_file(Path(path))
     robot = robot_of(file.robot)
     required, required_self = file.required
     pose = np.eye(4)
@@ -213,9 +245,8 @@ def read_cell(path: Path) -> Cell:
         required_self_clearance=required_self,
         stated_name=file.model.name or "",
         T_world_base=frozen(pose),
-        source=file.source((*robot.more_files, *more), of_obstacles),
         others=others,
-    )
+    ).read_from(file.source((*robot.more_files, *more), of_obstacles))
     try:
         return cell.under(file.errors(scene))
     except InvalidFile:

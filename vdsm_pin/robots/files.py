@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
-from typing import Annotated, Final, Literal, TypeAlias
+from typing import Annotated, Final, Literal, TypeAlias, get_args
 
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError
@@ -34,24 +34,37 @@ from vdsm_pin.robots.scene_files import MAX_BYTES, SceneModel, read_scene_with_f
 Named: TypeAlias = tuple[tuple[str, Path], ...]
 """Names of obstacles that have a file of their own, with it."""
 
-MeshCover: TypeAlias = Literal["hull", "parts", "primitives"]
+CoverKind: TypeAlias = Literal["hull", "parts", "primitives"]
 
 PARTS: Final = 8
 """Hulls that a mesh is covered by, where `parts` is asked for without a number."""
 
 
 @dataclass(frozen=True)
-class Solids:
+class MeshCover:
     """What stands for the collision meshes of links; other shapes count as they are.
 
     Args:
         cover: `hull`: the convex hull of each mesh; `parts`: hulls of groups of its
             triangles; `primitives`: a ball, capsule or box that holds it.
-        parts: Hulls of one mesh.
+        parts: Hulls of one mesh, 1 to 256.
+
+    Raises:
+        InvalidInput: If there is no such cover.
     """
 
-    cover: MeshCover = "hull"
+    cover: CoverKind = "hull"
     parts: int = PARTS
+
+    def __post_init__(self) -> None:
+        """Refuse what is no cover."""
+        if self.cover not in get_args(CoverKind):
+            known = ", ".join(get_args(CoverKind))
+            message = f"cover is {self.cover!r}, expected one of {known}"
+            raise InvalidInput(message)
+        if not 1 <= self.parts <= MAX_PARTS:
+            message = f"parts is {self.parts}, expected 1 to {MAX_PARTS}"
+            raise InvalidInput(message)
 
     @property
     def words(self) -> str:
@@ -64,7 +77,7 @@ class Solids:
         return f"{meshes[self.cover]}; boxes, cylinders, spheres, capsules as they are"
 
 
-HULLS: Final = Solids()
+HULLS: Final = MeshCover()
 """The default."""
 
 
@@ -95,7 +108,7 @@ def find_mesh(name: str, urdf: Path, package_dirs: tuple[Path, ...]) -> Path | N
 
 @dataclass(frozen=True)
 class RobotFiles:
-    """A robot, by files and what is said of them; as `read_robot` takes it.
+    """A robot, by files and what is said of them.
 
     Args:
         urdf: The robot.
@@ -112,8 +125,16 @@ class RobotFiles:
     package_dirs: tuple[Path, ...] = ()
     lock: Mapping[str, float] = field(default_factory=dict)
     group: str | None = None
-    solids: Solids = HULLS
+    solids: MeshCover = HULLS
     joint_limits: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Take names of files for their paths."""
+        for name in ("urdf", "srdf", "joint_limits"):
+            if (file := getattr(self, name)) is not None:
+                object.__setattr__(self, name, Path(file))
+        folders = tuple(map(Path, self.package_dirs))
+        object.__setattr__(self, "package_dirs", folders)
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -121,7 +142,7 @@ class RobotFiles:
         return (self.urdf, *filter(None, (self.srdf, self.joint_limits)))
 
 
-def solids_of(bodies: MeshCover | None, parts: int | None) -> Solids:
+def solids_of(bodies: CoverKind | None, parts: int | None) -> MeshCover:
     """What stands for meshes; a number of parts alone asks for parts.
 
     Raises:
@@ -131,7 +152,7 @@ def solids_of(bodies: MeshCover | None, parts: int | None) -> Solids:
     if parts is not None and cover != "parts":
         message = f"parts is {parts} beside bodies {cover!r}, expected bodies 'parts'"
         raise InvalidInput(message)
-    return Solids(cover, parts or PARTS)
+    return MeshCover(cover, parts or PARTS)
 
 
 class RobotModel(FileModel):
@@ -154,7 +175,7 @@ class RobotModel(FileModel):
         description="Group of the SRDF whose joints a trajectory moves; the others "
         "stand where lock says, or at 0. Default: all move that are not locked.",
     )
-    bodies: MeshCover | None = Field(
+    bodies: CoverKind | None = Field(
         default=None,
         description="What stands for the mesh of a link: its hull, hulls of parts of "
         "it, or a ball, capsule or box around it (primitives). Default: hull.",

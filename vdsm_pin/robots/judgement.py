@@ -9,6 +9,7 @@ import numpy as np
 from vdsm_pin.errors import VdsmError
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.winding import Side
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import Proof, prove
@@ -73,13 +74,13 @@ class RobotVerification(Verification):
         problem: The robot, its obstacles, the clearances asked for.
         trajectory: What was judged.
         least: The least clearance of every pair.
-        notes: Of the trajectory's file, a sentence each.
+        motion: The waypoints it was made of; None where a path alone was given.
     """
 
     problem: Cell
     trajectory: Path
     least: LeastClearances
-    notes: tuple[str, ...] = ()
+    motion: JointTrajectory | None = None
 
 
 def verify_robot(

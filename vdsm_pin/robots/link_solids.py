@@ -14,7 +14,7 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray, rotation_from_rpy
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.geometry.solids import BOX_CORNERS
 from vdsm_pin.io.mesh_file import read_mesh
-from vdsm_pin.robots.files import HULLS, Solids, find_mesh
+from vdsm_pin.robots.files import HULLS, MeshCover, find_mesh
 from vdsm_pin.robots.hulls import covering_hull, covering_primitive
 
 LARGEST_LINK: Final = 20.0
@@ -38,7 +38,7 @@ class LinkReader:
 
     path: Path
     package_dirs: tuple[Path, ...] = ()
-    solids: Solids = HULLS
+    solids: MeshCover = HULLS
     covers: dict[str, list[MeshPieces]] = field(default_factory=dict)
 
     def pieces(self, link: ET.Element) -> tuple[LinkPiece, ...]:

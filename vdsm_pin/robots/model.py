@@ -14,7 +14,7 @@ from vdsm_pin.io.tables import listed
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.packed_tree import TreePoses
 from vdsm_pin.proof.tree import Tree
-from vdsm_pin.robots.files import HULLS, Solids
+from vdsm_pin.robots.files import HULLS, MeshCover
 from vdsm_pin.robots.srdf import Base
 
 Values: TypeAlias = Mapping[str, tuple[int | None, float, float]]
@@ -109,7 +109,7 @@ class Robot:
     held: tuple[tuple[int, int], ...]
     left_out: tuple[LeftOut, ...]
     base: Base | None = None
-    solids: Solids = HULLS
+    solids: MeshCover = HULLS
     notes: tuple[str, ...] = ()
     more_files: tuple[Path, ...] = ()
     covers: Mapping[str, Sequence[tuple[IntArray, ...] | Hull]] = field(

@@ -7,7 +7,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io.joint_trajectory import finite_numbers
+from vdsm_pin.io.trajectory_messages import finite_numbers
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
 
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io.joint_trajectory import JointTrajectory
 from vdsm_pin.io.source import readable
 from vdsm_pin.io.tables import BETWEEN, Table, listed, open_text, quoted, split
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.robots.model import Robot, RobotJoint, Values
 from vdsm_pin.units import MM_PER_M
 

@@ -10,14 +10,10 @@ import numpy as np
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.bags import is_bag, read_bag
-from vdsm_pin.io.joint_trajectory import (
-    ENDINGS,
-    STILL,
-    JointTrajectory,
-    read_joint_trajectory,
-)
 from vdsm_pin.io.source import check_is_file
 from vdsm_pin.io.tables import listed
+from vdsm_pin.io.trajectory_messages import ENDINGS, STILL, read_joint_trajectory
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.robots.model import Robot, RobotJoint, Values
 from vdsm_pin.robots.trajectory_csv import csv_text, read_csv
 
@@ -63,6 +59,23 @@ def read_motion(
             whole = read_joint_trajectory(file)
         else:
             whole = read_csv(file, joints, values)
+    return moved(whole, joints, values, file)
+
+
+def moved(
+    whole: JointTrajectory, joints: Sequence[RobotJoint], values: Values, file: File
+) -> JointTrajectory:
+    """The columns of the joints that move, checked as those of any file.
+
+    Args:
+        whole: With any other joints beside.
+        joints: Those that move.
+        values: As of `read_motion`.
+        file: For messages.
+
+    Raises:
+        InvalidFile: As of `read_motion`.
+    """
     found = _of_joints(file, whole, joints)
     unstated = [joint for joint in joints if joint.name not in whole.in_degrees]
     _check_units(file, found.of([joint.name for joint in unstated]).q, unstated)
@@ -145,17 +158,11 @@ def path_of(file: File, motion: JointTrajectory) -> "Path":
     """The pieces through some waypoints.
 
     Raises:
-        InvalidFile: If times do not rise.
+        InvalidFile: If times do not rise, or a piece is not finite.
     """
-    from vdsm_pin.proof.paths import Path, cubic_path, quintic_path
-
     _check_times(file, motion.times)
     try:
-        if motion.times is None or motion.rates is None:
-            return Path(motion.q, times=motion.times)
-        if motion.changes is None:
-            return cubic_path(motion.q, motion.rates, motion.times)
-        return quintic_path(motion.q, motion.rates, motion.changes, motion.times)
+        return motion.path
     except ValueError as error:
         raise InvalidFile(file=file, problem=str(error)) from None
 

@@ -9,7 +9,7 @@ from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.tables import listed
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.tree import Tree
-from vdsm_pin.robots.files import HULLS, RobotFiles, Solids
+from vdsm_pin.robots.files import HULLS, MeshCover, RobotFiles
 from vdsm_pin.robots.joint_limits import read_limits
 from vdsm_pin.robots.joints import JointReader, Moving
 from vdsm_pin.robots.link_solids import LinkReader
@@ -25,7 +25,7 @@ def read_robot(
     package_dirs: tuple[Path, ...] = (),
     lock: Mapping[str, float] | None = None,
     group: str | None = None,
-    solids: Solids = HULLS,
+    solids: MeshCover = HULLS,
     joint_limits: Path | None = None,
 ) -> Robot:
     """The robot of a URDF.

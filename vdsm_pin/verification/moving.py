@@ -12,6 +12,7 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Moving, Scene
 from vdsm_pin.problem.trajectory import Trajectory
@@ -46,7 +47,7 @@ def frames_beside(tree: Tree, scene: Scene) -> list[int]:
     ]
 
 
-def untimed(scene: Scene, trajectory: Trajectory | Path) -> str:
+def untimed(scene: Scene, trajectory: Trajectory | JointTrajectory | Path) -> str:
     """Why a motion cannot be judged beside what moves; empty where it can."""
     if trajectory.times is not None or not scene.moving:
         return ""

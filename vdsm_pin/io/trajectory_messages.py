@@ -1,17 +1,16 @@
 """Trajectories of named joints: JointTrajectory and RobotTrajectory as YAML or JSON."""
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidFile
+from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_quaternion
 from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import read_yaml
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.trajectory import MAX_ROWS
 
 ENDINGS: Final = (".yaml", ".yml", ".json")
@@ -25,38 +24,6 @@ UNIT_NORM: Final = 1e-3
 MULTI: Final = "multi_dof_joint_trajectory"
 _FREE: Final = ("x", "y", "z", "yaw", "pitch", "roll")
 _NANO: Final = 1e-9
-
-
-@dataclass(frozen=True)
-class JointTrajectory:
-    """Waypoints of named joints.
-
-    Args:
-        names: One for each column.
-        q: Shape (n_rows, n_columns); [rad], [m].
-        times: Shape (n_rows,); [s]. None where not stated.
-        rates: As q; per [s]. None where not stated.
-        changes: As q; per [s^2]. None where not stated.
-        notes: What else a reader should know, a sentence each.
-        in_degrees: Joints whose unit the file states as degrees.
-    """
-
-    names: tuple[str, ...]
-    q: FloatArray
-    times: FloatArray | None = None
-    rates: FloatArray | None = None
-    changes: FloatArray | None = None
-    notes: tuple[str, ...] = ()
-    in_degrees: tuple[str, ...] = ()
-
-    def of(self, names: Sequence[str]) -> "JointTrajectory":
-        """The columns of some of its joints, in their order."""
-        order = [self.names.index(name) for name in names]
-        parts = (self.rates, self.changes)
-        rates, changes = (None if part is None else part[:, order] for part in parts)
-        return JointTrajectory(
-            tuple(names), self.q[:, order], self.times, rates, changes
-        )
 
 
 def read_joint_trajectory(file: Path) -> JointTrajectory:
@@ -132,15 +99,10 @@ def _single(file: Path, message: dict[str, Any]) -> JointTrajectory:
     rates = _values(file, points, "velocities", len(names))
     changes = _values(file, points, "accelerations", len(names))
     times = _times(file, points)
-    for key, values, needs in (
-        ("velocities", rates, "times"),
-        ("accelerations", changes, "velocities and times"),
-    ):
-        lacks = times is None or (values is changes and rates is None)
-        if values is not None and values.any() and len(q) > 1 and lacks:
-            problem = f"has {key}, expected {needs} too"
-            raise InvalidFile(file=file, where="points", problem=problem)
-    return JointTrajectory(names, q, times, rates, changes)
+    try:
+        return JointTrajectory(names, q, times, rates, changes)
+    except InvalidInput as error:
+        raise InvalidFile(file=file, where="points", problem=str(error)) from None
 
 
 def _values(file: Path, points: list[Any], key: str, count: int) -> FloatArray | None:
@@ -268,7 +230,11 @@ def _together(
     elif not np.array_equal(one.times, times):
         problem = "has other times than joint_trajectory"
         raise InvalidFile(file=file, where=MULTI, problem=problem)
-    return JointTrajectory(one.names + other.names, np.hstack([one.q, other.q]), times)
+    q = np.hstack([one.q, other.q])
+    try:
+        return JointTrajectory(one.names + other.names, q, times)
+    except InvalidInput as error:
+        raise InvalidFile(file=file, where=MULTI, problem=str(error)) from None
 
 
 def message_of(motion: JointTrajectory) -> dict[str, Any]:

@@ -1,0 +1,111 @@
+"""A trajectory of named joints, of any robot."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray, freeze
+
+if TYPE_CHECKING:
+    from vdsm_pin.proof.paths import Path
+
+
+@dataclass(frozen=True, eq=False)
+class JointTrajectory:
+    """Waypoints of named joints.
+
+    Straight lines join them; cubic pieces where there are times and rates, and quintic
+    ones where there are changes of the rates too, as trajectory controllers run them.
+
+    Args:
+        names: One for each column.
+        q: Shape (n_rows, n_columns), at least one row; [rad], [m].
+        times: Shape (n_rows,), rising; [s]. None where not known.
+        rates: Velocities, as q; per [s]. None where not known.
+        changes: Accelerations, as q; per [s^2]. None where not known.
+        notes: What else a reader should know, a sentence each.
+        in_degrees: Joints whose unit the file states as degrees.
+
+    Raises:
+        InvalidInput: If shapes disagree, a name is there twice, velocities lack times,
+            or accelerations lack velocities.
+
+    Example:
+        >>> both = JointTrajectory(("shoulder", "elbow"), [[0.0, 0.0], [1.0, 0.5]])
+        >>> both.path.n_intervals
+        1
+    """
+
+    names: tuple[str, ...]
+    q: FloatArray
+    times: FloatArray | None = None
+    rates: FloatArray | None = None
+    changes: FloatArray | None = None
+    notes: tuple[str, ...] = ()
+    in_degrees: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays and check their shapes."""
+        freeze(self, "q", "times", "rates", "changes")
+        object.__setattr__(self, "names", tuple(self.names))
+        names, q = self.names, self.q
+        if q.ndim != 2 or not len(q) or q.shape[1] != len(names):
+            expected = f"(1 or more, {len(names)})"
+            message = f"positions have shape {q.shape}, expected {expected}"
+            raise InvalidInput(message)
+        if len(set(names)) < len(names):
+            message = f"joint names are {', '.join(names)}, expected each once"
+            raise InvalidInput(message)
+        shapes = {"times": q.shape[:1], "rates": q.shape, "changes": q.shape}
+        for name, shape in shapes.items():
+            values = getattr(self, name)
+            if values is not None and values.shape != shape:
+                message = f"{name} have shape {values.shape}, expected {shape}"
+                raise InvalidInput(message)
+        self._check_smooth()
+
+    def _check_smooth(self) -> None:
+        """Refuse rates that no piece would take, unless nothing moves.
+
+        Raises:
+            InvalidInput: If times or velocities are missing.
+        """
+        for what, values, needed in (
+            ("velocities", self.rates, {"times": self.times}),
+            (
+                "accelerations",
+                self.changes,
+                {"velocities": self.rates, "times": self.times},
+            ),
+        ):
+            lacks = " and ".join(key for key, known in needed.items() if known is None)
+            if lacks and values is not None and values.any() and len(self.q) > 1:
+                message = f"has {what}, expected {lacks} too"
+                raise InvalidInput(message)
+
+    @cached_property
+    def path(self) -> "Path":
+        """The pieces through the waypoints.
+
+        Raises:
+            ValueError: If times do not rise, or a value is not finite.
+        """
+        # Whoever reads waypoints alone needs no pieces.
+        from vdsm_pin.proof.paths import Path, cubic_path, quintic_path
+
+        if self.times is None or self.rates is None:
+            return Path(self.q, times=self.times)
+        if self.changes is None:
+            return cubic_path(self.q, self.rates, self.times)
+        return quintic_path(self.q, self.rates, self.changes, self.times)
+
+    def of(self, names: Sequence[str]) -> "JointTrajectory":
+        """The columns of some of its joints, in their order."""
+        order = [self.names.index(name) for name in names]
+        parts = (self.rates, self.changes)
+        rates, changes = (None if part is None else part[:, order] for part in parts)
+        return JointTrajectory(
+            tuple(names), self.q[:, order], self.times, rates, changes
+        )
