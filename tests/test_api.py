@@ -151,6 +151,16 @@ def test_arguments_of_another_kind_are_refused_in_a_sentence() -> None:
             call()
 
 
+def test_errors_are_equal_in_whatever_units_they_were_stated() -> None:
+    stated = vp.ErrorBox(joint_deg=[0.5, 0.1], base_mm=2.0, obstacles_mm={"ball": 1.0})
+    kept = in_python().under(stated).errors
+    assert type(kept) is not type(stated)
+    assert kept == stated
+    assert {kept, stated} == {stated}
+    assert kept != vp.ErrorBox(base_mm=2.0)
+    assert kept != 0.002
+
+
 def test_results_show_themselves_in_a_few_lines() -> None:
     problem = in_python("<b>&")
     plan = vp.plan(problem)

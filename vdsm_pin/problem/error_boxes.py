@@ -1,7 +1,7 @@
 """How far a real motion, its base and its obstacles may be off what was asked about."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from itertools import zip_longest
 from numbers import Real
 from types import MappingProxyType
@@ -63,7 +63,7 @@ class JointError:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ErrorBox:
     """How far the real motion may stray from the nominal one.
 
@@ -107,6 +107,14 @@ class ErrorBox:
                     f"{name.replace('_', ' ')} error is {value}, expected 0 or more"
                 )
                 raise InvalidInput(message)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the errors are the same, in whatever units they were stated."""
+        return isinstance(other, ErrorBox) and astuple(self) == astuple(other)
+
+    def __hash__(self) -> int:
+        """Of the errors."""
+        return hash(astuple(self))
 
     def with_joint(self, joint: float) -> "ErrorBox":
         """The same with one error of all joint angles; [rad]."""
