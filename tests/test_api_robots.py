@@ -136,7 +136,9 @@ def test_a_motion_is_repaired(files: vp.RobotFiles) -> None:
         vp.repair_trajectory(hit, SWEEP)
 
 
-def test_what_is_of_no_robot_is_refused_in_a_sentence(cell: vp.Cell) -> None:
+def test_what_is_of_no_robot_is_refused_in_a_sentence(
+    files: vp.RobotFiles, cell: vp.Cell
+) -> None:
     arm, turn = vp.read_problem("paper/free"), ("turn",)
     still = vp.Trajectory([False], [0.0], [0.0], np.zeros((1, 8)), np.zeros((1, 8)))
     late = replace(SWEEP, times=np.array([1.0, 0.5]))
@@ -154,6 +156,9 @@ def test_what_is_of_no_robot_is_refused_in_a_sentence(cell: vp.Cell) -> None:
         "each once": lambda: vp.JointTrajectory(2 * turn, np.zeros((1, 2))),
         "with problem=": lambda: vp.write_trajectory("t.csv", SWEEP),
         "expected 0 or more": lambda: replace(cell, required_clearance=-1.0),
+        "required_clearance has text": lambda: replace(cell, required_clearance="5"),  # type: ignore[arg-type]
+        "scene is a list": lambda: vp.cell_of(files, [BALL]),  # type: ignore[arg-type]
+        "joint 'elbow'": lambda: vp.cell_of(replace(files, lock={"elbow": 0.0})),
         "no rigid motion": lambda: replace(cell, T_world_base=2.0 * np.eye(4)),
         "one of hull": lambda: vp.MeshCover("hulls"),  # type: ignore[arg-type]
     }

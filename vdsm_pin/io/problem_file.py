@@ -56,7 +56,9 @@ def read_problem(name_or_path: str | Path) -> PlanningProblem:
     if isinstance(document.data, dict) and "robot" in document.data:
         line = document.line(("robot",))
         where = "robot" if line is None else f"robot (line {line})"
-        others = "verify, repair, convert and batch --trajectories"
+        others = (
+            "verify, repair, convert, batch --trajectories and, from Python, read_cell"
+        )
         what = f"is for {others} only; expected manipulator"
         raise ProblemOfRobot(file=path, where=where, problem=what)
     try:

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, frozen, is_rigid
+from vdsm_pin.geometry.arrays import FloatArray, check_numbers, freeze, frozen, is_rigid
 from vdsm_pin.geometry.solids import ConvexCover, Solid
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -69,6 +69,8 @@ class Cell(Summarised):
 
     def __post_init__(self) -> None:
         """Check clearances, pose and errors."""
+        freeze(self, "T_world_base")
+        check_numbers(self, "required_clearance", "required_self_clearance")
         if not is_rigid(self.T_world_base):
             message = "T_world_base is no rigid motion, shape (4, 4)"
             raise InvalidInput(message)
@@ -207,6 +209,9 @@ def cell_of(
     of_files: Named = ()
     if scene is None or isinstance(scene, Scene):
         solids = scene or Scene()
+    elif not isinstance(scene, str | Path):
+        message = f"scene is a {type(scene).__name__}, expected a Scene or its file"
+        raise InvalidInput(message)
     else:
         file = Path(scene)
         solids, of_files = read_scene_with_files(file, _size(read), _others(read))
