@@ -81,6 +81,11 @@ def _stroke(joint: Joint, reach: FloatArray | None) -> float:
     return abs(joint.ratio) * most + abs(joint.offset)
 
 
+def strokes(tree: Tree, reach: FloatArray | None) -> FloatArray:
+    """The same of every joint, shape (n_joints,); [m]."""
+    return np.array([_stroke(joint, reach) for joint in tree.joints])
+
+
 def pack_tree(tree: Tree, reach: FloatArray | None = None) -> PackedTree:
     """The joints as compiled code reads them; axes along -x are taken along x.
 
@@ -109,7 +114,7 @@ def pack_tree(tree: Tree, reach: FloatArray | None = None) -> PackedTree:
         column=np.array(columns, dtype=np.int64),
         ratio=np.array(ratio) * sense,
         offset=np.array([joint.offset for joint in joints]) * sense,
-        stroke=np.array([_stroke(joint, reach) for joint in joints]),
+        stroke=strokes(tree, reach),
     )
 
 

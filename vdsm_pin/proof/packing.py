@@ -10,7 +10,7 @@ from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.error_box import ErrorBox
-from vdsm_pin.proof.packed_tree import PRISMATIC, PackedTree, pack_tree
+from vdsm_pin.proof.packed_tree import PRISMATIC, PackedTree, pack_tree, strokes
 from vdsm_pin.proof.terms import (
     LINKS,
     OBSTACLES,
@@ -278,6 +278,19 @@ def pack_task(
     exact = way_errors(joints, ways, blank, blank, blank)
     task = Task(pieces, joints, ways, exact, places, moving, packed, rules)
     return _erring(task, exact, np.zeros(n))
+
+
+def for_motion(task: Task, tree: Tree, reach: FloatArray, rules: Rules) -> Task:
+    """The same about a motion, of which errors are to be told by `with_errors`.
+
+    Args:
+        task: What is asked.
+        tree: Its joints.
+        reach: How large each column of q gets, shape (n_columns,).
+        rules: What may be assumed.
+    """
+    joints = task.tree._replace(stroke=strokes(tree, reach))
+    return task._replace(tree=joints, rules=rules)
 
 
 def with_errors(task: Task, box: ErrorBox) -> Task:

@@ -12,17 +12,15 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
-from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
-from vdsm_pin.proof.budget import Budget, rounding_pad
+from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, OWN, TIME, UP
-from vdsm_pin.proof.packing import pack_task, with_errors
-from vdsm_pin.proof.parts import PartPlan, planned_parts
+from vdsm_pin.proof.parts import PartPlan
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.proving import Proving, new_proving
+from vdsm_pin.proof.proving import Proving
+from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.results import Results
-from vdsm_pin.proof.rough import with_rough
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.proof.tree import Tree
 
@@ -69,17 +67,6 @@ class Proof:
         return bool(self.verdict.size and (self.verdict == CERTIFIED).all())
 
 
-def _extent(tree: Tree, path: Path, pieces: PackedPieces) -> float:
-    """Bound of all lengths and coordinates; [m]."""
-    far = 0.0
-    for joint in tree.joints:
-        far += float(np.linalg.norm(np.asarray(joint.placement)[:3, 3]))
-        moved = 0.0 if joint.column is None else path.reach[joint.column]
-        far += abs(joint.ratio) * float(moved) + abs(joint.offset)
-    values = (pieces.points, pieces.centre, pieces.extent, pieces.radius)
-    return far + max(float(np.abs(x).max(initial=0.0)) for x in values)
-
-
 def start_proof(
     tree: Tree,
     bodies: Sequence[Body],
@@ -90,44 +77,8 @@ def start_proof(
     columns: IntArray | None = None,
 ) -> tuple[Proving, PartPlan]:
     """Everything ready, nothing judged; arguments as for `prove`."""
-    _check(tree, bodies, path)
-    budget, plan = budget or Budget(), planned_parts(tree, bodies, pairs)
-    rough = with_rough(plan.bodies, plan.pairs)
-    number, every = plan.number[rough.original], rough.bodies
-    pieces = pack_pieces([body.pieces for body in every])
-    rules = budget.rules(rounding_pad(_extent(tree, path, pieces)))
-    count = 1 if columns is None else int(columns.max(initial=0)) + 1
-    columns = None if columns is None else columns[number]
-    task = pack_task(tree, every, rough.pairs, rules, path.reach, columns, pieces)
-    if errors is not None:
-        surfaces = errors.surfaces
-        if surfaces is not None:
-            surfaces = np.asarray(surfaces, dtype=np.float64)[number]
-        task = with_errors(
-            task, ErrorBox(errors.joints, errors.shifts, errors.tilts, surfaces)
-        )
-    return new_proving(task, path.packed(), count, plan.n_obstacles, budget), plan
-
-
-def _check(tree: Tree, bodies: Sequence[Body], path: Path) -> None:
-    """Refuse what does not fit together.
-
-    Raises:
-        ValueError: If a body rides on no frame of the tree, has no piece, or the path
-            has other columns than the tree.
-    """
-    for body in bodies:
-        if not 0 <= body.frame < tree.n_frames or not len(body.pieces):
-            message = (
-                f"body {body.name!r} has {len(body.pieces)} pieces on frame "
-                f"{body.frame}, expected at least one and a frame below {tree.n_frames}"
-            )
-            raise ValueError(message)
-    if path.knots.shape[1] != tree.n_columns:
-        message = (
-            f"the path has {path.knots.shape[1]} columns, the tree {tree.n_columns}"
-        )
-        raise ValueError(message)
+    asked = Question.of(tree, bodies, pairs, errors, columns)
+    return asked.about(path, budget), asked.plan
 
 
 def prove(
@@ -158,9 +109,14 @@ def prove(
         ValueError: If bodies, pairs, path and tree do not fit together.
     """
     table = pairs if isinstance(pairs, PairTable) else PairTable.of(pairs)
-    proving, plan = start_proof(tree, bodies, path, table, errors, budget, columns)
+    return answer(Question.of(tree, bodies, table, errors, columns), path, budget)
+
+
+def answer(question: Question, path: Path, budget: Budget | None = None) -> Proof:
+    """`prove` of what is packed already."""
+    proving = question.about(path, budget)
     in_time = proving.run()
-    return summed(proving.results, plan, table.size, in_time)
+    return summed(proving.results, question.plan, question.n_pairs, in_time)
 
 
 def verdicts_of(counts: IntArray) -> IntArray:

@@ -16,11 +16,12 @@ from vdsm_pin.notebook import Summarised
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.problem.scene import Obstacle, Scene, solid_of
-from vdsm_pin.proof.bodies import Body, Pair
+from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.packed_tree import TreePoses
+from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.contacts import Placed
-from vdsm_pin.robots.errors import check_errors
+from vdsm_pin.robots.errors import check_errors, proof_box
 from vdsm_pin.robots.files import Named, RobotFiles, read_cell_file, source_of
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.other_robots import OtherRobot, read_other
@@ -120,6 +121,13 @@ class Cell(Summarised):
         pairs = [Pair(k, b, required) for k in outer for b in range(n)]
         own = self.required_self_clearance
         return pairs + [Pair(i, k, own) for i, k in self.robot.held]
+
+    @cached_property
+    def question(self) -> Question:
+        """All pairs under the errors, packed for any motion."""
+        pairs, columns = PairTable.of(self.pairs), np.arange(len(self.bodies))
+        box = proof_box(self.robot, self.scene, self.errors)
+        return Question.of(self.tree, self.bodies, pairs, box, columns)
 
     @cached_property
     def coal(self) -> CoalShapes:

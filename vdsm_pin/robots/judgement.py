@@ -12,7 +12,7 @@ from vdsm_pin.geometry.winding import Side
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import Proof, prove
+from vdsm_pin.proof.prover import Proof, answer, prove
 from vdsm_pin.proof.terms import REFUTED
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.clearances import (
@@ -95,10 +95,10 @@ def verify_robot(
         contacts: Whether to look for when bodies first and last come too close.
     """
     robot = cell.robot
-    columns, budget = np.arange(len(cell.bodies)), Budget(until=deadline.end)
+    budget = Budget(until=deadline.end)
     box = proof_box(robot, cell.scene, cell.errors)
     whole, knots = in_short_parts(*path_beside(path, cell.scene))
-    proof = prove(cell.tree, cell.bodies, whole, cell.pairs, box, budget, columns)
+    proof = answer(cell.question, whole, budget)
     located = locate_links(cell, whole, box, budget)
     named = named_pairs(cell)
     proved = least_clearances(cell, cell.pairs, whole, proof)

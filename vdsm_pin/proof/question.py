@@ -1,0 +1,117 @@
+"""What is asked of every motion of a tree: bodies and pairs, packed once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import IntArray
+from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
+from vdsm_pin.proof.bodies import Body, PairTable
+from vdsm_pin.proof.budget import Budget, rounding_pad
+from vdsm_pin.proof.error_box import ErrorBox
+from vdsm_pin.proof.packing import for_motion, pack_task, with_errors
+from vdsm_pin.proof.parts import PartPlan, planned_parts
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.proving import Proving, new_proving
+from vdsm_pin.proof.rough import with_rough
+from vdsm_pin.proof.terms import Task
+from vdsm_pin.proof.tree import Tree
+
+
+@dataclass(frozen=True)
+class Question:
+    """Pairs of bodies on a tree under errors, ready to be asked about motions.
+
+    Args:
+        tree: The joints.
+        plan: How the pairs are asked.
+        n_pairs: Their number.
+        task: The same as compiled code reads it, without errors and of no motion.
+        errors: Of joints, placements and of the packed bodies' surfaces.
+        n_columns: Columns of a profile.
+        extent: Bound of all lengths and coordinates where q is 0; [m].
+    """
+
+    tree: Tree
+    plan: PartPlan
+    n_pairs: int
+    task: Task
+    errors: ErrorBox
+    n_columns: int
+    extent: float
+
+    @classmethod
+    def of(
+        cls,
+        tree: Tree,
+        bodies: Sequence[Body],
+        pairs: PairTable,
+        errors: ErrorBox | None = None,
+        columns: IntArray | None = None,
+    ) -> "Question":
+        """Pack it; arguments as for `prove`.
+
+        Raises:
+            ValueError: If bodies, pairs and tree do not fit together.
+        """
+        _check(tree, bodies)
+        plan = planned_parts(tree, bodies, pairs)
+        rough = with_rough(plan.bodies, plan.pairs)
+        number, every = plan.number[rough.original], rough.bodies
+        pieces = pack_pieces([body.pieces for body in every])
+        count = 1 if columns is None else int(columns.max(initial=0)) + 1
+        columns = None if columns is None else columns[number]
+        extent, rules = _extent(tree, pieces), Budget().rules(0.0)
+        task = pack_task(tree, every, rough.pairs, rules, None, columns, pieces)
+        box = errors or ErrorBox(*np.zeros((3, len(tree.joints))))
+        if box.surfaces is not None:
+            surfaces = np.asarray(box.surfaces, dtype=np.float64)[number]
+            box = ErrorBox(box.joints, box.shifts, box.tilts, surfaces)
+        return cls(tree, plan, pairs.size, task, box, count, extent)
+
+    def about(self, path: Path, budget: Budget | None = None) -> Proving:
+        """The question about a motion, nothing judged.
+
+        Raises:
+            ValueError: If the path has other columns than the tree.
+        """
+        tree, budget = self.tree, budget or Budget()
+        if path.knots.shape[1] != tree.n_columns:
+            message = (
+                f"the path has {path.knots.shape[1]} columns, the tree {tree.n_columns}"
+            )
+            raise ValueError(message)
+        reach, extent = path.reach, self.extent
+        for joint in tree.joints:
+            if joint.column is not None:
+                extent += abs(joint.ratio) * float(reach[joint.column])
+        rules = budget.rules(rounding_pad(extent))
+        task = for_motion(self.task, tree, reach, rules)
+        asked = with_errors(task, self.errors), path.packed(), self.n_columns
+        return new_proving(*asked, self.plan.n_obstacles, budget)
+
+
+def _extent(tree: Tree, pieces: PackedPieces) -> float:
+    """Bound of all lengths and coordinates where q is 0; [m]."""
+    far = 0.0
+    for joint in tree.joints:
+        far += float(np.linalg.norm(np.asarray(joint.placement)[:3, 3]))
+        far += abs(joint.offset)
+    values = (pieces.points, pieces.centre, pieces.extent, pieces.radius)
+    return far + max(float(np.abs(x).max(initial=0.0)) for x in values)
+
+
+def _check(tree: Tree, bodies: Sequence[Body]) -> None:
+    """Refuse what does not fit together.
+
+    Raises:
+        ValueError: If a body rides on no frame of the tree or has no piece.
+    """
+    for body in bodies:
+        if not 0 <= body.frame < tree.n_frames or not len(body.pieces):
+            message = (
+                f"body {body.name!r} has {len(body.pieces)} pieces on frame "
+                f"{body.frame}, expected at least one and a frame below {tree.n_frames}"
+            )
+            raise ValueError(message)
