@@ -10,7 +10,7 @@ to its skin, so that the sign of a body in a mesh has to come from elsewhere.
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -48,8 +48,7 @@ class CoalBody:
     pose: Any
 
 
-@dataclass(frozen=True, eq=False)
-class Measured:
+class Measured(NamedTuple):
     """What Coal says about two bodies.
 
     Args:
@@ -311,5 +310,5 @@ def _usable(distance: float, stored: float, near: FloatArray, far: FloatArray) -
         return False
     if distance <= 0.0:
         return True
-    excess = abs(math.dist(near, far) - distance)
+    excess = abs(math.dist(near.tolist(), far.tolist()) - distance)
     return excess <= TOLERANCES.coal_agreement

@@ -60,26 +60,30 @@ def disagreement(
 
 
 class _Parts(NamedTuple):
-    """Parts of a body in its frame.
+    """Parts of the bodies that are placed, one body after the other.
 
     Args:
+        first: Where each body's parts start, shape (n_bodies + 1,).
         shapes: A coal.CollisionGeometry each.
-        rotations: Shape (n_parts, 3, 3); [-].
+        rotations: In their body's frame, shape (n_parts, 3, 3); [-].
         shifts: Shape (n_parts, 3); [m].
     """
 
+    first: IntArray
     shapes: list[Any]
     rotations: FloatArray
     shifts: FloatArray
 
     @classmethod
-    def of(cls, parts: CoalObstacle) -> "_Parts":
-        """Those of a body that is no cloud."""
-        assert not isinstance(parts, CoalCloud)  # an obstacle is the other one
+    def of(cls, bodies: Sequence[CoalObstacle | None]) -> "_Parts":
+        """Those of all bodies; clouds have none, they are never placed."""
+        clouds_too = [() if isinstance(b, CoalCloud) else b or () for b in bodies]
+        parts = [part for each in clouds_too for part in each]
         return cls(
+            np.cumsum([0, *map(len, clouds_too)]),
             [part.geometry for part in parts],
-            np.array([part.pose.getRotation() for part in parts]),
-            np.array([part.pose.getTranslation() for part in parts]),
+            np.array([part.pose.getRotation() for part in parts]).reshape(-1, 3, 3),
+            np.array([part.pose.getTranslation() for part in parts]).reshape(-1, 3),
         )
 
 
@@ -95,7 +99,7 @@ class CoalShapes:
         self, frames: Sequence[int], bodies: Sequence[CoalObstacle | None]
     ) -> None:
         self._bodies, self._frames = bodies, np.array(frames, np.int64)
-        self._parts = dict[int, _Parts | None]()
+        self._parts = _Parts.of(bodies)
 
     def distances(self, poses: FloatArray, sides: Sides) -> Distances:
         """Coal's distance of each pair.
@@ -104,53 +108,49 @@ class CoalShapes:
             poses: T_base_frame at some rows, shape (n_rows, n_frames, 3, 4); [m].
             sides: The pairs.
         """
-        count = len(sides.row)
-        found = Distances(np.full(count, np.nan), *np.full((2, count, 3), np.nan))
-        for body in dict.fromkeys(sides.one.tolist()):
-            parts = self._parts_of(body)
-            if parts is not None:
-                mine = np.flatnonzero(sides.one == body)
-                self._measure(parts, poses, sides, mine, found)
-        return found
-
-    def _parts_of(self, body: int) -> _Parts | None:
-        """Those of a body that is placed, made once."""
-        if body not in self._parts:
-            bodies = self._bodies[body]
-            self._parts[body] = None if bodies is None else _Parts.of(bodies)
-        return self._parts[body]
-
-    def _measure(
-        self,
-        parts: _Parts,
-        poses: FloatArray,
-        sides: Sides,
-        mine: IntArray,
-        found: Distances,
-    ) -> None:
-        """Measure the pairs `mine` of one body and write what is found."""
         import coal
 
-        row, one, other = (side[mine] for side in sides)
-        frame, rest = (poses[row, self._frames[body]] for body in (one, other))
-        turns = frame[:, None, :, :3] @ parts.rotations
-        shifts = np.einsum("nij,pj->npi", frame[..., :3], parts.shifts)
-        shifts += frame[:, None, :, 3]
-        if self._frames[other].any():  # seen from others than those at rest
-            back = rest[:, :, :3].swapaxes(1, 2)[:, None]
+        count, first = len(sides.row), self._parts.first
+        found = Distances(np.full(count, np.nan), *np.full((2, count, 3), np.nan))
+        # Every part of every first body, pair by pair.
+        n_parts = first[sides.one + 1] - first[sides.one]
+        pair = np.repeat(np.arange(count), n_parts)
+        within = np.arange(pair.size) - np.repeat(np.cumsum(n_parts) - n_parts, n_parts)
+        part = first[sides.one][pair] + within
+        places = self._places(poses, Sides(*(side[pair] for side in sides)), part)
+        request, best = distance_request(), [NOTHING] * count
+        calls = zip(pair.tolist(), part.tolist(), *places, strict=True)
+        other = sides.other.tolist()
+        for k, number, *place in calls:
+            partner = self._bodies[other[k]]
+            if partner is not None:
+                shape, pose = self._parts.shapes[number], coal.Transform3s(*place)
+                answer = measure(request, shape, pose, partner)
+                if answer.distance < best[k].distance:
+                    best[k] = answer
+        for k in np.flatnonzero(n_parts).tolist():
+            if self._bodies[other[k]] is not None:
+                found.distance[k], found.near[k], found.far[k] = best[k]
+        return found
+
+    def _places(
+        self, poses: FloatArray, sides: Sides, part: IntArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """R and p of parts as seen from the frames of their partners.
+
+        Args:
+            poses: As for `distances`.
+            sides: The pair of each.
+            part: The part of its first body, shape (m,).
+        """
+        frame = poses[sides.row, self._frames[sides.one]]
+        turns = frame[:, :, :3] @ self._parts.rotations[part]
+        shifts = np.einsum("nij,nj->ni", frame[..., :3], self._parts.shifts[part])
+        shifts += frame[..., 3]
+        seen_from = self._frames[sides.other]
+        if seen_from.any():  # others than those at rest
+            rest = poses[sides.row, seen_from]
+            back = rest[:, :, :3].swapaxes(1, 2)
             turns = back @ turns
-            shifts = (back @ (shifts - rest[:, None, :, 3])[..., None])[..., 0]
-        theirs = [self._bodies[k] for k in other.tolist()]
-        request, best = distance_request(), [NOTHING] * len(theirs)
-        for part, shape in enumerate(parts.shapes):
-            placed = zip(theirs, turns[:, part], shifts[:, part], strict=True)
-            for k, (partner, *pose) in enumerate(placed):
-                if partner is not None:
-                    answer = measure(request, shape, coal.Transform3s(*pose), partner)
-                    if answer.distance < best[k].distance:
-                        best[k] = answer
-        found.near[mine] = [one.near for one in best]
-        found.far[mine] = [one.far for one in best]
-        found.distance[mine] = [one.distance for one in best]
-        unknown = [partner is None for partner in theirs]
-        found.distance[mine[unknown]] = np.nan
+            shifts = (back @ (shifts - rest[..., 3])[..., None])[..., 0]
+        return turns, shifts
