@@ -47,8 +47,7 @@ def _kind(value: Any) -> Any:
         TypeError: If compiled code takes no such value.
     """
     given = type(value)
-    if given is np.ndarray and value.flags.num & _ALIGNED:
-        flags = value.flags.num
+    if given is np.ndarray and (flags := value.flags.num) & _ALIGNED:
         return value.dtype, value.ndim, flags & _C or flags & _FORTRAN, flags & _WRITE
     if given in _SCALARS:
         return _SCALARS[given]

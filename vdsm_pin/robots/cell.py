@@ -32,6 +32,7 @@ from vdsm_pin.units import MM_PER_M, in_mm
 from vdsm_pin.verification.coal_bodies import CoalObstacle, coal_bodies
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
 from vdsm_pin.verification.moving import frames_beside, tree_beside
+from vdsm_pin.verification.records import Pair as NamedPair
 
 ROOT_FRAME: Final = 1
 """The frame that obstacles stand in: of the root link, where it does not move."""
@@ -121,6 +122,20 @@ class Cell(Summarised):
         pairs = [Pair(k, b, required) for k in outer for b in range(n)]
         own = self.required_self_clearance
         return pairs + [Pair(i, k, own) for i, k in self.robot.held]
+
+    @cached_property
+    def named_pairs(self) -> tuple[NamedPair, ...]:
+        """The pairs by the names of their bodies, a link first."""
+        n, found = len(self.robot.bodies), []
+        for pair in self.pairs:
+            one, other = self.bodies[pair.one].name, self.bodies[pair.other].name
+            if pair.one >= n:
+                named = NamedPair(link=pair.other + 1, obstacle=one, body=other)
+            else:
+                both = {"body": one, "other_body": other}
+                named = NamedPair(pair.one + 1, other_link=pair.other + 1, **both)
+            found.append(named)
+        return tuple(found)
 
     @cached_property
     def question(self) -> Question:

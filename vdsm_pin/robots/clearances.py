@@ -15,32 +15,13 @@ from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.contacts import common_ball
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.moving import Knots
-from vdsm_pin.verification.records import LeastClearances, Pair
+from vdsm_pin.verification.records import LeastClearances
 
 MEETING: Final = 2.0 * TOLERANCES.bracket_gap
 """Bodies that come so near may meet; [m]."""
 
 BESIDE: Final = (0.0, 0.01, -0.01, 0.05, -0.05)
 """Where a ball in both is looked for, beside the moment at which bodies meet; [-]."""
-
-
-def named_pairs(cell: Cell) -> tuple[Pair, ...]:
-    """The pairs by the names of their bodies, a link first."""
-    n, found = len(cell.robot.bodies), []
-    for pair in cell.pairs:
-        one, other = cell.bodies[pair.one].name, cell.bodies[pair.other].name
-        if pair.one >= n:
-            found.append(Pair(link=pair.other + 1, obstacle=one, body=other))
-        else:
-            found.append(
-                Pair(
-                    link=pair.one + 1,
-                    other_link=pair.other + 1,
-                    body=one,
-                    other_body=other,
-                )
-            )
-    return tuple(found)
 
 
 def least_clearances(

@@ -19,7 +19,6 @@ from vdsm_pin.robots.clearances import (
     MEETING,
     least_clearances,
     least_in_rows,
-    named_pairs,
 )
 from vdsm_pin.robots.counterexamples import in_rows, robot_counterexamples
 from vdsm_pin.robots.errors import proof_box
@@ -65,6 +64,9 @@ POSE_ERROR: Final = 1e-9
 COMPARED: Final = 1000
 """Most waypoints at which poses are compared, spread evenly."""
 
+WIDTH: Final = 0.1
+"""How wide brackets may be but for the least one, as a part of the clearance; [-]."""
+
 
 @dataclass(frozen=True, repr=False, kw_only=True)
 class RobotVerification(Verification):
@@ -95,12 +97,12 @@ def verify_robot(
         contacts: Whether to look for when bodies first and last come too close.
     """
     robot = cell.robot
-    budget = Budget(until=deadline.end)
+    budget = Budget(until=deadline.end, slack=WIDTH)
     box = proof_box(robot, cell.scene, cell.errors)
     whole, knots = in_short_parts(*path_beside(path, cell.scene))
     proof = answer(cell.question, whole, budget)
     located = locate_links(cell, whole, box, budget)
-    named = named_pairs(cell)
+    named = cell.named_pairs
     proved = least_clearances(cell, cell.pairs, whole, proof)
     coal, measured = _coal(cell, whole, proof, knots)
     least, besides = enclosed_least(proved, points_inside(located), 0.0), Besides()
@@ -173,7 +175,7 @@ def _no_pair(cell: Cell) -> Check:
 
 def _is_clear(cell: Cell, path: Path, deadline: Deadline) -> bool:
     """Whether the motion is proved clear of everything, without errors."""
-    budget = Budget(until=deadline.end)
+    budget = Budget(until=deadline.end, slack=WIDTH)
     return prove(cell.tree, cell.bodies, path, cell.pairs, budget=budget).is_certified
 
 

@@ -3,7 +3,7 @@
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -33,23 +33,83 @@ def pose_difference(robot: Robot, q: FloatArray) -> FloatArray:
     """
     import pinocchio as pin
 
-    model = _model(robot.text, robot.base)
-    data, values = model.createData(), robot.tree.values(q)
-    ours = robot.poses(q)[:, [*robot.frames.values()]]
-    theirs = np.zeros_like(ours)
-    numbers = {name: model.getFrameId(name, pin.BODY) for name in robot.frames}
-    missing = [name for name, number in numbers.items() if number >= model.nframes]
-    if missing:
-        message = f"Pinocchio has no link {missing[0]!r}"
-        raise VerificationFailed(message)
+    known = _known(robot)
+    data, ours = known.model.createData(), robot.poses(q)[:, [*robot.frames.values()]]
+    theirs, full = np.zeros_like(ours), known.configurations(robot.tree.values(q))
     for row in range(len(q)):
-        full = _configuration(pin, model, robot, values[row])
-        pin.framesForwardKinematics(model, data, full)
-        theirs[row] = [data.oMf[number].homogeneous for number in numbers.values()]
+        pin.framesForwardKinematics(known.model, data, full[row])
+        theirs[row] = [data.oMf[number].homogeneous for number in known.links]
     return np.asarray(np.abs(theirs - ours).max(axis=(1, 2, 3)))
 
 
+class _Known(NamedTuple):
+    """A robot as Pinocchio has it.
+
+    Args:
+        model: Its model.
+        links: Frames of the robot's links.
+        neutral: Its q of joints at 0.
+        joints: Where each joint's part of q starts, and the tree's joints that it is:
+            one, or those of a joint that is planar or floats.
+    """
+
+    model: Any
+    links: list[int]
+    neutral: FloatArray
+    joints: list[tuple[int, int, list[int]]]
+
+    def configurations(self, values: FloatArray) -> FloatArray:
+        """Pinocchio's q of values of the tree's joints, a row each.
+
+        It has a cosine and a sine for an angle without limits, a quaternion for a frame
+        that floats.
+        """
+        import pinocchio as pin
+
+        full = np.tile(self.neutral, (len(values), 1))
+        for at, count, joints in self.joints:
+            own = values[:, joints]
+            if count == 1:
+                full[:, at] = own[:, 0]
+                continue
+            if count in (2, 4):
+                shifts, angle = own[:, :-1], own[:, -1]
+                own = np.column_stack([shifts, np.cos(angle), np.sin(angle)])
+            else:
+                turns = [pin.Quaternion(rotation_from_rpy(row)) for row in own[:, 3:]]
+                own = np.column_stack([own[:, :3], [one.coeffs() for one in turns]])
+            full[:, at : at + count] = own
+        return full
+
+
 @lru_cache(maxsize=KEPT)
+def _known(robot: Robot) -> _Known:
+    """A robot as Pinocchio has it.
+
+    Raises:
+        VerificationFailed: If Pinocchio refuses the URDF or has no such link.
+    """
+    import pinocchio as pin
+
+    model = _model(robot.text, robot.base)
+    links = [model.getFrameId(name, pin.BODY) for name in robot.frames]
+    for name, number in zip(robot.frames, links, strict=True):
+        if number >= model.nframes:
+            message = f"Pinocchio has no link {name!r}"
+            raise VerificationFailed(message)
+    place = {joint.name: k for k, joint in enumerate(robot.tree.joints)}
+    parts = {
+        4: ("/x", "/y", "/theta"),
+        7: ("/x", "/y", "/z", "/roll", "/pitch", "/yaw"),
+    }
+    joints = []
+    for number in range(1, model.njoints):
+        name, at, count = model.names[number], model.idx_qs[number], model.nqs[number]
+        own = [place[name + part] for part in parts.get(count, ("",))]
+        joints.append((at, count, own))
+    return _Known(model, links, np.array(pin.neutral(model)), joints)
+
+
 def _model(text: str, base: Base | None) -> Any:
     """Pinocchio's model of a URDF on its base.
 
@@ -87,34 +147,6 @@ def _bare(text: str) -> str:
                 joint, "limit", lower="0", upper="0", effort="0", velocity="0"
             )
     return ET.tostring(document, encoding="unicode")
-
-
-def _configuration(pin: Any, model: Any, robot: Robot, values: FloatArray) -> Any:
-    """Pinocchio's q of the values of the tree's joints.
-
-    It has a cosine and a sine for an angle without limits, a quaternion for a frame
-    that floats.
-    """
-    names = [joint.name for joint in robot.tree.joints]
-    value = dict(zip(names, values.tolist(), strict=True))
-    full = pin.neutral(model)
-    for number in range(1, model.njoints):
-        name, at, count = model.names[number], model.idx_qs[number], model.nqs[number]
-        if count == 1:
-            own = [value[name]]
-        elif count == 2:
-            own = [np.cos(value[name]), np.sin(value[name])]
-        else:
-            own = [value[f"{name}/x"], value[f"{name}/y"]]
-            if count == 4:
-                theta = value[f"{name}/theta"]
-                own += [np.cos(theta), np.sin(theta)]
-            else:
-                turns = (value[f"{name}/{part}"] for part in ("roll", "pitch", "yaw"))
-                turn = pin.Quaternion(rotation_from_rpy(np.array([*turns])))
-                own += [value[f"{name}/z"], *turn.coeffs()]
-        full[at : at + count] = own
-    return full
 
 
 @lru_cache(maxsize=KEPT)
