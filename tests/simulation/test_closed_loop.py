@@ -100,6 +100,14 @@ def test_half_the_step_changes_angles_by_less_than_a_hundredth_of_a_degree(
     assert np.rad2deg(change) < 0.01
 
 
+def test_a_step_that_does_not_divide_the_period_is_shortened(calm: Simulation) -> None:
+    """0.005 s hold seven steps of 0.0008 s: the clock keeps the time of the plan."""
+    coarse = run(step_s=0.0008)
+    np.testing.assert_array_equal(coarse.times, calm.times)
+    change = np.abs(calm.executed[:, 1:] - coarse.executed[:, 1:]).max()
+    assert np.rad2deg(change) < 0.02
+
+
 def test_the_same_seed_gives_the_same_motion() -> None:
     noisy = Settings(seed=3)
     one, two = (simulate(HRM8, bending(), noisy) for _ in range(2))
@@ -107,13 +115,13 @@ def test_the_same_seed_gives_the_same_motion() -> None:
 
 
 def test_a_kick_at_no_joint_is_refused() -> None:
-    with pytest.raises(InvalidInput, match="joint 9"):
+    with pytest.raises(InvalidInput, match=r"kicks\[0\].joint is 9, expected 1 to 8"):
         run(kicks=(Kick(axis="theta", joint=9, share=0.1, torque_nm=1.0),))
 
 
 def test_a_step_at_which_it_diverges_is_told() -> None:
     with pytest.raises(VerificationFailed, match="diverges"):
-        run(step_s=0.02)
+        run(step_s=0.02, controller=Controller(period_s=0.02))
 
 
 def test_what_is_proved_covers_the_errors_that_the_problem_states() -> None:

@@ -178,16 +178,23 @@ def test_too_much_pretension_buckles_the_arm() -> None:
 
 
 def test_settings_are_refused_by_name(tmp_path: Any) -> None:
-    from vdsm_pin.errors import InvalidFile
+    from vdsm_pin.errors import InvalidFile, InvalidInput
     from vdsm_pin.simulation.settings import read_settings
 
     file = tmp_path / "s.yaml"
     file.write_text("cables: {stiffness_ea_n: -1}\n")
-    with pytest.raises(InvalidFile, match=r"cables\.stiffness_ea_n"):
+    said = r"cables\.stiffness_ea_n \(line 1\): is -1, expected above 0"
+    with pytest.raises(InvalidFile, match=said):
         read_settings(file)
-    file.write_text("cabels: {}\n")
-    with pytest.raises(InvalidFile, match="cabels"):
+    file.write_text("seed: 1\ncabels: {}\n")
+    said = r"cabels \(line 2\): is not a known key; known: bodies, cables, motors"
+    with pytest.raises(InvalidFile, match=said):
         read_settings(file)
+    file.write_text("kicks: [{axis: alpha, joint: 5, share: 0.4, torque_nm: 10}]\n")
+    assert read_settings(file).kicks[0].joint == 5
+    file.write_text("cables: {least_tension_n: 500, largest_tension_n: 100}\n")
+    with pytest.raises(InvalidInput, match=r"least_tension_n is 500, expected below"):
+        read_settings(file).check(8)
     file.write_text("bodies: {gravity_m_s2: 1.62}\n")
     assert read_settings(file).bodies.gravity_m_s2 == 1.62
     assert replace(HRM8, name="x").name == "x"

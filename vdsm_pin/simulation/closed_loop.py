@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
-from vdsm_pin.errors import InvalidInput, VerificationFailed
+from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.robots.mjcf import load_mujoco
@@ -25,6 +25,9 @@ SLACK = 1.0
 
 SETTLE = 1.0
 """The arm is held so long at the start and again at the end of the motion; [s]."""
+
+ROUNDING = 1e-9
+"""A period longer than whole steps by less takes no step more; [-]."""
 
 KNOTS = 200
 """Most rows at which tensions are solved for; they are interpolated between; [-]."""
@@ -86,14 +89,10 @@ def simulate(
         Planned and executed motion at the recorded times.
 
     Raises:
-        InvalidInput: If a kick names a joint that is not there.
+        InvalidInput: If settings contradict each other or the arm.
         VerificationFailed: If MuJoCo is not installed, or the simulation diverges.
     """
-    for kick in settings.kicks:
-        if kick.joint > manipulator.n_links:
-            known = f"expected 1 to {manipulator.n_links}"
-            message = f"a kick names joint {kick.joint}, {known}"
-            raise InvalidInput(message)
+    settings.check(manipulator.n_links)
     return _Loop(manipulator, trajectory, settings).run()
 
 
@@ -152,7 +151,8 @@ class _Loop:
         control = settings.controller
         period, lag = control.period_s, control.derivative_lag_s
         most = settings.motors.largest_rate_m_s * period
-        substeps = max(1, round(period / settings.step_s))
+        substeps = int(np.ceil(period / settings.step_s - ROUNDING))
+        self._model.opt.timestep = period / substeps
         count = int(np.ceil((self._row_times[-1] + SETTLE) / period)) + 1
         times = frozen(period * np.arange(count))
         planned = self._planned(times)

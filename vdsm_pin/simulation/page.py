@@ -5,13 +5,14 @@ from typing import Any
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io.schema_types import FileModel
 from vdsm_pin.report.charts import limit, packed, series
 from vdsm_pin.report.html import rendered
 from vdsm_pin.report.page_data import embedded
 from vdsm_pin.report.palette import AXES, link_colours
 from vdsm_pin.report.thinning import MOST_ROWS
 from vdsm_pin.simulation.closed_loop import SLACK, Simulation
-from vdsm_pin.simulation.settings import Part, Settings
+from vdsm_pin.simulation.settings import Settings
 
 BAND_DEG = 0.3
 """The paper's main range of joint errors (Fig. 21); [deg]."""
@@ -147,7 +148,7 @@ def assumptions(settings: Settings) -> tuple[tuple[str, str, str], ...]:
     rows = []
     for name, field in type(settings).model_fields.items():
         part = getattr(settings, name)
-        if not isinstance(part, Part):
+        if not isinstance(part, FileModel):
             rows.append((name, str(part), field.description or ""))
             continue
         rows += [

@@ -7,24 +7,18 @@ reason, to be changed in a file and swept; none was fitted to a result.
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
-from vdsm_pin.errors import InvalidFile
+from vdsm_pin.errors import InvalidInput
+from vdsm_pin.io.problem_errors import first_error
+from vdsm_pin.io.schema_types import FileModel, NotNegative, Number, Positive
 from vdsm_pin.io.source import decode, read_bytes
 from vdsm_pin.io.yaml_reader import read_yaml
 
 MAX_BYTES = 1 << 20
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 
 
-class Part(BaseModel):
-    """Common rules: no unknown keys, nothing changes after it is built."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Bodies(Part):
+class Bodies(FileModel):
     """The links."""
 
     mass_per_length_kg_m: Positive = Field(
@@ -39,7 +33,7 @@ class Bodies(Part):
     gravity_m_s2: NotNegative = Field(default=9.81, description="along -z of the base")
 
 
-class Cables(Part):
+class Cables(FileModel):
     """The cables; tension is uniform along each (no capstan friction)."""
 
     stiffness_ea_n: Positive = Field(
@@ -60,7 +54,7 @@ class Cables(Part):
     )
 
 
-class Motors(Part):
+class Motors(FileModel):
     """What winds the cables and moves the base."""
 
     lag_s: NotNegative = Field(default=0.005, description="first-order; assumed")
@@ -68,7 +62,7 @@ class Motors(Part):
     base_stiffness_n_m: Positive = Field(default=2e6, description="of the rail's drive")
 
 
-class Sensors(Part):
+class Sensors(FileModel):
     """Encoders of the joints, and of the cables."""
 
     resolution_deg: NotNegative = Field(default=360.0 / 2**16, description="16 bits")
@@ -79,7 +73,7 @@ class Sensors(Part):
     )
 
 
-class Controller(Part):
+class Controller(FileModel):
     """PID on the joint angles or on the cable lengths.
 
     Angles commanded go through the cable kinematics; lengths are commanded as they are.
@@ -106,7 +100,7 @@ class Controller(Part):
     )
 
 
-class Speed(Part):
+class Speed(FileModel):
     """Limits of the time law."""
 
     tip_m_s: Positive = Field(default=0.05, description="of the tip; assumed")
@@ -114,17 +108,17 @@ class Speed(Part):
     joint_deg_s2: Positive = Field(default=20.0, description="acceleration; assumed")
 
 
-class Kick(Part):
+class Kick(FileModel):
     """A torque pulse at one joint axis."""
 
     axis: Literal["alpha", "theta"]
     joint: int = Field(ge=1, description="joints count from 1 at the base")
     share: float = Field(ge=0.0, le=1.0, description="when, as part of the duration")
-    torque_nm: float = Field(allow_inf_nan=False)
+    torque_nm: Number
     duration_s: Positive = 0.2
 
 
-class Settings(Part):
+class Settings(FileModel):
     """Everything a simulation assumes."""
 
     bodies: Bodies = Bodies()
@@ -133,10 +127,29 @@ class Settings(Part):
     sensors: Sensors = Sensors()
     controller: Controller = Controller()
     speed: Speed = Speed()
-    kicks: tuple[Kick, ...] = ()
+    kicks: Annotated[tuple[Kick, ...], Field(strict=False)] = ()
     seed: int = Field(default=0, ge=0, description="of the noise")
-    step_s: Positive = Field(default=0.0005, description="of the integrator")
+    step_s: Positive = Field(default=0.0005, description="of the integrator, at most")
     record_s: Positive = Field(default=0.02, description="between recorded rows")
+
+    def check(self, n_links: int) -> None:
+        """Refuse what contradicts itself or an arm of N links.
+
+        Raises:
+            InvalidInput: Naming the field.
+        """
+        cables = self.cables
+        expected = f"expected below largest_tension_n, {cables.largest_tension_n:g}"
+        for name in ("least_tension_n", "pretension_n"):
+            value = getattr(cables, name)
+            if not value < cables.largest_tension_n:
+                message = f"cables.{name} is {value:g}, {expected}"
+                raise InvalidInput(message)
+        for k, kick in enumerate(self.kicks):
+            if kick.joint > n_links:
+                known = f"expected 1 to {n_links}"
+                message = f"kicks[{k}].joint is {kick.joint}, {known}"
+                raise InvalidInput(message)
 
 
 def read_settings(path: Path) -> Settings:
@@ -150,6 +163,4 @@ def read_settings(path: Path) -> Settings:
     try:
         return Settings.model_validate(data)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise InvalidFile(file=path, where=where, problem=first["msg"]) from None
+        raise first_error(error, document, Settings) from None
