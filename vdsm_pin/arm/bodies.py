@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.arm.manipulator import FEED, PART, LinkBody, Manipulator
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct_rows
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import pack_pieces
@@ -143,7 +143,7 @@ def grouped(corners: FloatArray, parts: int) -> tuple[IntArray, ...]:
 
 def outer_points(points: FloatArray) -> FloatArray:
     """Some of the points, with the same hull; those surely inside are left out."""
-    points = np.unique(points, axis=0)
+    points = distinct_rows(points)
     if len(points) <= DIRECTIONS // 4:
         return points
     directions = np.random.default_rng(0).normal(size=(DIRECTIONS, 3))

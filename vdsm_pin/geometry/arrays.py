@@ -166,13 +166,21 @@ def read_only(values: FloatArray) -> FloatArray:
     return view
 
 
-def distinct(values: npt.NDArray[Any], axis: int | None = None) -> npt.NDArray[Any]:
-    """Every value, or every row along an axis, once, sorted.
+def distinct(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Every value once, sorted.
 
     As `np.unique`, which asks for masked arrays first unless it is asked for more: the
     module for them takes longer to import than it takes to plan a simple motion.
     """
-    return np.unique(values, return_index=True, axis=axis)[0]
+    return np.unique(values, return_index=True)[0]
+
+
+def distinct_rows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Every row of (n, k) values once, sorted; several times faster than numpy's."""
+    rows = values[np.lexsort(values.T[::-1])]
+    first = np.ones(len(rows), np.bool_)
+    first[1:] = (rows[1:] != rows[:-1]).any(axis=1)
+    return rows[first]
 
 
 def running_sums(values: FloatArray) -> FloatArray:

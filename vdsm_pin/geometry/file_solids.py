@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct, frozen
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct_rows, frozen
 from vdsm_pin.geometry.closed_meshes import ClosedMesh, close_mesh
 from vdsm_pin.geometry.convex import FlatCylinder, Hull, Hulls
 from vdsm_pin.geometry.primitives import BOX_CORNERS, NamedSolid
@@ -75,7 +75,7 @@ class Mesh(FromFile):
     @cached_property
     def hull(self) -> "ConvexCover":
         """Its convex hull."""
-        corners = distinct(self.corners, axis=0)
+        corners = distinct_rows(self.corners)
         return ConvexCover(self.name, (Hull(frozen(corners)),))
 
     @property

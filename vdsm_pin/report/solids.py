@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct_rows
 from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
 from vdsm_pin.geometry.solids import (
     BOX_CORNERS,
@@ -240,7 +240,7 @@ def _cells(
     while len(centres) * 2 * len(_BOX_FACES) > most:
         half = 2.0 * half
         grid = np.floor(centres @ turn / (2.0 * half))
-        centres = (distinct(grid, axis=0) + 0.5) * (2.0 * half) @ turn.T
+        centres = (distinct_rows(grid) + 0.5) * (2.0 * half) @ turn.T
     cube = _polygons(BOX_CORNERS * half @ turn.T, _BOX_FACES)
     starts = len(cube.vertices) * np.arange(len(centres))
     triangles = (starts[:, None, None] + cube.triangles).reshape(-1, 3)

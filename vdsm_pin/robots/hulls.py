@@ -38,7 +38,8 @@ def covering_hull(points: FloatArray) -> Hull:
     """
     if (hull := coal_hull(points)) is not None:
         corners = np.array(hull.points())
-        grown = float(_distances(points, corners).max(initial=0.0))
+        # A distance from a hull is convex: no point inside of others is farther off.
+        grown = float(_distances(outer_points(points), corners).max(initial=0.0))
         if grown <= MOST_GROWN:
             return Hull(corners, grown, few_corners(corners))
     corners = outer_points(points)

@@ -10,7 +10,12 @@ import numpy as np
 
 from vdsm_pin.arm.bodies import grouped
 from vdsm_pin.errors import InvalidFile
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, rotation_from_rpy
+from vdsm_pin.geometry.arrays import (
+    FloatArray,
+    IntArray,
+    distinct_rows,
+    rotation_from_rpy,
+)
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
 from vdsm_pin.geometry.solids import BOX_CORNERS
 from vdsm_pin.io.mesh_file import read_mesh
@@ -99,7 +104,7 @@ class LinkReader:
         groups = grouped(corners, count)
         covers.append(groups)
         for group in groups:
-            yield covering_hull(np.unique(corners[group].reshape(-1, 3), axis=0))
+            yield covering_hull(distinct_rows(corners[group].reshape(-1, 3)))
 
     def _triangles(self, link: str, shape: ET.Element) -> FloatArray:
         """The corners of a link's mesh, scaled, shape (n, 3, 3); [m]."""
