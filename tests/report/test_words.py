@@ -1,12 +1,16 @@
 """Oracle: the text a person expects."""
 
 import math
+from fractions import Fraction
 
+import numpy as np
 import pytest
 
 from vdsm_pin.report.words import (
     MISSING,
     OUTCOMES,
+    at_least,
+    at_most,
     lost,
     outcome,
     percent,
@@ -90,3 +94,22 @@ def test_joint_errors_are_rounded_to_the_safe_side_and_told_apart() -> None:
     assert (survived(0.0), survived(None), lost(math.nan)) == (
         "±0.0000°", MISSING, MISSING,
     )  # fmt: skip
+
+
+def test_what_is_proved_is_never_rounded_up() -> None:
+    """Oracle: exact fractions of what the texts say."""
+    rng = np.random.default_rng(0)
+    sizes = 10.0 ** rng.uniform(-9.0, 2.0, 3000) * rng.choice([-1.0, 1.0], 3000)
+    noise = Fraction(1, 10**12)  # [m]: of 5.0 mm that rounding left a little less
+    for value in [*sizes.tolist(), 5e-3, 0.105, 1.2345, 0.0, 1.0]:
+        texts = at_least(value), at_most(value)
+        low, high = (
+            Fraction(text.removesuffix(" mm").replace("\u2212", "-")) / 1000
+            for text in texts
+        )
+        last = Fraction(1, 10**4 if abs(value) >= 1.0 else 10**6)
+        assert low - noise <= Fraction(value) <= high + noise
+        assert high - low <= last + noise
+    assert at_least(5e-3) == at_most(5e-3) == quantity(5e-3, "m") == "5.000 mm"
+    assert at_least(0.10600089937594809) == "106.000 mm"
+    assert at_least(1.23456) == "1234.5 mm"

@@ -7,7 +7,7 @@ from itertools import count
 
 from vdsm_pin.batch.task import Done
 from vdsm_pin.report.files import BatchRow
-from vdsm_pin.report.words import outcome, percent, quantity, term
+from vdsm_pin.report.words import at_least, outcome, percent, quantity, term
 from vdsm_pin.text import printable
 from vdsm_pin.tolerances import TOLERANCES
 
@@ -59,7 +59,7 @@ def _said(done: Done) -> tuple[str, str, str]:
 
 def _measures(row: BatchRow) -> str:
     """The numbers of a problem that passed."""
-    near = _measure(row, "min_clearance_lower_m", "m")
+    near = f"{term('min_clearance_lower_m')} {at_least(row.min_clearance_lower_m)}"
     parts = [near if row.closest_link else "no obstacle"]
     if row.max_link_angle_rad is not None:
         parts.append(_measure(row, "max_link_angle_rad", "rad"))

@@ -29,6 +29,9 @@ from vdsm_pin.report.words import (
     MISSING,
     OUTCOMES,
     TIME_LIMIT,
+    at_least,
+    at_most,
+    check_cells,
     counted,
     depth,
     errors,
@@ -81,7 +84,8 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    filters = [quantity, depth, limit, percent, errors, outcome, measured, survived,
+    filters = [quantity, depth, at_least, at_most, check_cells, limit, percent,
+               errors, outcome, measured, survived,
                lost, counted, term, place, assumption, point, css_text,
                scene_words]  # fmt: skip
     environment.filters |= {one.__name__: one for one in filters}

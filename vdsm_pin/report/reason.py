@@ -9,7 +9,7 @@ from vdsm_pin.io.tables import listed
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.report.rows import LeftOutRow
-from vdsm_pin.report.words import depth, finite, percent, place, quantity
+from vdsm_pin.report.words import at_least, depth, finite, percent, place, quantity
 from vdsm_pin.verification.inside import ARM, LINKS, surfaces
 from vdsm_pin.verification.records import (
     ArmVerification,
@@ -105,12 +105,12 @@ def _certified_sentence(verification: Verification) -> str:
             f"All {count} checks passed over the whole motion; no obstacle is {none}"
             f"{but}{drawn}."
         )
-    required = quantity(problem.required_clearance, "m")
+    required = at_least(problem.required_clearance)
     box = asdict(verification.errors)
     errors = ", with any error of the error box," if any(box.values()) else ""
     return (
         f"All {count} checks passed; at every instant of the motion{errors} the {who} "
-        f"keeps at least {quantity(smallest, 'm')} from every obstacle{but}, "
+        f"keeps at least {at_least(smallest)} from every obstacle{but}, "
         f"{required} are required{drawn}."
         + "".join(f" {name!r} is a surface only." for name in surfaces(problem))
     )

@@ -9,9 +9,8 @@ from vdsm_pin.report.files import PlanFile, VerificationFile
 from vdsm_pin.report.inputs import assumption
 from vdsm_pin.report.rows import CheckRow
 from vdsm_pin.report.words import (
-    depth,
+    check_cells,
     errors,
-    limit,
     lost,
     measured,
     outcome,
@@ -109,8 +108,7 @@ def show_checks(checks: tuple[CheckRow, ...]) -> None:
     """Print checks in columns."""
     rows = [("check", "worst", "limit", "count", "verdict")]
     for one in checks:
-        worst = depth(one.worst, one.deeper, one.unit)
-        cells = worst, limit(one.limit, one.unit), str(one.count)
+        cells = *check_cells(one), str(one.count)
         rows.append((one.name, *cells, _verdict(one.verdict)))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for name, *numbers, verdict in rows:

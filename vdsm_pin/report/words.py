@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeAlias
 
 from vdsm_pin.units import MM_PER_M
 
@@ -15,7 +15,15 @@ TIME_LIMIT: Final = "time-limit"
 """The outcome of what the time limit ended."""
 
 if TYPE_CHECKING:
-    from vdsm_pin.report.rows import ErrorBoxRow
+    from vdsm_pin.report.rows import CheckRow, ErrorBoxRow
+
+Whole: TypeAlias = Callable[[float], int]
+"""How a number is rounded to whole ones."""
+
+_CLEARANCE: Final = "clearance "
+"""How the names of checks of clearances begin."""
+
+_NOISE_DIGITS: Final = 6  # of the last digit; what rounding leaves of 5.0 mm is 5.0
 
 _SMALLEST_FIXED: Final = 1e-3  # below this, three decimals would print 0.000
 _LARGE: Final = 1e3  # from here on, a tenth is fine enough
@@ -113,12 +121,13 @@ def outcome(word: str) -> Outcome:
     return OUTCOMES.get(word, unknown)
 
 
-def quantity(value: float | None, unit: str) -> str:
+def quantity(value: float | None, unit: str, whole: Whole | None = None) -> str:
     """A value with its unit as people read it: mm and degrees.
 
     Args:
         value: In SI; None or NaN where there is none.
         unit: "m", "rad", "share" or "-"; any other unit is printed as it is.
+        whole: Rounds to the last digit that is shown; to the nearest where not given.
 
     Returns:
         For instance "3.500 mm", "42.500°", "1.2e-10 mm" or "not available".
@@ -135,14 +144,37 @@ def quantity(value: float | None, unit: str) -> str:
         return f"{shown:.0f}"
     fixed = shown == 0.0 or abs(shown) >= _SMALLEST_FIXED
     digits = 3 if abs(shown) < _LARGE else 1
+    if whole is not None and shown:
+        last = digits if fixed else 1 - math.floor(math.log10(abs(shown)))
+        shown = whole(round(shown * 10.0**last, _NOISE_DIGITS)) / 10.0**last
     text = f"{shown:.{digits}f}" if fixed else f"{shown:.1e}"
     return text.replace("-", "−", 1) + suffix if text[0] == "-" else text + suffix
 
 
-def depth(value: float | None, deeper: bool, unit: str = "m") -> str:
+def depth(
+    value: float | None, deeper: bool, unit: str = "m", whole: Whole | None = None
+) -> str:
     """A clearance; of one that is as deep as is measured it is said that it is more."""
-    text = quantity(value, unit)
+    text = quantity(value, unit, whole)
     return f"{text} or deeper" if deeper else text
+
+
+def at_least(value: float | None, deeper: bool = False) -> str:
+    """A length that is proved, rounded down: no more is said than was proved; [m]."""
+    return depth(value, deeper, "m", math.floor)
+
+
+def at_most(value: float | None, deeper: bool = False) -> str:
+    """A length that is proved not to be exceeded, rounded up; [m]."""
+    return depth(value, deeper, "m", math.ceil)
+
+
+def check_cells(row: "CheckRow") -> tuple[str, str]:
+    """Worst value and limit of a check; a clearance that is proved is rounded down."""
+    proved = row.name.startswith(_CLEARANCE) and row.verdict != "refuted"
+    whole = math.floor if proved else None
+    asked = limit(row.limit, row.unit, whole)
+    return depth(row.worst, row.deeper, row.unit, whole), asked
 
 
 def measured(value: float | None, unit: str) -> str:
@@ -163,7 +195,7 @@ def lost(error: float | None) -> str:
     return _joint_error(error, math.ceil)
 
 
-def _joint_error(error: float | None, whole: Callable[[float], int]) -> str:
+def _joint_error(error: float | None, whole: Whole) -> str:
     """In degrees, with digits enough to tell the two apart."""
     if error is None or math.isnan(error):
         return MISSING
@@ -207,9 +239,9 @@ def counted(count: int, word: str) -> str:
     return f"{count} {word}" if count == 1 else f"{count} {word}s"
 
 
-def limit(value: float | None, unit: str) -> str:
+def limit(value: float | None, unit: str, whole: Whole | None = None) -> str:
     """A check's limit, or that it only reports."""
-    return "no limit asked" if value is None else quantity(value, unit)
+    return "no limit asked" if value is None else quantity(value, unit, whole)
 
 
 def percent(share: float | None) -> str:

@@ -8,8 +8,9 @@ const NARROW_GAP = 44; // pixels; below, the arrows of a dimension stand outside
 const FONT = '600 13px system-ui, "DejaVu Sans", sans-serif';
 const AXES = [["x", "#c92a2a"], ["y", "#2b8a3e"], ["z", "#1864ab"]];
 
-function lengthText(metres) {
-  const mm = metres * 1000;
+function lengthText(metres, proved = false) {
+  // What is proved is rounded down; a millionth of a digit is noise.
+  const mm = proved ? Math.floor(metres * 1e6 + 1e-6) / 1e3 : metres * 1000;
   const size = Math.abs(mm);
   const digits = size >= 1000 ? 1 : size >= 1e-3 || size === 0 ? 3 : -1;
   const text = digits < 0 ? mm.toExponential(1) : mm.toFixed(digits);
