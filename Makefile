@@ -2,6 +2,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# Every process that a test starts would compile the package anew, a third of its time.
+export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: demo test test-slow lint docs check urdf figures report claims soundness mutants bench dist clean
 

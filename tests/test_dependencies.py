@@ -4,6 +4,7 @@ import ast
 import re
 import sys
 import tomllib
+from functools import cache
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("vdsm_pin", "tests", "analysis", "benchmarks")
+STATEMENTS = (ast.stmt, ast.ExceptHandler, ast.match_case)
 COMES_WITH = {
     "pinocchio": "pin",
     "pink": "pin-pink",
@@ -34,20 +36,23 @@ def declared(*extras: str) -> set[str]:
     return {plain(re.split(r"[<>=\[; ]", line)[0]) for line in wanted}
 
 
-def imported(folder: str) -> set[str]:
+@cache
+def imported(folder: str) -> frozenset[str]:
     """Top names a folder imports, also by importorskip."""
     names = set()
     for path in (ROOT / folder).rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        text = path.read_text(encoding="utf-8")
+        names |= set(re.findall(r'importorskip\(\s*"([\w.]+)"', text))
+        blocks: list[ast.AST] = [ast.parse(text)]
+        while blocks:
+            node = blocks.pop()
             if isinstance(node, ast.Import):
                 names |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
                 names.add(node.module)
-            elif isinstance(node, ast.Call) and node.args:
-                called, first = ast.unparse(node.func), node.args[0]
-                if called.endswith("importorskip") and isinstance(first, ast.Constant):
-                    names.add(str(first.value))
-    return {name.split(".")[0] for name in names}
+            inside = ast.iter_child_nodes(node)
+            blocks += [one for one in inside if isinstance(one, STATEMENTS)]
+    return frozenset(name.split(".")[0] for name in names)
 
 
 def ours() -> set[str]:

@@ -170,7 +170,13 @@ class TestWithABrowser:
         program.chmod(0o755)
         monkeypatch.setenv("FFMPEG", str(program))
         problem = read_problem(write_problem(tmp_path / "near.yaml", NEAR))
-        order = ExportOrder(problem, None, tmp_path / "near.mp4", seconds=1.0)
+        order = ExportOrder(
+            problem,
+            None,
+            tmp_path / "near.mp4",
+            shot=Shot(width=320, height=180),
+            seconds=1.0,
+        )
         export(order)
         written = order.out.read_bytes()
         assert written.count(b"\xff\xd8\xff\xe0") == 2  # it stands still

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from watched_pages import CHROMIUM, SOFTWARE_GL
+from watched_pages import CHROMIUM, OPENED, SOFTWARE_GL
 
 
 @pytest.fixture(scope="session")
@@ -16,3 +16,14 @@ def browser() -> Iterator[Any]:
         )
         yield chromium
         chromium.close()
+
+
+def pages_end() -> Iterator[None]:
+    before = len(OPENED)
+    yield
+    while len(OPENED) > before:
+        OPENED.pop().close()
+
+
+pages_of_a_test_end = pytest.fixture(pages_end, autouse=True)
+pages_of_a_module_end = pytest.fixture(pages_end, autouse=True, scope="module")

@@ -46,4 +46,3 @@ def test_a_live_page_follows_a_file_and_keeps_the_moment_and_the_camera(
     page.locator("[data-lost]").wait_for(state="visible")
     assert watched.errors == []
     assert all(request.startswith(server.url) for request in watched.requests)
-    page.close()

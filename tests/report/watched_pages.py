@@ -15,6 +15,7 @@ SOFTWARE_GL = [
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",  # a quarter less work without a graphics card
 ]
 NEEDS_CHROMIUM = [
     pytest.mark.display,
@@ -23,11 +24,16 @@ NEEDS_CHROMIUM = [
 """Marks of a module of tests that open pages."""
 
 
+OPENED: list[Any] = []
+"""Pages not closed yet: one that nobody looks at still draws."""
+
+
 class Watched:
     """A page whose requests and errors are written down."""
 
     def __init__(self, browser: Any, address: str, **options: Any) -> None:
         self.page = browser.new_page(**options)
+        OPENED.append(self.page)
         self.requests: list[str] = []
         self.errors: list[str] = []
         self.page.on("request", lambda request: self.requests.append(request.url))

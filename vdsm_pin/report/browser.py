@@ -20,6 +20,7 @@ _FLAGS: Final = (
     "--use-gl=angle",
     "--use-angle=swiftshader",  # draws in 3D without a graphics card
     "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",
     "--disable-background-networking",
     "--no-first-run",
     "--virtual-time-budget=20000",  # its scripts end before the result is taken

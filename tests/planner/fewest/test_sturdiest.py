@@ -100,7 +100,7 @@ def test_each_link_keeps_its_own() -> None:
     np.testing.assert_array_equal(made.node, free.node[enough])
 
 
-@pytest.mark.parametrize(("seed", "clutter"), [(0, False), (0, True), (1, False)])
+@pytest.mark.parametrize(("seed", "clutter"), [(0, False), (0, True)])
 def test_what_is_claimed_is_certified_and_no_less_than_the_others(
     seed: int, clutter: bool
 ) -> None:
@@ -109,7 +109,7 @@ def test_what_is_claimed_is_certified_and_no_less_than_the_others(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("clutter", [False, True])
-@pytest.mark.parametrize("seed", range(2, 12))
+@pytest.mark.parametrize("seed", range(1, 12))
 def test_the_same_on_many_scenes(seed: int, clutter: bool) -> None:
     hold_to_account(random_problem(seed, clutter=clutter))
 
@@ -138,6 +138,7 @@ def hold_to_account(task: PlanningProblem) -> None:
         assert alone.counterexamples  # a configuration within the box that is too near
 
 
+@pytest.mark.slow
 def test_room_that_grows_along_the_arm_is_worth_more_than_the_same_everywhere() -> None:
     task = random_problem(1, clutter=True)
     clearance = link_clearance(task)
