@@ -143,6 +143,18 @@ BROKEN = {
         replaced('<axis xyz="1 0 0"', '<axis xyz="0 1 0"/><axis xyz="1 0 0"'),
         "joint 'x0': joint has 2 <axis>, expected 1",
     ),
+    "turn that is not read": (
+        replaced('xyz="0.0 0.0 0.0"', 'xyz="0 0 0" quat_xyzw="0 0 1 0"'),
+        "joint 'x0': origin has 'quat_xyzw', expected xyz and rpy alone",
+    ),
+    "collision in capitals": (
+        replaced(TIP, '<link name="tip"><Collision/></link>'),
+        "link 'tip': a collision stands where it is not read, or in capitals",
+    ),
+    "collision within": (
+        replaced(TIP, '<link name="tip"><x><collision/></x></link>'),
+        "link 'tip': a collision stands where it is not read",
+    ),
     "flat box": (
         replaced(TIP, SHAPE.format('<box size="1 1"/>')),
         "link 'tip': box size is '1 1'",

@@ -204,15 +204,20 @@ POINT = '{{"positions": [{}, 0], {}"time_from_start": {}}}'
     [
         ('"velocities": [0, 1], ', 0, "velocities, expected times too"),
         ('"accelerations": [0, 1], ', 1, "accelerations, expected velocities too"),
+        ("", '{"sec": 1, "nsec": 5}', "time_from_start: is .*expected seconds"),
+        ("", "{}", "time_from_start: is .*expected seconds"),
         ('"velocities": [0, 0], ', 0, None),
         ('"velocities": [0, 0], "accelerations": [0, 1], ', 1, None),
     ],
 )
 def test_rates_without_what_they_need_are_refused(
-    tmp_path: Path, robot: Robot, rates: str, time: int, said: str | None
+    tmp_path: Path, robot: Robot, rates: str, time: int | str, said: str | None
 ) -> None:
     """As of a table: straight lines would be judged, which no controller runs."""
-    points = ", ".join(POINT.format(k, rates, k * time) for k in range(2))
+    points = ", ".join(
+        POINT.format(k, rates, time if isinstance(time, str) else k * time)
+        for k in range(2)
+    )
     text = f'{{"joint_names": ["turn", "slide"], "points": [{points}]}}'
     file = write(tmp_path, "t.json", text)
     if said is None:

@@ -159,6 +159,9 @@ def _link_problems(link: ET.Element, geometry_only: bool) -> Iterator[str]:
         yield from _inertia_problems(inertial, where)
     shown = [] if geometry_only else link.findall("visual")
     sizes = ANY_SIZES if geometry_only else SIZES
+    tags = [one.tag.rpartition("}")[2].lower() for one in link.iter()]
+    if tags.count("collision") != len(link.findall("collision")):
+        yield f"{where}: a collision stands where it is not read, or in capitals"
     for shape in shown + link.findall("collision"):
         yield from _repeated(shape, where)
         yield from _origin_problems(shape, where)
@@ -207,7 +210,9 @@ def _shape_problems(
 def _origin_problems(element: ET.Element, where: str) -> Iterator[str]:
     origin = element.find("origin")
     for name in () if origin is None else sorted(origin.keys()):
-        if name in ("xyz", "rpy") and _numbers(element, "origin", name, 3) is None:
+        if name not in ("xyz", "rpy"):
+            yield f"{where}: origin has {name!r}, expected xyz and rpy alone"
+        elif _numbers(element, "origin", name, 3) is None:
             text = _attribute(element, "origin", name)
             yield f"{where}: origin {name} is {text!r}, expected 3 finite numbers"
 

@@ -24,6 +24,8 @@ UNIT_NORM: Final = 1e-3
 MULTI: Final = "multi_dof_joint_trajectory"
 _FREE: Final = ("x", "y", "z", "yaw", "pitch", "roll")
 _NANO: Final = 1e-9
+_TIME: Final = {"sec", "secs", "nanosec", "nsecs"}
+"""Keys of a duration in ROS 1 and 2."""
 
 
 def read_joint_trajectory(file: Path) -> JointTrajectory:
@@ -139,7 +141,7 @@ def _times(file: Path, points: list[Any]) -> FloatArray | None:
     times = []
     for k, stated in enumerate(found):
         time = [stated]
-        if isinstance(stated, dict):
+        if isinstance(stated, dict) and stated and stated.keys() <= _TIME:
             part = stated.get("nanosec", stated.get("nsecs", 0))
             time = [stated.get("sec", stated.get("secs", 0)), part]
         numbers = finite_numbers(time, len(time))
