@@ -153,7 +153,7 @@ def _samples(
 def _witness(found: RobotVerification, motion: Motion) -> FloatArray:
     """The configuration at which the proof finds two bodies nearest; [rad]."""
     worst = [int(np.argmin(found.least.upper))]
-    return motion.within(found.least.interval[worst], found.least.time[worst])[0]
+    return motion.within(found.least.interval[worst], found.least.share[worst])[0]
 
 
 def _fault(

@@ -104,7 +104,7 @@ def test_far_pairs_have_one_row_and_near_ones_a_row_an_interval(tmp_path: Path) 
     numbers = np.arange(len(pairs))
     least = LeastClearances(
         interval=numbers % 4,
-        time=np.full(len(pairs), 0.25),
+        share=np.full(len(pairs), 0.25),
         lower=np.full(len(pairs), 7.0),
         upper=np.full(len(pairs), 8.0),
         verdict=np.zeros(len(pairs), np.int64),

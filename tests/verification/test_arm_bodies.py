@@ -251,7 +251,7 @@ def attained(
             q = rows.joints[k] + share * (rows.joints[k + 1] - rows.joints[k])
             found = distances(problem, pairs, q, (np.eye(3), np.zeros(3)))
             for pair, gap in found.items():
-                if chunk.time[k, pair] == share and gap > 0.0:
+                if chunk.share[k, pair] == share and gap > 0.0:
                     assert chunk.upper[k, pair] >= gap - COAL
                     points = chunk.link_point[k, pair] - chunk.other_point[k, pair]
                     apart = float(np.linalg.norm(points))

@@ -128,7 +128,7 @@ def test_a_corner_cut_between_clear_rows_is_refuted_between_them() -> None:
     proof, (chunk,) = prove(problem, rows)
     pair = 5  # link 6 lies over x = 2.43 to 2.636
     assert chunk.verdict[0, pair] == 1
-    assert 0.3 < chunk.time[0, pair] < 0.7
+    assert 0.3 < chunk.share[0, pair] < 0.7
     assert proof.best[pair, 2] < 0.0
 
 

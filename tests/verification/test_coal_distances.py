@@ -26,8 +26,8 @@ from vdsm_pin.verification.coal_check import check_coal_obstacles
 from vdsm_pin.verification.coal_distances import (
     CoalDistances,
     Partners,
+    coal_reach,
     obstacles_at_rest,
-    reach_of,
 )
 from vdsm_pin.verification.proved_lowers import ProvedLowers
 from vdsm_pin.verification.records import Verdict
@@ -120,7 +120,7 @@ def test_coal_agrees_with_the_brackets_everywhere(shape: str) -> None:
 def test_culling_skips_only_what_is_far(shape: str) -> None:
     obstacle = obstacle_of(shape, np.random.default_rng(10 + SHAPES.index(shape)))
     problem, trajectory = problem_with(obstacle), trajectory_of(60)
-    reach = reach_of(problem)
+    reach = coal_reach(problem)
     full = list(obstacles_at_rest(ROBOT, problem).distances(trajectory, np.inf))
     culled = list(obstacles_at_rest(ROBOT, problem).distances(trajectory, reach))
     near = {
@@ -147,7 +147,7 @@ def test_rows_close_to_each_other_are_seen_once(
     along = np.concatenate([np.linspace(0.0, shift, n - 1000), np.full(1000, shift)])
     motion = Trajectory(np.zeros(n), np.zeros(n), along, still, still)
     problem = ball_near_link_4(0.03)
-    reach = reach_of(problem)
+    reach = coal_reach(problem)
 
     def rows() -> list[int]:
         found = obstacles_at_rest(ROBOT, problem).distances(motion, reach, travel)

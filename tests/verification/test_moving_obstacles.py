@@ -305,7 +305,7 @@ def compare(seed: int, tmp_path: Path) -> Verdict:
         lower, upper = found.least.lower[index], found.least.upper[index]
         assert lower <= max(gaps.min(), -0.040) + 1e-9
         # Where it says that it is, it is: by the distance at the witness's moment.
-        moment = found.least.interval[index] + found.least.time[index]
+        moment = found.least.interval[index] + found.least.share[index]
         when = np.interp(moment, np.arange(rows), times)
         now = np.stack([np.interp([when], times, x) for x in joints.T], axis=1)
         spine = centres(now, lengths * 1e-3)

@@ -172,7 +172,7 @@ def test_what_slides_past_the_arm_is_the_arm_that_slides(
     # Three intervals of the trajectory, however many pieces they are proved in.
     rows = np.concatenate([chunk.lower for chunk in chunks])
     assert len(rows) == 3
-    assert ((chunks[0].time >= 0.0) & (chunks[0].time <= 1.0)).all()
+    assert ((chunks[0].share >= 0.0) & (chunks[0].share <= 1.0)).all()
     if clearance(two).verdict is Verdict.CERTIFIED:
         assert two.least is not None
         near = [k for k, pair in enumerate(two.pairs) if pair.obstacle]

@@ -23,7 +23,7 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.tables import write_cables, write_centres, write_link_angles
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.verification.coal_distances import reach_of
+from vdsm_pin.verification.coal_distances import coal_reach
 from vdsm_pin.verification.moving import untimed
 from vdsm_pin.verification.records import (
     AnyProblem,
@@ -172,7 +172,7 @@ class ArmSubject:
     @property
     def near(self) -> float:
         """As far as Coal looks; [m]."""
-        return reach_of(self.problem)
+        return coal_reach(self.problem)
 
     def read(self, file: Path) -> Trajectory:
         """The motion of a file."""

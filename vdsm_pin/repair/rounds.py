@@ -230,7 +230,7 @@ def repaired(
         if under_errors:
             lost |= {k: _lost(least, k) for k in bad}
         wanted = {k: room + lost.get(k, 0.0) for k, room in near.items()}
-        moments = least.interval[bad] + least.time[bad]
+        moments = least.interval[bad] + least.share[bad]
         motion = motion.pushed(wanted, moments[moments >= 0.0])
         found = judge(motion)
     if found.verdict is not Verdict.CERTIFIED:

@@ -77,7 +77,7 @@ class ClearanceCsv:
         pairs = column if chunk.pairs is None else chunk.pairs[column]
         part = LeastClearances(
             interval=row + chunk.first_interval,
-            time=chunk.time[row, column],
+            share=chunk.share[row, column],
             lower=chunk.lower[row, column],
             upper=chunk.upper[row, column],
             verdict=chunk.verdict[row, column],
@@ -138,7 +138,7 @@ class ClearanceCsv:
         """Rows as numbers, of which each has a pair, shape (k, 12)."""
         columns = [
             rows.interval,
-            rows.interval + rows.time,
+            rows.interval + rows.share,
             pairs + len(_VERDICTS),
             rows.lower,
             rows.upper,

@@ -31,7 +31,7 @@ from vdsm_pin.robots.urdf import robot_of
 from vdsm_pin.units import MM_PER_M, in_mm
 from vdsm_pin.verification.coal_bodies import CoalObstacle, coal_bodies
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
-from vdsm_pin.verification.moving import frames_beside, tree_beside
+from vdsm_pin.verification.moving import joined_tree, obstacle_frames
 from vdsm_pin.verification.records import Pair as NamedPair
 
 ROOT_FRAME: Final = 1
@@ -98,7 +98,7 @@ class Cell(Summarised):
     @cached_property
     def tree(self) -> Tree:
         """The robot's joints first, then those that carry obstacles."""
-        return tree_beside(self.robot.tree, self.scene)
+        return joined_tree(self.robot.tree, self.scene)
 
     @cached_property
     def poses(self) -> TreePoses:
@@ -108,7 +108,7 @@ class Cell(Summarised):
     @cached_property
     def bodies(self) -> list[Body]:
         """Links first, then obstacles."""
-        frames = frames_beside(self.robot.tree, self.scene)
+        frames = obstacle_frames(self.robot.tree, self.scene)
         both = zip(frames, self.scene.obstacles, strict=True)
         obstacles = (Body(frame, one.pieces, one.name) for frame, one in both)
         return [*self.robot.bodies, *obstacles]

@@ -37,7 +37,7 @@ from vdsm_pin.verification.certificate_lines import (
     write_lines,
 )
 from vdsm_pin.verification.certificate_writer import errors_beside, pieces_of_obstacles
-from vdsm_pin.verification.moving import path_beside
+from vdsm_pin.verification.moving import joined_path
 
 DEGREES: Final[Mapping[int, Joined]] = {1: "linear", 3: "cubic", 5: "quintic"}
 UNCLEAR: Final = "the inside of {!r} has gaps, and then none is written"
@@ -72,7 +72,7 @@ def write_robot_certificate(
     cell, motion = verification.problem, verification.trajectory
     table, budget = PairTable.of(cell.pairs), Budget(until=deadline.end)
     bodies, errors = cell.bodies, verification.errors
-    whole, _ = path_beside(motion, cell.scene)
+    whole, _ = joined_path(motion, cell.scene)
     box = proof_box(cell.robot, cell.scene, errors)
     proving, plan = start_proof(cell.tree, bodies, whole, table, box, budget)
     pieces, n_links = proving.task.pieces, len(cell.robot.bodies)

@@ -54,7 +54,7 @@ def _least(cell: Cell, pairs: Sequence[BodyPair], proof: Proof) -> LeastClearanc
     points[outer] = points[outer, ::-1]
     return LeastClearances(
         interval=proof.interval,
-        time=proof.share,
+        share=proof.share,
         lower=proof.lower,
         upper=proof.upper,
         verdict=proof.verdict,
@@ -76,7 +76,7 @@ def _met(
     changed = dict[int, tuple[Any, ...]]()
     beside = min(1.0, span[1] - span[0]) * np.array(BESIDE)
     for k in np.flatnonzero(near).tolist():
-        moment = least.interval[k] + least.time[k]
+        moment = least.interval[k] + least.share[k]
         middle = 0.5 * (least.link_point[k] + least.other_point[k])
         moments = np.clip(moment + beside, *span)
         intervals, shares = path.split(moments)
@@ -95,5 +95,5 @@ def least_in_rows(least: LeastClearances, knots: Knots) -> LeastClearances:
     """The same, its moments in intervals of the robot's own path."""
     if knots.are_rows:
         return least
-    time = knots.share(least.interval, least.time)
-    return replace(least, interval=knots.interval(least.interval), time=time)
+    share = knots.share(least.interval, least.share)
+    return replace(least, interval=knots.interval(least.interval), share=share)

@@ -47,7 +47,7 @@ def robot_counterexamples(
         return ()
 
     def moments(k: int) -> tuple[Moment, ...]:
-        nearest = Moment(int(least.interval[k]), float(least.time[k]))
+        nearest = Moment(int(least.interval[k]), float(least.share[k]))
         return moments_of(nearest, int(weakest[k]))
 
     return Undecided(

@@ -14,7 +14,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.error_box import ErrorBox as ProofBox
 from vdsm_pin.robots.model import Robot, RobotJoint
-from vdsm_pin.verification.moving import tree_beside
+from vdsm_pin.verification.moving import joined_tree
 from vdsm_pin.verification.task import obstacle_growth
 
 BASE = 0
@@ -65,7 +65,7 @@ def proof_box(robot: Robot, scene: Scene, errors: ErrorBox) -> ProofBox | None:
     if errors == ErrorBox():
         return None
     of_columns = joint_errors(robot.joints, errors)
-    n_joints = len(tree_beside(robot.tree, scene).joints)
+    n_joints = len(joined_tree(robot.tree, scene).joints)
     joints, shifts, tilts = np.zeros((3, n_joints))
     for k, joint in enumerate(robot.tree.joints):
         if joint.column is not None:

@@ -20,7 +20,7 @@ from vdsm_pin.verification.first_contact import (
     Noted,
     first_contacts,
 )
-from vdsm_pin.verification.moving import in_short_parts, path_beside
+from vdsm_pin.verification.moving import in_short_parts, joined_path
 from vdsm_pin.verification.records import LeastClearances, Pair
 
 ENOUGH: Final = 1e-6
@@ -75,7 +75,7 @@ class _Judge:
         deadline: Deadline,
     ) -> None:
         self._cell, self._pairs, self._deadline = cell, pairs, deadline
-        self._path, self._knots = in_short_parts(*path_beside(path, cell.scene))
+        self._path, self._knots = in_short_parts(*joined_path(path, cell.scene))
         asked, budget = (self._path, pairs, box), Budget(until=deadline.end)
         self._stretches = Stretches(cell.tree, cell.bodies, *asked, budget)
 

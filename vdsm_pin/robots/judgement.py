@@ -36,7 +36,7 @@ from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.approaches import nearest_pairs
-from vdsm_pin.verification.besides import Besides
+from vdsm_pin.verification.best_effort import BestEffort
 from vdsm_pin.verification.clearance import profile_of
 from vdsm_pin.verification.clearance_check import LINKS, Evidence, clearance_checks
 from vdsm_pin.verification.coal_check import Evidence as CoalEvidence
@@ -45,7 +45,7 @@ from vdsm_pin.verification.enclosed import enclosed_least
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import LINKS as INSIDE
 from vdsm_pin.verification.inside import check_inside
-from vdsm_pin.verification.moving import Knots, in_short_parts, path_beside
+from vdsm_pin.verification.moving import Knots, in_short_parts, joined_path
 from vdsm_pin.verification.records import (
     Check,
     Counterexample,
@@ -99,16 +99,16 @@ def verify_robot(
     robot = cell.robot
     budget = Budget(until=deadline.end, slack=WIDTH)
     box = proof_box(robot, cell.scene, cell.errors)
-    whole, knots = in_short_parts(*path_beside(path, cell.scene))
+    whole, knots = in_short_parts(*joined_path(path, cell.scene))
     proof = answer(cell.question, whole, budget)
     located = locate_links(cell, whole, box, budget)
     named = cell.named_pairs
     proved = least_clearances(cell, cell.pairs, whole, proof)
     coal, measured = _coal(cell, whole, proof, knots)
-    least, besides = enclosed_least(proved, points_inside(located), 0.0), Besides()
+    least, extras = enclosed_least(proved, points_inside(located), 0.0), BestEffort()
     profile = profile_of(proof.profile, proof.stride, knots, len(robot.bodies))
     none: tuple[Counterexample, ...] = ()
-    lost = besides.take(
+    lost = extras.take(
         "search for counterexamples",
         lambda: robot_counterexamples(
             cell, whole, named, least, proof.lower_interval, deadline
@@ -118,7 +118,7 @@ def verify_robot(
     nowhere: tuple[FirstContact, ...] = ()
     met = nowhere
     if contacts:
-        met = besides.take(
+        met = extras.take(
             "first contact",
             lambda: robot_contacts(cell, path, named, proved, box, deadline),
             nowhere,
@@ -162,7 +162,7 @@ def verify_robot(
         least=least,
         counterexamples=lost,
         nominal_clear=clear,
-        not_done=tuple(besides.not_done),
+        not_done=tuple(extras.not_done),
         time_limit=deadline.limit,
     )
 

@@ -29,7 +29,7 @@ def closest_approaches(
     problem: PlanningProblem,
     trajectory: Trajectory,
     proof: ClearanceProof,
-    around: Enclosed | None = None,
+    enclosed: Enclosed | None = None,
 ) -> tuple[ClosestApproach, ...]:
     """The pairs that come nearest, by their upper bounds; obstacles first.
 
@@ -40,13 +40,13 @@ def closest_approaches(
         problem: Arm and scene.
         trajectory: The motion.
         proof: Of its distances.
-        around: What begins inside the meshes that the arm is inside of.
+        enclosed: What begins inside the meshes that the arm is inside of.
     """
-    around = around or {}
-    rows = list(enclosed_approaches(problem, around))
+    enclosed = enclosed or {}
+    rows = list(enclosed_approaches(problem, enclosed))
     nearest = nearest_pairs(proof.pairs, least_clearances(proof))
     for near in nearest.values():
-        if near.pair.own in around.get(near.pair.obstacle, ()):
+        if near.pair.own in enclosed.get(near.pair.obstacle, ()):
             continue
         deeper = is_deepest(near.upper, ball_of(problem, near.pair))
         station = _station(problem, trajectory, near)
@@ -69,7 +69,7 @@ def nearest_pairs(
     return {
         k: ClosestApproach(
             interval=int(least.interval[k]),
-            share=float(least.time[k]),
+            share=float(least.share[k]),
             pair=pairs[k],
             lower=float(least.lower[k]),
             upper=float(least.upper[k]),

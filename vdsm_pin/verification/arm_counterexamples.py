@@ -24,7 +24,7 @@ from vdsm_pin.verification.counterexample import (
     grown_by,
     moments_of,
 )
-from vdsm_pin.verification.moving import frames_beside, tree_beside, whole_rows
+from vdsm_pin.verification.moving import joined_tree, obstacle_frames, whole_rows
 from vdsm_pin.verification.records import Counterexample, Pair
 from vdsm_pin.verification.task import ball_of
 
@@ -36,14 +36,14 @@ def arm_question(
     mine = tuple(o for o in problem.scene.obstacles if o.name == pair.obstacle)
     problem, arm = replace(problem, scene=Scene(mine)), problem.manipulator
     own, required = arm_tree(arm), problem.required_self_clearance
-    tree = tree_beside(own, problem.scene)
+    tree = joined_tree(own, problem.scene)
     bodies = {
         body.name: Body(link_frame(body.link), (body.piece,), body.name)
         for body in arm_bodies(arm)
     }
     if pair.obstacle:
         required = problem.required_clearance
-        (frame,) = frames_beside(own, problem.scene)
+        (frame,) = obstacle_frames(own, problem.scene)
         bodies[pair.label] = Body(frame, mine[0].pieces, pair.label)
     sizes, angles = np.zeros(tree.n_columns), errors.angles(arm.n_links)
     sizes[1 : 1 + angles.size] = angles.reshape(-1)

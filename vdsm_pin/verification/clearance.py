@@ -13,7 +13,6 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
-from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
@@ -86,7 +85,7 @@ class ClearanceProof:
 def _chunk(
     proof: ProblemProof, first: int, last: int, least: FloatArray, pairs: IntArray
 ) -> ClearanceChunk:
-    """The brackets of intervals of the trajectory, from `first` to below `last`."""
+    """A chunk of the trajectory's intervals from `first` to below `last`."""
     proving, knots = proof.proving, proof.knots
     dense, count = proving.results.dense, int(knots.first[last] - knots.first[first])
     own, other = dense.own[:count], dense.other[:count]
@@ -97,7 +96,7 @@ def _chunk(
         # No interval is worse than what narrowing proved of all of them.
         lower=frozen(np.maximum(dense.lower[:count], least)),
         upper=frozen(dense.upper[:count]),
-        time=frozen(dense.time[:count]),
+        share=frozen(dense.time[:count]),
         verdict=frozen(dense.verdict[:count], np.int64),
         link_point=frozen(np.where(swapped, other, own)),
         other_point=frozen(np.where(swapped, own, other)),
@@ -116,13 +115,13 @@ def _merged(chunk: ClearanceChunk, knots: Knots, last: int) -> ClearanceChunk:
     numbers = np.arange(len(inner))[:, None]
     at = np.maximum.reduceat(np.where(chunk.upper == least[groups], numbers, 0), begins)
     columns = np.arange(at.shape[1])
-    time = [knots.share(inner[a], chunk.time[a, columns]) for a in at]
+    shares = [knots.share(inner[a], chunk.share[a, columns]) for a in at]
     worst = np.maximum.reduceat(RANK[chunk.verdict], begins)
     return replace(
         chunk,
         lower=frozen(np.minimum.reduceat(chunk.lower, begins)),
         upper=frozen(least),
-        time=frozen(np.array(time).reshape(at.shape)),
+        share=frozen(np.array(shares).reshape(at.shape)),
         verdict=frozen(RANK[worst], np.int64),
         link_point=frozen(chunk.link_point[at, columns]),
         other_point=frozen(chunk.other_point[at, columns]),
@@ -160,7 +159,6 @@ def prove_clearance(
     trajectory: Trajectory,
     errors: ErrorBox,
     sinks: Sequence[ClearanceSink] = (),
-    pieces: PackedPieces | None = None,
     deadline: Deadline = NO_LIMIT,
     reach: float = math.inf,
 ) -> ClearanceProof:
@@ -169,9 +167,8 @@ def prove_clearance(
     Args:
         problem: Arm, scene, required clearances.
         trajectory: The motion; one row counts as an interval without motion.
-        errors: The proof covers every motion within it.
+        errors: The proof covers every motion within this box.
         sinks: Receive the brackets in chunks, in order, once all is proved.
-        pieces: `pack_scene(problem)`, where it is known already.
         deadline: What is not judged by then is undecided.
         reach: Obstacles that no link is proved nearer to than this, at any time, are
             left out of what the sinks receive; [m].
@@ -180,7 +177,7 @@ def prove_clearance(
         The proof, its least brackets narrowed unless the time ended before.
     """
     budget = Budget(until=deadline.end)
-    proof = prove_problem(problem, trajectory, errors, pieces, budget)
+    proof = prove_problem(problem, trajectory, errors, budget)
     step("proving the clearance of %d pairs", len(proof.best))
     with watched(lambda: proof.proving.share):
         late = not proof.proving.run()
@@ -223,7 +220,7 @@ def _send(
         scene = Scene(tuple(obstacles[k] for k in near))
         near_problem = replace(problem, scene=scene)
         budget = proving.budget
-        proof = prove_problem(near_problem, trajectory, errors, budget=budget)
+        proof = prove_problem(near_problem, trajectory, errors, budget)
         proving = proof.proving
     length = CHUNK_VALUES // max(1, pairs.size) // BLOCK * BLOCK
     length = min(CHUNK, proving.n_intervals, max(BLOCK, length))
@@ -274,7 +271,7 @@ def least_clearances(proof: ClearanceProof) -> LeastClearances:
     swapped = np.array([not pair.obstacle for pair in proof.pairs], bool)[:, None]
     return LeastClearances(
         interval=frozen(best[:, AT_UPPER], np.int64),
-        time=frozen(best[:, TIME]),
+        share=frozen(best[:, TIME]),
         lower=frozen(best[:, LOW]),
         upper=frozen(best[:, UP]),
         verdict=verdicts_of(proof.counts),

@@ -140,7 +140,7 @@ def _row(row: Check, evidence: Evidence, mine: IntArray) -> Check:
         count=int(counts.sum()),
         worst=worst,
         where=where,
-        moment=float(least.interval[k] + least.time[k]) if seen else nan,
+        moment=float(least.interval[k] + least.share[k]) if seen else nan,
         deeper=evidence.deepest(k, worst),
     )
 

@@ -145,7 +145,7 @@ def _at_approaches(
 ) -> Iterator[tuple[float, float, float]]:
     """The same where the two come nearest, upper bounds included."""
     for k, near in enumerate(log.approaches):
-        if (near.pair.own, near.pair.label) != names or names[1] in log.around:
+        if (near.pair.own, near.pair.label) != names or names[1] in log.enclosing:
             continue
         found = both.distances(np.array([near.moment]))
         log.keep_approaches(np.array([k]), found)

@@ -20,9 +20,9 @@ from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.coal_distances import (
     CoalDistances,
     Partners,
+    coal_reach,
     links_farther_out,
     obstacles_at_rest,
-    reach_of,
 )
 from vdsm_pin.verification.coal_log import BETWEEN_LINKS, CoalLog
 from vdsm_pin.verification.proved_lowers import ProvedLowers
@@ -139,7 +139,7 @@ def check_coal_obstacles(
         partners=obstacles_at_rest(robot, problem, deadline),
         numbers=numbers,
         near=problem.scene.names,
-        reach=reach_of(problem),
+        reach=coal_reach(problem),
         travel=TOLERANCES.coal_travel,
         proved=proved,
         against="proved",

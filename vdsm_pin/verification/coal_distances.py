@@ -70,10 +70,10 @@ class CoalDistances:
         return np.maximum(found, 0.0)
 
 
-def reach_of(problem: PlanningProblem) -> float:
-    """Distance up to which pairs are measured at every row; [m].
+def coal_reach(problem: PlanningProblem) -> float:
+    """Distance up to which Coal measures a pair at every row; [m].
 
-    The required clearance and the arm's own radius past it.
+    It is the required clearance plus the arm's largest radius.
     """
     return problem.required_clearance + problem.manipulator.most_radius
 

@@ -21,20 +21,22 @@ class CoalLog:
     Args:
         pairs: Every pair that is judged.
         approaches: The closest approaches, measured at their moments.
-        around: Names of the meshes around the arm: Coal knows their surface alone, so
-            its distance is no clearance and is not kept.
+        enclosing: Names of the meshes that the arm is inside of; Coal measures to
+            their surface alone, which is no clearance, so no distance is kept.
     """
 
     def __init__(
         self,
         pairs: Sequence[Pair],
         approaches: Sequence[ClosestApproach],
-        around: Sequence[str],
+        enclosing: Sequence[str],
     ) -> None:
         self.pairs, self.approaches = tuple(pairs), tuple(approaches)
-        self.around = tuple(around)
+        self.enclosing = tuple(enclosing)
         # An array of names would be as wide as the longest, for every pair.
-        of_surface = (k for k, pair in enumerate(pairs) if pair.obstacle in self.around)
+        of_surface = (
+            k for k, pair in enumerate(pairs) if pair.obstacle in self.enclosing
+        )
         self._surfaces = np.fromiter(of_surface, np.int64)
         self._parts: list[tuple[IntArray, IntArray, FloatArray]] = []
 
@@ -51,7 +53,7 @@ class CoalLog:
                 k
                 for k, near in enumerate(self.approaches)
                 if near.pair.obstacle in partners
-                and near.pair.obstacle not in self.around
+                and near.pair.obstacle not in self.enclosing
                 and {near.pair.body, near.pair.other_body} <= {"", TOOL}
             ],
             dtype=np.int64,

@@ -9,12 +9,12 @@ inside; what reaches out through the surface has its distance from that.
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from math import nan
-from typing import Final
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.proof.terms import REFUTED
 from vdsm_pin.verification.inside import Enclosed
 from vdsm_pin.verification.records import (
     Check,
@@ -28,34 +28,31 @@ from vdsm_pin.verification.records import (
 )
 from vdsm_pin.verification.task import all_pairs
 
-REFUTED: Final = 1
-"""In `ClearanceChunk.verdict`."""
 
-
-def _begins_inside(pair: Pair, around: Enclosed) -> bool:
+def _begins_inside(pair: Pair, enclosed: Enclosed) -> bool:
     """Whether the obstacle of a pair is a mesh, and its body begins inside."""
-    return pair.own in around.get(pair.obstacle, ())
+    return pair.own in enclosed.get(pair.obstacle, ())
 
 
 class EnclosedSink:
-    """Corrects chunks for the meshes around the arm and passes them on.
+    """Corrects chunks for the meshes that the arm is inside of and passes them on.
 
     The arm stays inside until its axis may meet the surface.
 
     Args:
         sink: Receives the corrected chunks.
         problem: The arm.
-        around: What begins inside the meshes around it.
+        enclosed: Meshes and the bodies that begin inside them.
     """
 
     def __init__(
-        self, sink: ClearanceSink, problem: PlanningProblem, around: Enclosed
+        self, sink: ClearanceSink, problem: PlanningProblem, enclosed: Enclosed
     ) -> None:
         self.sink, self.least = sink, -problem.manipulator.least_radius
         pairs = list(enumerate(all_pairs(problem)))
         self.columns = [
             np.array([k for k, pair in pairs if _begins_inside(pair, {name: inside})])
-            for name, inside in around.items()
+            for name, inside in enclosed.items()
             if inside
         ]
         self.left = [False] * len(self.columns)
@@ -84,15 +81,15 @@ class EnclosedSink:
 
 
 def enclosed_profile(
-    profile: ClearanceProfile, problem: PlanningProblem, around: Enclosed
+    profile: ClearanceProfile, problem: PlanningProblem, enclosed: Enclosed
 ) -> ClearanceProfile:
-    """The profile with the meshes around the arm as solids."""
-    if not around:
+    """The profile with the meshes that the arm is inside of as solids."""
+    if not enclosed:
         return profile
     least = -problem.manipulator.least_radius
     lower, upper = profile.obstacle_lower.copy(), profile.obstacle_upper.copy()
     link_lower, link_upper = profile.link_lower.copy(), profile.link_upper.copy()
-    for name, bodies in around.items():
+    for name, bodies in enclosed.items():
         column = problem.scene.names.index(name)
         mine: BoolArray = ~np.logical_or.accumulate(lower[:, column] <= least)
         lower[:, column] = upper[mine, column] = least
@@ -124,17 +121,17 @@ def enclosed_least(
     return least.with_rows(rows) if rows else least
 
 
-def pairs_inside(pairs: Sequence[Pair], around: Enclosed) -> dict[int, FloatArray]:
+def pairs_inside(pairs: Sequence[Pair], enclosed: Enclosed) -> dict[int, FloatArray]:
     """The pairs of an arm that begin inside, as `enclosed_least` takes them."""
     return {
-        k: around[pair.obstacle][pair.own]
+        k: enclosed[pair.obstacle][pair.own]
         for k, pair in enumerate(pairs)
-        if _begins_inside(pair, around)
+        if _begins_inside(pair, enclosed)
     }
 
 
 def enclosed_approaches(
-    problem: PlanningProblem, around: Enclosed
+    problem: PlanningProblem, enclosed: Enclosed
 ) -> tuple[ClosestApproach, ...]:
     """Each link that begins inside a mesh, by its middle."""
     arm = problem.manipulator
@@ -150,24 +147,24 @@ def enclosed_approaches(
             other_point=frozen(bodies[f"link {link}"]),
             deeper=True,
         )
-        for name, bodies in around.items()
+        for name, bodies in enclosed.items()
         for link in range(1, arm.n_links + 1)
         if f"link {link}" in bodies
     )
 
 
 def enclosed_checks(
-    rows: tuple[Check, ...], problem: PlanningProblem, around: Collection[str]
+    rows: tuple[Check, ...], problem: PlanningProblem, enclosed: Collection[str]
 ) -> tuple[Check, ...]:
     """The rows of the clearance, the one from obstacles first."""
-    if not around:
+    if not enclosed:
         return rows
     worst = min(rows[0].worst, -problem.manipulator.least_radius)
     refuted = replace(
         rows[0],
         verdict=Verdict.REFUTED,
         worst=worst,
-        where="; ".join(f"the arm is inside {name!r}" for name in around),
+        where="; ".join(f"the arm is inside {name!r}" for name in enclosed),
         moment=0.0,
         first_moment=0.0,
         last_moment=nan,

@@ -19,7 +19,6 @@ from vdsm_pin.verification.clearance import (
     prove_clearance,
 )
 from vdsm_pin.verification.records import AnyProblem, ClearanceChunk, Motion, Pair
-from vdsm_pin.verification.task import pack_scene
 
 STRETCH: Final = 64
 """Intervals looked at first; the next stretches are twice as long each."""
@@ -166,17 +165,16 @@ def arm_contacts(
     deadline: Deadline = NO_LIMIT,
     noted: Noted | None = None,
 ) -> tuple[FirstContact, ...]:
-    """Those of an arm's motion, of which the whole is proved already.
+    """`first_contacts` of an arm's motion, of which `proof` has the whole.
 
     Raises:
         OutOfTime: If the time is over.
     """
-    pieces = pack_scene(problem)
 
     def judge(low: float, high: float) -> Judged:
         deadline.check()
         rows = trajectory.between(low, high)
-        found = prove_clearance(problem, rows, errors, (), pieces, deadline)
+        found = prove_clearance(problem, rows, errors, deadline=deadline)
         return least_clearances(found)
 
     whole = least_clearances(proof)

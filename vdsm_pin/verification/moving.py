@@ -22,21 +22,29 @@ from vdsm_pin.proof.terms import WORLD
 from vdsm_pin.proof.tree import Tree
 
 PART: Final = 0.4
-"""How far a column goes in a part of a long interval, about; [rad], [m]."""
+"""About how far a column of q moves in one part of a long interval; [rad], [m]."""
 
 MOST_PARTS: Final = 64
-"""Of an interval."""
+"""Most parts that one interval is cut into."""
 
 
-def tree_beside(tree: Tree, scene: Scene) -> Tree:
-    """The joints of a tree first, then those that carry obstacles."""
+def joined_tree(tree: Tree, scene: Scene) -> Tree:
+    """One tree: the joints of the arm or robot, then those that carry obstacles."""
     for carrier in scene.carriers:
         tree = tree.joined(carrier.tree)
     return tree
 
 
-def frames_beside(tree: Tree, scene: Scene) -> list[int]:
-    """The frame of the whole tree in which each obstacle rests."""
+def obstacle_frames(tree: Tree, scene: Scene) -> list[int]:
+    """The frame of `joined_tree` in which each obstacle is at rest.
+
+    Args:
+        tree: Of the arm or robot alone.
+        scene: The obstacles.
+
+    Returns:
+        One number for each obstacle, in scene order; `WORLD` where it does not move.
+    """
     first, before = {}, len(tree.joints)
     for carrier in scene.carriers:
         first[carrier] = before
@@ -48,7 +56,7 @@ def frames_beside(tree: Tree, scene: Scene) -> list[int]:
 
 
 def untimed(scene: Scene, trajectory: Trajectory | JointTrajectory | Path) -> str:
-    """Why a motion cannot be judged beside what moves; empty where it can."""
+    """Why moving obstacles need times that a motion lacks; empty where it has them."""
     if trajectory.times is not None or not scene.moving:
         return ""
     name = scene.moving[0].name
@@ -56,10 +64,10 @@ def untimed(scene: Scene, trajectory: Trajectory | JointTrajectory | Path) -> st
 
 
 def check_timed(scene: Scene, trajectory: Trajectory | Path) -> None:
-    """Refuse a motion without times beside what moves.
+    """Refuse a motion without times in a scene where obstacles move.
 
     Raises:
-        InvalidInput: If it has none.
+        InvalidInput: If obstacles move and the motion has no times.
     """
     if why := untimed(scene, trajectory):
         message = f"trajectory {why}"
@@ -136,18 +144,18 @@ class Knots:
         return found
 
 
-def path_beside(path: Path, scene: Scene) -> tuple[Path, Knots]:
-    """How all columns of the whole tree move, from the first row to the last.
+def joined_path(path: Path, scene: Scene) -> tuple[Path, Knots]:
+    """How all columns of `joined_tree` move, from the first row to the last.
 
     Args:
-        path: Of the columns of the tree beside which obstacles move.
+        path: Of the arm or robot alone.
         scene: The obstacles.
 
     Returns:
         The path, and where its intervals lie in the given one.
 
     Raises:
-        InvalidInput: If something moves beside rows without times.
+        InvalidInput: If obstacles move and the path has no times.
     """
     check_timed(scene, path)
     if not scene.carriers:
@@ -169,9 +177,13 @@ def in_short_parts(path: Path, knots: Knots) -> tuple[Path, Knots]:
 
 
 def whole_path(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Path, Knots]:
-    """`path_beside` of a snake arm's trajectory."""
+    """The joined path of an arm's trajectory and what carries the obstacles.
+
+    Raises:
+        InvalidInput: If obstacles move and the trajectory has no times.
+    """
     path = Path(trajectory.joints, trajectory.inner, trajectory.times)
-    return path_beside(path, problem.scene)
+    return joined_path(path, problem.scene)
 
 
 def whole_rows(

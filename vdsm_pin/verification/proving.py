@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
@@ -37,20 +36,18 @@ def prove_problem(
     problem: PlanningProblem,
     trajectory: Trajectory,
     errors: ErrorBox,
-    pieces: PackedPieces | None = None,
     budget: Budget = BUDGET,
 ) -> ProblemProof:
-    """Everything ready, nothing judged.
+    """A proof that is ready to run; nothing is judged yet.
 
     Args:
         problem: Arm, scene, required clearances.
         trajectory: The motion; one row counts as an interval without motion.
-        errors: The proof covers every motion within it.
-        pieces: `pack_scene(problem)`, where it is known already.
+        errors: The proof covers every motion within this box.
         budget: Sizes and when to stop.
     """
     path, knots = whole_path(problem, trajectory)
-    task = make_task(problem, errors, pieces, budget, path.reach)
+    task = make_task(problem, errors, budget, path.reach)
     n_obstacles = len(problem.scene.obstacles)
     columns = problem.manipulator.n_links + n_obstacles
     proving = new_proving(task, path.packed(), columns, n_obstacles, budget)

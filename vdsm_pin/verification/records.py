@@ -204,8 +204,8 @@ class ClearanceChunk:
     Args:
         first_interval: Number of the interval that row 0 of the arrays is about.
         lower: Proved lower bounds, shape (m, n_pairs); [m].
-        upper: Proved upper bounds at `time`, shape (m, n_pairs); [m].
-        time: Place of the upper bounds in their intervals, 0 to 1, (m, n_pairs); [-].
+        upper: Proved upper bounds at `share`, shape (m, n_pairs); [m].
+        share: Place of the upper bounds in their intervals, 0 to 1, (m, n_pairs); [-].
         verdict: 0 certified, 1 refuted, 2 undecided, shape (m, n_pairs).
         link_point: Witnesses on the links, base frame, shape (m, n_pairs, 3); [m].
         other_point: Witnesses on the partners, shape (m, n_pairs, 3); [m].
@@ -215,7 +215,7 @@ class ClearanceChunk:
     first_interval: int
     lower: FloatArray
     upper: FloatArray
-    time: FloatArray
+    share: FloatArray
     verdict: IntArray
     link_point: FloatArray
     other_point: FloatArray
@@ -228,7 +228,7 @@ class LeastClearances:
 
     Args:
         interval: Where the upper bound was found, shape (n_pairs,).
-        time: Its place in the interval, 0 to 1, shape (n_pairs,); [-].
+        share: Its place in the interval, 0 to 1, shape (n_pairs,); [-].
         lower: Proved lower bound over the motion, shape (n_pairs,); [m].
         upper: Proved upper bound, shape (n_pairs,); [m].
         verdict: 0 certified, 1 refuted, 2 undecided, shape (n_pairs,).
@@ -237,7 +237,7 @@ class LeastClearances:
     """
 
     interval: IntArray
-    time: FloatArray
+    share: FloatArray
     lower: FloatArray
     upper: FloatArray
     verdict: IntArray

@@ -16,7 +16,6 @@ from vdsm_pin.arm.bodies import (
 from vdsm_pin.arm.tree import RAIL, arm_tree, link_frame
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.geometry.solids import HalfSpace
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.held import held_pairs
@@ -29,7 +28,7 @@ from vdsm_pin.proof.packing import pack_task
 from vdsm_pin.proof.packing import with_errors as with_box
 from vdsm_pin.proof.terms import Task
 from vdsm_pin.verification.link_clearance import arithmetic_pad
-from vdsm_pin.verification.moving import frames_beside, tree_beside
+from vdsm_pin.verification.moving import joined_tree, obstacle_frames
 from vdsm_pin.verification.records import Pair
 
 
@@ -127,11 +126,6 @@ def all_pairs(problem: PlanningProblem) -> tuple[Pair, ...]:
     return ArmPairs(problem).pairs
 
 
-def pack_scene(problem: PlanningProblem) -> PackedPieces:
-    """The obstacles, then the bodies of the arm in the frames of their links."""
-    return problem.packed
-
-
 def obstacle_growth(obstacles: Sequence[Obstacle], errors: ErrorBox) -> list[float]:
     """How far the surface of each obstacle may be off; [m].
 
@@ -159,7 +153,6 @@ def obstacle_growth(obstacles: Sequence[Obstacle], errors: ErrorBox) -> list[flo
 def make_task(
     problem: PlanningProblem,
     errors: ErrorBox,
-    pieces: PackedPieces | None = None,
     budget: Budget | None = None,
     reach: FloatArray | None = None,
 ) -> Task:
@@ -168,34 +161,33 @@ def make_task(
     Args:
         problem: Arm, scene, required clearances.
         errors: What the proof covers.
-        pieces: `pack_scene(problem)`, where it is known already.
         budget: Sizes and when to stop.
         reach: How large each column of the whole tree gets, shape (n_columns,); where
             the base may turn, nothing is proved of a motion of which that is not known.
     """
     table, arm = ArmPairs(problem), problem.manipulator
     obstacles = problem.scene.obstacles
-    pieces = pieces or pack_scene(problem)
+    pieces = problem.packed
     own = arm_tree(arm)
-    frames = zip(obstacles, frames_beside(own, problem.scene), strict=True)
+    frames = zip(obstacles, obstacle_frames(own, problem.scene), strict=True)
     bodies = [Body(frame, one.pieces, one.name) for one, frame in frames]
     bodies += [Body(link_frame(b.link), (b.piece,), b.name) for b in table.bodies]
     columns = arm.n_links + np.arange(len(bodies))
     # The feed counts as what link 1 is mounted on.
     columns[len(obstacles) :] = [max(0, body.link - 1) for body in table.bodies]
     rules = (budget or Budget()).rules(arithmetic_pad(problem, pieces))
-    tree, numbers = tree_beside(own, problem.scene), table.numbers()
+    tree, numbers = joined_tree(own, problem.scene), table.numbers()
     task = pack_task(tree, bodies, numbers, rules, reach, columns, pieces)
     return with_errors(task, problem, errors)
 
 
 def with_errors(task: Task, problem: PlanningProblem, errors: ErrorBox) -> Task:
-    """The same asked about another error box.
+    """A task with its error box replaced.
 
     Args:
-        task: Of the same problem.
+        task: `make_task` of this problem, with any errors.
         problem: Arm and scene.
-        errors: The box.
+        errors: The new box.
     """
     return with_growth(
         task,
@@ -208,7 +200,14 @@ def with_errors(task: Task, problem: PlanningProblem, errors: ErrorBox) -> Task:
 def with_growth(
     task: Task, errors: ErrorBox, n_links: int, grown: Sequence[float]
 ) -> Task:
-    """The same, the errors of the obstacles' surfaces given in their order; [m]."""
+    """A task with its error box replaced, for obstacles whose growth is known.
+
+    Args:
+        task: Any task of an arm.
+        errors: The new box; its errors of obstacles are not read.
+        n_links: Number of links of the arm.
+        grown: How far each obstacle's surface may be off, in scene order; [m].
+    """
     shifts, tilts = np.zeros((2, task.tree.parent.size))
     shifts[RAIL], tilts[RAIL] = errors.base, errors.base_turn
     asked = task.bodies.number.max(initial=0), task.pairs.obstacle.max(initial=0)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import nan
 
 import numpy as np
@@ -19,7 +19,7 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification import cable_check, fk, pointing
 from vdsm_pin.verification.approaches import closest_approaches
 from vdsm_pin.verification.arm_counterexamples import find_counterexamples
-from vdsm_pin.verification.besides import Besides, guarded
+from vdsm_pin.verification.best_effort import BestEffort, guarded
 from vdsm_pin.verification.clearance import (
     ClearanceProof,
     least_clearances,
@@ -33,7 +33,7 @@ from vdsm_pin.verification.coal_check import (
     check_coal_links,
     check_coal_obstacles,
 )
-from vdsm_pin.verification.coal_distances import reach_of
+from vdsm_pin.verification.coal_distances import coal_reach
 from vdsm_pin.verification.coal_log import CoalLog
 from vdsm_pin.verification.enclosed import (
     EnclosedSink,
@@ -59,7 +59,7 @@ from vdsm_pin.verification.inside import (
 )
 from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.moving import check_timed
-from vdsm_pin.verification.proved_lowers import LowersSink
+from vdsm_pin.verification.proved_lowers import LowersSink, ProvedLowers
 from vdsm_pin.verification.records import (
     ArmVerification,
     Check,
@@ -91,13 +91,13 @@ def verify(
         problem: What is asked.
         trajectory: What is judged, whoever made it.
         robot: The arm in Pinocchio and Coal.
-        errors: The clearance proof covers every motion within it, and within the
+        errors: The clearance proof covers every motion within this box and within the
             errors of the problem.
         sinks: Receive the clearance brackets in chunks, in order.
         joint_error: Whether to find the largest joint error that is still certified.
         deadline: When to give up what is left.
-        reach: The sinks hear of obstacles within it, see `prove_clearance`; as far as
-            Coal looks where not given; [m].
+        reach: Obstacles that no link is proved nearer to than this are left out of
+            what the sinks receive; `coal_reach(problem)` where it is None; [m].
         centres: The joint centres that were planned, to be held against Pinocchio's,
             shape (n_samples, N + 1, 3); [m].
 
@@ -110,24 +110,26 @@ def verify(
     """
     box = problem.errors.widened(errors or ErrorBox())
     _check_input(problem, trajectory, box)
+    reach = coal_reach(problem) if reach is None else reach
     located = locate_arm(problem, trajectory, box, deadline)
-    around = bodies_inside(problem, trajectory, arm_inside(located))
-    asked = _Judgement(problem, trajectory, box, deadline)
-    proof = asked.proved(around, sinks, reach_of(problem) if reach is None else reach)
-    counterexamples = asked.counterexamples(proof)
-    clear = bool(counterexamples) and asked.is_nominally_clear()
-    contacts = asked.contacts(proof)
+    enclosed = bodies_inside(problem, trajectory, arm_inside(located))
+    judgement = _Judgement(problem, trajectory, box, deadline)
+    proved = judgement.proved(enclosed, sinks, reach)
+    proof = proved.proof
+    counterexamples = judgement.counterexamples(proof)
+    clear = bool(counterexamples) and judgement.is_nominally_clear()
+    contacts = judgement.contacts(proved)
     if sinks and proof.sent < proof.n_intervals:
-        asked.besides.note(f"clearance.csv from interval {proof.sent} on", deadline)
+        judgement.extras.note(f"clearance.csv from interval {proof.sent} on", deadline)
     tip = check_tip(problem, trajectory)
-    near_misses = closest_approaches(problem, trajectory, proof, around)
-    log = CoalLog(proof.pairs, near_misses, tuple(around))
+    near_misses = closest_approaches(problem, trajectory, proof, enclosed)
+    log = CoalLog(proof.pairs, near_misses, tuple(enclosed))
     clearance = check_clearance(
         problem, proof, counterexamples, contacts, deadline, nominal=clear
     )
     checks = [
         *guarded(fk.NAME, lambda: fk.check_fk(robot, problem, trajectory, deadline)),
-        *asked.planned(robot, centres),
+        *judgement.planned(robot, centres),
         *check_limits(problem, trajectory),
         *tip.checks,
         *guarded(
@@ -135,15 +137,16 @@ def verify(
             lambda: pointing.check_pointing(problem, trajectory, deadline, box),
         ),
         *check_inside(located),
-        *enclosed_checks(clearance, problem, around),
-        *asked.by_coal(robot, proof, log),
+        *enclosed_checks(clearance, problem, enclosed),
+        *judgement.by_coal(robot, proved, log),
         *guarded(
             cable_check.NAME,
             lambda: cable_check.check_cables(problem, trajectory, deadline),
         ),
     ]
-    survived = asked.survived(proof, located) if joint_error else (nan, nan)
-    inside, depth = pairs_inside(proof.pairs, around), -problem.manipulator.least_radius
+    survived = judgement.survived(proof, located) if joint_error else (nan, nan)
+    inside = pairs_inside(proof.pairs, enclosed)
+    depth = -problem.manipulator.least_radius
     return ArmVerification(
         problem=problem,
         trajectory=trajectory,
@@ -151,7 +154,7 @@ def verify(
         pairs=proof.pairs,
         checks=tuple(checks),
         approaches=log.approaches,
-        profile=enclosed_profile(proof.profile, problem, around),
+        profile=enclosed_profile(proof.profile, problem, enclosed),
         tip_deviation=tip.deviation,
         coverage=tip.coverage,
         undrawn=tip.undrawn,
@@ -159,20 +162,35 @@ def verify(
         refuted_joint_error=survived[1],
         counterexamples=counterexamples,
         nominal_clear=clear,
-        not_done=tuple(asked.besides.not_done),
+        not_done=tuple(judgement.extras.not_done),
         time_limit=deadline.limit,
         least=enclosed_least(least_clearances(proof), inside, depth),
         coal=log.rows(),
     )
 
 
-class _Judgement:
-    """What is worked out of one motion, and what there was no time for.
+@dataclass(frozen=True)
+class _Proved:
+    """The clearance proof of a motion, and what its brackets told besides.
 
     Args:
-        problem: What is asked.
+        proof: Of every pair over every interval.
+        lowers: Its lower bounds, by interval where they fit into memory.
+        too_close: The intervals that are too close; None where not all were seen.
+    """
+
+    proof: ClearanceProof
+    lowers: ProvedLowers
+    too_close: Noted | None
+
+
+class _Judgement:
+    """Works out what `verify` returns of one motion, and notes what time left out.
+
+    Args:
+        problem: Arm, scene, required clearances.
         trajectory: The motion.
-        errors: Every motion within it is meant.
+        errors: The error box that the proof covers.
         deadline: When to give up what is left.
     """
 
@@ -184,38 +202,36 @@ class _Judgement:
         deadline: Deadline,
     ) -> None:
         self.problem, self.trajectory = problem, trajectory
-        self.errors, self.deadline, self.besides = errors, deadline, Besides()
-        self.lowers = LowersSink(problem, trajectory)
-        self.too_close: Noted | None = None
+        self.errors, self.deadline, self.extras = errors, deadline, BestEffort()
 
     def proved(
-        self, around: Enclosed, sinks: Sequence[ClearanceSink], reach: float
-    ) -> ClearanceProof:
+        self, enclosed: Enclosed, sinks: Sequence[ClearanceSink], reach: float
+    ) -> _Proved:
         """The clearance of every pair; `sinks` and `reach` are those of `verify`."""
         problem, trajectory = self.problem, self.trajectory
         wanted = [
-            EnclosedSink(one, problem, around) if around else one for one in sinks
+            EnclosedSink(one, problem, enclosed) if enclosed else one for one in sinks
         ]
+        lowers = LowersSink(problem, trajectory)
         noted = TooClose(all_pairs(problem), max(1, trajectory.n_samples - 1))
-        if sinks or self.lowers.fits:
-            wanted += [self.lowers.keep, noted]
+        if sinks or lowers.fits:
+            wanted += [lowers.keep, noted]
         proof = prove_clearance(
             problem,
             trajectory,
             self.errors,
             wanted,
             deadline=self.deadline,
-            reach=math.inf if around else reach,
+            reach=math.inf if enclosed else reach,
         )
-        if proof.sent == proof.n_intervals:
-            self.too_close = noted.noted
-        return proof
+        too_close = noted.noted if proof.sent == proof.n_intervals else None
+        return _Proved(proof, lowers.proved(proof), too_close)
 
     def counterexamples(self, proof: ClearanceProof) -> tuple[Counterexample, ...]:
         """Motions within the errors that come too close."""
         problem, motion, box = self.problem, self.trajectory, self.errors
         none: tuple[Counterexample, ...] = ()
-        return self.besides.take(
+        return self.extras.take(
             "search for counterexamples",
             lambda: find_counterexamples(problem, motion, box, proof, self.deadline),
             none,
@@ -231,15 +247,17 @@ class _Judgement:
             return outside and is_certified(*motion)
 
         name = "proof of the motion without errors"
-        return self.besides.take(name, is_clear, False)
+        return self.extras.take(name, is_clear, False)
 
-    def contacts(self, proof: ClearanceProof) -> tuple[FirstContact, ...]:
+    def contacts(self, proved: _Proved) -> tuple[FirstContact, ...]:
         """When pairs first come too close."""
-        motion, known = (self.problem, self.trajectory, self.errors), self.too_close
+        motion = self.problem, self.trajectory, self.errors
         nowhere: tuple[FirstContact, ...] = ()
-        return self.besides.take(
+        return self.extras.take(
             "first contact",
-            lambda: arm_contacts(*motion, proof, self.deadline, known),
+            lambda: arm_contacts(
+                *motion, proved.proof, self.deadline, proved.too_close
+            ),
             nowhere,
         )
 
@@ -253,26 +271,26 @@ class _Judgement:
         return guarded(fk.PLANNED, lambda: fk.check_planned(*motion))
 
     def by_coal(
-        self, robot: RobotModel, proof: ClearanceProof, log: CoalLog
+        self, robot: RobotModel, proved: _Proved, log: CoalLog
     ) -> tuple[Check, ...]:
         """The second opinions on distances."""
-        asked, deadline = (robot, self.problem, self.trajectory), self.deadline
-        proved = self.lowers.proved(proof)
+        motion, deadline = (robot, self.problem, self.trajectory), self.deadline
+        lowers = proved.lowers
         checks = {
-            OBSTACLES: lambda: check_coal_obstacles(*asked, proved, deadline, log),
-            LINKS: lambda: check_coal_links(*asked, deadline, log),
-            CARRIED: lambda: check_coal_carried(*asked, proved, log, deadline),
+            OBSTACLES: lambda: check_coal_obstacles(*motion, lowers, deadline, log),
+            LINKS: lambda: check_coal_links(*motion, deadline, log),
+            CARRIED: lambda: check_coal_carried(*motion, lowers, log, deadline),
         }
         return tuple(row for name, run in checks.items() for row in guarded(name, run))
 
     def survived(
         self, proof: ClearanceProof, located: Mapping[str, Location]
     ) -> tuple[float, float]:
-        """The largest joint error that is proved, and the smallest found that is lost.
+        """The largest joint error that is certified, and the least refuted one; [rad].
 
-        NaN where there was no time; nothing is proved of an arm that may be inside a
-        mesh. Nothing is refuted by a mesh's hull, and nothing survives that may enter
-        it.
+        Each is NaN where the time was over; 0 and NaN for an arm that may be inside a
+        mesh. Where the inside of a mesh cannot be told, its hull stands for it in what
+        is certified, and the mesh itself in what is refuted.
         """
         if any(where.side is not Side.OUTSIDE for where in located.values()):
             return 0.0, nan
@@ -284,14 +302,14 @@ class _Judgement:
         least = lower[ArmPairs(problem).number].min(axis=0)
         least[[name in hulls for name in problem.scene.names]] = -math.inf
         known = self.deadline, least
-        largest = self.besides.take(
+        largest = self.extras.take(
             "largest joint error",
             lambda: largest_joint_error(hulled, motion, errors, *known),
             nan,
         )
         if np.isnan(largest):
             return nan, nan
-        return largest, self.besides.take(
+        return largest, self.extras.take(
             "joint error that loses the clearance",
             lambda: refuted_joint_error(problem, motion, errors, largest, *known),
             nan,

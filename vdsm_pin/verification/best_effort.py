@@ -1,4 +1,4 @@
-"""What to do where a check fails to run, or no time is left for what is wanted."""
+"""What becomes of a check that fails, and of results for which no time is left."""
 
 from collections.abc import Callable
 from math import nan
@@ -12,14 +12,24 @@ from vdsm_pin.verification.records import Check, Verdict
 T = TypeVar("T")
 
 
-class Besides:
-    """What is wanted besides the checks, as far as the time allows it."""
+class BestEffort:
+    """Results besides the checks, as far as the time allows them.
+
+    Attributes:
+        not_done: What the time did not allow, and why, one entry each.
+    """
 
     def __init__(self) -> None:
         self.not_done: list[str] = []
 
     def take(self, name: str, run: Callable[[], T], otherwise: T) -> T:
-        """A result, and a note where there is none in time."""
+        """What `run` returns, or `otherwise` and a note if it raises `OutOfTime`.
+
+        Args:
+            name: What is worked out, for the note and the progress bar.
+            run: Works it out.
+            otherwise: What stands for the result if the time is over.
+        """
         step("%s", name)
         try:
             return run()
@@ -28,14 +38,14 @@ class Besides:
             return otherwise
 
     def note(self, name: str, deadline: Deadline) -> None:
-        """Say that something is missing."""
+        """Note that the time did not allow a result."""
         self.not_done.append(f"{name}: {OutOfTime(deadline.limit)}")
 
 
 def guarded(
     name: str, run: Callable[[], Check | tuple[Check, ...]]
 ) -> tuple[Check, ...]:
-    """A check's rows; one undecided row where it could not be carried out."""
+    """A check's rows; one undecided row if it raises a domain or arithmetic error."""
     step("%s", name)
     try:
         rows = run()
