@@ -10,16 +10,18 @@ from oracles.tree_queries import (
     random_pieces,
     random_placement,
     random_tree,
+    unit,
     wrong_poses,
 )
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import Hull
-from vdsm_pin.proof.bodies import Body, Pair
+from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.broad_phase import FEW
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import Proof, prove
+from vdsm_pin.proof.prover import Proof, prove, start_proof
+from vdsm_pin.proof.proving import dense_rows
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.proof.tree import Joint, Kind, Tree
 from vdsm_pin.tolerances import TOLERANCES
@@ -131,6 +133,53 @@ def along(body: Body, count: int) -> Body:
     shares = np.linspace(0.0, 1.0, count)[:, None]
     points = piece.points[0] + shares * (piece.points[-1] - piece.points[0])
     return Body(body.frame, (Hull(points, piece.radius),))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_each_interval_is_bracketed_by_itself(seed: int) -> None:
+    rng = np.random.default_rng([34, seed])
+    tree, bodies, path = random_scene(rng)
+    pairs, n = pairs_of(bodies), max(1, path.n_intervals)
+    made, plan = start_proof(tree, bodies, path, PairTable.of(pairs))
+    dense = dense_rows(n, len(plan.owner))
+    results = made.new_results()._replace(dense=dense)
+    assert made.fresh(results).sweep(0, n)
+    assert plan.owner.tolist() == list(range(len(pairs)))
+    for k in range(n):
+        part = Path(path.knots[k : k + 2], path.inner[k : k + 1])
+        for number, pair in enumerate(pairs):
+            two, time = (bodies[pair.one], bodies[pair.other]), dense.time[k, number]
+            shares = np.array([*np.linspace(0.0, 1.0, 33), time])
+            rows = at(part, shares) if len(path.knots) > 1 else path.knots
+            met = clearances(tree, two, tree.poses(rows))
+            if met.min() <= 0.0:
+                assert dense.verdict[k, number] != CERTIFIED
+                continue
+            assert dense.verdict[k, number] == CERTIFIED
+            assert 0.0 <= dense.lower[k, number] <= met.min() + 1e-9
+            assert dense.upper[k, number] >= met[-1] - 1e-9
+            way = dense.own[k, number] - dense.other[k, number]
+            assert met[-1] - 1e-6 <= np.linalg.norm(way) <= dense.upper[k, number] + 0.6
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_boxes_settle_all_that_is_far(seed: int) -> None:
+    """Beside one ball that is near others 20 m off need no look of their own."""
+    rng = np.random.default_rng([35, seed])
+    tree = random_tree(rng, 3)
+    path = random_path(rng, tree, 6, int(rng.choice([1, 3])))
+    bodies = [Body(k, random_pieces(rng, "capsule")) for k in range(1, tree.n_frames)]
+    n_bodies, near = len(bodies), int(rng.integers(FEW + 2))
+    for k in range(FEW + 2):
+        away = unit(rng) * (6.0 if k == near else rng.uniform(25.0, 40.0))
+        bodies.append(Body(0, (Hull(away[None], 0.1),)))
+    pairs = [Pair(i, j) for i in range(n_bodies) for j in range(n_bodies, len(bodies))]
+    made, _ = start_proof(tree, bodies, path, PairTable.of(pairs))
+    assert made.run()
+    settled = np.full((n_bodies, FEW + 2), path.n_intervals)
+    settled[:, near] = 0
+    assert np.array_equal(np.sort(made.broad.settled), np.sort(settled))
+    assert (made.results.counts[:, CERTIFIED] == path.n_intervals).all()
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -8,6 +8,7 @@ from oracles.tree_queries import random_tree
 from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.proof.packed_tree import TreePoses
 from vdsm_pin.proof.tree import Joint, Kind, Tree, free_tree, shifted
 
 SEEDS = range(40)
@@ -34,6 +35,16 @@ def pinocchio_poses(tree: Tree, q: FloatArray) -> FloatArray:
     data = model.createData()
     pinocchio.forwardKinematics(model, data, given)
     return np.array([data.oMi[k].homogeneous for k in numbers])
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_proof_places_frames_as_numpy_does(seed: int) -> None:
+    rng = np.random.default_rng([2, seed])
+    tree = random_tree(rng, int(rng.integers(1, 12)))
+    q = rng.normal(size=(5, tree.n_columns))
+    placed, expected = TreePoses(tree)(q), tree.poses(q)
+    assert placed.shape == (5, tree.n_frames, 4, 4)
+    np.testing.assert_allclose(placed, expected, rtol=0.0, atol=1e-13)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
