@@ -22,6 +22,7 @@ from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import Proof, prove, start_proof
 from vdsm_pin.proof.proving import dense_rows
+from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.proof.tree import Joint, Kind, Tree
 from vdsm_pin.tolerances import TOLERANCES
@@ -160,6 +161,44 @@ def test_each_interval_is_bracketed_by_itself(seed: int) -> None:
             assert dense.upper[k, number] >= met[-1] - 1e-9
             way = dense.own[k, number] - dense.other[k, number]
             assert met[-1] - 1e-6 <= np.linalg.norm(way) <= dense.upper[k, number] + 0.6
+
+
+@pytest.mark.parametrize("error", [0.0, 0.05])
+@pytest.mark.parametrize("seed", range(2))
+def test_full_blocks_are_bracketed_row_by_row(seed: int, error: float) -> None:
+    """Bodies of every kind, over two blocks and one interval more, past balls."""
+    rng = np.random.default_rng([36, seed])
+    tree = random_tree(rng, 3)
+    path = random_path(rng, tree, 2 * BLOCK + 2, 1)
+    kinds = ["capsule", "triangle", "box", "cylinder"]
+    bodies = [Body(tree.n_frames - 1, random_pieces(rng, kind)) for kind in kinds]
+    bodies += [Body(0, (Hull(4.0 * unit(rng)[None], 0.1),)) for _ in range(2)]
+    pairs = [
+        Pair(i, j) for i in range(len(kinds)) for j in (len(kinds), len(kinds) + 1)
+    ]
+    box = ErrorBox(*(np.full(len(tree.joints), e) for e in (error, 0.0, 0.0)))
+    made, _ = start_proof(tree, bodies, path, PairTable.of(pairs), box)
+    dense = dense_rows(path.n_intervals, len(pairs))
+    results = made.new_results()._replace(dense=dense)
+    assert made.fresh(results).sweep(0, path.n_intervals)
+    poses = tree.poses(path.knots)
+    for number, pair in enumerate(pairs):
+        met = clearances(tree, (bodies[pair.other], bodies[pair.one]), poses)
+        assert met.min() > 0.0
+        lower, upper = dense.lower[:, number], dense.upper[:, number]
+        assert (dense.verdict[:, number] == CERTIFIED).all()
+        assert (lower >= 0.0).all()
+        assert (lower <= np.minimum(met[1:], met[:-1]) + 1e-9).all()
+        at_rows = np.isin(dense.time[:, number], [0.0, 1.0])
+        there = np.where(dense.time[:, number] == 0.0, met[:-1], met[1:])
+        assert (upper[at_rows] >= there[at_rows] - 1e-9).all()
+        assert (upper >= lower).all()
+        for row in range(BLOCK - 2, BLOCK + 2) if error else ():
+            least = max(lower[row - 1], lower[row])
+            for _ in range(16):
+                wrong = wrong_poses(tree, path.knots[row], box, rng)[None]
+                two = bodies[pair.other], bodies[pair.one]
+                assert clearances(tree, two, wrong)[0] >= least - 1e-9
 
 
 @pytest.mark.parametrize("seed", range(6))

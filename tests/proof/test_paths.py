@@ -33,6 +33,7 @@ def test_pieces_are_the_polynomials_that_they_fit(degree: int) -> None:
     rng = np.random.default_rng(degree)
     for _ in range(20):
         path, p = made(degree, rng)
+        assert path.inner.shape == ((0, 0, 1) if degree == 1 else (3, degree - 1, 1))
         for k in range(3):
             start, end = path.times[k : k + 2]
             for t in [0.0, 1.0, *rng.uniform(size=5)]:
