@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, TypeAlias, TypeVar
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.atomic import write_text
+from vdsm_pin.io.problem_file import ProblemOfRobot, read_problem
 from vdsm_pin.io.trajectory_file import (
     Interpolation,
     read_trajectory,
@@ -361,6 +362,20 @@ def _check_times(file: Path, scene: Scene, motion: Motion) -> None:
     """
     if why := untimed(scene, motion):
         raise InvalidFile(file=file, where="line 1", problem=why)
+
+
+def read_asked(name_or_path: str | Path) -> Asked:
+    """The problem of a built-in name or a file, of an arm or of any other robot.
+
+    Raises:
+        InvalidFile: If the file or one that it names breaks its contract.
+    """
+    try:
+        return read_problem(name_or_path)
+    except ProblemOfRobot as error:
+        from vdsm_pin.robots.cell import read_cell
+
+        return read_cell(error.file)
 
 
 def subject_of(problem: Asked, terms: Terms = Terms()) -> Subject:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 from pydantic import ValidationError
 
-from vdsm_pin.app.subjects import Terms
+from vdsm_pin.app.subjects import Asked, Terms, read_asked
 from vdsm_pin.app.workflow import (
     JUDGED,
     NO_PLAN,
@@ -32,7 +32,7 @@ from vdsm_pin.errors import (
     VerificationFailed,
 )
 from vdsm_pin.io.atomic import writing
-from vdsm_pin.io.problem_file import ProblemOfRobot, read_problem
+from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -47,7 +47,7 @@ from vdsm_pin.time_limit import Deadline, enforced
 from vdsm_pin.verification.records import Verdict
 
 if TYPE_CHECKING:  # whoever plans for an arm needs no robots
-    from vdsm_pin.robots.cell import Cell
+    pass
 
 MANIFEST: Final = "manifest.json"
 TIMING: Final = "timing.json"
@@ -223,24 +223,18 @@ def _clear(folder: Path) -> None:
             path.unlink()
 
 
-def _read(task: Task) -> "PlanningProblem | Cell":
+def _read(task: Task) -> Asked:
     """The problem of an arm, under the errors asked for, or of any other robot.
 
     Raises:
         InvalidFile: If it is bad, or asks for a robot what only arms have.
     """
-    try:
-        return read_problem(task.problem).under(task.settings.errors)
-    except ProblemOfRobot as error:
-        refusal = error
-    if task.trajectory is None:
-        raise refusal
-    from vdsm_pin.robots.cell import read_cell
-
-    return read_cell(Path(refusal.file)).under(task.settings.errors)
+    plans = task.trajectory is None
+    asked = read_problem(task.problem) if plans else read_asked(task.problem)
+    return asked.under(task.settings.errors)
 
 
-def _check_apart(task: Task, problem: "PlanningProblem | Cell") -> None:
+def _check_apart(task: Task, problem: Asked) -> None:
     """Refuse a problem with files in the folder that its results replace.
 
     Raises:
@@ -329,9 +323,7 @@ def _hash(problem: str) -> str:
     return hashlib.sha256(os.fsencode(problem)).hexdigest()
 
 
-def _done(
-    task: Task, problem: "PlanningProblem | Cell", deadline: Deadline
-) -> BatchRow:
+def _done(task: Task, problem: Asked, deadline: Deadline) -> BatchRow:
     """Plan where no motion is given, verify, and tell."""
     asked, plan = task.settings, None
     if task.trajectory is None:

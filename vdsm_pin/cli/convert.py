@@ -55,19 +55,17 @@ def convert(
     takes a trajectory of any format and writes trajectory.csv. Nothing is judged.
     """
     from vdsm_pin.app.conversion import Given, convert_robot, convert_to_folder
-    from vdsm_pin.io.problem_file import ProblemOfRobot, read_problem
+    from vdsm_pin.app.subjects import read_asked
+    from vdsm_pin.problem.planning_problem import PlanningProblem
 
     given, more = Given(trajectory, centres, cables), [one.value for one in also or ()]
-    try:
-        asked = read_problem(problem)
-    except ProblemOfRobot as error:
-        from vdsm_pin.robots.cell import read_cell
-
-        refuse_beside("a robot", {"--centres": centres, "--cables": cables})
-        count = convert_robot(read_cell(Path(error.file)), given.file, out, more)
-    else:
+    asked = read_asked(problem)
+    if isinstance(asked, PlanningProblem):
         motion = convert_to_folder(asked, given, out, more)
         count = motion.n_samples
         for note in motion.notes:
             typer.echo(printable(f"note: {note}"))
+    else:
+        refuse_beside("a robot", {"--centres": centres, "--cables": cables})
+        count = convert_robot(asked, given.file, out, more)
     typer.echo(f"wrote {count} waypoints to {out}")

@@ -96,21 +96,15 @@ class RobotOptions(NamedTuple):
     parts: Parts = None
     joint_limits: JointLimits = None
 
-    def cell(self, problem: Path | None) -> "Cell":
+    def cell(self) -> "Cell":
         """The robot and what it is held to.
 
-        Args:
-            problem: A problem file with `robot`, in place of the options.
-
         Raises:
-            InvalidInput: If both or neither are given, or a file is bad.
+            InvalidInput: If a file is bad.
         """
-        from vdsm_pin.robots.cell import cell_of, read_cell
+        from vdsm_pin.robots.cell import cell_of
         from vdsm_pin.units import MM_PER_M
 
-        if problem is not None:
-            refuse_beside("a problem", self.named())
-            return read_cell(problem)
         return cell_of(
             self.files(),
             self.scene,

@@ -145,22 +145,20 @@ def asked_problem(
     """
     if of_robot.urdf is not None:
         refuse_beside("--urdf", {"PROBLEM": problem, **of_arm})
-        return of_robot.cell(None).under(errors)
+        return of_robot.cell().under(errors)
     refuse_beside("a problem", of_robot.named())
     if problem is None:
         message = "expected a PROBLEM, or --urdf for any other robot"
         raise InvalidInput(message)
-    from vdsm_pin.io.problem_file import ProblemOfRobot, read_problem
+    from vdsm_pin.app.subjects import read_asked
+    from vdsm_pin.problem.planning_problem import PlanningProblem
 
-    try:
-        arm = read_problem(problem).under(errors)
-    except ProblemOfRobot as error:
-        path = Path(error.file)
-    else:
+    asked = read_asked(problem)
+    if isinstance(asked, PlanningProblem):
         refuse_beside("an arm", {"--topic": topic})
-        return arm
-    refuse_beside("a robot", of_arm)
-    return of_robot.cell(path).under(errors)
+    else:
+        refuse_beside("a robot", of_arm)
+    return asked.under(errors)
 
 
 def _stated(
