@@ -151,8 +151,6 @@ def culprit(problem: PlanningProblem, centres: FloatArray) -> Culprit:
     """
     arm, radii = problem.manipulator, problem.held.radii
     axes = arm.axes(centres[None])[0]
-    if arm.bodies and problem.held.whole:
-        axes, radii = centres, np.repeat(arm.reaches[:, None], radii.shape[1], axis=1)
     segments = np.stack([axes[:-1], axes[1:]], axis=1)
     links = np.minimum(np.arange(len(segments)) + 1, arm.n_links)
     return _nearest_of(problem, upper_distances(problem, segments), radii, links)

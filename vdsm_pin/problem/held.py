@@ -60,11 +60,10 @@ class HeldGroup:
         return float(self.radii.max())
 
     @property
-    def by_link(self) -> BoolArray:
-        """Whether a link, or the tool on it, is held apart, shape (N,)."""
-        held = np.isfinite(self.radii)
-        held[self.n_links - 1] |= held[-1]
-        return np.asarray(held[: self.n_links])
+    def by_link(self) -> FloatArray:
+        """The radii of whole links, the last with the tool on it, shape (N,); [m]."""
+        last = self.radii[self.n_links - 1 :].max()
+        return np.append(self.radii[: self.n_links - 1], last)
 
     @property
     def parted(self) -> bool:
@@ -74,27 +73,28 @@ class HeldGroup:
 
     def held(
         self, ends: FloatArray, axes: IntArray | None
-    ) -> tuple[IntArray, FloatArray]:
-        """Numbers of the pieces that are held apart, and what of them is.
+    ) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Numbers of the pieces that are held apart, what of them is, how thick it is.
 
         Args:
             ends: Of straight pieces, shape (n, 2, 3); [m].
-            axes: Which axis each is of, shape (n,); None: all are held.
+            axes: Which axis each is of, shape (n,); None: all are held, and as thick as
+                the thickest.
 
         Returns:
-            Shape (m,) and (m, 2, 3); [m].
+            Shape (m,), (m, 2, 3) and (m,); [m].
         """
         if axes is None:
-            return np.arange(len(ends)), ends
+            return np.arange(len(ends)), ends, np.full(len(ends), self.radius)
         last = axes == self.n_links - 1
-        held = np.isfinite(self.radii)[axes] | (last & self.by_link[-1])
-        which = np.flatnonzero(held)
+        radii = np.where(last, self.by_link[-1], self.radii[axes])
+        which = np.flatnonzero(np.isfinite(radii))
         some = ends[which]
         if self.parted:
             last = np.flatnonzero(last[which])
             joint = some[last, 0] + self.shaft * (some[last, 1] - some[last, 0])
             some[last, int(np.isfinite(self.radii[self.n_links - 1]))] = joint
-        return which, some
+        return which, some, radii[which]
 
 
 @dataclass(frozen=True)
@@ -143,6 +143,13 @@ class HeldApart:
         return np.broadcast_to(np.asarray(axes, dtype=np.int64), shape).reshape(-1)
 
     @cached_property
+    def alike(self) -> bool:
+        """Whether all of the arm is equally thick, and held from every obstacle."""
+        reaches = self.arm.reaches
+        thick = bool((reaches == self.arm.least_radius).all())
+        return self.whole and thick
+
+    @cached_property
     def groups(self) -> tuple[HeldGroup, ...]:
         """The groups of obstacles that anything of the axes is held apart from."""
         arm = self.arm
@@ -156,7 +163,10 @@ class HeldApart:
 
     @cached_property
     def cuts(self) -> BoolArray:
-        """Joints at which pieces end: links there are held differently, (N + 1,)."""
+        """Joints at which pieces end: links there differ, or are held differently.
+
+        Shape (N + 1,).
+        """
         cuts = np.zeros(self.arm.n_links + 1, dtype=np.bool_)
         for one in self.groups:
             cuts[1:-1] |= one.by_link[1:] != one.by_link[:-1]

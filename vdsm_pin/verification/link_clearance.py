@@ -47,9 +47,9 @@ def link_clearance(problem: PlanningProblem) -> Callable[..., FloatArray]:
         surface of each link and the nearest obstacle that it is held apart from, shape
         (n, N); negative where they meet (there the sign alone is meant), infinite
         without obstacles; [m]. The tool counts as part of the last link, and what links
-        carry as if it were round about their axes. Any other straight pieces of an arm
-        are taken to be as thick as its thickest part; a second argument says which
-        axes they are of (`Axes`).
+        carry as if it were round about their axes. A second argument says which axes
+        any other straight pieces of an arm are of (`Axes`), else these are taken to be
+        as thick as its thickest part.
 
     Raises:
         InvalidInput: If an obstacle moves: nothing of time is known here.
@@ -61,28 +61,21 @@ def link_clearance(problem: PlanningProblem) -> Callable[..., FloatArray]:
             "judges a given one"
         )
         raise InvalidInput(message)
-    if problem.held.whole:
+    if problem.held.alike:
         return _from_all(problem)
     return _from_held(problem)
 
 
 def _from_all(problem: PlanningProblem) -> Callable[..., FloatArray]:
-    """The function where every link is held apart from every obstacle."""
+    """The function of an arm that is equally thick and held from every obstacle."""
     obstacles = problem.scene.obstacles
     pieces = problem.packed_obstacles
     covers, pad = covers_of(obstacles, pieces), arithmetic_pad(problem, pieces)
-    arm, goal = problem.manipulator, TOLERANCES.bracket_gap
-    alike = arm.least_radius == arm.most_radius
+    radius, goal = problem.manipulator.most_radius, TOLERANCES.bracket_gap
 
     def clearances(centres: FloatArray, axes: Axes = None, /) -> FloatArray:
         rows = np.ascontiguousarray(centres, dtype=np.float64)
-        if alike or rows.shape[1] != arm.n_links + 1:
-            return link_clearances(pieces, covers, rows, arm.most_radius, pad, goal)
-        if arm.bodies:
-            gaps = link_clearances(pieces, covers, rows, 0.0, pad, goal)
-            return np.asarray(gaps - arm.reaches)
-        gaps = link_clearances(pieces, covers, _axes(arm, rows), 0.0, pad, goal)
-        return _by_link(arm, gaps - arm.axis_radii)
+        return link_clearances(pieces, covers, rows, radius, pad, goal)
 
     return clearances
 
@@ -98,7 +91,7 @@ def _by_link(arm: Manipulator, gaps: FloatArray) -> FloatArray:
 
 
 def _from_held(problem: PlanningProblem) -> Callable[..., FloatArray]:
-    """The function where each group of obstacles is held from some axes only."""
+    """The function where groups of obstacles are held from axes, or these differ."""
     arm, goal, groups = problem.manipulator, TOLERANCES.bracket_gap, problem.held.groups
     pad, packed = arithmetic_pad(problem, problem.packed_obstacles), []
     for group in groups:
@@ -120,8 +113,8 @@ def _from_held(problem: PlanningProblem) -> Callable[..., FloatArray]:
         number = problem.held.numbers(axes, shape)
         least = np.full(len(ends), np.inf)
         for group, scene in zip(groups, packed, strict=True):
-            which, some = group.held(ends, number)
-            gaps = link_clearances(*scene, some, group.radius, pad, goal)[:, 0]
+            which, some, radii = group.held(ends, number)
+            gaps = link_clearances(*scene, some, 0.0, pad, goal)[:, 0] - radii
             least[which] = np.minimum(least[which], gaps)
         return least.reshape(shape)
 

@@ -554,3 +554,16 @@ def test_a_short_rail_is_served_by_a_swing_round_it() -> None:
     assert (np.diff(far) * np.sign(far[-1] - far[0]) >= -1e-12).all()
     long = replace(task, manipulator=replace(ARM, base_range=(-3.0, 1.0)))
     assert not list(space_of(long).swing(goal))
+
+
+def test_thin_links_pass_where_thick_ones_do_not() -> None:
+    """The window is narrower than the links that stay before it."""
+    arm = replace(ARM, link_radius=0.12, radii=np.repeat([0.12, 0.05], 4))
+    points = np.array([[1.35, 0.01, 0.0], [1.55, 0.02, 0.01]])
+    walls = wall(0.65, 0.0, 0.0, 0.1)
+    task = problem(*walls, points=points, closed=False, start=START)
+    task = replace(task, manipulator=arm)
+    plan = plan_fewest(task, link_clearance(task), 0.0)
+    assert plan.undrawn == ()
+    found = verify(task, plan.trajectory, load_robot(arm))
+    assert found.verdict is Verdict.CERTIFIED

@@ -67,16 +67,21 @@ class Cover:
         return cls(boxes, np.array(flat).reshape(-1, 4), surfaces_of(obstacles), group)
 
     def bounds(
-        self, ends: FloatArray, far: float, floor: float, deadline: Deadline
+        self,
+        ends: FloatArray,
+        radii: FloatArray,
+        far: float,
+        floor: float,
+        deadline: Deadline,
     ) -> tuple[FloatArray, FloatArray]:
         """Bounds from boxes and from meshes, see `BroadPhase`, shape (n,) each; [m]."""
-        radius = self.group.radius
-        enough = far + radius
+        enough = far + self.group.radius
         boxes = _box_bounds(ends, self.boxes, self.planes, STRETCHES, enough)
         # Who asks for what is below 0 asks for what is far, too.
         most = np.inf if floor == -np.inf else enough
-        mesh = self.surfaces.least(ends, floor + radius, most, deadline)
-        return boxes - radius, mesh - radius
+        least = floor + radii.min(initial=self.group.radius)
+        mesh = self.surfaces.least(ends, least, most, deadline)
+        return boxes - radii, mesh - radii
 
 
 @dataclass(frozen=True)
@@ -107,11 +112,13 @@ class BroadPhase:
         self.deadline.check()
         shape = len(centres), centres.shape[1] - 1
         ends = np.stack([centres[:, :-1], centres[:, 1:]], axis=2).reshape(-1, 2, 3)
-        number = None if self.held.whole else self.held.numbers(axes, shape)
+        number = None if self.held.alike else self.held.numbers(axes, shape)
         clearances, mesh = np.full((2, len(ends)), np.inf)
         for cover in self.covers:
-            which, some = cover.group.held(ends, number)
-            boxes, surfaces = cover.bounds(some, self.far, self.floor, self.deadline)
+            which, some, radii = cover.group.held(ends, number)
+            boxes, surfaces = cover.bounds(
+                some, radii, self.far, self.floor, self.deadline
+            )
             clearances[which] = np.minimum(clearances[which], boxes)
             mesh[which] = np.minimum(mesh[which], surfaces)
         # A step below the distance will do, but not where it decides.

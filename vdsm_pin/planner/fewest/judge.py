@@ -165,14 +165,14 @@ class Judge:
     def _cuts(self, intervals: Intervals) -> BoolArray:
         """Joints at which arms are cut into straight pieces, shape (n, N + 1).
 
-        Links in line between two knees are one piece, unless each keeps its own, or
-        they are held apart from different obstacles.
+        Links in line between two knees are one piece, unless each keeps its own, they
+        are not equally thick, or are held apart from different obstacles.
         """
         knees = intervals.knees(self.problem.manipulator)
         if self.kept is not None:
             return np.ones_like(knees)
         held = self.problem.held
-        return knees if held.whole else knees | held.cuts
+        return knees if held.alike else knees | held.cuts
 
     def _states(
         self,

@@ -179,7 +179,7 @@ def build_roadmap(
             there, axes = aims[node // shapes.size], ends[:, 2] - ends[:, 1]
             looks = pricing.cone.holds(ends[:, 0, 0], axes, there)
             node, ends, bends = node[looks], ends[looks], bends[looks]
-        if kept is not None or not problem.held.whole:
+        if kept is not None or not problem.held.alike:
             ends = link_by_link(ends, arm.stations)
         clearances = _least(clearance, ends, required, kept)
         keep = clearances >= required
