@@ -1,5 +1,6 @@
 """What is said of an arm that does not come in: the passage, the stop, the advice."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.fewest.stuck import (
     Stuck,
     at_reach,
+    following,
     no_way_in,
     on_the_path,
     too_narrow,
@@ -111,12 +113,36 @@ def test_the_narrowest_passage_is_measured_though_the_body_does_not_pass(
     task = behind(half)
     clearance = broad_phase(task, link_clearance(task))
     tip = task.path.points[0]
-    place = narrowest_passage(task, clearance, tip, NO_LIMIT)
-    assert place is not None
+    passed = narrowest_passage(task, clearance, tip, NO_LIMIT)
+    assert passed is not None
+    place = passed.place
     room = link_clearance(task)(np.repeat(place[None, None], 2, axis=1))[0, 0]
     assert room == pytest.approx(half - task.manipulator.most_radius, abs=2e-5)
     assert too_narrow(task, place)
     assert narrowest_passage(task, clearance, tip, Deadline(1.0, 0.0)) is None
+
+
+def test_what_keeps_an_arm_from_following_its_tip_is_named() -> None:
+    """Along the rail nothing does; round a right angle all that can, one by one."""
+    task, arm = behind(HALF), behind(HALF).manipulator
+    x = np.linspace(0.0, 1.4, 141)[:, None] * [1.0, 0.0, 0.0]
+    assert following(task, x).advice == ""
+    aside = np.linspace(0.0, 1.0, 101)[1:, None] * [0.0, 1.0, 0.0]
+    told = following(task, np.vstack([x, x[-1] + aside]))
+    # The last link turns by acos(1 - s / l) about once the tip is s aside.
+    assert re.search(
+        r"bend joint 8 by 4\d\.\d deg of 42\.5 deg with the tip", told.words
+    )
+    assert "max_link_angle_deg" in told.advice
+    told = following(replace(task, manipulator=replace(arm, base_range=(-5, -2.5))), x)
+    assert "x0 = -2496.000 mm with the tip at (630.0, 0.0, 0.0) mm" in told.words
+    assert "rail" in told.advice
+    told = following(task, x + np.clip(x[:, :1] - 0.3, 0.0, 0.05) * [0.0, 1.0, 0.0])
+    assert re.search(r"leave link 8 \S+ mm to 'wall1' with the tip", told.words)
+    told = following(task, np.vstack([x, x[-1] + [0.0, 4.0, 0.0]]))
+    assert (
+        "not reach back to its rail with the tip at (1400.0, 4000.0, 0.0)" in told.words
+    )
 
 
 def test_limits_that_are_met_are_named_first() -> None:

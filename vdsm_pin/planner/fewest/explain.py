@@ -23,6 +23,7 @@ from vdsm_pin.planner.fewest.pose_kernels import bends_of
 from vdsm_pin.planner.fewest.route import PathRows
 from vdsm_pin.planner.fewest.stuck import (
     at_reach,
+    following,
     no_way_in,
     on_the_path,
     passage,
@@ -232,11 +233,14 @@ def how_far(problem: PlanningProblem, outcome: Outcome, deadline: Deadline) -> R
     cause = at_reach(problem, rows, words, station)
     if cause is not None:
         return cause
-    place = narrowest_passage(problem, outcome.judge.clearance, tip, deadline)
-    if place is not None and too_narrow(problem, place):
-        return no_way_in(problem, place, words, station)
-    if place is not None:
-        words += f"; {passage(problem, place)}"
+    passed = narrowest_passage(problem, outcome.judge.clearance, tip, deadline)
+    if passed is not None and too_narrow(problem, passed.place):
+        return no_way_in(problem, passed.place, words, station)
+    advice = "another start or a longer time limit"
+    if passed is not None:
+        follower = following(problem, passed.route)
+        words += f"; {passage(problem, passed.place)}; {follower.words}"
+        advice = f"{follower.advice} or {advice}" if follower.advice else advice
     zero = np.zeros((1, problem.manipulator.n_links + 1, 2))
     centres = standing(problem.manipulator, tip[None], zero)[0]
     if not problem.scene.obstacles or not np.isfinite(centres).all():
@@ -247,7 +251,7 @@ def how_far(problem: PlanningProblem, outcome: Outcome, deadline: Deadline) -> R
     called = named(problem.manipulator, found.link)
     words += (
         f"; {called} of the straight arm there has {found.words} to "
-        f"{found.obstacle!r}; try another start or a longer time limit"
+        f"{found.obstacle!r}; try {advice}"
     )
     return Reached(words, station, found.link, found.obstacle)
 

@@ -218,9 +218,13 @@ class _Search:
     def _routes(self, path: FloatArray) -> Iterator[FloatArray]:
         """Ways of the tip to a path's first point, also by way of points after it.
 
-        Who comes from there arrives in a posture that goes on to there.
+        Who comes from there arrives in a posture that goes on to there. Where the
+        first tries failed, a way comes first as the whole arm can follow it.
         """
-        yield from self.space.routes(path[0], self.effort.routes)
+        for route in self.space.routes(path[0], self.effort.routes):
+            if self.effort.led:
+                yield self.space.followable(route)
+            yield route
         yield from self.space.swing(path[0])
         for ahead in AHEAD:
             if ahead < len(path):

@@ -83,8 +83,22 @@ class Insert(Level):
 SEED: Final = 0
 """Seed of the growth of shapes; the same problem gives the same plan."""
 
+MANY: Final = 60
+"""Arms beyond which tips and rows come closer together too."""
+
 LED: Final = 0.4
 """Part of the children that follow the leader where the first tries fail; [-]."""
+
+
+def _both(population: int, routes: int, backtracks: int, seed: int) -> list[Insert]:
+    """Insertions in both charts, with children that follow the leader."""
+    fine = population > MANY
+    one = Insert(
+        population=population, routes=routes, backtracks=backtracks, seed=seed, led=LED,
+        fine=fine,
+    )  # fmt: skip
+    return [one, replace(one, directed=True)]
+
 
 THOROUGH: Final[tuple[Level, ...]] = (
     Search(rounds=20, back=0.0, grow=1, ease=0.79, around=4),
@@ -92,21 +106,10 @@ THOROUGH: Final[tuple[Level, ...]] = (
     Search(rounds=20, back=1.0, grow=2),
     Insert(population=10, routes=1, backtracks=2, seed=0, cells=60_000),
     Insert(population=10, routes=2, backtracks=3, seed=0, cells=60_000, directed=True),
-    Insert(population=30, routes=2, backtracks=4, seed=1, led=LED),
-    Insert(population=30, routes=3, backtracks=4, seed=1, led=LED, directed=True),
+    *_both(population=30, routes=3, backtracks=4, seed=1),
     Search(rounds=60, back=1.0, grow=3, fine=True),
-    Insert(population=60, routes=4, backtracks=5, seed=2, led=LED),
-    Insert(population=60, routes=4, backtracks=5, seed=2, led=LED, directed=True),
-    Insert(population=120, routes=6, backtracks=6, seed=3, led=LED, fine=True),
-    Insert(
-        population=120,
-        routes=6,
-        backtracks=6,
-        seed=3,
-        led=LED,
-        fine=True,
-        directed=True,
-    ),
+    *_both(population=60, routes=4, backtracks=5, seed=2),
+    *_both(population=120, routes=6, backtracks=6, seed=3),
 )
 """Each is for what the ones before leave undrawn.
 

@@ -4,7 +4,7 @@ A way of the tip is looked for that may come nearer to obstacles than the body d
 and the opening where it comes nearest is measured in its middle. Nothing is proved.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -36,13 +36,26 @@ SHORTER: Final = 0.9
 """How much shorter each of them is than the one before; [-]."""
 
 
+@dataclass(frozen=True)
+class Passage:
+    """The best way in, and where it is narrowest.
+
+    Args:
+        place: The middle of its narrowest opening, shape (3,); [m].
+        route: Of the tip, shape (k, 3); [m].
+    """
+
+    place: FloatArray
+    route: FloatArray
+
+
 def narrowest_passage(
     problem: PlanningProblem,
     clearance: LinkClearance,
     tip: FloatArray,
     deadline: Deadline,
-) -> FloatArray | None:
-    """The middle of the narrowest opening on the best way to a tip, shape (3,); [m].
+) -> Passage | None:
+    """The best way in to a tip and the middle of its narrowest opening.
 
     Args:
         problem: Arm and scene.
@@ -66,7 +79,8 @@ def narrowest_passage(
             points = resampled(route, step / FINER)
             worst = int(np.argmin(space.room.spare(points)))
             ends = points[[max(worst - 1, 0), min(worst + 1, len(points) - 1)]]
-            return _middle(space.room, points[worst], ends[1] - ends[0])
+            place = _middle(space.room, points[worst], ends[1] - ends[0])
+            return Passage(place, route)
     except OutOfTime:
         pass
     return None

@@ -8,7 +8,9 @@ import numpy as np
 from vdsm_pin.errors import Reached
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.feasibility import rail_distance
+from vdsm_pin.planner.fewest.follow_the_leader import led_along
 from vdsm_pin.planner.fewest.pose_kernels import bends_of
+from vdsm_pin.planner.start import start_centres
 from vdsm_pin.planner.upper_clearance import (
     TIP_ONLY,
     culprit,
@@ -71,7 +73,9 @@ def where_stuck(
         found = culprit(problem, stuck.centres)
         link, obstacle = found.link, found.obstacle
     parts.append(_stop(problem, stuck))
-    parts.append(f"try {' or '.join(_advice(problem, stuck))}")
+    follower = following(problem, stuck.route)
+    parts.append(follower.words)
+    parts.append(f"try {' or '.join(_advice(problem, stuck, follower.advice))}")
     centres = stuck.centres.tolist()
     return Reached("; ".join(parts), station, link, obstacle, centres, narrowest)
 
@@ -85,15 +89,73 @@ def _opening(problem: PlanningProblem, stuck: Stuck) -> tuple[int, float]:
     return narrow, 2.0 * float(distances[narrow])
 
 
+@dataclass(frozen=True)
+class Following:
+    """What keeps an arm from following its tip along a way, and what might help.
+
+    Args:
+        words: In a sentence.
+        advice: What to try; empty where it can.
+    """
+
+    words: str
+    advice: str
+
+
+def following(problem: PlanningProblem, route: FloatArray) -> Following:
+    """Where an arm that follows its tip along a way first breaks what is asked.
+
+    Args:
+        problem: Arm and scene.
+        route: Of the tip from its start on, shape (k, 3); [m].
+    """
+    arm, who = problem.manipulator, "an arm that follows its tip along it"
+    laid = led_along(
+        np.ascontiguousarray(route), start_centres(problem), arm.link_lengths
+    )
+    for tip, centres in zip(route, laid, strict=True):
+        place = f"with the tip at {problem.in_file(tip)}"
+        if not np.isfinite(centres).all():
+            return Following(
+                f"{who} would not reach back to its rail {place}", "longer links"
+            )
+        bends = bends_of(centres[None])[0]
+        joint = int(np.argmax(bends))
+        if bends[joint] > arm.max_link_angle:
+            asked, limit = np.rad2deg([bends[joint], arm.max_link_angle])
+            return Following(
+                f"{who} would bend joint {joint + 1} by {asked:.1f} deg of {limit:.1f} "
+                f"deg {place}",
+                "a larger `max_link_angle_deg` or links shorter against the turn",
+            )
+        base, (low, high) = float(centres[0, 0]), arm.base_range
+        if not low <= base <= high:
+            return Following(
+                f"{who} would need its base at x0 = {in_mm(base)} {place}, and the "
+                f"rail is from {in_mm(low)} to {in_mm(high)}",
+                "a longer rail (`base_range`)",
+            )
+        found = culprit(problem, centres) if problem.scene.obstacles else None
+        if found and found.clearance < problem.required_clearance:
+            return Following(
+                f"{who} would leave {named(arm, found.link)} {found.words} to "
+                f"{found.obstacle!r} {place}",
+                f"links shorter against the turn there or more room at "
+                f"{found.obstacle!r}",
+            )
+    return Following(f"{who} comes through", "")
+
+
 def _needed(problem: PlanningProblem) -> float:
-    """Width of the body with its clearance on both sides; [m]."""
-    return 2.0 * (problem.manipulator.most_radius + problem.required_clearance)
+    """Width of the tip with its clearance on both sides; [m]."""
+    tip = float(problem.manipulator.reaches[-1])
+    return 2.0 * (tip + problem.required_clearance)
 
 
 def passage(problem: PlanningProblem, place: FloatArray) -> str:
     """The narrowest place of the best way, its width and that of the body."""
     name, distance = nearest(problem, place)
-    radius = problem.manipulator.most_radius
+    radius = problem.manipulator.reaches[-1]
     return (
         f"the best way in is narrowest at {problem.in_file(place)}, beside {name!r}: "
         f"{in_mm(max(0.0, 2.0 * distance))} wide, for a body of "
@@ -198,8 +260,8 @@ def _stop(problem: PlanningProblem, stuck: Stuck) -> str:
     return words
 
 
-def _advice(problem: PlanningProblem, stuck: Stuck) -> list[str]:
-    """What might help, most likely first."""
+def _advice(problem: PlanningProblem, stuck: Stuck, follower: str) -> list[str]:
+    """What might help, most likely first; `follower` is what would help a follower."""
     arm, tried = problem.manipulator, []
     base, (low, high) = float(stuck.centres[0, 0]), arm.base_range
     if min(base - low, high - base) <= AT_END * arm.total_length:
@@ -212,4 +274,6 @@ def _advice(problem: PlanningProblem, stuck: Stuck) -> list[str]:
         _, width = _opening(problem, stuck)
         if width <= SNUG * _needed(problem):
             tried.append("a smaller `required_clearance` or a wider opening")
+    if follower:
+        tried.append(follower)
     return [*tried, "another start", "a longer time limit"]
