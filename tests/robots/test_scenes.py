@@ -6,10 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.robots.test_robots import mutated, write
+from tests.robots.test_robots import CELL, URDF, mutated, write
 from vdsm_pin.errors import InvalidFile, VdsmError
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, HalfSpace, Sphere
 from vdsm_pin.robots import mjcf_size
+from vdsm_pin.robots.cell import cell_of, read_cell
+from vdsm_pin.robots.files import RobotFiles
 from vdsm_pin.robots.scene_files import read_scene
 
 OLD = """(noname)+
@@ -200,6 +202,27 @@ def test_what_a_world_repeats_is_counted_before_it_is_made(
     monkeypatch.setattr(mjcf_size, "MOST", elements - 1)
     with pytest.raises(InvalidFile, match=f"has {elements} elements"):
         mjcf_size.check_size(file)
+
+
+def test_what_a_world_includes_is_in_the_hash(tmp_path: Path) -> None:
+    """A batch that goes on, and reports, would take another scene for the same."""
+    pytest.importorskip("mujoco")
+    content = '<include file="part.xml"/>'
+    world = write(
+        tmp_path, "w.xml", f"<mujoco><worldbody>{content}</worldbody></mujoco>"
+    )
+    write(tmp_path, "two.urdf", URDF)
+    problem = write(tmp_path, "cell.yaml", CELL + "length_unit: mm\nscene: w.xml\n")
+    found = []
+    for size in ("0.1", "0.2"):
+        ball = f'<geom type="sphere" size="{size}" pos="0 0 9"/>'
+        part = write(tmp_path, "part.xml", f"<mujocoinclude>{ball}</mujocoinclude>")
+        cells = read_cell(problem), cell_of(RobotFiles(tmp_path / "two.urdf"), world)
+        for cell in cells:
+            assert cell.source is not None
+            assert part in cell.source.files
+        found.append([cell.source.sha256 for cell in cells if cell.source])
+    assert not set(found[0]) & set(found[1])
 
 
 def test_a_world_of_hundreds_of_millions_is_refused_at_once(tmp_path: Path) -> None:

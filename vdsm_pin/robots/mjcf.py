@@ -14,8 +14,8 @@ from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.robots.mjcf_size import check_size
 
 
-def read_mjcf(file: Path) -> Scene:
-    """The geoms of a world that collide, where they stand.
+def read_mjcf(file: Path) -> tuple[Scene, tuple[Path, ...]]:
+    """The geoms of a world that collide, where they stand, and what it includes.
 
     Raises:
         InvalidFile: If it is too large or mujoco refuses it, a geom rides on a joint,
@@ -28,9 +28,9 @@ def read_mjcf(file: Path) -> Scene:
     if not _is_text(str(file)):
         problem = "has a name that is not UTF-8 text, which mujoco does not open"
         raise InvalidFile(file=file, problem=problem)
-    check_size(file)
+    included = check_size(file)
     try:
-        return Scene(tuple(_solids(file)))
+        return Scene(tuple(_solids(file))), included
     except InvalidFile:
         raise
     except InvalidInput as error:

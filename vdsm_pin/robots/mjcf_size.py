@@ -19,22 +19,27 @@ REPEATED: Final = ("replicate", "composite", "flexcomp")
 """Elements whose `count` says how often what is in them stands there."""
 
 
-def check_size(file: Path) -> None:
+def check_size(file: Path) -> tuple[Path, ...]:
     """Refuse a world with more elements than are read.
+
+    Returns:
+        The files that it includes or attaches, each once.
 
     Raises:
         InvalidFile: If it has more, or is no XML.
     """
-    count = _elements(file, file.parent, set())
+    seen: dict[Path, None] = {}
+    count = _elements(file, file.parent, seen)
     if not count <= MOST:
         problem = (
             f"has {count:.6g} elements, each counted as often as `replicate` and the "
             f"like repeat it, expected at most {MOST}"
         )
         raise InvalidFile(file=file, problem=problem)
+    return tuple(seen)[1:]
 
 
-def _elements(file: Path, folder: Path, seen: set[Path]) -> float:
+def _elements(file: Path, folder: Path, seen: dict[Path, None]) -> float:
     """Elements of a file and of all that it includes or attaches.
 
     Args:
@@ -44,7 +49,7 @@ def _elements(file: Path, folder: Path, seen: set[Path]) -> float:
     """
     if file in seen or not file.is_file():  # which mujoco tells
         return 0.0
-    seen.add(file)
+    seen[file] = None
     try:
         root = ET.fromstring(read_bytes(file, limit=MAX_BYTES))
     except ET.ParseError as error:

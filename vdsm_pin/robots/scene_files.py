@@ -59,7 +59,8 @@ def read_scene_with_files(
         links: Of the robot, besides the root link.
 
     Returns:
-        The obstacles, and the names of those that have a file of their own, with it.
+        The obstacles, and the names of those that have a file of their own, with it;
+        so are files that a world includes.
 
     Raises:
         InvalidFile: If the file breaks its contract, or has attached objects, which are
@@ -67,7 +68,8 @@ def read_scene_with_files(
     """
     kind = path.suffix.lower()
     if kind in (".xml", ".mjcf"):
-        return read_mjcf(path), ()
+        world, included = read_mjcf(path)
+        return world, tuple((f"{path.name} includes", one) for one in included)
     text = read_text(path, limit=MAX_BYTES)
     if kind == ".scene":
         return _moveit(read_scene_text(path, text), links), ()
