@@ -21,7 +21,7 @@ from vdsm_pin.arm.manipulator import (
 )
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io import problem_schema as schema
+from vdsm_pin.io import arm_schema as schema
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.source import Digest

@@ -5,8 +5,8 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from vdsm_pin.geometry.solids import HalfSpace, Solid
+from vdsm_pin.io.errors_schema import ErrorsModel
 from vdsm_pin.io.frames import Frame
-from vdsm_pin.io.problem_schema import ErrorsModel
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.problem.error_boxes import ErrorBox, JointError, ObstacleError
 from vdsm_pin.problem.scene import Scene, solid_of

@@ -10,7 +10,6 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry import curves
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.frames import Frame
 from vdsm_pin.io.obstacle_builder import without_repeats
 from vdsm_pin.io.path_schema import (
@@ -19,6 +18,7 @@ from vdsm_pin.io.path_schema import (
     FilePart,
     PathPart,
     SplinePart,
+    TipPathModel,
 )
 from vdsm_pin.io.points_file import read_points
 from vdsm_pin.io.posture_builder import PostureBuilder
@@ -37,7 +37,7 @@ DEFAULT_SPACING: Final = 0.010
 """The paper's spacing of waypoints; [m]."""
 
 
-def spacing_of(model: schema.TipPathModel, frame: Frame) -> float:
+def spacing_of(model: TipPathModel, frame: Frame) -> float:
     """The spacing of a path, or the default one; [m]."""
     if model.spacing is None:
         return DEFAULT_SPACING
@@ -54,7 +54,7 @@ class PathBuilder:
     folder: Path
     digest: Digest
 
-    def build(self, model: schema.TipPathModel) -> DesiredPath:
+    def build(self, model: TipPathModel) -> DesiredPath:
         """The desired path in the base frame.
 
         Raises:
@@ -85,9 +85,7 @@ class PathBuilder:
         self._check_rows(path)
         return path
 
-    def _pointing(
-        self, model: schema.TipPathModel, points: FloatArray
-    ) -> Pointing | None:
+    def _pointing(self, model: TipPathModel, points: FloatArray) -> Pointing | None:
         """Where the last link looks, in the base frame.
 
         Args:
@@ -112,7 +110,7 @@ class PathBuilder:
         except InvalidInput as error:
             raise self.document.invalid(at, str(error)) from None
 
-    def _directions(self, model: schema.TipPathModel, points: FloatArray) -> FloatArray:
+    def _directions(self, model: TipPathModel, points: FloatArray) -> FloatArray:
         """A direction for each corner, the closing one included, shape (m, 3)."""
         assert model.pointing is not None
         given = model.pointing.directions or []
@@ -130,7 +128,7 @@ class PathBuilder:
             turned = np.concatenate([turned, turned[:1]])
         return turned
 
-    def _corners(self, model: schema.TipPathModel) -> tuple[FloatArray, IntArray]:
+    def _corners(self, model: TipPathModel) -> tuple[FloatArray, IntArray]:
         """All corners, shape (n, 3) in the file's frame, and whose part each is."""
         tolerance = model.curve_tolerance
         if tolerance is None:

@@ -1,11 +1,19 @@
-"""What a desired path may be made of, as pydantic models."""
+"""The desired path in a problem file, as pydantic models: its parts, and the whole."""
 
 from functools import partial
-from typing import Annotated, Any, Final, TypeAlias
+from typing import Annotated, Any, Final, Literal, TypeAlias
 
 from pydantic import Discriminator, Field, Tag
 
-from vdsm_pin.io.schema_types import FileModel, FileName, Vector
+from vdsm_pin.io.posture_schema import Start
+from vdsm_pin.io.schema_types import (
+    FileModel,
+    FileName,
+    NotNegative,
+    Positive,
+    Vector,
+    text_or_not,
+)
 
 
 class ArcModel(FileModel):
@@ -78,3 +86,92 @@ PathPart: TypeAlias = Annotated[
     ),
 ]
 """A point of a path, or a curve that goes on from the point before."""
+
+
+Retreat: TypeAlias = Annotated[
+    Annotated[Literal["home"], Tag("name")] | Annotated[NotNegative, Tag("value")],
+    Discriminator(text_or_not),
+]
+"""A length, or the word home."""
+
+
+class PointingModel(FileModel):
+    """Where the last link looks while the tip draws, one of the three."""
+
+    target: Vector | None = Field(
+        default=None, description="A point to look at [length_unit]."
+    )
+    direction: Vector | None = Field(
+        default=None, description="A direction to look in, of any length."
+    )
+    directions: Annotated[list[Vector], Field(min_length=1)] | None = Field(
+        default=None,
+        description="A direction for each of the points, of any length; in between it "
+        "turns from one to the next.",
+    )
+    cone_deg: Annotated[float, Field(gt=0.0, lt=90.0)] = Field(
+        description="Largest angle between the last link's axis and that direction "
+        "[deg]."
+    )
+
+
+class TipPathModel(FileModel):
+    """What the tip shall draw, and how it comes there."""
+
+    start: Start = Field(
+        description="Where the tip of the straight arm is now [length_unit], or "
+        "{joints: ...} for an arm that is not straight."
+    )
+    points: list[PathPart] = Field(
+        min_length=1,
+        description="Corners of the desired path [length_unit], and arcs, circles, "
+        "splines and files of points between them; each goes on where the one before "
+        "ends.",
+    )
+    curve_tolerance: Positive | None = Field(
+        default=None,
+        description="Largest distance of the corners' polyline from an arc, circle or "
+        "spline [length_unit]. Default: 0.05 mm.",
+    )
+    closed: bool = Field(
+        default=False, description="Whether the last corner joins the first."
+    )
+    spacing: Positive | None = Field(
+        default=None,
+        description="Largest distance between waypoints [length_unit]. Default: 10 mm.",
+    )
+    approach: Literal["shortest", "equidistant", "nearest_equidistant"] = Field(
+        default="shortest", description="How the tip comes onto the path."
+    )
+    retreat: Retreat = Field(
+        default=0.0,
+        description="Step back along -X of the base while off the path [length_unit], "
+        "or home: behind the path the arm goes back to its start by the way it came.",
+    )
+    blocked: Literal["detour", "fail"] = Field(
+        default="detour",
+        description="What to do where the desired path itself cannot be drawn: plan "
+        "the rest of it, or no plan at all.",
+    )
+    required_coverage: float = Field(
+        default=1.0,
+        ge=0.0,
+        le=1.0,
+        description="Least part of the desired path that must be drawn, 0 to 1. A "
+        "motion that draws less is incomplete, which is not passed.",
+    )
+    order: Literal["as_given", "free"] = Field(
+        default="as_given",
+        description="Whether pieces of the path may be drawn in another order or "
+        "direction.",
+    )
+    insertion: list[Vector] = Field(
+        default=[],
+        description="Places between start and path by way of which strategy "
+        "follow-the-leader brings the tip in [length_unit].",
+    )
+    pointing: PointingModel | None = Field(
+        default=None,
+        description="Where the last link's axis looks wherever the tip draws. Default: "
+        "anywhere.",
+    )

@@ -7,7 +7,7 @@ import numpy as np
 from vdsm_pin.arm.kinematics import joint_centres, link_angles
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io import problem_schema as schema
+from vdsm_pin.io import posture_schema as schema
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
 from vdsm_pin.problem.planning_problem import Posture

@@ -10,6 +10,7 @@ from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io import problem_schema as schema
 from vdsm_pin.io.arm_builder import ArmBuilder
 from vdsm_pin.io.errors_builder import build_errors
+from vdsm_pin.io.errors_schema import ErrorsModel
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.other_arms import OtherArms
@@ -101,7 +102,7 @@ def _frame(model: schema.ProblemModel) -> tuple[Frame, FloatArray]:
 
 
 def _errors(
-    model: schema.ErrorsModel,
+    model: ErrorsModel,
     frame: Frame,
     known: tuple[int, Scene],
     document: YamlDocument,

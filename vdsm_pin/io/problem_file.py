@@ -8,16 +8,13 @@ from typing import Any, Final
 from pydantic import ValidationError
 
 from vdsm_pin.errors import InvalidFile, UnknownName
+from vdsm_pin.io.arm_schema import ManipulatorModel, UrdfManipulatorModel
 from vdsm_pin.io.motion_schema import MovableModel
 from vdsm_pin.io.obstacle_schema import FromFileModel
 from vdsm_pin.io.path_schema import FilePart
 from vdsm_pin.io.problem_builder import build_problem
 from vdsm_pin.io.problem_errors import first_error
-from vdsm_pin.io.problem_schema import (
-    ManipulatorModel,
-    ProblemModel,
-    UrdfManipulatorModel,
-)
+from vdsm_pin.io.problem_schema import ProblemModel
 from vdsm_pin.io.source import check_is_file, decode, read_bytes
 from vdsm_pin.io.yaml_reader import read_yaml
 from vdsm_pin.problem.planning_problem import PlanningProblem, ProblemSource

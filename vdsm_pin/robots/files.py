@@ -17,12 +17,13 @@ from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, frozen, rotation_from_rpy
 from vdsm_pin.io.body_schema import MAX_PARTS
 from vdsm_pin.io.errors_builder import build_errors
+from vdsm_pin.io.errors_schema import ErrorsModel
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.motion_schema import MovableModel
 from vdsm_pin.io.obstacle_builder import ObstacleBuilder
 from vdsm_pin.io.problem_errors import first_error
 from vdsm_pin.io.problem_file import files_of_obstacles
-from vdsm_pin.io.problem_schema import BasePoseModel, ErrorsModel, not_bool
+from vdsm_pin.io.problem_schema import BasePoseModel, not_bool
 from vdsm_pin.io.schema_types import FileModel, FileName, Name, NotNegative, Number
 from vdsm_pin.io.source import check_is_file, read_text
 from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
