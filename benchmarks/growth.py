@@ -19,12 +19,9 @@ import numpy as np
 
 from benchmarks.certify import ARM, NEAR, beside, certify_growth, problem_of, sway
 from benchmarks.common import MILLI, Results, command, timed
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.cables import angles_from_cables, cable_lengths
 from vdsm_pin.arm.kinematics import joint_angles, joint_centres
-from vdsm_pin.arm.manipulator import (
-    CableLayout,
-    paper_hole_angles,
-)
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.planner.paper.pipeline import plan_paper

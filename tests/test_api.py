@@ -15,7 +15,7 @@ from oracles.certificate_cases import certificate_lines
 
 import vdsm_pin as vp
 from vdsm_pin import api
-from vdsm_pin.arm.manipulator import paper_hole_angles
+from vdsm_pin.arm.cable_layout import paper_hole_angles
 from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.problem.error_boxes import ErrorBox as Box

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import vdsm_pin as vp
-from vdsm_pin.arm.manipulator import Feed, Tool
+from vdsm_pin.arm.mounted import Feed, Tool
 from vdsm_pin.geometry.arrays import frozen
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.pointing import Pointing

@@ -24,14 +24,9 @@ if TYPE_CHECKING:
         write_report,
         write_trajectory,
     )
-    from vdsm_pin.arm.manipulator import (
-        CableLayout,
-        Feed,
-        LinkBody,
-        Manipulator,
-        Tool,
-        built_in,
-    )
+    from vdsm_pin.arm.cable_layout import CableLayout
+    from vdsm_pin.arm.manipulator import Manipulator, built_in
+    from vdsm_pin.arm.mounted import Feed, LinkBody, Tool
     from vdsm_pin.errors import Infeasible, InvalidInput, VdsmError
     from vdsm_pin.geometry.solids import (
         Box,
@@ -94,9 +89,9 @@ __all__ = [
 
 _HOMES: Final = {
     "errors": ("Infeasible", "InvalidInput", "VdsmError"),
-    "arm.manipulator": (
-        *("CableLayout", "Feed", "LinkBody", "Manipulator", "Tool", "built_in"),
-    ),
+    "arm.cable_layout": ("CableLayout",),
+    "arm.manipulator": ("Manipulator", "built_in"),
+    "arm.mounted": ("Feed", "LinkBody", "Tool"),
     "geometry.solids": (
         *("Box", "Capsule", "Cylinder", "HalfSpace", "Mesh", "Prism", "Sphere"),
     ),

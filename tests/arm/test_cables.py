@@ -7,13 +7,9 @@ from flint import arb
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.cables import angles_from_cables, cable_lengths
-from vdsm_pin.arm.manipulator import (
-    CableLayout,
-    Manipulator,
-    built_in,
-    paper_hole_angles,
-)
+from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.errors import InconsistentCables, InvalidInput
 from vdsm_pin.tolerances import TOLERANCES
 

@@ -3,12 +3,8 @@
 import numpy as np
 import pytest
 
-from vdsm_pin.arm.manipulator import (
-    CableLayout,
-    Manipulator,
-    built_in,
-    paper_hole_angles,
-)
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
+from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.errors import InvalidInput, UnknownName
 
 HRM8 = built_in("hrm8")

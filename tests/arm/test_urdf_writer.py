@@ -8,12 +8,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from vdsm_pin.arm.manipulator import (
-    CableLayout,
-    Manipulator,
-    built_in,
-    paper_hole_angles,
-)
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
+from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.arm.urdf_writer import DENSITY, urdf_text
 

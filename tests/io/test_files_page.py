@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 from problem_texts import edited
 
+from vdsm_pin.arm.cable_layout import paper_hole_angles
 from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.arm.manipulator import built_in, paper_hole_angles
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import write_trajectory

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from problem_texts import EVERYTHING, TETRAHEDRON, edited, write_everything
 
+from vdsm_pin.arm.cable_layout import paper_hole_angles
 from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.arm.manipulator import paper_hole_angles
 from vdsm_pin.errors import UnknownName
 from vdsm_pin.geometry import solids
 from vdsm_pin.geometry.arrays import rotation_from_rpy

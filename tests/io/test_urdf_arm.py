@@ -7,12 +7,8 @@ import pytest
 import yaml
 
 import vdsm_pin as vp
-from vdsm_pin.arm.manipulator import (
-    CableLayout,
-    Manipulator,
-    built_in,
-    paper_hole_angles,
-)
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
+from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.arm.urdf_writer import urdf_text
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile

@@ -28,8 +28,9 @@ from oracles.adversarial_bodies import (
     small_angles,
 )
 
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.arm.manipulator import CableLayout, Manipulator, paper_hole_angles
+from vdsm_pin.arm.manipulator import Manipulator
 
 MOTIONS: Final = ("none", "still", "rail", "away", "base_turn", "pierce")
 LINK_MOTIONS: Final = ("links_none", "links_still", "links_swing")

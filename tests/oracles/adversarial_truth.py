@@ -15,7 +15,8 @@ from oracles.adversarial import (
 )
 from oracles.adversarial_bodies import SHAPES, Bodies
 
-from vdsm_pin.arm.manipulator import CableLayout, Manipulator, paper_hole_angles
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.convex import HalfSpacePiece, Hull
 
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vdsm_pin.arm.manipulator import Feed, Manipulator, built_in
+from vdsm_pin.arm.manipulator import Manipulator, built_in
+from vdsm_pin.arm.mounted import Feed
 from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.planner.feed import within_feed
 from vdsm_pin.planner.records import Prepared

@@ -5,15 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.cable_layout import CableLayout
 from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.arm.manipulator import (
-    CableLayout,
-    Feed,
-    LinkBody,
-    Manipulator,
-    Tool,
-    built_in,
-)
+from vdsm_pin.arm.manipulator import Manipulator, built_in
+from vdsm_pin.arm.mounted import Feed, LinkBody, Tool
 from vdsm_pin.errors import StartBlocked
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
 from vdsm_pin.planner.fewest.broad_phase import broad_phase

@@ -6,14 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.arm.manipulator import (
-    CableLayout,
-    Manipulator,
-    built_in,
-    paper_hole_angles,
-)
+from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.simulation.feed_forward import Statics
 from vdsm_pin.simulation.plant import free_ends, plant_xml, stiffnesses

@@ -15,14 +15,10 @@ from oracles.certificate_cases import certificate_lines
 from oracles.certificate_oracle import sealed, sha256
 
 from vdsm_pin.arm.bodies import arm_bodies, convex_cover, self_pairs
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.kinematics import joint_centres, link_frames
-from vdsm_pin.arm.manipulator import (
-    CableLayout,
-    LinkBody,
-    Manipulator,
-    Tool,
-    paper_hole_angles,
-)
+from vdsm_pin.arm.manipulator import Manipulator
+from vdsm_pin.arm.mounted import LinkBody, Tool
 from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry import solids

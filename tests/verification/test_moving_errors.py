@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.arm.manipulator import CableLayout, Manipulator, paper_hole_angles
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.problem.error_boxes import ErrorBox, ObstacleError

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from vdsm_pin.arm.bodies import arm_bodies, self_pairs
-from vdsm_pin.arm.manipulator import CableLayout, Manipulator, paper_hole_angles
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
+from vdsm_pin.arm.manipulator import Manipulator
 
 
 def test_axes_part_at_least_as_fast_as_they_leave_their_joint() -> None:

@@ -9,13 +9,9 @@ import numpy as np
 import pytest
 import yourdfpy
 
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.arm.manipulator import (
-    CableLayout,
-    Manipulator,
-    built_in,
-    paper_hole_angles,
-)
+from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.arm.urdf_writer import urdf_text
 from vdsm_pin.errors import InvalidInput, UnknownName, VerificationFailed
 from vdsm_pin.verification.robot_model import frame_id, load_robot, read_robot

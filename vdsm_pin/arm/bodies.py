@@ -9,7 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.manipulator import FEED, PART, LinkBody, Manipulator
+from vdsm_pin.arm.manipulator import FEED, PART, Manipulator
+from vdsm_pin.arm.mounted import LinkBody
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct_rows
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
 from vdsm_pin.geometry.ordering import coherent_order

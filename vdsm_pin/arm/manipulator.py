@@ -4,20 +4,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import Final, TypeAlias
+from typing import Final
 
 import numpy as np
 
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
+from vdsm_pin.arm.mounted import MAX_LENGTH, BodySolid, Feed, LinkBody, Tool
 from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import FloatArray, check_numbers, freeze, frozen
-from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, Mesh, Prism, Sphere
+from vdsm_pin.geometry.solids import Capsule
 from vdsm_pin.units import MM_PER_M
 
 MAX_LINKS: Final = 40
 """Largest number of links the package is tested with."""
-
-MAX_LENGTH: Final = 1e6
-"""Largest length of an arm; far beyond it inertias overflow; [m]."""
 
 
 TOOL: Final = "tool"
@@ -28,123 +27,6 @@ FEED: Final = "feed"
 
 PART: Final = " part "
 """Between the name of a body and the number of its convex part."""
-
-
-@dataclass(frozen=True)
-class CableLayout:
-    """Where the three driving cables of each link run (paper, section 5.2).
-
-    Args:
-        hole_radius: Radius r of the circle of cable holes; [m].
-        half_gap: Distance d from a joint centre to the link's end face; [m].
-        hole_angles: phi of the holes a, b, c of each link, shape (N, 3); [rad].
-    """
-
-    hole_radius: float
-    half_gap: float
-    hole_angles: FloatArray
-
-    def __post_init__(self) -> None:
-        """Freeze the array and refuse impossible sizes."""
-        freeze(self, "hole_angles")
-        check_numbers(self, "hole_radius", "half_gap")
-        if not 0.0 < self.hole_radius < np.inf:
-            message = f"hole_radius is {self.hole_radius} m, expected above 0"
-            raise InvalidInput(message)
-        if not 0.0 < self.half_gap < np.inf:
-            message = f"half_gap is {self.half_gap} m, expected above 0"
-            raise InvalidInput(message)
-        if self.hole_angles.ndim != 2 or self.hole_angles.shape[1] != 3:
-            shape = self.hole_angles.shape
-            message = f"hole_angles has shape {shape}, expected (N, 3)"
-            raise InvalidInput(message)
-        if not np.isfinite(self.hole_angles).all():
-            message = "hole_angles has a value that is not finite"
-            raise InvalidInput(message)
-
-
-def paper_hole_angles(n_links: int) -> FloatArray:
-    """Hole angles as in Fig. 10, for any number of links.
-
-    The 3N holes are 360/3N deg apart; phi_b of link 5 is 0 in the paper's arm of eight
-    (phi_ijb = 15 (j - 5) deg), and a and c lie 120 deg to either side of b.
-
-    Args:
-        n_links: Number of links N.
-
-    Returns:
-        phi of the holes a, b, c, shape (N, 3), in [0, 2 pi); [rad].
-    """
-    step = 2.0 * np.pi / (3 * n_links)
-    phi_b = step * (np.arange(1, n_links + 1) - (n_links // 2 + 1))
-    third = 2.0 * np.pi / 3.0
-    return np.mod(np.stack([phi_b - third, phi_b, phi_b + third], axis=1), 2.0 * np.pi)
-
-
-@dataclass(frozen=True)
-class _Extension:
-    """A straight extension of the arm, a capsule about its axis.
-
-    Args:
-        length: From the arm to its end; [m].
-        radius: Of the capsule; [m].
-    """
-
-    length: float
-    radius: float
-
-    def __post_init__(self) -> None:
-        """Refuse impossible sizes."""
-        check_numbers(self, "length", "radius")
-        for name in ("length", "radius"):
-            if not 0.0 < getattr(self, name) <= MAX_LENGTH:
-                value, kind = getattr(self, name), type(self).__name__.lower()
-                message = f"{kind}: {name} is {value} m, expected above 0"
-                raise InvalidInput(message)
-
-
-class Tool(_Extension):
-    """A straight extension of the last link; its end draws the path."""
-
-
-class Feed(_Extension):
-    """What pushes the arm along its rail: from O_1 backwards, moved by x0 alone."""
-
-
-BodySolid: TypeAlias = Sphere | Capsule | Cylinder | Box | Prism | Mesh
-"""What may ride on a link."""
-
-
-@dataclass(frozen=True)
-class LinkBody:
-    """A solid that rides on a link, in its frame: origin at O_i, x along the link.
-
-    Args:
-        link: The link, 1 to N.
-        solid: Any shape but a half-space.
-        parts: Hulls that a mesh is covered by, 1 or more.
-    """
-
-    link: int
-    solid: BodySolid
-    parts: int = 1
-
-    @property
-    def name(self) -> str:
-        """The solid's."""
-        return self.solid.name
-
-    def __post_init__(self) -> None:
-        """Refuse what rides on no link, or is no solid that can."""
-        if not isinstance(self.solid, BodySolid):
-            kind = type(self.solid).__name__
-            message = f"a {kind} rides on no link, expected one of {BodySolid}"
-            raise InvalidInput(message)
-        for field in ("link", "parts"):
-            value = getattr(self, field)
-            if not isinstance(value, (int, np.integer)):
-                message = f"body {self.name!r}: {field} is {value!r}, expected a number"
-                raise InvalidInput(message)
 
 
 @dataclass(frozen=True)
@@ -270,7 +152,10 @@ class Manipulator:
 
     @cached_property
     def carried(self) -> tuple[tuple[int, BodySolid], ...]:
-        """What is no link and no tool, each with its link, 0 for the feed's frame."""
+        """The feed, then the bodies, each with the link that it rides on.
+
+        Links count from 1; the feed has link 0.
+        """
         found = [(body.link, body.solid) for body in self.bodies]
         if self.feed:
             half, axis = self.feed.length / 2.0, np.array([1.0, 0.0, 0.0])
@@ -279,7 +164,7 @@ class Manipulator:
         return tuple(found)
 
     def check_ignored(self, pair: tuple[str, str], obstacles: Sequence[str]) -> None:
-        """Hold a pair that is not to be judged against the names there are.
+        """Refuse a pair of `ignore_pairs` that names nothing that is held apart.
 
         Args:
             pair: Two names of `ignore_pairs`.
@@ -287,7 +172,7 @@ class Manipulator:
 
         Raises:
             UnknownName: If there is no such body or obstacle.
-            InvalidInput: If neither is a body, or both are the same one.
+            InvalidInput: If neither name is a body of the arm, or both are the same.
         """
         own = self.body_names
         bodies = [self.owner_of(name) in own for name in pair]
@@ -300,7 +185,10 @@ class Manipulator:
             raise InvalidInput(message)
 
     def owner_of(self, name: str) -> str:
-        """The body that a name is of, or of a part of; any other name as it is."""
+        """The body that a name, such as `camera part 2`, is a part of.
+
+        A name that is of no part is returned unchanged.
+        """
         owner = name.rpartition(PART)[0]
         return owner if owner in (body.name for body in self.bodies) else name
 
@@ -348,17 +236,17 @@ class Manipulator:
 
     @property
     def least_radius(self) -> float:
-        """Within it every place along the arm's axis has matter; [m]."""
+        """Smallest radius of a link or of the tool; [m]."""
         return float(self.axis_radii.min())
 
     @cached_property
     def most_radius(self) -> float:
-        """Within it of the arm's axis is all matter that the links carry; [m]."""
+        """Largest distance of any link, tool or body from the arm's axis; [m]."""
         return float(self.reaches.max())
 
     @cached_property
     def reaches(self) -> FloatArray:
-        """Within it of a link's axis is all that it is and carries, shape (N,); [m]."""
+        """How far each link, its tool and bodies reach from its axis, (N,); [m]."""
         found = np.array([self.radius_of(i + 1) for i in range(self.n_links)])
         if self.tool:
             found[-1] = max(found[-1], self.tool.radius)
@@ -380,8 +268,8 @@ class Manipulator:
             centres: Joint centres, shape (n_samples, N + 1, 3); [m].
 
         Returns:
-            The same, with the place where the tool begins before the last one, if there
-            is a tool, shape (n_samples, n_axes + 1, 3); [m].
+            The joint centres and, before the tip, the place where a tool begins, shape
+            (n_samples, n_axes + 1, 3); [m].
         """
         if self.tool is None:
             return centres

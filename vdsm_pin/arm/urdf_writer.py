@@ -21,7 +21,8 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.arm.manipulator import BodySolid, Manipulator
+from vdsm_pin.arm.manipulator import Manipulator
+from vdsm_pin.arm.mounted import BodySolid
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, Mesh, Prism, Sphere
 

@@ -6,19 +6,9 @@ from typing import Final, TypeAlias, cast
 
 import numpy as np
 
-from vdsm_pin.arm.manipulator import (
-    BUILT_IN,
-    FEED,
-    TOOL,
-    BodySolid,
-    CableLayout,
-    Feed,
-    LinkBody,
-    Manipulator,
-    Tool,
-    built_in,
-    paper_hole_angles,
-)
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
+from vdsm_pin.arm.manipulator import BUILT_IN, FEED, TOOL, Manipulator, built_in
+from vdsm_pin.arm.mounted import BodySolid, Feed, LinkBody, Tool
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io import arm_schema as schema

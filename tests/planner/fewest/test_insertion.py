@@ -14,13 +14,9 @@ from benchmarks.hrm2000.curves import (
 )
 from benchmarks.hrm2000.solids import Tube
 from benchmarks.hrm2000.sweeps import Sweep, least_bore
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.arm.manipulator import (
-    CableLayout,
-    Manipulator,
-    built_in,
-    paper_hole_angles,
-)
+from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere
 from vdsm_pin.planner.fewest.broad_phase import broad_phase

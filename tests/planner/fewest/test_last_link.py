@@ -6,12 +6,8 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem, random_problem
 
-from vdsm_pin.arm.manipulator import (
-    CableLayout,
-    Manipulator,
-    built_in,
-    paper_hole_angles,
-)
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
+from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.errors import HemmedIn
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box

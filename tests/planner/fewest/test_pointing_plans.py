@@ -7,7 +7,8 @@ import pytest
 from scenes_for_fewest import problem
 
 from vdsm_pin.arm.kinematics import joint_centres
-from vdsm_pin.arm.manipulator import LinkBody, built_in
+from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.arm.mounted import LinkBody
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Cylinder, Sphere

@@ -9,8 +9,9 @@ import pytest
 import yaml
 from scenes_for_fewest import problem
 
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.kinematics import joint_centres, link_angles
-from vdsm_pin.arm.manipulator import CableLayout, Manipulator, paper_hole_angles
+from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import Infeasible, NoPlanFound, NoWayOut
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.geometry.solids import Sphere

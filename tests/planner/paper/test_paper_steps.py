@@ -6,13 +6,9 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.kinematics import joint_angles, link_angles
-from vdsm_pin.arm.manipulator import (
-    CableLayout,
-    Manipulator,
-    built_in,
-    paper_hole_angles,
-)
+from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.errors import LimitExceeded, LinkTooShort, OutOfReach
 from vdsm_pin.planner.feasibility import (
     check_feasibility,
