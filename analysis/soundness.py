@@ -64,8 +64,8 @@ from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove
 from vdsm_pin.proof.proving import new_proving
 from vdsm_pin.proof.terms import WORLD
+from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.records import ClearanceChunk
 from vdsm_pin.verification.task import with_growth
 
 FAR: Final = 1e-6

@@ -18,11 +18,10 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.run_record import RunRecord
+from vdsm_pin.verification.brackets import ClearanceChunk, ClearanceProfile
 from vdsm_pin.verification.records import (
     ArmVerification,
     Check,
-    ClearanceChunk,
-    ClearanceProfile,
     ClosestApproach,
     Pair,
     Verdict,

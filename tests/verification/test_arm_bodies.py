@@ -30,11 +30,12 @@ from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_bodies import coal_bodies, distance_request, measure
-from vdsm_pin.verification.records import ClearanceChunk, Pair, Verdict
+from vdsm_pin.verification.records import Pair, Verdict
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.task import ArmPairs
 from vdsm_pin.verification.verify import verify

@@ -14,9 +14,10 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
 from vdsm_pin.verification.inside import check_inside, locate_start
-from vdsm_pin.verification.records import ClearanceChunk, Verdict
+from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 from vdsm_pin.verification.yes_or_no import is_certified

@@ -27,10 +27,10 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.arm_counterexamples import find_counterexamples
+from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.coal_arm import arm_poses, arm_shapes
 from vdsm_pin.verification.coal_shapes import Sides
-from vdsm_pin.verification.records import ClearanceChunk
 from vdsm_pin.verification.robot_model import RobotModel, load_robot
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 

@@ -30,10 +30,11 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.report.inputs import input_notes
 from vdsm_pin.time_limit import Deadline
+from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.link_clearance import link_clearance
-from vdsm_pin.verification.records import ClearanceChunk, Verdict, Verification
+from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 

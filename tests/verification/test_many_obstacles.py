@@ -20,9 +20,10 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import LOW
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_check, coal_distances, robust
+from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import least_clearances, prove_clearance
 from vdsm_pin.verification.link_clearance import link_clearance
-from vdsm_pin.verification.records import ClearanceChunk, Verdict
+from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
 
 ARM = built_in("hrm8")

@@ -18,9 +18,9 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import RENEWED
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import prove_clearance
 from vdsm_pin.verification.proving import prove_problem
-from vdsm_pin.verification.records import ClearanceChunk
 
 ARM = built_in("hrm8")
 N = ARM.n_links

@@ -12,7 +12,8 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene, solid_of
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.verification.records import Check, ClearanceChunk, Verdict, Verification
+from vdsm_pin.verification.brackets import ClearanceChunk
+from vdsm_pin.verification.records import Check, Verdict, Verification
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.verify import verify
 

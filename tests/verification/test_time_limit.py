@@ -24,10 +24,11 @@ from vdsm_pin.report.facts import verification_file
 from vdsm_pin.report.html import write_report
 from vdsm_pin.report.run_record import RunRecord
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.certificate_writer import write_certificate
 from vdsm_pin.verification.clearance import prove_clearance
-from vdsm_pin.verification.records import ClearanceChunk, Verdict, Verification
+from vdsm_pin.verification.records import Verdict, Verification
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.robust import largest_joint_error
 from vdsm_pin.verification.verify import verify

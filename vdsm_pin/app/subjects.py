@@ -24,14 +24,11 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.tables import write_cables, write_centres, write_link_angles
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.verification.brackets import ClearanceSink
 from vdsm_pin.verification.coal_distances import coal_reach
 from vdsm_pin.verification.moving import untimed
-from vdsm_pin.verification.records import (
-    AnyProblem,
-    ArmVerification,
-    ClearanceSink,
-    Verification,
-)
+from vdsm_pin.verification.protocols import AnyProblem
+from vdsm_pin.verification.records import ArmVerification, Verification
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.task import ArmPairs
 from vdsm_pin.verification.verify import verify

@@ -16,7 +16,8 @@ from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.time_limit import Deadline
 from vdsm_pin.units import MM_PER_M
-from vdsm_pin.verification.records import LeastClearances, Verdict, Verification
+from vdsm_pin.verification.brackets import LeastClearances
+from vdsm_pin.verification.records import Verdict, Verification
 
 V = TypeVar("V", bound=Verification)
 

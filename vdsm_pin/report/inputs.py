@@ -10,7 +10,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import solid_of
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.inside import mesh_notes
-from vdsm_pin.verification.records import AnyProblem
+from vdsm_pin.verification.protocols import AnyProblem
 
 _NAMED: Final = 3
 """Sizes that one line names; the JSON files have all of them."""

@@ -7,7 +7,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.problem.scene import Moving, Obstacle
 from vdsm_pin.report.charts import packed
-from vdsm_pin.verification.records import Motion
+from vdsm_pin.verification.protocols import AnyMotion
 
 _TURN: Final = np.deg2rad(5.0)
 """Between two poses that a page is told nothing turns farther; [rad]."""
@@ -15,7 +15,7 @@ _MOST: Final = 4_000
 """Poses that a page is told of an obstacle, besides one a knot."""
 
 
-def start_pose(obstacle: Obstacle, trajectory: Motion) -> FloatArray:
+def start_pose(obstacle: Obstacle, trajectory: AnyMotion) -> FloatArray:
     """T_base_obstacle as the motion begins, shape (4, 4); [m].
 
     At its first knot where the motion has no times.
@@ -27,7 +27,7 @@ def start_pose(obstacle: Obstacle, trajectory: Motion) -> FloatArray:
     return np.asarray(obstacle.poses(begin[:1])[0])
 
 
-def moves(obstacle: Obstacle, trajectory: Motion) -> dict[str, Any]:
+def moves(obstacle: Obstacle, trajectory: AnyMotion) -> dict[str, Any]:
     """How a page moves what it draws: nothing of what rests.
 
     Poses at moments in waypoints, near enough to each other that going straight and
@@ -50,7 +50,7 @@ def moves(obstacle: Obstacle, trajectory: Motion) -> dict[str, Any]:
     }
 
 
-def told_moments(obstacle: Moving, trajectory: Motion) -> FloatArray:
+def told_moments(obstacle: Moving, trajectory: AnyMotion) -> FloatArray:
     """When to tell where it stands, in waypoints, rising."""
     times, path = trajectory.times, obstacle.carrier.path
     if times is None or len(times) == 1:

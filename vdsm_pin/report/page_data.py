@@ -27,12 +27,11 @@ from vdsm_pin.report.thinning import (
     thinned,
 )
 from vdsm_pin.report.words import finite
+from vdsm_pin.verification.protocols import AnyMotion, AnyProblem
 from vdsm_pin.verification.records import (
-    AnyProblem,
     ArmVerification,
     ClosestApproach,
     Counterexample,
-    Motion,
     Verification,
 )
 
@@ -43,7 +42,7 @@ _MOST_BETWEEN: Final = 4_000
 def obstacle_data(
     problem: AnyProblem,
     obstacles: Sequence[Obstacle],
-    trajectory: Motion,
+    trajectory: AnyMotion,
     extent: float,
 ) -> dict[str, Any]:
     """Some obstacles, and where their frame is; base frame, [m].
@@ -97,7 +96,7 @@ def _solid(solid: Solid, extent: float, fine: Detail) -> dict[str, Any]:
     }
 
 
-def row_data(trajectory: Motion, shown: Thinned) -> dict[str, Any]:
+def row_data(trajectory: AnyMotion, shown: Thinned) -> dict[str, Any]:
     """Which rows are shown, and when they are."""
     times = {} if trajectory.times is None else {"times": trajectory.times[shown.rows]}
     return {

@@ -22,15 +22,10 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.row_text import Form
+from vdsm_pin.verification.brackets import ClearanceChunk, LeastClearances
 from vdsm_pin.verification.coal_rows import NOTHING_MEASURED, CoalIndex
-from vdsm_pin.verification.records import (
-    AnyProblem,
-    ArmVerification,
-    ClearanceChunk,
-    LeastClearances,
-    Pair,
-    Verification,
-)
+from vdsm_pin.verification.protocols import AnyProblem
+from vdsm_pin.verification.records import ArmVerification, Pair, Verification
 
 _VERDICTS: Final = ("certified", "refuted", "undecided")
 _CLEARANCE_HEADER: Final = (

@@ -7,7 +7,8 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.verification.records import Motion, Verification
+from vdsm_pin.verification.protocols import AnyMotion
+from vdsm_pin.verification.records import Verification
 
 MOST_ROWS: Final = 2_000
 """Rows of a motion that a page shows at most, besides remarkable ones."""
@@ -72,7 +73,7 @@ class Thinned:
         return frozen(np.minimum.reduceat(padded, edges, axis=0)[::2])
 
 
-def thinned(trajectory: Motion, keep: IntArray) -> Thinned:
+def thinned(trajectory: AnyMotion, keep: IntArray) -> Thinned:
     """Choose the rows to show.
 
     Args:

@@ -14,8 +14,8 @@ from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.contacts import common_ball
 from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.moving import Knots
-from vdsm_pin.verification.records import LeastClearances
 
 MEETING: Final = 2.0 * TOLERANCES.bracket_gap
 """Bodies that come so near may meet; [m]."""

@@ -11,6 +11,7 @@ from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.contacts import common_ball
 from vdsm_pin.robots.errors import joint_errors
 from vdsm_pin.time_limit import Deadline
+from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.counterexample import (
     Moment,
     Question,
@@ -19,7 +20,7 @@ from vdsm_pin.verification.counterexample import (
     moments_of,
 )
 from vdsm_pin.verification.moving import Knots
-from vdsm_pin.verification.records import Counterexample, LeastClearances, Pair
+from vdsm_pin.verification.records import Counterexample, Pair
 
 
 def robot_counterexamples(

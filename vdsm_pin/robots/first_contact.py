@@ -14,6 +14,7 @@ from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.clearances import MEETING, least_clearances
 from vdsm_pin.time_limit import Deadline
+from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.first_contact import (
     FirstContact,
     Judged,
@@ -21,7 +22,7 @@ from vdsm_pin.verification.first_contact import (
     first_contacts,
 )
 from vdsm_pin.verification.moving import in_short_parts, joined_path
-from vdsm_pin.verification.records import LeastClearances, Pair
+from vdsm_pin.verification.records import Pair
 
 ENOUGH: Final = 1e-6
 """How deep a ball in both bodies need lie to tell that they meet; [m]."""

@@ -24,9 +24,10 @@ from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import prove
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.robots.cell import Cell
+from vdsm_pin.verification.brackets import ClearanceProfile
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import worst_location
-from vdsm_pin.verification.records import ClearanceProfile, Pair
+from vdsm_pin.verification.records import Pair
 
 
 class Place(NamedTuple):

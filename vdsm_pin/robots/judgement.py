@@ -37,6 +37,7 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.approaches import nearest_pairs
 from vdsm_pin.verification.best_effort import BestEffort
+from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.clearance import profile_of
 from vdsm_pin.verification.clearance_check import LINKS, Evidence, clearance_checks
 from vdsm_pin.verification.coal_check import Evidence as CoalEvidence
@@ -46,13 +47,7 @@ from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import LINKS as INSIDE
 from vdsm_pin.verification.inside import check_inside
 from vdsm_pin.verification.moving import Knots, in_short_parts, joined_path
-from vdsm_pin.verification.records import (
-    Check,
-    Counterexample,
-    LeastClearances,
-    Verdict,
-    Verification,
-)
+from vdsm_pin.verification.records import Check, Counterexample, Verdict, Verification
 
 POSES: Final = "link poses by Pinocchio against the tree's"
 LIMITS: Final = "joint {name!r} in its limits"

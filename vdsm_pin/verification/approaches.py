@@ -10,15 +10,11 @@ import numpy as np
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.clearance import ClearanceProof, least_clearances
 from vdsm_pin.verification.enclosed import enclosed_approaches
 from vdsm_pin.verification.inside import Enclosed
-from vdsm_pin.verification.records import (
-    ClosestApproach,
-    LeastClearances,
-    Pair,
-    is_deepest,
-)
+from vdsm_pin.verification.records import ClosestApproach, Pair, is_deepest
 from vdsm_pin.verification.task import ball_of
 
 CLOSEST: Final = 10

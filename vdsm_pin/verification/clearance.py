@@ -37,15 +37,15 @@ from vdsm_pin.proof.terms import (
     OBSTACLES,
 )
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.verification.moving import Knots
-from vdsm_pin.verification.proving import ProblemProof, prove_problem
-from vdsm_pin.verification.records import (
+from vdsm_pin.verification.brackets import (
     ClearanceChunk,
     ClearanceProfile,
     ClearanceSink,
     LeastClearances,
-    Pair,
 )
+from vdsm_pin.verification.moving import Knots
+from vdsm_pin.verification.proving import ProblemProof, prove_problem
+from vdsm_pin.verification.records import Pair
 from vdsm_pin.verification.task import all_pairs
 
 CHUNK_VALUES: Final = 1_000_000

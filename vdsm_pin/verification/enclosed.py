@@ -15,17 +15,14 @@ import numpy as np
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, frozen
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.proof.terms import REFUTED
-from vdsm_pin.verification.inside import Enclosed
-from vdsm_pin.verification.records import (
-    Check,
+from vdsm_pin.verification.brackets import (
     ClearanceChunk,
     ClearanceProfile,
     ClearanceSink,
-    ClosestApproach,
     LeastClearances,
-    Pair,
-    Verdict,
 )
+from vdsm_pin.verification.inside import Enclosed
+from vdsm_pin.verification.records import Check, ClosestApproach, Pair, Verdict
 from vdsm_pin.verification.task import all_pairs
 
 

@@ -13,12 +13,14 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
+from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import (
     ClearanceProof,
     least_clearances,
     prove_clearance,
 )
-from vdsm_pin.verification.records import AnyProblem, ClearanceChunk, Motion, Pair
+from vdsm_pin.verification.protocols import AnyMotion, AnyProblem
+from vdsm_pin.verification.records import Pair
 
 STRETCH: Final = 64
 """Intervals looked at first; the next stretches are twice as long each."""
@@ -59,7 +61,7 @@ class FirstContact:
     time: float = nan
     last_time: float = nan
 
-    def timed(self, trajectory: Motion) -> "FirstContact":
+    def timed(self, trajectory: AnyMotion) -> "FirstContact":
         """The same with the times of its moments, where there are any."""
         times = trajectory.times_at(np.array([self.moment, self.last]))
         if times is None:
@@ -118,7 +120,7 @@ def first_contacts(
     problem: AnyProblem,
     pairs: Sequence[Pair],
     whole: Judged,
-    motion: Motion,
+    motion: AnyMotion,
     judge: Judge,
     noted: Noted | None = None,
     shallow: float = 0.0,
@@ -187,7 +189,7 @@ class _Search:
     def __init__(
         self,
         pairs: Sequence[Pair],
-        motion: Motion,
+        motion: AnyMotion,
         judge: Judge,
         mine: BoolArray,
         enough: float,

@@ -28,7 +28,8 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
-from vdsm_pin.verification.records import AnyProblem, Check, Verdict, combine
+from vdsm_pin.verification.protocols import AnyProblem
+from vdsm_pin.verification.records import Check, Verdict, combine
 
 ARM: Final = "arm outside the meshes"
 LINKS: Final = "links outside the meshes"

@@ -9,8 +9,8 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.layouts import LOW
+from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import ClearanceProof
-from vdsm_pin.verification.records import ClearanceChunk
 
 COMPARED: Final = 2_000_000
 """Most proved bounds kept to hold Coal's distances against."""

@@ -1,22 +1,21 @@
-"""What a verification returns: verdicts, rows of evidence, brackets."""
+"""What a verification returns: verdicts, rows of evidence, closest approaches."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import StrEnum
 from math import inf, isfinite, nan
-from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.notebook import Summarised, in_percent
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.problem.planning_problem import PlanningProblem, ProblemSource
-from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
+from vdsm_pin.verification.brackets import ClearanceProfile, LeastClearances
 from vdsm_pin.verification.coal_rows import CoalRows
+from vdsm_pin.verification.protocols import AnyMotion, AnyProblem
 
 
 class Verdict(StrEnum):
@@ -91,13 +90,14 @@ def is_deepest(clearance: float, link_radius: float) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """A body of the arm and what it must stay clear of: an obstacle, or another body.
+    """A body of an arm or robot and what it must stay clear of.
 
-    Of any other robot the bodies are its links, by their names in the URDF.
+    The partner is an obstacle or another body. Every body of a robot of a URDF is a
+    link, named as there.
 
     Args:
-        link: The link that the body rides on, 1 to N; of any other robot its number
-            among the links with solids, from 1.
+        link: The link that the body rides on, 1 to N, 0 for the feed; of a robot of a
+            URDF its number among the links with solids, from 1.
         obstacle: Name; empty for a pair of bodies.
         other_link: The link of the other body, farther from the base; else 0.
         body: Name of the body; empty for the link itself.
@@ -177,7 +177,7 @@ class Counterexample:
         required: What it falls short of; [m].
         link_point: Witness on the link's surface, base frame, shape (3,); [m].
         other_point: Witness on the partner's nominal surface, shape (3,); [m].
-        deeper: As of a closest approach.
+        deeper: Whether the link's axis meets the partner, see `ClosestApproach`.
     """
 
     interval: int
@@ -197,158 +197,27 @@ class Counterexample:
         return self.interval + self.share
 
 
-@dataclass(frozen=True)
-class ClearanceChunk:
-    """Brackets of consecutive intervals; long motions arrive in many chunks.
-
-    Args:
-        first_interval: Number of the interval that row 0 of the arrays is about.
-        lower: Proved lower bounds, shape (m, n_pairs); [m].
-        upper: Proved upper bounds at `share`, shape (m, n_pairs); [m].
-        share: Place of the upper bounds in their intervals, 0 to 1, (m, n_pairs); [-].
-        verdict: 0 certified, 1 refuted, 2 undecided, shape (m, n_pairs).
-        link_point: Witnesses on the links, base frame, shape (m, n_pairs, 3); [m].
-        other_point: Witnesses on the partners, shape (m, n_pairs, 3); [m].
-        pairs: Numbers of the pairs of the columns; None for all pairs in order.
-    """
-
-    first_interval: int
-    lower: FloatArray
-    upper: FloatArray
-    share: FloatArray
-    verdict: IntArray
-    link_point: FloatArray
-    other_point: FloatArray
-    pairs: IntArray | None = None
-
-
-@dataclass(frozen=True)
-class LeastClearances:
-    """The least clearance of every pair over the whole motion.
-
-    Args:
-        interval: Where the upper bound was found, shape (n_pairs,).
-        share: Its place in the interval, 0 to 1, shape (n_pairs,); [-].
-        lower: Proved lower bound over the motion, shape (n_pairs,); [m].
-        upper: Proved upper bound, shape (n_pairs,); [m].
-        verdict: 0 certified, 1 refuted, 2 undecided, shape (n_pairs,).
-        link_point: Witnesses on the links, base frame, shape (n_pairs, 3); [m].
-        other_point: Witnesses on the partners, shape (n_pairs, 3); [m].
-    """
-
-    interval: IntArray
-    share: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-    verdict: IntArray
-    link_point: FloatArray
-    other_point: FloatArray
-
-    def of(self, pairs: IntArray) -> "LeastClearances":
-        """Those of some pairs, by their numbers."""
-        return LeastClearances(
-            *(getattr(self, one.name)[pairs] for one in fields(self))
-        )
-
-    def with_rows(self, rows: Mapping[int, Sequence[Any]]) -> "LeastClearances":
-        """The same with others of some pairs, each in the order of the fields."""
-        changed = [getattr(self, one.name).copy() for one in fields(self)]
-        for k, row in rows.items():
-            for values, value in zip(changed, row, strict=True):
-                values[k] = value
-        for values in changed:
-            values.setflags(write=False)
-        return LeastClearances(*changed)
-
-
-ClearanceSink: TypeAlias = Callable[[ClearanceChunk], None]
-"""Receives chunks in order while a verification runs (a CSV writer, say)."""
-
-
-@dataclass(frozen=True)
-class ClearanceProfile:
-    """Brackets along the motion, reduced to what a plot shows.
-
-    Args:
-        link_lower: Least over the obstacles, shape (n_bins, N); [m].
-        link_upper: The same for the upper bounds; [m].
-        obstacle_lower: Least over the links, shape (n_bins, n_obstacles); [m].
-        obstacle_upper: The same for the upper bounds; [m].
-        first_interval: First interval of each bin, shape (n_bins,). A bin is one
-            interval unless the motion is very long.
-    """
-
-    link_lower: FloatArray
-    link_upper: FloatArray
-    obstacle_lower: FloatArray
-    obstacle_upper: FloatArray
-    first_interval: IntArray
-
-
-class AnyProblem(Protocol):
-    """What the motion of an arm or of any other robot is held to."""
-
-    @property
-    def name(self) -> str:
-        """Of the problem."""
-
-    @property
-    def scene(self) -> Scene:
-        """The obstacles, in the base frame."""
-
-    @property
-    def required_clearance(self) -> float:
-        """Least clearance from obstacles; [m]."""
-
-    @property
-    def required_self_clearance(self) -> float:
-        """Least clearance between bodies of the robot; [m]."""
-
-    @property
-    def T_world_base(self) -> FloatArray:  # noqa: N802  field notation
-        """The base frame in the frame of the problem file, shape (4, 4); [m]."""
-
-    @property
-    def source(self) -> ProblemSource | None:
-        """The files that it was read from."""
-
-
-class Motion(Protocol):
-    """Rows of joint values, whatever lies between them."""
-
-    @property
-    def n_samples(self) -> int:
-        """Number of rows."""
-
-    @property
-    def times(self) -> FloatArray | None:
-        """Of the rows; None where not known; [s]."""
-
-    def times_at(self, moments: FloatArray) -> FloatArray | None:
-        """Times of moments in waypoints; None where not known; [s]."""
-
-
 @dataclass(frozen=True, repr=False, kw_only=True)
 class Verification(Summarised):
     """The judgement of one motion against one problem, of an arm or any other robot.
 
     Args:
-        problem: What was asked.
-        trajectory: What was judged.
+        problem: Arm or robot, scene and required clearances.
+        trajectory: The motion that was judged.
         errors: The error box the clearance proof covers.
         pairs: Every pair judged, in the order that chunks number them.
         checks: One row per check, in a fixed order.
         approaches: The closest approaches over the whole motion, nearest first, one per
             pair at most, ten at most; the first is the minimum clearance.
         profile: Brackets along the motion.
-        joint_error: Largest joint error still certified; 0 if none is; NaN if it was
-            not asked for; [rad].
+        joint_error: Largest joint error still certified; 0 if none is; NaN if nobody
+            looked for it or the time was over; [rad].
         refuted_joint_error: A joint error at which the clearance is lost, with a
             counterexample; NaN if none was looked for or found; [rad].
         counterexamples: Motions within the error box that miss a required clearance:
             one against obstacles, one between links, at most.
-        nominal_clear: Whether, where there are any, the motion without errors is proved
-            clear.
+        nominal_clear: Whether the motion without errors is proved clear; False where
+            there is no counterexample, since nobody asked then.
         not_done: What the time limit left out besides checks, which have their rows;
             in words, one thing each.
         time_limit: How long all of it was allowed to take; [s].
@@ -357,7 +226,7 @@ class Verification(Summarised):
     """
 
     problem: AnyProblem
-    trajectory: Motion
+    trajectory: AnyMotion
     errors: ErrorBox
     pairs: tuple[Pair, ...]
     checks: tuple[Check, ...]

@@ -20,6 +20,7 @@ from vdsm_pin.verification import cable_check, fk, pointing
 from vdsm_pin.verification.approaches import closest_approaches
 from vdsm_pin.verification.arm_counterexamples import find_counterexamples
 from vdsm_pin.verification.best_effort import BestEffort, guarded
+from vdsm_pin.verification.brackets import ClearanceSink
 from vdsm_pin.verification.clearance import (
     ClearanceProof,
     least_clearances,
@@ -60,12 +61,7 @@ from vdsm_pin.verification.inside import (
 from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.moving import check_timed
 from vdsm_pin.verification.proved_lowers import LowersSink, ProvedLowers
-from vdsm_pin.verification.records import (
-    ArmVerification,
-    Check,
-    ClearanceSink,
-    Counterexample,
-)
+from vdsm_pin.verification.records import ArmVerification, Check, Counterexample
 from vdsm_pin.verification.robot_model import RobotModel
 from vdsm_pin.verification.robust import largest_joint_error, refuted_joint_error
 from vdsm_pin.verification.task import ArmPairs, all_pairs
