@@ -16,7 +16,7 @@ from statistics import median
 from typing import Final
 
 import yaml
-from result_files import REPORTS, write_table
+from result_files import REPORTS, table_lines, write_table
 
 from benchmarks.hrm1000.families import FAMILIES
 from benchmarks.hrm1000.generate import generate
@@ -111,18 +111,29 @@ def sample(per_family: int, folder: Path) -> list[Line]:
     return lines
 
 
-def drawn(method: str, lines: list[Line]) -> str:
+MEASURED: Final = {
+    "ψ max [°]": ("psi_deg", ".1f"),
+    "changed angles, mean": ("changed", ".2f"),
+    "clearance [mm]": ("clearance_mm", ".1f"),
+    "time [s]": ("seconds", ".2f"),
+}
+"""Columns of numbers, with what stands in them."""
+
+
+def drawn(method: str, lines: list[Line]) -> list[str]:
     """How many problems a method draws whole, and medians over these."""
     own = [one for one in lines if one.method == method]
     whole = [one for one in own if one.answer == "certified"]
     cells = [method, f"{len(whole)} of {len(own)}"]
-    for key, form in (
-        ("psi_deg", ".1f"), ("changed", ".2f"), ("clearance_mm", ".1f"),
-        ("seconds", ".2f"),
-    ):  # fmt: skip
+    for key, form in MEASURED.values():
         values = [v for one in whole if (v := getattr(one, key)) is not None]
         cells.append(cell(median(values) if values else None, form))
-    return "| " + " | ".join(cells) + " |"
+    return cells
+
+
+def numbers(one: Line) -> list[str]:
+    """What was measured of one plan."""
+    return [cell(getattr(one, key), form) for key, form in MEASURED.values()]
 
 
 def cell(value: float | None, form: str) -> str:
@@ -143,20 +154,14 @@ def markdown(lines: list[Line], sampled: list[Line]) -> str:
         "planning. Clearances of refuted motions are of their worst place, as deep as",
         "is measured.",
         "",
-        "| method | what it is |",
-        "|---|---|",
-        *(f"| {name} | {words} |" for name, words in METHODS.items()),
+        *table_lines(("method", "what it is"), METHODS.items()),
         "",
-        "| method | scene | answer | ψ max [°] | changed angles, mean | "
-        "clearance [mm] | time [s] | why |",
-        "|---|---|---|---|---|---|---|---|",
     ]
-    rows = [
-        f"| {one.method} | {one.scene} | {one.answer} | {cell(one.psi_deg, '.1f')} | "
-        f"{cell(one.changed, '.2f')} | {cell(one.clearance_mm, '.1f')} | "
-        f"{one.seconds:.2f} | {one.reason} |"
-        for one in lines
+    names = ("method", "scene", "answer", *MEASURED, "why")
+    cells = [
+        (one.method, one.scene, one.answer, *numbers(one), one.reason) for one in lines
     ]
+    rows = table_lines(names, cells)
     if not sampled:
         return "\n".join([*head, *rows, ""])
     words = [
@@ -167,11 +172,9 @@ def markdown(lines: list[Line], sampled: list[Line]) -> str:
         "each plan; the first problems of every feasible family; medians over the",
         "problems drawn.",
         "",
-        "| method | drawn | ψ max [°] | changed angles, mean | clearance [mm] "
-        "| time [s] |",
-        "|---|---|---|---|---|---|",
     ]
-    table = [drawn(name, sampled) for name in METHODS]
+    names = ("method", "drawn", *MEASURED)
+    table = table_lines(names, [drawn(name, sampled) for name in METHODS])
     return "\n".join([*head, *rows, *words, *table, ""])
 
 

@@ -11,7 +11,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any, Final
 from unittest.mock import patch
@@ -19,6 +19,7 @@ from unittest.mock import patch
 import numpy as np
 from paper_figures.runs import SCENES, Run, Runs
 from paper_table import touching_error
+from result_files import table_lines
 
 from benchmarks.hrm1000.families import FAMILIES
 from benchmarks.hrm1000.generate import VERSION, generate
@@ -266,20 +267,18 @@ def counted() -> Iterator[Counts]:
 
 def iterations(runs: Runs) -> tuple[Claim, list[str]]:
     """Which step goes round in circles, and how often, scene by scene."""
-    lines = [
-        "| scene | times Steps 2-7 are carried out (waypoints in all / in the plan) | "
-        "lines and regions tried for Step 5 | rounds of planning and proving |",
-        "|---|---|---|---|",
-    ]
+    head = ("scene",
+            "times Steps 2-7 are carried out (waypoints in all / in the plan)",
+            "lines and regions tried for Step 5",
+            "rounds of planning and proving")  # fmt: skip
+    lines = []
     for scene in SCENES:
         problem = runs.problem(scene)
         with counted() as counts:
             found = plan_and_verify(problem, "paper", load_robot(problem.manipulator))
         rows = found.plan.trajectory.n_samples
-        lines.append(
-            f"| {scene} | {counts.solves} ({counts.rows} / {rows}) | "
-            f"{counts.sections} | {len(found.rounds)} |"
-        )
+        solves = f"{counts.solves} ({counts.rows} / {rows})"
+        lines.append((scene, solves, counts.sections, len(found.rounds)))
     claim = Claim(
         '"non-iterative", "at one time" (1)', "holds for Steps 1-3, 6 and 7",
         "these are closed forms; Steps 4 and 5 try lines and regions, across the rail "
@@ -287,12 +286,12 @@ def iterations(runs: Runs) -> tuple[Claim, list[str]]:
         "are inserted (table below)",
         "`python analysis/claims.py`",
     )  # fmt: skip
-    return claim, lines
+    return claim, table_lines(head, lines)
 
 
 def generality(per_family: int) -> tuple[Claim, list[str]]:
     """How many of HRM-1000's problems the paper's own method solves."""
-    lines = ["| family | solved by `paper` |", "|---|---|"]
+    lines: list[tuple[str, str]] = []
     total = solved = 0
     with tempfile.TemporaryDirectory() as folder:
         for family in FAMILIES:
@@ -302,7 +301,7 @@ def generality(per_family: int) -> tuple[Claim, list[str]]:
                 draws_all(generate(Path(folder) / family, family, number))
                 for number in range(per_family)
             )
-            lines.append(f"| {family} | {count} of {per_family} |")
+            lines.append((family, f"{count} of {per_family}"))
             total, solved = total + per_family, solved + count
     claim = Claim(
         '"all kinds of obstacle environments" (1)', "does not hold",
@@ -310,7 +309,7 @@ def generality(per_family: int) -> tuple[Claim, list[str]]:
         f"whole ({100.0 * solved / total:.0f} %)",
         f"`python analysis/claims.py --per-family {per_family}`",
     )  # fmt: skip
-    return claim, lines
+    return claim, table_lines(("family", "solved by `paper`"), lines)
 
 
 def draws_all(file: Path) -> bool:
@@ -326,10 +325,6 @@ def draws_all(file: Path) -> bool:
 
 def page(claims: list[Claim], rounds: list[str], families: list[str]) -> str:
     """The page."""
-    rows = [
-        f"| {one.words} | {one.verdict} | {one.number} | {one.command} |"
-        for one in claims
-    ]
     return "\n".join(
         [
             "# What the paper claims, measured",
@@ -339,9 +334,9 @@ def page(claims: list[Claim], rounds: list[str], families: list[str]) -> str:
             "`make claims`, which measures every number; times depend on the machine.",
             "Departures from the text are in [paper.md](paper.md).",
             "",
-            "| claim | verdict | measured | how to see it |",
-            "|---|---|---|---|",
-            *rows,
+            *table_lines(
+                ("claim", "verdict", "measured", "how to see it"), map(astuple, claims)
+            ),
             "",
             "## Which step iterates",
             "",

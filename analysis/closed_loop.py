@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from closed_loop_figures import actual_and_planned, errors, poses
 from paper_figures import style
-from result_files import output_folder, write_table
+from result_files import output_folder, table_lines, write_table
 
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -112,21 +112,16 @@ def markdown(rows: list[dict[str, str]], swept: list[dict[str, str]]) -> str:
              "what is assumed: [docs/simulation.md](../../docs/simulation.md). \"Any "
              "motion within that error\": the largest error of any joint at any time "
              "fed to the proof as the error of every joint.", ""]  # fmt: skip
-    lines += [*_table(rows), "", "## What the assumptions do", "",
+    planned, changed = (
+        table_lines(list(some[0]), [one.values() for one in some])
+        for some in (rows, swept)
+    )
+    lines += [*planned, "", "## What the assumptions do", "",
               "obs3 by the paper's rule, one assumption changed at a time.", "",
-              *_table(swept)]  # fmt: skip
+              *changed]  # fmt: skip
     for name in ("fig19", "fig20-paper", "fig20-fewest", "fig21-paper", "fig21-fewest"):
         lines += ["", f'<img src="{name}.png" width="800" alt="{name}">']
     return "\n".join(lines) + "\n"
-
-
-def _table(rows: list[dict[str, str]]) -> list[str]:
-    names = list(rows[0])
-    return [
-        "| " + " | ".join(names) + " |",
-        "|" + "---|" * len(names),
-        *("| " + " | ".join(one.values()) + " |" for one in rows),
-    ]
 
 
 def main(folder: Path) -> None:

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 import yaml
-from result_files import output_folder, write_table
+from result_files import output_folder, table_lines, write_table
 
 from vdsm_pin.io.problem_file import built_in_text, read_problem
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -115,16 +115,16 @@ def markdown(lines: list[Line]) -> str:
         f"side to side in {SWING_S:g} s, beside the plan for the resting one (a row in",
         f"{ROW_S:g} s), and every instant is judged.",
         "",
-        "| scene | strategy | plan for the arriving obstacle | sway borne, required "
-        "clearance kept [mm] | sway borne without contact [mm] |",
-        "|---|---|---|---|---|",
     ]
+    names = ("scene", "strategy", "plan for the arriving obstacle",
+             "sway borne, required clearance kept [mm]",
+             "sway borne without contact [mm]")  # fmt: skip
     rows = [
-        f"| {one.scene} | {one.strategy} | {one.arrival} | ±{one.sway_kept_mm:.1f} | "
-        f"±{one.sway_clear_mm:.1f} |"
+        (one.scene, one.strategy, one.arrival,
+         f"±{one.sway_kept_mm:.1f}", f"±{one.sway_clear_mm:.1f}")
         for one in lines
-    ]
-    return "\n".join([*head, *rows, ""])
+    ]  # fmt: skip
+    return "\n".join([*head, *table_lines(names, rows), ""])
 
 
 def main() -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from result_files import output_folder, write_table
+from result_files import output_folder, table_lines, write_table
 
 from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.errors import Infeasible
@@ -80,22 +80,24 @@ def row_of(circle: str, turn_deg: float) -> Row:
 
 def markdown(rows: list[Row]) -> str:
     """The table for reading."""
-    lines = [
-        "# obs2: turns of the prism",
-        "",
-        "Made by `python analysis/obs2_orientations.py --out reports/paper`.",
-        "",
-        "| circle | turn [deg] | outcome | max psi [deg] | x0 max [mm] | drawn [%] |",
-        "|---|---|---|---|---|---|",
-    ]
+    head = (
+        "circle",
+        "turn [deg]",
+        "outcome",
+        "max psi [deg]",
+        "x0 max [mm]",
+        "drawn [%]",
+    )
+    made = "Made by `python analysis/obs2_orientations.py --out reports/paper`."
+    lines = []
     for row in rows:
         numbers = ["-", "-", "-"]
         if row.psi_deg is not None:
             numbers = [f"{row.psi_deg:.2f}", f"{row.x0_max_mm:.1f}"]
             numbers.append(f"{row.drawn_percent:.2f}")
-        cells = [row.circle, f"{row.turn_deg:g}", row.outcome, *numbers]
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines) + "\n"
+        lines.append([row.circle, f"{row.turn_deg:g}", row.outcome, *numbers])
+    text = ["# obs2: turns of the prism", "", made, "", *table_lines(head, lines), ""]
+    return "\n".join(text)
 
 
 def main() -> None:

@@ -6,11 +6,11 @@ Writes `table.json` and `table.md`. "Paper says" is quoted from the text, with i
 section; "we get" comes from the certified plan and its verification.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from typing import Final
 
 import numpy as np
-from result_files import output_folder, write_table
+from result_files import output_folder, table_lines, write_table
 
 from vdsm_pin.arm.kinematics import link_angles
 from vdsm_pin.arm.manipulator import built_in
@@ -212,11 +212,9 @@ def markdown(rows: list[Row]) -> str:
         "`python analysis/paper_table.py --out reports/paper`. Section numbers are the",
         "paper's; the reasons for differences are in `docs/paper.md`.",
         "",
-        "| scene | quantity | paper says | we get |",
-        "|---|---|---|---|",
     ]
-    lines += [f"| {r.scene} | {r.quantity} | {r.paper} | {r.ours} |" for r in rows]
-    return "\n".join(lines) + "\n"
+    head = "scene", "quantity", "paper says", "we get"
+    return "\n".join([*lines, *table_lines(head, map(astuple, rows)), ""])
 
 
 def main() -> None:

@@ -23,7 +23,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from result_files import output_folder, write_table
+from result_files import output_folder, table_lines, write_table
 
 from benchmarks.hrm1000.generate import generate
 from vdsm_pin.arm.kinematics import joint_angles, link_angles
@@ -210,37 +210,30 @@ def whole_table(rows: list[dict[str, object]]) -> str:
         "Step 5, the others do not. Angles and stroke are those of the setting that",
         "draws the whole path with the least psi; where none does, there is no row.",
         "",
-        "| scene | ratios | tried | draw it all | largest psi [deg] | "
-        "stroke of x0 [mm] | changed link angles, mean |",
-        "|---|---|---|---|---|---|---|",
     ]
-    for one in rows:
-        if not one["drawn"]:
-            continue
+    head = ("scene", "ratios", "tried", "draw it all", "largest psi [deg]",
+            "stroke of x0 [mm]", "changed link angles, mean")  # fmt: skip
+    cells = []
+    for one in (one for one in rows if one["drawn"]):
         psi, stroke, changed = one["best"]  # type: ignore[misc]
-        best = f"{psi:.2f} | {1e3 * stroke:.0f} | {changed:.2f}"
-        cells = [one["scene"], one["ratios"], one["tried"], one["drawn"], best]
-        lines.append("| " + " | ".join(map(str, cells)) + " |")
-    return "\n".join(lines) + "\n"
+        best = f"{psi:.2f}", f"{1e3 * stroke:.0f}", f"{changed:.2f}"
+        cells.append([one["scene"], one["ratios"], one["tried"], one["drawn"], *best])
+    return "\n".join([*lines, *table_lines(head, cells), ""])
 
 
 def table(rows: list[dict[str, object]]) -> str:
     """The rows as Markdown."""
-    lines = [
-        "# Other ways of scaling",
-        "",
-        "| scene | tip positions | straight arm blocked | of those clear with varying "
-        "ratios | with another centre | median largest psi there, ratios / centre [deg]"
-        " |",
-        "|---|---|---|---|---|---|",
-    ]
+    head = ("scene", "tip positions", "straight arm blocked",
+            "of those clear with varying ratios", "with another centre",
+            "median largest psi there, ratios / centre [deg]")  # fmt: skip
+    cells = []
     for one in rows:
         _, ratios, centre = one["of_blocked"]  # type: ignore[misc]
         _, psi_r, psi_c = one["psi_deg"]  # type: ignore[misc]
         psi = "-" if psi_r is None else f"{psi_r} / {psi_c}"
-        cells = [one["scene"], one["positions"], one["blocked"], ratios, centre, psi]
-        lines.append("| " + " | ".join(map(str, cells)) + " |")
-    return "\n".join(lines) + "\n"
+        place = one["scene"], one["positions"], one["blocked"]
+        cells.append([*place, ratios, centre, psi])
+    return "\n".join(["# Other ways of scaling", "", *table_lines(head, cells), ""])
 
 
 def main() -> None:

@@ -12,7 +12,7 @@ from unittest.mock import patch
 import numpy as np
 import shapely
 from paper_figures.runs import Runs
-from result_files import output_folder, write_table
+from result_files import output_folder, table_lines, write_table
 
 from vdsm_pin.app.explanation.cross import DIRECTIONS, leave
 from vdsm_pin.arm.kinematics import link_angles
@@ -144,6 +144,19 @@ def one_line(runs: Runs, scene: str, number: int) -> OneLine:
 
 def markdown(literals: list[Literal], singles: list[OneLine]) -> str:
     """Both tables for reading."""
+    head = ("scene", "region [mm]", "waypoints", "with a link too short",
+            "largest jump of a joint [mm]", "link inside by [mm]")  # fmt: skip
+    rows = [
+        (one.scene, f"+{one.growth_mm:.0f}", one.waypoints, one.short,
+         f"{one.jump_mm:.0f}", f"{one.depth_mm:.0f}")
+        for one in literals
+    ]  # fmt: skip
+    drawn = {
+        (one.line, one.scene): "–"
+        if one.psi_deg is None or one.drawn is None
+        else f"{100.0 * one.drawn:.1f} %, {one.psi_deg:.1f}°"
+        for one in singles
+    }
     lines = [
         "# What Step 5 leaves open",
         "",
@@ -155,14 +168,7 @@ def markdown(literals: list[Literal], singles: list[OneLine]) -> str:
         "where the cross through P′ meets the boundary, on the route of the tip that",
         "the strategy `paper` plans. Region: how much wider than the least one.",
         "",
-        "| scene | region [mm] | waypoints | with a link too short | largest jump of a "
-        "joint [mm] | link inside by [mm] |",
-        "|---|---|---|---|---|---|",
-        *(
-            f"| {one.scene} | +{one.growth_mm:.0f} | {one.waypoints} | {one.short} | "
-            f"{one.jump_mm:.0f} | {one.depth_mm:.0f} |"
-            for one in literals
-        ),
+        *table_lines(head, rows),
         "",
         "## One line for all joints",
         "",
@@ -171,19 +177,13 @@ def markdown(literals: list[Literal], singles: list[OneLine]) -> str:
         "limits. The paper names an oblique line and a circle about P₁ as well and",
         'says that "the latter two make the link angle larger".',
         "",
-        "| line | " + " | ".join(SCENES) + " |",
-        "|---|" + "---|" * len(SCENES),
+        *table_lines(
+            ("line", *SCENES),
+            [(name, *(drawn[name, scene] for scene in SCENES)) for name in LINES],
+        ),
+        "",
     ]
-    for name in LINES:
-        cells = [
-            "–"
-            if one.psi_deg is None or one.drawn is None
-            else f"{100.0 * one.drawn:.1f} %, {one.psi_deg:.1f}°"
-            for one in singles
-            if one.line == name
-        ]
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    return "\n".join([*lines, ""])
+    return "\n".join(lines)
 
 
 def main() -> None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from paper_figures.style import subscript
+from result_files import table_lines
 
 from vdsm_pin.arm.manipulator import Manipulator, built_in
 from vdsm_pin.geometry.arrays import FloatArray
@@ -129,26 +130,20 @@ def rows(arm: Manipulator) -> list[tuple[str, str, str, str, str]]:
 def markdown(arm: Manipulator) -> str:
     """Table 1 for reading."""
     last = subscript(arm.n_links + 1)
-    lines = [
-        f"| a [mm] | θ | α | d [mm] | kᵢ,{last} |",
-        "|---|---|---|---|---|",
-        *("| " + " | ".join(row) + " |" for row in rows(arm)),
-    ]
-    return "\n".join(lines) + "\n"
+    head = "a [mm]", "θ", "α", "d [mm]", f"kᵢ,{last}"
+    return "\n".join([*table_lines(head, rows(arm)), ""])
 
 
 def traditional_markdown(arm: Manipulator) -> str:
     """The table of the 16 frames for reading."""
-    lines = [
-        "| frame | angle about z | d [mm] | a [mm] | twist about x [°] |",
-        "|---|---|---|---|---|",
-    ]
+    head = "frame", "angle about z", "d [mm]", "a [mm]", "twist about x [°]"
+    cells = []
     for k, row in enumerate(traditional(arm), start=1):
         name, number = row.angle
         angle, twist = f"{name}{subscript(number)}", np.rad2deg(row.twist)
-        cells = f"{k} | {angle} | 0 | {row.a * MM_PER_M:.0f} | {twist:+.0f}"
-        lines.append(f"| {cells} |".replace("-", "−"))
-    return "\n".join(lines) + "\n"
+        turned = f"{twist:+.0f}".replace("-", "−")
+        cells.append((k, angle, 0, f"{row.a * MM_PER_M:.0f}", turned))
+    return "\n".join([*table_lines(head, cells), ""])
 
 
 if __name__ == "__main__":
