@@ -9,8 +9,8 @@ import shapely
 from vdsm_pin.errors import NoPlanFound
 from vdsm_pin.geometry.solids import Cylinder, Sphere
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.planner.paper.approach import first_station
 from vdsm_pin.planner.paper.danger_region import DangerRegion
-from vdsm_pin.planner.paper.detours import first_station
 from vdsm_pin.planner.paper.sections import Section, merged
 from vdsm_pin.problem.desired_path import Approach
 from vdsm_pin.problem.planning_problem import PlanningProblem

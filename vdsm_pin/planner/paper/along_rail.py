@@ -13,8 +13,9 @@ import numpy as np
 
 from vdsm_pin.errors import PathBlocked
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.planner.paper.approach import first_station
 from vdsm_pin.planner.paper.danger_region import DangerRegion
-from vdsm_pin.planner.paper.detours import detour_route, first_station, path_rows
+from vdsm_pin.planner.paper.detours import detour_route, path_rows
 from vdsm_pin.planner.paper.joint_paths import SideRule, slide_joints
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.region_kernels import core_gaps

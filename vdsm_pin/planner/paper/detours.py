@@ -17,6 +17,7 @@ import numpy as np
 
 from vdsm_pin.errors import PathBlocked
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.planner.paper.approach import first_station
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.shadow import Shadow, Visit
@@ -30,7 +31,7 @@ from vdsm_pin.planner.paper.tip_path import (
     rows_at,
     undrawn_by,
 )
-from vdsm_pin.problem.desired_path import Approach, DesiredPath
+from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
 
@@ -56,63 +57,13 @@ def path_rows(path: DesiredPath, start: float, region: DangerRegion) -> Rows:
     crossed = np.flatnonzero(inside[1:] != inside[:-1])
     if not len(crossed):
         return rows
-    within = np.where(
-        inside[crossed], rows.stations[crossed], rows.stations[crossed + 1]
-    )
-    without = np.where(
-        inside[crossed], rows.stations[crossed + 1], rows.stations[crossed]
-    )
+    ends = rows.stations[np.stack([crossed, crossed + 1])]
+    within, without = np.where(inside[crossed], ends, ends[::-1])
     while np.abs(within - without).max() > TOLERANCES.on_boundary:
         middle = 0.5 * (within + without)
         hit = region.contains(project(rows_at(path, middle).points))
         within, without = np.where(hit, middle, within), np.where(hit, without, middle)
     return rows_at(path, np.unique(np.concatenate([rows.stations, without])))
-
-
-def first_station(path: DesiredPath, region: DangerRegion) -> tuple[float, str]:
-    """Where the tip joins a closed path, by the scheme asked for (paper, 4.2.2).
-
-    The equidistant points are those where the line from the start through the centre of
-    the obstacle meets the path behind the obstacle: there both ways round are equal. Of
-    several obstacles the line goes through the middle of all, or, for the nearest
-    equidistant point, one line through each.
-
-    Returns:
-        The arc length [m], and a note where the scheme had to be widened.
-    """
-    if path.approach is Approach.SHORTEST or not path.closed:
-        return path.entry, ""
-    each = path.approach is Approach.NEAREST_EQUIDISTANT and region.centres is not None
-    centres = region.centres if each else region.centre[None]
-    assert centres is not None
-    found = [_behind(path, centre) for centre in centres]
-    stations = np.concatenate([one[0] for one in found])
-    distances = np.concatenate([one[1] for one in found])
-    if not len(stations):
-        return path.entry, "no equidistant point: the nearest point is used"
-    note = ""
-    if path.approach is Approach.EQUIDISTANT and len(stations) > 1:
-        note = f"{len(stations)} equidistant points: the nearest is used"
-    return float(stations[np.argmin(distances)]), note
-
-
-def _behind(path: DesiredPath, centre: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Where the line from the start through a centre meets the path behind it.
-
-    Returns:
-        Arc lengths along the path, and distances from the start, shape (k,) each; [m].
-    """
-    start = path.start[1:]
-    ray = centre - start
-    offsets = project(path.corners) - start
-    across = ray[0] * offsets[:, 1] - ray[1] * offsets[:, 0]
-    crossed = np.flatnonzero((across[:-1] <= 0.0) != (across[1:] <= 0.0))
-    part = across[crossed] / (across[crossed] - across[crossed + 1])
-    sides = np.diff(path.corner_stations)[crossed]
-    stations = path.corner_stations[crossed] + part * sides
-    along = (project(path.at(stations)) - start) @ ray / (ray @ ray)
-    behind = along > 1.0
-    return stations[behind], along[behind] * float(np.hypot(*ray))
 
 
 def detour_route(
@@ -155,8 +106,7 @@ def detour_route(
         ways += [_connect(walk, here, there, left_at), piece]
         here = _end(piece, shadow, last=True)
     if path.closed:
-        left_at = float(ways[-1].stations[-1])
-        ways.append(_connect(walk, here, start, left_at))
+        ways.append(_connect(walk, here, start, float(ways[-1].stations[-1])))
     return join(path, ways, (note,) if note else ())
 
 
@@ -232,8 +182,7 @@ def _sides_drawn(
 
 def _leading(angles: FloatArray) -> int:
     """How many entries are finite from the beginning on."""
-    able = np.isfinite(angles)
-    return len(able) if able.all() else int(np.argmin(able))
+    return int(np.argmin(np.append(np.isfinite(angles), False)))
 
 
 @dataclass(frozen=True)
