@@ -88,6 +88,18 @@ def test_what_floats_stands_where_pinocchio_has_it(tmp_path: Path, kind: str) ->
         read_robot(urdf, srdf, lock={"cart": 1.0})
 
 
+def test_prefixes_that_nothing_declares_are_read_as_ros_does(tmp_path: Path) -> None:
+    """As in URDFs for Drake; `document.iter` sees them, Pinocchio the same joints."""
+    text = URDF.replace("<limit ", '<limit drake:acceleration="2.5" ', 1)
+    assert text != URDF
+    robot = read_robot(write(tmp_path, "drake.urdf", text))
+    assert robot.notes == ("what is of these namespaces is not read: 'drake'",)
+    assert pose_difference(robot, np.array([[0.7, 0.1]])).max() < 1e-12
+    declared = text.replace("<robot ", '<robot xmlns:drake="http://drake.mit.edu" ', 1)
+    (note,) = read_robot(write(tmp_path, "declared.urdf", declared)).notes
+    assert "http://drake.mit.edu" in note
+
+
 def test_limits_that_are_not_stated_are_noted(tmp_path: Path, urdf: Path) -> None:
     limit = '<limit lower="-3" upper="3" effort="1" velocity="1"/>'
     free = write(tmp_path, "free.urdf", URDF.replace(limit, "", 1))

@@ -39,7 +39,9 @@ def covering_hull(points: FloatArray) -> Hull:
     if (hull := coal_hull(points)) is not None:
         corners = np.array(hull.points())
         # A distance from a hull is convex: no point inside of others is farther off.
-        grown = float(_distances(outer_points(points), corners).max(initial=0.0))
+        known, outer = set(map(tuple, corners.tolist())), outer_points(points)
+        other = [tuple(point) not in known for point in outer.tolist()]
+        grown = float(_distances(outer[other], corners).max(initial=0.0))
         if grown <= MOST_GROWN:
             return Hull(corners, grown, few_corners(corners))
     corners = outer_points(points)

@@ -115,6 +115,10 @@ def _not_judged(document: ET.Element) -> Iterator[str]:
     if others:
         what = "Pinocchio's collision_checking is not read; cylinders have flat ends"
         yield f"{what}: {listed(others)}"
+    words = (word for one in document.iter() for word in (one.tag, *one.attrib))
+    spaces = {word[1:].partition("}")[0] for word in words if word.startswith("{")}
+    if spaces:
+        yield f"what is of these namespaces is not read: {listed(sorted(spaces))}"
 
 
 def _bodies(
