@@ -516,7 +516,10 @@ def test_a_certificate_is_written_and_accepted(
     assert ran.status == 0, ran.err
     assert vdsm("check-certificate", proof, planned / "near.yaml", rows).status == 0
     other = write_problem(tmp_path / "other.yaml", NEAR.replace("3.5", "3.6"))
-    assert vdsm("check-certificate", proof, other, rows).status == 1
+    ran = vdsm("check-certificate", proof, other, rows, "--json")
+    told = json.loads(ran.out)
+    assert (ran.status, told["accepted"]) == (1, False)
+    assert told["reason"] in vdsm("check-certificate", proof, other, rows).out
 
 
 def test_the_joint_error_that_the_sturdiest_plan_claims_is_the_one_verified(
@@ -599,6 +602,42 @@ def test_results_can_be_read_by_programs_or_not_said_at_all(
     ran = vdsm(*words, "--json")
     assert ran.out == (out / "verification.json").read_text(encoding="utf-8")
     assert vdsm(*words, "--quiet").out == ""
+
+
+SPEAK_FOR_THEMSELVES = {"problems", "schema", "view"}
+
+
+def test_every_command_has_an_answer_for_programs_and_can_be_silent(
+    vdsm: Shell, planned: Path, tmp_path: Path
+) -> None:
+    """Oracle: the files that a command has written, the words that it says else."""
+    rows, near = planned / "trajectory.csv", planned / "near.yaml"
+    for command in set(COMMANDS) - SPEAK_FOR_THEMSELVES:
+        text = vdsm(command, "--help").out
+        assert "--json" in text and "--quiet" in text, command
+    made, urdf = tmp_path / "made", tmp_path / "arm.urdf"
+    commands: dict[str, list[object]] = {
+        "doctor": ["doctor"],
+        "diff": ["diff", planned, planned],
+        "urdf": ["urdf", "hrm8", "--out", urdf],
+        "convert": ["convert", near, "--trajectory", rows, "--out", tmp_path / "c"],
+        "export": ["export", near, "--out", tmp_path / "a.glb"],
+        "new": ["new", made],
+    }
+    found = {}
+    for name, words in commands.items():
+        shutil.rmtree(made, ignore_errors=True)
+        ran = vdsm(*words, "--json")
+        found[name] = json.loads(ran.out)
+        shutil.rmtree(made, ignore_errors=True)
+        assert (ran.status, vdsm(*words, "--quiet").out) == (0, ""), name
+    assert set(found["new"]["files"]) == {path.name for path in made.iterdir()}
+    assert found["diff"] == {"worse": False, "changes": []}
+    assert found["urdf"]["files"] == [str(urdf)]
+    assert found["convert"]["waypoints"] == len(rows.read_text().splitlines()) - 1
+    assert Path(found["export"]["file"]).stat().st_size > 1000
+    needed = [one for one in found["doctor"]["findings"] if one["needed"]]
+    assert needed and all(one["works"] for one in needed)
 
 
 def test_a_batch_can_be_proved_under_errors_with_certificates(

@@ -6,7 +6,14 @@ from typing import Annotated
 
 import typer
 
-from vdsm_pin.cli.options import OutFolder, ProblemArgument, examples, family
+from vdsm_pin.cli.options import (
+    Answer,
+    OutFolder,
+    ProblemArgument,
+    examples,
+    family,
+    grouped,
+)
 from vdsm_pin.cli.robot import refuse_beside
 from vdsm_pin.text import printable
 
@@ -30,6 +37,7 @@ class Format(StrEnum):
         "vdsm convert mine.yaml --cables cables.csv --out out/mine",
     )
 )
+@grouped
 def convert(
     problem: ProblemArgument,
     out: OutFolder,
@@ -47,6 +55,8 @@ def convert(
         list[Format] | None,
         typer.Option(help="Write a JointTrajectory too; mcap is ROS 2, bag ROS 1."),
     ] = None,
+    *,
+    answer: Answer,
 ) -> None:
     """Convert angles, centres and cable lengths.
 
@@ -59,13 +69,14 @@ def convert(
     from vdsm_pin.problem.planning_problem import PlanningProblem
 
     given, more = Given(trajectory, centres, cables), [one.value for one in also or ()]
+    notes: tuple[str, ...] = ()
     asked = read_asked(problem)
     if isinstance(asked, PlanningProblem):
         motion = convert_to_folder(asked, given, out, more)
-        count = motion.n_samples
-        for note in motion.notes:
-            typer.echo(printable(f"note: {note}"))
+        count, notes = motion.n_samples, motion.notes
     else:
         refuse_beside("a robot", {"--centres": centres, "--cables": cables})
         count = convert_robot(asked, given.file, out, more)
-    typer.echo(f"wrote {count} waypoints to {out}")
+    lines = [printable(f"note: {note}") for note in notes]
+    lines.append(f"wrote {count} waypoints to {out}")
+    answer.tell("\n".join(lines), waypoints=count, folder=out, notes=notes)

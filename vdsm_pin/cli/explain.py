@@ -4,7 +4,14 @@ from typing import Annotated
 
 import typer
 
-from vdsm_pin.cli.options import OutFolder, ProblemArgument, examples, family
+from vdsm_pin.cli.options import (
+    Answer,
+    OutFolder,
+    ProblemArgument,
+    examples,
+    family,
+    grouped,
+)
 
 commands = family()
 
@@ -15,6 +22,7 @@ commands = family()
         "vdsm explain paper/obs3 --waypoint 300 --out out/explain",
     )
 )
+@grouped
 def explain(
     problem: ProblemArgument,
     out: OutFolder,
@@ -26,6 +34,8 @@ def explain(
             help="From 0; the one with the largest link angle if none.",
         ),
     ] = None,
+    *,
+    answer: Answer,
 ) -> None:
     """Follow the paper's seven steps at one waypoint.
 
@@ -36,4 +46,4 @@ def explain(
     from vdsm_pin.io.problem_file import read_problem
 
     page, row = explain_to_folder(read_problem(problem), waypoint, out)
-    typer.echo(f"waypoint {row}: wrote {page}")
+    answer.tell(f"waypoint {row}: wrote {page}", waypoint=int(row), page=page)

@@ -5,7 +5,14 @@ from typing import Annotated
 
 import typer
 
-from vdsm_pin.cli.options import ProblemArgument, ShownMotion, examples, family
+from vdsm_pin.cli.options import (
+    Answer,
+    ProblemArgument,
+    ShownMotion,
+    examples,
+    family,
+    grouped,
+)
 
 commands = family()
 
@@ -17,6 +24,7 @@ commands = family()
         "vdsm export mine.yaml --trajectory mine.csv --out mine.mp4 --look tip",
     ),
 )
+@grouped
 def export(
     problem: ProblemArgument,
     out: Annotated[
@@ -54,6 +62,8 @@ def export(
     numbers: Annotated[
         bool, typer.Option("--numbers", help="Number the links.")
     ] = False,
+    *,
+    answer: Answer,
 ) -> None:
     """Write a motion as glTF, as a picture or as a film.
 
@@ -67,4 +77,4 @@ def export(
     shot = Shot(look_of(look), width - width % 2, height - height % 2, numbers)
     asked = read_problem(problem)
     write(ExportOrder(asked, trajectory, out, moment, seconds, shot))
-    typer.echo(f"wrote {out}")
+    answer.tell(f"wrote {out}", file=out)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from vdsm_pin.cli.options import examples, family
+from vdsm_pin.cli.options import Answer, examples, family, grouped
 
 commands = family()
 
@@ -34,12 +34,15 @@ def schema(
         "vdsm urdf hrm8 --out hrm8.urdf", "vdsm urdf mine.yaml --out a.urdf"
     )
 )
+@grouped
 def urdf(
     name: Annotated[
         str,
         typer.Argument(metavar="ARM", help="A built-in arm, or a problem for its arm."),
     ],
     out: Annotated[Path, typer.Option("--out", metavar="FILE")],
+    *,
+    answer: Answer,
 ) -> None:
     """Write the URDF of an arm."""
     from vdsm_pin.arm.manipulator import BUILT_IN, built_in
@@ -66,4 +69,5 @@ def urdf(
     for file, content in {**files, out: text}.items():
         with atomic_path(file) as path:
             path.write_text(content, encoding="utf-8")
-    typer.echo(f"wrote {', '.join(map(str, (out, *files)))}")
+    made = [str(file) for file in (out, *files)]
+    answer.tell(f"wrote {', '.join(made)}", files=made)

@@ -1,5 +1,6 @@
 """What commands share: arguments and options, exit codes, help pages."""
 
+import json
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -103,6 +104,20 @@ Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors only.")]
 AsJson = Annotated[
     bool, typer.Option("--json", help="Print the result as JSON, for other programs.")
 ]
+
+
+class Answer(NamedTuple):
+    """How a command says what it did."""
+
+    quiet: Quiet = False
+    as_json: AsJson = False
+
+    def tell(self, text: str, **facts: Any) -> None:
+        """Say it in words, as facts for other programs, or not at all."""
+        if self.as_json:
+            typer.echo(json.dumps(facts, indent=2, default=str))
+        elif not self.quiet:
+            typer.echo(text)
 
 
 def family() -> typer.Typer:

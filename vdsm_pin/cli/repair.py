@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from vdsm_pin.cli.options import (
+    Answer,
     OutFolder,
     TimeLimit,
     Trajectory,
@@ -41,6 +42,7 @@ def repair(
         typer.Option(metavar="ROW", help="A waypoint, from 0, that stays."),
     ] = None,
     time_limit: TimeLimit = None,
+    answer: Answer,
 ) -> None:
     """Mend a trajectory until it is certified.
 
@@ -63,4 +65,11 @@ def repair(
     new, most = int((found.given < 0).sum()), found.moved.max()
     changed = f"{new} of them new; moved by {most:.6f} rad (m) at most"
     how = changed if new or most else "none of them moved: it was clear as given"
-    typer.echo(f"certified with {len(found.moved)} waypoints, {how}; wrote {out}")
+    answer.tell(
+        f"certified with {len(found.moved)} waypoints, {how}; wrote {out}",
+        verdict="certified",
+        waypoints=len(found.moved),
+        new=new,
+        moved_at_most=float(most),
+        folder=out,
+    )

@@ -8,11 +8,13 @@ import typer
 from vdsm_pin.cli.options import (
     NOT_PASSED,
     PASSED,
+    Answer,
     OutFolder,
     ProblemArgument,
     Trajectory,
     examples,
     family,
+    grouped,
 )
 
 commands = family()
@@ -23,6 +25,7 @@ commands = family()
         "vdsm simulate paper/obs3 --trajectory out/obs3/trajectory.csv --out out/loop"
     )
 )
+@grouped
 def simulate(
     problem: ProblemArgument,
     trajectory: Trajectory,
@@ -33,6 +36,8 @@ def simulate(
             metavar="FILE", help="Masses, cables, motors, gains and kicks (YAML)."
         ),
     ] = None,
+    *,
+    answer: Answer,
 ) -> None:
     """Run a plan in closed loop.
 
@@ -49,6 +54,9 @@ def simulate(
     asked = read_problem(problem)
     order = SimulationOrder(asked, trajectory, out, assumed, settings)
     file = simulate_to_folder(order)
-    show_simulation(file, out)
+    if any(answer):
+        answer.tell("", **file.model_dump(mode="json"))
+    else:
+        show_simulation(file, out)
     passed = file.executed.verdict == "certified"
     raise typer.Exit(PASSED if passed else NOT_PASSED)

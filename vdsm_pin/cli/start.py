@@ -1,12 +1,13 @@
 """What a beginner asks first: `vdsm problems`, `vdsm new`, `vdsm doctor`."""
 
 import shlex
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from vdsm_pin.cli.options import NOT_PASSED, PASSED, examples, family
+from vdsm_pin.cli.options import NOT_PASSED, PASSED, Answer, examples, family, grouped
 from vdsm_pin.text import printable
 
 commands = family()
@@ -31,6 +32,7 @@ def problems(
 
 
 @commands.command(epilog=examples("vdsm new mine", "vdsm new cell --from robot"))
+@grouped
 def new(
     folder: Annotated[
         Path, typer.Argument(metavar="NAME", help="Folder to make; names the problem.")
@@ -38,20 +40,24 @@ def new(
     kind: Annotated[
         str, typer.Option("--from", metavar="KIND", help="snake, port, robot or paper.")
     ] = "snake",
+    *,
+    answer: Answer,
 ) -> None:
     """Make a folder with a problem to start from."""
     from vdsm_pin.app.new_project import new_project
 
     files = new_project(folder, kind)
-    typer.echo(f"made {folder} with {', '.join(files)}; next:")
     words = ["vdsm", "plan", str(folder / "problem.yaml")]
     if kind == "robot":
         words = ["vdsm", "verify", words[-1], "--trajectory", str(folder / "plan.csv")]
-    typer.echo(f"  {shlex.join(words)} --out out")
+    then = f"{shlex.join(words)} --out out"
+    text = f"made {folder} with {', '.join(files)}; next:\n  {then}"
+    answer.tell(text, folder=folder, files=files, next=then)
 
 
 @commands.command(epilog=examples("vdsm doctor"))
-def doctor() -> None:
+@grouped
+def doctor(*, answer: Answer) -> None:
     """Say what this installation can do and lacks.
 
     A line for each part, with the way to get what is missing.
@@ -60,10 +66,11 @@ def doctor() -> None:
     """
     from vdsm_pin.app.doctor import examine
 
-    findings = examine()
+    findings, lines = examine(), []
     for one in findings:
         sign = "✓" if one.works else "✗" if one.needed else "–"
         remedy = f"; {one.remedy}" if one.remedy else ""
-        typer.echo(printable(f"{sign} {one.what:<14} {one.found}{remedy}"))
+        lines.append(printable(f"{sign} {one.what:<14} {one.found}{remedy}"))
+    answer.tell("\n".join(lines), findings=[asdict(one) for one in findings])
     lacking = any(one.needed and not one.works for one in findings)
     raise typer.Exit(NOT_PASSED if lacking else PASSED)
