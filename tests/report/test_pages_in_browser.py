@@ -253,6 +253,10 @@ def test_dark_and_narrow_pages_work_and_show_what_failed(
     watched.shot("report-dark-narrow")
     width = watched.page.evaluate("document.documentElement.scrollWidth")
     assert width <= 420, "the page scrolls sideways"
+    cut = """name => { const told = document.querySelector("[data-clearance]");
+      told.textContent = name;
+      return told.getBoundingClientRect().right > window.innerWidth; }"""
+    assert not watched.page.evaluate(cut, "x" * 200), "a long name is cut"
     assert time_of(watched) == 17.25, "the page opens where the verdict was decided"
     flags = watched.page.locator("[data-chart=psi] .flag")
     assert flags.count() == 2
