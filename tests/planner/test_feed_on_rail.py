@@ -11,6 +11,7 @@ from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.planner.feed import within_feed
 from vdsm_pin.planner.records import Prepared
 from vdsm_pin.problem.desired_path import DesiredPath
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 
@@ -25,9 +26,9 @@ def asked(arm: Manipulator, balls: tuple[Sphere, ...]) -> PlanningProblem:
     return PlanningProblem("feed", arm, Scene(balls), path, REQUIRED, np.eye(4))
 
 
-def too_near(ball: Sphere) -> tuple[float, float]:
+def too_near(ball: Sphere, error: float) -> tuple[float, float]:
     """Between which x0 the feed is; of no length where it passes."""
-    reach = ball.radius + FEED.radius + REQUIRED
+    reach = ball.radius + FEED.radius + REQUIRED + error
     across = np.linalg.norm(ball.centre[1:])
     half = float(np.sqrt(max(reach**2 - across**2, 0.0)))
     if not half:
@@ -39,17 +40,19 @@ def too_near(ball: Sphere) -> tuple[float, float]:
 def test_the_rail_ends_where_the_feed_is_too_near(seed: int) -> None:
     rng = np.random.default_rng(seed)
     arm = replace(built_in("hrm8"), feed=FEED, base_range=(-3.0, 3.0))
-    balls = []
+    errors = ErrorBox(base=0.002, obstacle=0.001) if seed % 2 else ErrorBox()
+    error, balls = errors.base + errors.obstacle, []
     for k in range(6):
         radius = rng.uniform(0.01, 0.1)
         ball = Sphere(f"ball {k}", rng.uniform((-4, 0, 0), (3, 0.2, 0.05)), radius)
-        low, high = too_near(ball)
+        low, high = too_near(ball, error)
         if not low < 0.0 < high:
             balls.append(ball)
-    spans = [too_near(ball) for ball in balls]
+    spans = [too_near(ball, error) for ball in balls]
     low = max([-3.0, *(b for a, b in spans if b < 0.0)])
     high = min([3.0, *(a for a, b in spans if 0.0 < a < np.inf)])
-    found = within_feed(Prepared(asked(arm, tuple(balls))))
+    task = replace(asked(arm, tuple(balls)), errors=errors)
+    found = within_feed(Prepared(task))
     ends = found.problem.manipulator.base_range
     assert low - 2e-6 < ends[0] <= low
     assert high <= ends[1] < high + 2e-6

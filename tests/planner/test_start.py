@@ -151,7 +151,8 @@ def test_a_narrow_place_is_as_wide_as_it_is_however_thick_the_links() -> None:
     path = DesiredPath(np.array([1.6, 0.0, 0.0]), POINTS, False)
     task = PlanningProblem("walls", arm, Scene(walls), path, 0.005, np.eye(4))
     told = str(no_way_in(task, np.array([1.0, 0.0, 0.0]), "", 0.0).words)
-    assert "100.000 mm wide, for a body of 160.000 mm" in told
+    # The tip is the first to pass, and thick links may stay outside.
+    assert "100.000 mm wide, for a body of 40.000 mm" in told
 
 
 # An arm that follows its leader has no way round the corner of this path.
@@ -227,6 +228,20 @@ def test_clearances_are_those_of_the_pairs_that_are_held_apart(
         assert np.isinf(ask(tips, TIP)).all() == all(
             ("tool", ball.name) in left_out for ball in balls
         )
+
+
+def test_a_tool_passes_where_its_link_may_touch() -> None:
+    """The slab is 40 mm above the path: room for the tool alone, all that is held."""
+    slab = Box("slab", np.array([3.3, 0.0, 0.14]), np.eye(3), np.array([0.3, 0.3, 0.1]))
+    arm = replace(ARM, tool=Tool(0.15, 0.01), ignore_pairs=(("link 8", "slab"),))
+    points = np.array([[3.126, 0.0, 0.0], [3.126, 0.1, 0.0]])
+    path = DesiredPath(np.array([3.126, 0.0, -0.2]), points, False)
+    task = PlanningProblem("slab", arm, Scene((slab,)), path, 0.0035, np.eye(4))
+    plan = plan_fewest(task, link_clearance(task), 0.0)
+    assert plan.undrawn == ()
+    axes = arm.axes(plan.centres)
+    below = 0.04 - np.maximum(axes[:, -2, 2], axes[:, -1, 2]) - 0.01
+    assert below[plan.trajectory.on_path].min() > task.required_clearance
 
 
 def test_what_is_ignored_proves_nothing() -> None:

@@ -56,9 +56,11 @@ def _last_place(
     """The x0 at which the feed is too near, and to what; None if none is on the way.
 
     The clearance changes by no more than x0 does: it allows steps as long as it is more
-    than required (conservative advancement).
+    than required (conservative advancement). Base and surfaces may be off in any
+    direction: by so much more is required. What turns add is left to the verification.
     """
-    required, towards = problem.required_clearance, float(np.sign(end - start[0]))
+    errors, towards = problem.errors, float(np.sign(end - start[0]))
+    required = problem.required_clearance + errors.base + errors.obstacle
     base = start.copy()
     for step in range(STEPS):
         near = feed_culprit(problem, base)
