@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 from oracles.certificate_cases import certificate_lines
 
+from vdsm_pin.app.workflow import Verified, VerifyOrder
+from vdsm_pin.batch import task as task_module
 from vdsm_pin.batch.run import Batch, run_batch
-from vdsm_pin.batch.task import CERTIFICATE, Settings
+from vdsm_pin.batch.task import CERTIFICATE, Settings, Task, perform
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.report.files import VerificationFile
@@ -109,6 +111,26 @@ def test_what_changed_is_done_again(folder: Path) -> None:
     }
     assert after["cell-clear"].outcome == "refuted"
     assert after["cell-through"] == before["cell-through"]
+
+
+def test_what_changes_while_results_are_written_is_done_again(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As while the report is printed: the result is of the motion before."""
+    file, verify = folder / "plans" / "clear.csv", task_module.verify_to_folder
+    final, aside = folder / "done", folder / "aside"
+    task = Task(str(folder / "cell.yaml"), final, aside, FEWEST, str(file))
+
+    def judged(order: VerifyOrder) -> Verified:
+        found = verify(order)
+        file.write_text(PLANS["through.csv"])
+        return found
+
+    monkeypatch.setattr(task_module, "verify_to_folder", judged)
+    assert perform(task).row.outcome == "certified"
+    aside.rename(final)
+    again = perform(replace(task, settings=replace(FEWEST, resume=True)))
+    assert (again.kept, again.row.outcome) == (False, "refuted")
 
 
 @pytest.mark.parametrize(("degrees", "passes"), [(10.0, True), (20.0, False)])

@@ -296,7 +296,7 @@ def _settle(ended: Ended[Task, Done]) -> Done:
     if done is None:
         shutil.rmtree(task.aside, ignore_errors=True)
         done = Done(failed_row(task, ended.outcome, ended.reason), kept=False)
-        write_manifest(task, done.row, "")
+        write_manifest(task, done.row, "", task.depends_on())
     if task.final.exists():
         task.final.rename(task.aside.with_name(f"{task.final.name}.replaced"))
     task.aside.rename(task.final)

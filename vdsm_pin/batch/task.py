@@ -184,14 +184,14 @@ def perform(task: Task) -> Done:
 def _performed(task: Task) -> Done:
     started, deadline = time.monotonic(), Deadline.after(task.settings.time_limit)
     shutil.rmtree(task.aside, ignore_errors=True)
-    digest = ""
+    digest, asked = "", task.depends_on()  # before the motion is read
     try:
         with enforced(deadline, grace=0.0):
             problem = _read(task)
             digest = problem.source.sha256 if problem.source else ""
             _check_apart(task, problem)
             if task.settings.resume:
-                kept = finished(task, digest)
+                kept = finished(task, digest, asked)
                 if kept is not None:
                     return Done(kept, kept=True)
         with enforced(deadline):
@@ -210,7 +210,7 @@ def _performed(task: Task) -> Done:
         shutil.rmtree(task.aside, ignore_errors=True)
     elif not row.waypoints:
         _clear(task.aside)
-    write_manifest(task, row, digest)
+    write_manifest(task, row, digest, asked)
     timing = TimingFile(seconds=round(time.monotonic() - started, 3))
     (task.aside / TIMING).write_text(timing.text(), encoding="utf-8")
     return Done(row, kept=False)
@@ -262,17 +262,17 @@ def failed_row(task: Task, word: str, reason: str) -> BatchRow:
     )
 
 
-def write_manifest(task: Task, row: BatchRow, digest: str) -> None:
+def write_manifest(
+    task: Task, row: BatchRow, digest: str, asked: dict[str, str]
+) -> None:
     """Write manifest.json, which makes the folder a finished one."""
     task.aside.mkdir(parents=True, exist_ok=True)
     files = {path.name: sha256_of_file(path) for path in sorted(task.aside.iterdir())}
-    manifest = ManifestFile(
-        problem_sha256=digest, settings=task.depends_on(), row=row, files=files
-    )
+    manifest = ManifestFile(problem_sha256=digest, settings=asked, row=row, files=files)
     (task.aside / MANIFEST).write_text(manifest.text(), encoding="utf-8")
 
 
-def finished(task: Task, digest: str) -> BatchRow | None:
+def finished(task: Task, digest: str, asked: dict[str, str]) -> BatchRow | None:
     """The row of a folder that is finished, intact and still wanted, else None."""
     try:
         text = (task.final / MANIFEST).read_text(encoding="utf-8")
@@ -283,7 +283,7 @@ def finished(task: Task, digest: str) -> BatchRow | None:
         )
     except (OSError, ValidationError, UnicodeDecodeError):
         return None
-    same = (manifest.problem_sha256, manifest.settings) == (digest, task.depends_on())
+    same = (manifest.problem_sha256, manifest.settings) == (digest, asked)
     wanted = manifest.row.outcome not in ("error", TIME_LIMIT)
     return manifest.row if intact and same and wanted else None
 
