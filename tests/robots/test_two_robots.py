@@ -119,6 +119,30 @@ def test_another_robot_may_stand_still(tmp_path: Path) -> None:
     assert "right: ball" in report_data(found).text
 
 
+@pytest.mark.parametrize(
+    ("most", "velocity", "wrong"),
+    [(8.9, 99, ""), (9.5, 99, "limits"), (8.9, 6, "velocity limit")],
+)
+def test_another_robot_is_held_to_its_limits(
+    most: float, velocity: float, wrong: str, tmp_path: Path
+) -> None:
+    """Of -9 to 9 rad, and of 7.12 rad/s in its first 1.25 s where most is 8.9."""
+    q = {"left": np.array([1.5, 1.6, 1.5]), "right": np.array([0.0, most, most])}
+    _, file = two(tmp_path, q)
+    text = urdf(RADIUS["right"]).replace('velocity="99"', f'velocity="{velocity}"')
+    write(tmp_path, "right.urdf", text)
+    cell = read_cell(tmp_path / "left.yaml")
+    checks = verify_robot(cell, read_path(file, cell.robot)).checks
+    rows = {one.name: one for one in checks if one.name.startswith("right: joint")}
+    assert len(rows) == 2
+    failed = [row for row in rows.values() if row.verdict is Verdict.REFUTED]
+    names = [f"right: joint 'turn' in its {wrong}"] if wrong else []
+    assert [row.name for row in failed] == names
+    for row in failed:
+        value = most if wrong == "limits" else most / 1.25
+        assert row.worst == pytest.approx(value) and np.isnan(row.moment)
+
+
 def test_swapped_roles_agree_to_the_padding(tmp_path: Path) -> None:
     q = {"left": np.array([1.0, 0.8, 0.9]), "right": np.array([-0.9, 0.9, 1.4])}
     for times in TIMES.values():

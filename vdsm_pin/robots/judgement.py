@@ -1,5 +1,6 @@
 """The judgement of a robot's trajectory: every check, one row each."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import nan
 from typing import Final
@@ -137,6 +138,7 @@ def verify_robot(
         *(_poses(one.robot, one.path, f"{one.name}: ") for one in cell.others),
         *_limits(robot, path),
         *rate_checks(robot.joints, path),
+        *_limits_of_others(cell),
         *check_inside(by_mesh(cell, located), INSIDE),
         *clearance_checks(cell, evidence, None if proof.in_time else deadline),
         *([coal] if cell.pairs else [_no_pair(cell)]),
@@ -200,6 +202,14 @@ def _limits(robot: Robot, path: Path) -> list[Check]:
         for k, joint in enumerate(robot.joints)
         if np.isfinite([joint.lower, joint.upper]).all()
     ]
+
+
+def _limits_of_others(cell: Cell) -> Iterator[Check]:
+    """The same rows of other robots, whose moments are not those of the motion."""
+    for one in cell.others:
+        rates = rate_checks(one.robot.joints, one.path)
+        for check in (*_limits(one.robot, one.path), *rates):
+            yield replace(check, name=f"{one.name}: {check.name}", moment=nan)
 
 
 def _limit(joint: RobotJoint, path: Path, k: int) -> Check:

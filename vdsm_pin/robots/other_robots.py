@@ -15,8 +15,8 @@ from vdsm_pin.robots.trajectory_files import path_of, read_motion
 from vdsm_pin.robots.urdf import robot_of
 
 HELD: Final = (
-    "is judged by its clearance from this robot alone: its limits, and clearances "
-    "between its own links and from obstacles, are not judged"
+    "is judged by its limits and its clearance from this robot alone: clearances "
+    "between its own links and from obstacles are not judged"
 )
 
 
