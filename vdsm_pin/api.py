@@ -12,15 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
-from vdsm_pin.app.subjects import (
-    NO_TERMS,
-    Asked,
-    Motion,
-    Subject,
-    Terms,
-    expect,
-    subject_of,
-)
+from vdsm_pin.app.motions import NO_OPTIONS, Motion, MotionOptions, expect
+from vdsm_pin.app.subjects import ProblemOrCell, Subject, subject_of
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.io.problem_file import read_problem as read_problem
@@ -108,7 +101,7 @@ def verify(
 
 
 def verify(
-    problem: Asked,
+    problem: ProblemOrCell,
     trajectory: Motion,
     *,
     errors: Box | None = None,
@@ -144,7 +137,7 @@ def verify(
         >>> result.closest(1)[0].pair.obstacle
         'pillar'
     """
-    subject = _subject(problem, Terms(Deadline.after(time_limit)), errors)
+    subject = _subject(problem, MotionOptions(Deadline.after(time_limit)), errors)
     if joint_error and not isinstance(problem, PlanningProblem):
         message = "joint_error is looked for of snake arms alone"
         raise InvalidInput(message)
@@ -152,12 +145,13 @@ def verify(
 
 
 def _subject(
-    problem: Any, terms: Terms = NO_TERMS, errors: Box | None = None
+    problem: Any, options: MotionOptions = NO_OPTIONS, errors: Box | None = None
 ) -> Subject:
-    """A problem under errors, with how its motions are handled.
+    """The subject of a problem, its clearances asked for under more errors.
 
     Raises:
-        InvalidInput: If it is none, or the errors are none.
+        InvalidInput: If the problem is neither `PlanningProblem` nor `Cell`, or the
+            errors are no error box.
     """
     if not isinstance(problem, PlanningProblem):
         from vdsm_pin.robots.cell import Cell
@@ -165,7 +159,7 @@ def _subject(
         expect(problem, Cell, "read_cell(path); or a Problem, as of read_problem(path)")
     if errors is not None:
         problem = problem.under(expect(errors, Box, "ErrorBox(base_mm=1.0)"))
-    return subject_of(problem, terms)
+    return subject_of(problem, options)
 
 
 @overload
@@ -189,7 +183,7 @@ def repair_trajectory(
 
 
 def repair_trajectory(
-    problem: Asked,
+    problem: ProblemOrCell,
     trajectory: Motion,
     pinned: Sequence[int] = (),
     *,
@@ -218,7 +212,7 @@ def repair_trajectory(
         >>> float(found.moved.max())
         0.0
     """
-    subject = _subject(problem, Terms(Deadline.after(time_limit)))
+    subject = _subject(problem, MotionOptions(Deadline.after(time_limit)))
     return subject.repair(subject.checked(trajectory), tuple(pinned))
 
 
@@ -249,14 +243,14 @@ def write_report(result: Verification, path: str | Path) -> None:
         write(temporary, result, verification_file(result, record))
 
 
-def _judged(result: Any, terms: Terms = NO_TERMS) -> Subject:
-    """What a verification is of.
+def _judged(result: Any, options: MotionOptions = NO_OPTIONS) -> Subject:
+    """The subject of the problem that a verification is about.
 
     Raises:
-        InvalidInput: If it is none.
+        InvalidInput: If the result is no `Verification`.
     """
     expect(result, Verification, "verify(problem, trajectory)")
-    return _subject(result.problem, terms)
+    return _subject(result.problem, options)
 
 
 def write_certificate(
@@ -295,7 +289,7 @@ def write_certificate(
     joined: Interpolation = "auto"
     if isinstance(result, ArmVerification):
         joined = result.trajectory.interpolation
-    subject = _judged(result, Terms(interpolation=joined, topic=topic))
+    subject = _judged(result, MotionOptions(interpolation=joined, topic=topic))
     file, source = Path(trajectory), result.problem.source
     if source is None or not source.is_whole:
         message = "a certificate is bound to a problem file; this problem has none"
@@ -324,7 +318,7 @@ def read_trajectory(
 
 def read_trajectory(
     path: str | Path,
-    problem: Asked,
+    problem: ProblemOrCell,
     interpolation: Interpolation = "auto",
     *,
     topic: str | None = None,
@@ -352,13 +346,13 @@ def read_trajectory(
         >>> read_trajectory("out/api/t.csv", problem).n_links
         8
     """
-    terms = Terms(interpolation=interpolation, topic=topic)
-    motion: Motion = _subject(problem, terms).read(Path(path))
+    options = MotionOptions(interpolation=interpolation, topic=topic)
+    motion: Motion = _subject(problem, options).read(Path(path))
     return motion
 
 
 def write_trajectory(
-    path: str | Path, trajectory: Motion, problem: "Asked | None" = None
+    path: str | Path, trajectory: Motion, problem: "ProblemOrCell | None" = None
 ) -> None:
     """Write a trajectory as CSV, with digits that read back as the same doubles.
 

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from vdsm_pin.app import repair as app_repair
-from vdsm_pin.app.subjects import Terms
+from vdsm_pin.app.motions import MotionOptions
 from vdsm_pin.app.workflow import Verified, VerifyOrder
 from vdsm_pin.arm.kinematics import joint_centres, tip_jacobian
 from vdsm_pin.arm.manipulator import built_in
@@ -155,7 +155,7 @@ def test_a_repaired_motion_that_is_not_proved_as_written_is_no_success(
     write_trajectory(given, planned("paper/free")[1])
 
     def late(order: VerifyOrder) -> Verified:
-        return verify(replace(order, terms=Terms(Deadline.after(0.0))))
+        return verify(replace(order, options=MotionOptions(Deadline.after(0.0))))
 
     monkeypatch.setattr(app_repair, "verify_to_folder", late)
     words = ["repair", "paper/free", "--trajectory", str(given), "--out"]

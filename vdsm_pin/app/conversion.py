@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.app.subjects import CABLES, CENTRES
+from vdsm_pin.app.arm_subject import CABLES, CENTRES
 from vdsm_pin.app.workflow import TRAJECTORY
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidFile, InvalidInput

@@ -5,7 +5,8 @@ from dataclasses import replace
 from typing import Final
 
 from vdsm_pin import __version__
-from vdsm_pin.app.subjects import Terms, subject_of
+from vdsm_pin.app.motions import MotionOptions
+from vdsm_pin.app.subjects import subject_of
 from vdsm_pin.app.workflow import JUDGED, TRAJECTORY, VerifyOrder, verify_to_folder
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.io.source import (
@@ -41,7 +42,7 @@ def repair_to_folder(
     check_is_file_or_bag(order.trajectory)
     digest = sha256_of_file(order.trajectory)
     check_kept([order.folder / n for n in (TRAJECTORY, REPAIR, *JUDGED)], inputs)
-    subject = subject_of(order.problem, order.terms)
+    subject = subject_of(order.problem, order.options)
     found = subject.repair(subject.read(order.trajectory), pinned)
     check_unchanged(order.trajectory, digest)
     rows = zip(found.given.tolist(), found.moved.tolist(), strict=True)
@@ -58,9 +59,9 @@ def repair_to_folder(
     with staged(order.folder) as aside:
         subject.write(aside / TRAJECTORY, subject.motion_of(found.verification))
         (aside / REPAIR).write_text(json.dumps(content, indent=1) + "\n", "utf-8")
-    terms = Terms(deadline=order.terms.deadline)
+    options = MotionOptions(deadline=order.options.deadline)
     written = order.folder / TRAJECTORY
-    verified = verify_to_folder(replace(order, trajectory=written, terms=terms))
+    verified = verify_to_folder(replace(order, trajectory=written, options=options))
     if verified.records.verdict is not Verdict.CERTIFIED:
         message = f"{written}: the repaired motion, as written: {verified.file.reason}"
         raise Infeasible(message)

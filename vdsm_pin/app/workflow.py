@@ -11,16 +11,9 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
-from vdsm_pin.app.subjects import (
-    CABLES,
-    CENTRES,
-    LINK_ANGLES,
-    NO_TERMS,
-    Asked,
-    Subject,
-    Terms,
-    subject_of,
-)
+from vdsm_pin.app.arm_subject import CABLES, CENTRES, LINK_ANGLES
+from vdsm_pin.app.motions import NO_OPTIONS, MotionOptions
+from vdsm_pin.app.subjects import ProblemOrCell, Subject, subject_of
 from vdsm_pin.errors import (
     Infeasible,
     InvalidFile,
@@ -75,37 +68,38 @@ class VerifyOrder:
     """What to verify and what to write besides the folder.
 
     Args:
-        problem: Of an arm, or of a robot in its cell, as it was read.
+        problem: The problem of an arm or of any other robot, as it was read.
         trajectory: The trajectory file.
         folder: Where the results go.
         command: The exact command line, for the report.
         certificate: Where the certificate of a certified motion goes; None for none.
         pdf: Where the report on paper goes; None for none.
-        terms: When what is left is undecided, and how the trajectory file is read.
-        date: When, for the report; None where files shall not tell.
-        all_pairs: Whether clearance.csv has every pair at every interval, not the near
-            ones and the least of each alone.
+        options: The deadline, and how the trajectory file is read.
+        date: When the run began, for the report; None where files shall be the same
+            from run to run.
+        all_pairs: Whether clearance.csv has every pair at every interval; otherwise it
+            has the near pairs, and the least clearance of each other one.
     """
 
-    problem: Asked
+    problem: ProblemOrCell
     trajectory: Path
     folder: Path
     command: str
     certificate: Path | None = None
     pdf: Path | None = None
-    terms: Terms = NO_TERMS
+    options: MotionOptions = NO_OPTIONS
     all_pairs: bool = False
     date: str | None = None
 
 
 @dataclass(frozen=True)
 class Verified:
-    """A verification as records and as what verification.json says.
+    """A verification as records and as the content of verification.json.
 
     Args:
-        file: What verification.json says.
-        records: What was found.
-        no_certificate: Why there is none, in words; empty where there is.
+        file: The content of verification.json.
+        records: The verification.
+        no_certificate: Why there is no certificate, in words; empty where there is.
     """
 
     file: VerificationFile
@@ -131,7 +125,8 @@ def plan_to_folder(
         folder: Where the results go.
         command: The exact command line, for the files.
         deadline: When to give up.
-        report: Whether a report is written; who verifies next writes a fuller one.
+        report: Whether to write report.html; a caller that verifies next writes a
+            fuller one.
 
     Raises:
         UnknownName: If there is no such strategy.
@@ -201,7 +196,7 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
     _check_outputs(order)
     check_is_file_or_bag(order.trajectory)
     digest = sha256_of_file(order.trajectory)
-    subject = subject_of(order.problem, order.terms)
+    subject = subject_of(order.problem, order.options)
     motion = subject.read(order.trajectory)
     with staged(order.folder) as aside:
         verification = _judged(order, subject, motion, aside)
@@ -221,8 +216,8 @@ def verify_to_folder(order: VerifyOrder) -> Verified:
 def _judged(
     order: VerifyOrder, subject: Subject, motion: Any, aside: Path
 ) -> Verification:
-    """The judgement, whose tables stand aside."""
-    reach = math.inf if order.all_pairs else subject.near
+    """Verify a motion, and write clearance.csv and the tables of its kind aside."""
+    reach = math.inf if order.all_pairs else subject.csv_reach
     table = ClearanceCsv(aside / CLEARANCE, order.problem, subject.n_pairs, reach)
     with closing(table) as clearance:
         verification = subject.judge(motion, (clearance,), reach, joint_error=True)

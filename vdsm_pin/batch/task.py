@@ -9,11 +9,12 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from pydantic import ValidationError
 
-from vdsm_pin.app.subjects import Asked, Terms, read_asked
+from vdsm_pin.app.motions import MotionOptions
+from vdsm_pin.app.subjects import ProblemOrCell, read_problem_or_cell
 from vdsm_pin.app.workflow import (
     JUDGED,
     NO_PLAN,
@@ -45,9 +46,6 @@ from vdsm_pin.report.words import TIME_LIMIT, outcome
 from vdsm_pin.text import printable
 from vdsm_pin.time_limit import Deadline, enforced
 from vdsm_pin.verification.records import Verdict
-
-if TYPE_CHECKING:  # whoever plans for an arm needs no robots
-    pass
 
 MANIFEST: Final = "manifest.json"
 TIMING: Final = "timing.json"
@@ -223,18 +221,18 @@ def _clear(folder: Path) -> None:
             path.unlink()
 
 
-def _read(task: Task) -> Asked:
+def _read(task: Task) -> ProblemOrCell:
     """The problem of an arm, under the errors asked for, or of any other robot.
 
     Raises:
         InvalidFile: If it is bad, or asks for a robot what only arms have.
     """
     plans = task.trajectory is None
-    asked = read_problem(task.problem) if plans else read_asked(task.problem)
+    asked = read_problem(task.problem) if plans else read_problem_or_cell(task.problem)
     return asked.under(task.settings.errors)
 
 
-def _check_apart(task: Task, problem: Asked) -> None:
+def _check_apart(task: Task, problem: ProblemOrCell) -> None:
     """Refuse a problem with files in the folder that its results replace.
 
     Raises:
@@ -323,7 +321,7 @@ def _hash(problem: str) -> str:
     return hashlib.sha256(os.fsencode(problem)).hexdigest()
 
 
-def _done(task: Task, problem: Asked, deadline: Deadline) -> BatchRow:
+def _done(task: Task, problem: ProblemOrCell, deadline: Deadline) -> BatchRow:
     """Plan where no motion is given, verify, and tell."""
     asked, plan = task.settings, None
     if task.trajectory is None:
@@ -338,7 +336,7 @@ def _done(task: Task, problem: Asked, deadline: Deadline) -> BatchRow:
         task.command,
         certificate=task.aside / CERTIFICATE if asked.certificate else None,
         pdf=task.aside / PDF if asked.pdf else None,
-        terms=Terms(deadline),
+        options=MotionOptions(deadline),
     )
     verified = verify_to_folder(order)
     certified = verified.records.verdict is Verdict.CERTIFIED

@@ -65,12 +65,12 @@ def convert(
     takes a trajectory of any format and writes trajectory.csv. Nothing is judged.
     """
     from vdsm_pin.app.conversion import Given, convert_robot, convert_to_folder
-    from vdsm_pin.app.subjects import read_asked
+    from vdsm_pin.app.subjects import read_problem_or_cell
     from vdsm_pin.problem.planning_problem import PlanningProblem
 
     given, more = Given(trajectory, centres, cables), [one.value for one in also or ()]
     notes: tuple[str, ...] = ()
-    asked = read_asked(problem)
+    asked = read_problem_or_cell(problem)
     if isinstance(asked, PlanningProblem):
         motion = convert_to_folder(asked, given, out, more)
         count, notes = motion.n_samples, motion.notes

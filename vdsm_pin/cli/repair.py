@@ -50,8 +50,8 @@ def repair(
     trajectory.csv, repair.json (how far each waypoint moved) and what verify writes;
     where no such trajectory is found, nothing, and says why.
     """
+    from vdsm_pin.app.motions import MotionOptions
     from vdsm_pin.app.repair import repair_to_folder
-    from vdsm_pin.app.subjects import Terms
     from vdsm_pin.app.workflow import VerifyOrder
     from vdsm_pin.problem.error_boxes import ErrorBox
 
@@ -59,8 +59,8 @@ def repair(
     with enforced(deadline, grace=0.0):
         asked = asked_problem(problem, ErrorBox(), robot, {}, topic)
     with enforced(deadline):
-        terms = Terms(deadline, topic=topic)
-        order = VerifyOrder(asked, trajectory, out, context.obj, terms=terms)
+        options = MotionOptions(deadline, topic=topic)
+        order = VerifyOrder(asked, trajectory, out, context.obj, options=options)
         found = repair_to_folder(order, tuple(pin or ()))
     new, most = int((found.given < 0).sum()), found.moved.max()
     changed = f"{new} of them new; moved by {most:.6f} rad (m) at most"

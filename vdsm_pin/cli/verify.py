@@ -109,7 +109,7 @@ def verify(
     console = Console(quiet, as_json)
     deadline = Deadline.after(time_limit)
     box = errors.box(slide_error_mm)
-    from vdsm_pin.app.subjects import Terms
+    from vdsm_pin.app.motions import MotionOptions
     from vdsm_pin.app.workflow import VerifyOrder
     from vdsm_pin.report.run_record import now
 
@@ -124,7 +124,7 @@ def verify(
             command=context.obj,
             certificate=certificate,
             pdf=pdf,
-            terms=Terms(deadline, interpolation, topic),
+            options=MotionOptions(deadline, interpolation, topic),
             all_pairs=all_pairs,
             date=now(),
         )
@@ -150,10 +150,10 @@ def asked_problem(
     if problem is None:
         message = "expected a PROBLEM, or --urdf for any other robot"
         raise InvalidInput(message)
-    from vdsm_pin.app.subjects import read_asked
+    from vdsm_pin.app.subjects import read_problem_or_cell
     from vdsm_pin.problem.planning_problem import PlanningProblem
 
-    asked = read_asked(problem)
+    asked = read_problem_or_cell(problem)
     if isinstance(asked, PlanningProblem):
         refuse_beside("an arm", {"--topic": topic})
     else:
@@ -181,7 +181,7 @@ def _passes(order: "VerifyOrder", console: Console) -> bool:
     from vdsm_pin.report.terminal import show_verification
     from vdsm_pin.report.words import outcome
 
-    with enforced(order.terms.deadline), console.progress():
+    with enforced(order.options.deadline), console.progress():
         verified = verify_to_folder(order)
     written: list[tuple[str, str]] = []
     if order.certificate is not None:

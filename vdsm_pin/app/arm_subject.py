@@ -1,0 +1,119 @@
+"""How motions of a snake arm are read, judged, repaired and written."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from vdsm_pin.app.motions import NO_OPTIONS, MotionOptions, check_times, expect
+from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.report.tables import write_cables, write_centres, write_link_angles
+from vdsm_pin.verification.brackets import ClearanceSink
+from vdsm_pin.verification.coal_distances import coal_reach
+from vdsm_pin.verification.records import ArmVerification
+from vdsm_pin.verification.robot_model import load_robot
+from vdsm_pin.verification.task import ArmPairs
+from vdsm_pin.verification.verify import verify
+
+if TYPE_CHECKING:  # few need repair or a certificate
+    from vdsm_pin.repair.rounds import Repaired
+    from vdsm_pin.verification.certificate_lines import Hashes
+
+LINK_ANGLES: Final = "link_angles.csv"
+
+
+CABLES: Final = "cables.csv"
+
+
+CENTRES: Final = "centres.csv"
+
+
+@dataclass(frozen=True)
+class ArmSubject:
+    """A snake arm; see `Subject`."""
+
+    problem: PlanningProblem
+    options: MotionOptions = NO_OPTIONS
+
+    @property
+    def urdf_sha256(self) -> str:
+        """SHA-256 of the URDF that Pinocchio reads, in hexadecimal."""
+        return load_robot(self.problem.manipulator).urdf_sha256
+
+    @property
+    def n_pairs(self) -> int:
+        """Number of pairs that are judged."""
+        return ArmPairs(self.problem).size
+
+    @property
+    def csv_reach(self) -> float:
+        """The distance up to which Coal measures; [m]."""
+        return coal_reach(self.problem)
+
+    def read(self, file: Path) -> Trajectory:
+        """Read the motion of a file."""
+        arm, joined = self.problem.manipulator, self.options.interpolation
+        motion = read_trajectory(file, arm, joined)
+        check_times(file, self.problem.scene, motion)
+        return motion
+
+    def checked(self, motion: object) -> Trajectory:
+        """The motion itself, if it is a `Trajectory`; `verify` checks that it fits."""
+        return expect(motion, Trajectory, "plan(problem).trajectory")
+
+    def judge(
+        self,
+        motion: Trajectory,
+        sinks: Sequence[ClearanceSink] = (),
+        reach: float | None = None,
+        *,
+        joint_error: bool = False,
+    ) -> ArmVerification:
+        """Verify a motion; see `verification.verify`."""
+        return verify(
+            self.problem,
+            motion,
+            load_robot(self.problem.manipulator),
+            sinks=sinks,
+            joint_error=joint_error,
+            deadline=self.options.deadline,
+            reach=reach,
+        )
+
+    def is_of(self, verification: ArmVerification, motion: Trajectory) -> bool:
+        """Whether a verification judged this motion, equal to the last bit."""
+        return motion.same_as(verification.trajectory)
+
+    def certify(
+        self, path: Path, verification: ArmVerification, hashes: "Hashes"
+    ) -> None:
+        """Write the certificate of a verification."""
+        # Imported by those who ask for one: its schema takes a while to build.
+        from vdsm_pin.verification.certificate_writer import write_certificate
+
+        write_certificate(path, verification, hashes, self.options.deadline)
+
+    def repair(
+        self, motion: Trajectory, pinned: Sequence[int]
+    ) -> "Repaired[ArmVerification]":
+        """Find a certified motion near a given one."""
+        from vdsm_pin.repair.arm import repair_arm
+
+        return repair_arm(self.problem, motion, pinned, self.options.deadline)
+
+    def motion_of(self, verification: ArmVerification) -> Trajectory:
+        """The motion that was judged."""
+        return verification.trajectory
+
+    def write(self, file: Path, motion: Trajectory) -> None:
+        """Write a motion as CSV."""
+        write_trajectory(file, motion)
+
+    def write_tables(self, folder: Path, verification: ArmVerification) -> None:
+        """Write link angles, joint centres and cable lengths."""
+        motion = verification.trajectory
+        write_link_angles(folder / LINK_ANGLES, verification)
+        write_centres(folder / CENTRES, self.problem, motion)
+        write_cables(folder / CABLES, self.problem, motion)

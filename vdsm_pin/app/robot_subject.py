@@ -1,0 +1,110 @@
+"""How motions of any robot but a snake arm are read, judged, repaired and written."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from vdsm_pin.app.motions import NO_OPTIONS, MotionOptions, check_times, expect
+from vdsm_pin.io.atomic import write_text
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
+from vdsm_pin.robots.cell import Cell
+from vdsm_pin.robots.judgement import RobotVerification, verify_robot
+from vdsm_pin.robots.trajectory_csv import csv_text
+from vdsm_pin.robots.trajectory_files import moved, path_of, read_motion
+from vdsm_pin.verification.brackets import ClearanceSink
+
+if TYPE_CHECKING:  # few need repair or a certificate
+    from vdsm_pin.repair.rounds import Repaired
+    from vdsm_pin.verification.certificate_lines import Hashes
+
+GIVEN: Final = Path("trajectory")
+"""What messages name in place of a file where a motion has none."""
+
+
+@dataclass(frozen=True)
+class RobotSubject:
+    """Any other robot; see `Subject`."""
+
+    problem: Cell
+    options: MotionOptions = NO_OPTIONS
+
+    csv_reach = inf
+
+    @property
+    def urdf_sha256(self) -> str:
+        """SHA-256 of the URDF that Pinocchio reads, in hexadecimal."""
+        return sha256(self.problem.robot.text.encode()).hexdigest()
+
+    @property
+    def n_pairs(self) -> int:
+        """Number of pairs that are judged."""
+        return len(self.problem.pairs)
+
+    def read(self, file: Path) -> JointTrajectory:
+        """Read the motion of a file."""
+        robot = self.problem.robot
+        motion = read_motion(file, robot.joints, self.options.topic, robot.values)
+        path_of(file, motion)
+        check_times(file, self.problem.scene, motion)
+        return motion
+
+    def checked(self, motion: object) -> JointTrajectory:
+        """The motion with its columns in the robot's order, if it has its joints."""
+        robot = self.problem.robot
+        given = expect(motion, JointTrajectory, "read_trajectory(path, problem)")
+        found = moved(given, robot.joints, robot.values, GIVEN)
+        path_of(GIVEN, found)
+        return found
+
+    def judge(
+        self,
+        motion: JointTrajectory,
+        sinks: Sequence[ClearanceSink] = (),
+        reach: float | None = None,
+        *,
+        joint_error: bool = False,
+    ) -> RobotVerification:
+        """Verify a motion; all arguments but `motion` are ignored, being of arms."""
+        found = verify_robot(self.problem, motion.path, self.options.deadline)
+        return replace(found, motion=motion)
+
+    def is_of(self, verification: RobotVerification, motion: JointTrajectory) -> bool:
+        """Whether a verification judged this motion, equal to the last bit."""
+        return motion.path.same_as(verification.trajectory)
+
+    def certify(
+        self, path: Path, verification: RobotVerification, hashes: "Hashes"
+    ) -> None:
+        """Write the certificate of a verification."""
+        from vdsm_pin.robots.certificate import write_robot_certificate
+
+        more = self.options.topic, self.options.deadline
+        write_robot_certificate(path, verification, hashes, *more)
+
+    def repair(
+        self, motion: JointTrajectory, pinned: Sequence[int]
+    ) -> "Repaired[RobotVerification]":
+        """Find a certified motion near a given one."""
+        from vdsm_pin.repair.robot import repair_robot
+
+        found = repair_robot(self.problem, motion.path, pinned, self.options.deadline)
+        rows = self.motion_of(found.verification)
+        return replace(found, verification=replace(found.verification, motion=rows))
+
+    def motion_of(self, verification: RobotVerification) -> JointTrajectory:
+        """The motion that was judged."""
+        if verification.motion is not None:
+            return verification.motion
+        names = tuple(joint.name for joint in self.problem.robot.joints)
+        path = verification.trajectory
+        return JointTrajectory(names, path.knots, path.times)
+
+    def write(self, file: Path, motion: JointTrajectory) -> None:
+        """Write a motion as CSV."""
+        write_text(file, csv_text(motion, self.problem.robot))
+
+    def write_tables(self, folder: Path, verification: RobotVerification) -> None:
+        """Write nothing: these tables are of snake arms alone."""
