@@ -28,7 +28,8 @@ from benchmarks.batch import write_problems
 from benchmarks.common import Results, described, save, surroundings, table
 from vdsm_pin.batch.cluster import LONGEST_ERRAND
 from vdsm_pin.batch.pool import Ended
-from vdsm_pin.batch.task import Done, Settings, Task, perform
+from vdsm_pin.batch.task import Done, Settings, Task
+from vdsm_pin.batch.worker import perform
 from vdsm_pin.report.columns import write_columns
 from vdsm_pin.report.files import BatchRow
 

@@ -12,8 +12,9 @@ import pytest
 
 from vdsm_pin import api
 from vdsm_pin.app import subjects
+from vdsm_pin.batch.folders import folder_names
 from vdsm_pin.batch.run import OWN, Batch, run_batch
-from vdsm_pin.batch.task import Settings, folder_names
+from vdsm_pin.batch.task import Settings
 from vdsm_pin.cli import main
 from vdsm_pin.errors import InvalidFile
 

@@ -9,9 +9,10 @@ import pytest
 from oracles.certificate_cases import certificate_lines
 
 from vdsm_pin.app.workflow import Verified, VerifyOrder
-from vdsm_pin.batch import task as task_module
+from vdsm_pin.batch import worker as worker_module
 from vdsm_pin.batch.run import Batch, run_batch
-from vdsm_pin.batch.task import CERTIFICATE, Settings, Task, perform
+from vdsm_pin.batch.task import CERTIFICATE, Settings, Task
+from vdsm_pin.batch.worker import perform
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.report.files import VerificationFile
@@ -117,7 +118,7 @@ def test_what_changes_while_results_are_written_is_done_again(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As while the report is printed: the result is of the motion before."""
-    file, verify = folder / "plans" / "clear.csv", task_module.verify_to_folder
+    file, verify = folder / "plans" / "clear.csv", worker_module.verify_to_folder
     final, aside = folder / "done", folder / "aside"
     task = Task(str(folder / "cell.yaml"), final, aside, FEWEST, str(file))
 
@@ -126,7 +127,7 @@ def test_what_changes_while_results_are_written_is_done_again(
         file.write_text(PLANS["through.csv"])
         return found
 
-    monkeypatch.setattr(task_module, "verify_to_folder", judged)
+    monkeypatch.setattr(worker_module, "verify_to_folder", judged)
     assert perform(task).row.outcome == "certified"
     aside.rename(final)
     again = perform(replace(task, settings=replace(FEWEST, resume=True)))

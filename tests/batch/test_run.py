@@ -21,19 +21,15 @@ import pytest
 from batch_folders import tree
 from problem_files import BEHIND_A_WALL, NEAR, OUT_OF_REACH, write_problem
 
+import vdsm_pin.batch.inputs as inputs_module
 import vdsm_pin.batch.run as run_module
-import vdsm_pin.batch.task as task_module
+import vdsm_pin.batch.worker as worker_module
+from vdsm_pin.batch.folders import folder_names
+from vdsm_pin.batch.inputs import expanded, passed_over
 from vdsm_pin.batch.pool import Ended
-from vdsm_pin.batch.run import Batch, Interrupted, expanded, passed_over, run_batch
-from vdsm_pin.batch.task import (
-    MANIFEST,
-    TIMING,
-    Done,
-    Settings,
-    Task,
-    folder_names,
-    perform,
-)
+from vdsm_pin.batch.run import Batch, Interrupted, run_batch
+from vdsm_pin.batch.task import MANIFEST, TIMING, Done, Settings, Task
+from vdsm_pin.batch.worker import perform
 from vdsm_pin.errors import CannotWrite, InvalidFile, InvalidInput, UnknownName
 from vdsm_pin.report.tables import read_summary
 
@@ -282,7 +278,7 @@ def test_a_worker_that_never_asks_the_clock_ends_by_itself(
 
     for slow in ("read_problem", "plan_to_folder"):
         with monkeypatch.context() as changed:
-            changed.setattr(task_module, slow, for_ever)
+            changed.setattr(worker_module, slow, for_ever)
             file, place = str(problems / "good.yaml"), tmp_path / slow
             aside, settings = (
                 place.with_suffix(".part"),
@@ -343,7 +339,7 @@ def test_folders_in_folders_are_named_not_done(
     def may_not_be_read(_: Path) -> list[Path]:
         raise PermissionError
 
-    monkeypatch.setattr(run_module, "_problem_files", may_not_be_read)
+    monkeypatch.setattr(inputs_module, "_problem_files", may_not_be_read)
     assert passed_over((outer,)) == ()
 
 

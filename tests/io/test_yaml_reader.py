@@ -13,7 +13,7 @@ import yaml
 from problem_texts import EVERYTHING, edited, write_everything
 from typer.testing import CliRunner
 
-from vdsm_pin.batch.task import folder_names
+from vdsm_pin.batch.folders import folder_names
 from vdsm_pin.cli import app
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.io.problem_file import problem_schema, read_problem

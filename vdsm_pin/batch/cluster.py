@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from vdsm_pin.batch.pool import Ended, WarmProcess
-from vdsm_pin.batch.task import Done, Task, perform
+from vdsm_pin.batch.task import Done, Task
+from vdsm_pin.batch.worker import perform
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.report.run_record import versions
 

@@ -4,15 +4,17 @@ import fcntl
 import json
 import shutil
 import signal
-from collections import Counter
-from collections.abc import Iterator, Sequence, Set
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Final
 
 from vdsm_pin.app.workflow import NO_PLAN, REPORT
+from vdsm_pin.batch.folders import folder_names, jobs_by_name
+from vdsm_pin.batch.inputs import expanded, motions
+from vdsm_pin.batch.manifest import write_manifest
 from vdsm_pin.batch.pool import Ended, run_tasks
 from vdsm_pin.batch.progress import progress
 from vdsm_pin.batch.task import (
@@ -23,14 +25,10 @@ from vdsm_pin.batch.task import (
     Settings,
     Task,
     failed_row,
-    folder_names,
-    perform,
-    write_manifest,
 )
+from vdsm_pin.batch.worker import perform
 from vdsm_pin.errors import CannotWrite, InvalidFile, InvalidInput, VdsmError
 from vdsm_pin.io.atomic import write_text, writing
-from vdsm_pin.io.bags import is_bag
-from vdsm_pin.io.problem_file import built_in_names
 from vdsm_pin.planner.strategies import strategy
 from vdsm_pin.report.browser import find_browser
 from vdsm_pin.report.columns import COLUMNS, write_columns
@@ -50,9 +48,6 @@ SECONDS: Final = "timing.js"
 _ASIDE: Final = ".unfinished"
 _LOCK: Final = ".lock"
 
-PROBLEMS: Final = ".yaml", ".yml"
-MOTIONS: Final = ".csv", *PROBLEMS, ".json", ".bag", ".db3", ".mcap"
-"""Endings of trajectories."""
 
 OWN: Final = SUMMARY, RUNNING, COLUMNS, JUNIT, INDEX, SECONDS, _ASIDE, _LOCK
 """What a batch writes beside the folders of its problems."""
@@ -153,45 +148,6 @@ def _all_ended(batch: Batch, tasks: list[Task]) -> Iterator[Ended[Task, Done]]:
     return run_on_cluster(tasks, batch.scheduler)
 
 
-def expanded(problems: tuple[str, ...]) -> tuple[str, ...]:
-    """Every problem once, in one order whatever order they came in.
-
-    Raises:
-        InvalidFile: If a folder holds no problem file.
-    """
-    found: set[str] = set()
-    for name in problems or built_in_names():
-        if not _is_folder(name):
-            found.add(name)
-            continue
-        inside = _problem_files(Path(name))
-        if not inside:
-            deeper = ", ".join(passed_over((name,)))
-            more = f"; folders in it do: {deeper}" if deeper else ""
-            raise InvalidFile(file=name, problem=f"holds no .yaml file{more}")
-        found.update(map(str, inside))
-    return tuple(sorted(found))
-
-
-def passed_over(problems: tuple[str, ...]) -> tuple[str, ...]:
-    """Folders with .yaml files inside of those named, which nobody named."""
-    folders = [Path(name) for name in problems if _is_folder(name)]
-    inside = {sub for folder in folders for sub in folder.iterdir() if sub.is_dir()}
-    found = []
-    for folder in sorted(inside - set(folders)):
-        with suppress(OSError):  # of one that may not be read, as `lost+found`
-            found += [str(folder)] if _problem_files(folder) else []
-    return tuple(found)
-
-
-def _is_folder(name: str) -> bool:
-    return Path(name).is_dir() and name not in built_in_names()
-
-
-def _problem_files(folder: Path) -> list[Path]:
-    return [path for path in folder.iterdir() if path.suffix.lower() in PROBLEMS]
-
-
 def _tasks(batch: Batch) -> list[Task]:
     """The tasks.
 
@@ -201,10 +157,8 @@ def _tasks(batch: Batch) -> list[Task]:
     problems = expanded(batch.problems)
     given: tuple[str | None, ...] = (None,)
     if batch.trajectories:
-        given = _motions(
-            batch.trajectories, {Path(name).resolve() for name in problems}
-        )
-    jobs = _jobs(problems, given)
+        given = motions(batch.trajectories, {Path(name).resolve() for name in problems})
+    jobs = jobs_by_name(problems, given)
     names = folder_names(tuple(jobs), OWN)
     _check_own(batch.folder)
     files = [batch.folder / name for name in OWN if name != _ASIDE]
@@ -230,45 +184,6 @@ def _check_own(folder: Path) -> None:
         if file.exists():
             what = "exists and is not a result of a batch; nothing was overwritten"
             raise InvalidFile(file=file, problem=what)
-
-
-def _jobs(
-    problems: Sequence[str], given: Sequence[str | None]
-) -> dict[str, tuple[str, str | None]]:
-    """Problems and motions by what their folder is named after."""
-    both = [(problem, motion) for problem in problems for motion in given]
-    short, jobs = Counter(map(_stems, both)), {}
-    for problem, motion in both:
-        name = problem
-        if motion is not None:
-            name = _stems((problem, motion))
-            name = name if short[name] == 1 else f"{problem}/{motion}"
-        jobs[name] = problem, motion
-    return jobs
-
-
-def _stems(job: tuple[str, str | None]) -> str:
-    return "-".join(Path(name).stem for name in job if name is not None)
-
-
-def _motions(names: tuple[str, ...], problems: Set[Path]) -> tuple[str, ...]:
-    """Every trajectory once, in one order; `problems` beside them are none.
-
-    Raises:
-        InvalidFile: If a folder holds none.
-    """
-    found: set[str] = set()
-    for name in names:
-        if not Path(name).is_dir():
-            found.add(name)
-            continue
-        beside = [p for p in Path(name).iterdir() if p.resolve() not in problems]
-        inside = [p for p in beside if p.suffix.lower() in MOTIONS or is_bag(p)]
-        if not inside:
-            problem = f"holds no trajectory; expected {', '.join(MOTIONS)}"
-            raise InvalidFile(file=name, problem=problem)
-        found.update(str(path) for path in inside)
-    return tuple(sorted(found))
 
 
 def _check_replaceable(final: Path) -> None:

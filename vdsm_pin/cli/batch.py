@@ -85,7 +85,8 @@ def batch(
     """
     import json
 
-    from vdsm_pin.batch.run import Batch, Interrupted, passed_over, run_batch
+    from vdsm_pin.batch.inputs import passed_over
+    from vdsm_pin.batch.run import Batch, Interrupted, run_batch
     from vdsm_pin.batch.task import Settings
     from vdsm_pin.report.words import outcome
     from vdsm_pin.text import printable

@@ -1,0 +1,155 @@
+"""The worker of a batch: plans, verifies and writes the folder of one problem aside."""
+
+import shutil
+import time
+from pathlib import Path
+
+from vdsm_pin.app.motions import MotionOptions
+from vdsm_pin.app.subjects import ProblemOrCell, read_problem_or_cell
+from vdsm_pin.app.workflow import (
+    NO_PLAN,
+    TRAJECTORY,
+    VerifyOrder,
+    plan_to_folder,
+    verify_to_folder,
+)
+from vdsm_pin.batch.manifest import finished, write_manifest
+from vdsm_pin.batch.task import (
+    CERTIFICATE,
+    PDF,
+    PICTURE,
+    TIMING,
+    Done,
+    Task,
+    failed_row,
+)
+from vdsm_pin.errors import (
+    CannotWrite,
+    Infeasible,
+    InvalidFile,
+    OutOfTime,
+    VdsmError,
+    VerificationFailed,
+)
+from vdsm_pin.io.atomic import writing
+from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.refinement import HANDED_OUT
+from vdsm_pin.report.facts import batch_row
+from vdsm_pin.report.files import BatchRow, TimingFile
+from vdsm_pin.report.picture import picture
+from vdsm_pin.report.words import TIME_LIMIT
+from vdsm_pin.time_limit import Deadline, enforced
+from vdsm_pin.verification.records import Verdict
+
+
+def perform(task: Task) -> Done:
+    """Do one problem in a worker; whatever goes wrong becomes its row."""
+    try:
+        with writing(task.aside):
+            return _performed(task)
+    except CannotWrite as error:
+        row = failed_row(task, "error", str(error))
+        return Done(row, kept=True, unwritten=error.reason)
+
+
+def _performed(task: Task) -> Done:
+    started, deadline = time.monotonic(), Deadline.after(task.settings.time_limit)
+    shutil.rmtree(task.aside, ignore_errors=True)
+    digest, asked = "", task.depends_on()  # before the motion is read
+    try:
+        with enforced(deadline, grace=0.0):
+            problem = _read(task)
+            digest = problem.source.sha256 if problem.source else ""
+            _check_apart(task, problem)
+            if task.settings.resume:
+                kept = finished(task, digest, asked)
+                if kept is not None:
+                    return Done(kept, kept=True)
+        with enforced(deadline):
+            row = _done(task, problem, deadline)
+    except (CannotWrite, OSError):  # of our own files: readers tell of theirs
+        raise
+    except Infeasible as error:
+        row = failed_row(task, "infeasible", str(error))
+    except OutOfTime as error:
+        row = failed_row(task, TIME_LIMIT, str(error))
+    except VdsmError as error:
+        row = failed_row(task, "error", str(error))
+    except Exception as error:  # noqa: BLE001  a batch outlives any one problem
+        row = failed_row(task, "error", f"{type(error).__name__}: {error}")
+    if not task.settings.keeps_files(row):
+        shutil.rmtree(task.aside, ignore_errors=True)
+    elif not row.waypoints:
+        _clear(task.aside)
+    write_manifest(task, row, digest, asked)
+    timing = TimingFile(seconds=round(time.monotonic() - started, 3))
+    (task.aside / TIMING).write_text(timing.text(), encoding="utf-8")
+    return Done(row, kept=False)
+
+
+def _clear(folder: Path) -> None:
+    """Leave nothing but the page that tells why there is no plan."""
+    for path in folder.iterdir() if folder.is_dir() else ():
+        if path.name != NO_PLAN:
+            path.unlink()
+
+
+def _read(task: Task) -> ProblemOrCell:
+    """The problem of an arm, under the errors asked for, or of any other robot.
+
+    Raises:
+        InvalidFile: If it is bad, or asks for a robot what only arms have.
+    """
+    plans = task.trajectory is None
+    asked = read_problem(task.problem) if plans else read_problem_or_cell(task.problem)
+    return asked.under(task.settings.errors)
+
+
+def _check_apart(task: Task, problem: ProblemOrCell) -> None:
+    """Refuse a problem with files in the folder that its results replace.
+
+    Raises:
+        InvalidFile: If there is one.
+    """
+    final = task.final.resolve()
+    files = [*problem.files]
+    files += [] if task.trajectory is None else [Path(task.trajectory)]
+    for file in files:
+        if final in file.resolve().parents:
+            why = f"lies in {task.final}, which the results would replace"
+            raise InvalidFile(file=file, problem=why)
+
+
+def _done(task: Task, problem: ProblemOrCell, deadline: Deadline) -> BatchRow:
+    """Plan where no motion is given, verify, and tell."""
+    asked, plan = task.settings, None
+    if task.trajectory is None:
+        assert isinstance(problem, PlanningProblem)
+        plan = plan_to_folder(
+            problem, task.strategy, task.aside, task.command, deadline, report=False
+        )
+    order = VerifyOrder(
+        problem,
+        Path(task.trajectory) if task.trajectory else task.aside / TRAJECTORY,
+        task.aside,
+        task.command,
+        certificate=task.aside / CERTIFICATE if asked.certificate else None,
+        pdf=task.aside / PDF if asked.pdf else None,
+        options=MotionOptions(deadline),
+    )
+    verified = verify_to_folder(order)
+    certified = verified.records.verdict is Verdict.CERTIFIED
+    if asked.certificate and certified and verified.no_certificate:
+        message = f"certified, but without a certificate: {verified.no_certificate}"
+        raise VerificationFailed(message)
+    planned = task.trajectory is None
+    if planned and deadline.passed and verified.records.verdict not in HANDED_OUT:
+        raise OutOfTime(deadline.limit, "a plan was found and proved, but not reported")
+    drawing = picture(verified.records)
+    (task.aside / PICTURE).write_text(drawing, encoding="utf-8")
+    row = batch_row(task.final.name, task.strategy, verified.file)
+    # The planner knows why it left something out, the verification does not.
+    if plan is not None and plan.verdict == row.outcome == "incomplete":
+        return row.model_copy(update={"reason": plan.reason})
+    return row
