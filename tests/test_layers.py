@@ -31,6 +31,7 @@ LAYERS = {
     "io": 7,
     "planner": 8,
     "verification": 10,
+    "margins": 11,
     "refinement": 11,
     "report": 12,
     "simulation": 13,

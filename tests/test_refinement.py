@@ -13,6 +13,7 @@ import vdsm_pin.refinement as refinement
 from vdsm_pin.errors import Infeasible, InsideUnknown, NoPlanFound
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.margins import by_coal, raised_margins
 from vdsm_pin.planner.fewest.strategy import plan_fewest
 from vdsm_pin.planner.paper.pipeline import plan_paper
 from vdsm_pin.planner.records import LinkClearance, Margin, Plan
@@ -225,13 +226,13 @@ def test_only_the_link_that_coal_names_gets_a_margin() -> None:
     robot = load_robot(problem.manipulator)
     plan = plan_paper(problem, link_clearance(problem), 0.0)
     margins = np.zeros((8, 1))
-    assert refinement._by_coal(robot, plan, margins, NO_LIMIT) == ()
+    assert by_coal(robot, plan, margins, NO_LIMIT) == ()
     tight = replace(problem, required_clearance=0.0037)
-    found = refinement._by_coal(robot, replace(plan, problem=tight), margins, NO_LIMIT)
+    found = by_coal(robot, replace(plan, problem=tight), margins, NO_LIMIT)
     links = {one.link for one in found}
     assert links
     assert links < set(range(1, 9))
-    raised = refinement._raised(tight, margins, found)
+    raised = raised_margins(tight, margins, found)
     assert set(np.flatnonzero(raised[:, 0]) + 1) == links
     for one in found:
         assert one.margin > tight.required_clearance - one.distance > 0.0

@@ -9,12 +9,13 @@ handed out as a plan.
 """
 
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
 from vdsm_pin.errors import Infeasible, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.margins import Adjustment, by_coal, by_proof, raised_margins
 from vdsm_pin.planner.feed import within_feed
 from vdsm_pin.planner.goals import with_ends, with_path
 from vdsm_pin.planner.records import Plan
@@ -29,7 +30,6 @@ from vdsm_pin.progress import say
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
-from vdsm_pin.verification.coal_missing import coal_missing
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import ArmVerification, Verdict
 from vdsm_pin.verification.robot_model import RobotModel
@@ -43,33 +43,9 @@ from vdsm_pin.verification.verify import verify
 MAX_ROUNDS: Final = 8
 """Rounds before giving up."""
 
-OVERSHOOT: Final = 1.25
-"""The margin grows by this times what is missing, as a plan with a larger margin also
-swings a little farther; [-]."""
 
 HANDED_OUT: Final = (Verdict.CERTIFIED, Verdict.INCOMPLETE)
 """Verdicts of motions that are clear and within their limits at every instant."""
-
-
-@dataclass(frozen=True)
-class Adjustment:
-    """A margin that was raised after a round, and why.
-
-    Args:
-        moment: Where the clearance was missed, in waypoints of that round's motion.
-        link: 1 to N.
-        obstacle: Its name.
-        measured_by: "Coal" at a waypoint, or "proof" over an interval.
-        distance: What it found; [m].
-        margin: What the link keeps beyond the required clearance from now on; [m].
-    """
-
-    moment: float
-    link: int
-    obstacle: str
-    measured_by: Literal["Coal", "proof"]
-    distance: float
-    margin: float
 
 
 @dataclass(frozen=True)
@@ -160,7 +136,7 @@ def _plan_at_rest(
     robot: RobotModel,
     deadline: Deadline,
 ) -> Refinement:
-    """The same where nothing moves."""
+    """`plan_and_verify` of a problem in which no obstacle moves."""
     plan_with = with_ends(problem, strategy(strategy_name))
     if problem.scaling is not None and strategy_name != "paper":
         message = f"strategy {strategy_name!r} does not read ratios, which 'paper' does"
@@ -178,7 +154,7 @@ def _plan_at_rest(
             before = [f"before that {_story(rounds)}"] if rounds else []
             error.args = ("; ".join([*known.notes, str(error), *before]),)
             raise
-        adjustments = _by_coal(robot, plan, margins, deadline)
+        adjustments = by_coal(robot, plan, margins, deadline)
         if adjustments:
             rounds.append(_measured(margins, adjustments))
         else:
@@ -191,7 +167,7 @@ def _plan_at_rest(
             )
             if deadline.passed and verification.verdict not in HANDED_OUT:
                 raise OutOfTime(deadline.limit, "a motion was found, but not proved")
-            adjustments = _by_proof(verification, margins)
+            adjustments = by_proof(verification, margins)
             rounds.append(_proved(margins, verification, adjustments))
         kept = in_mm(rounds[-1].margin)
         say("planned with a margin of %s; %s", kept, rounds[-1].reason)
@@ -202,11 +178,11 @@ def _plan_at_rest(
             return Refinement(plan, verification, tuple(rounds))
         if not adjustments or len(rounds) == MAX_ROUNDS:
             raise NoPlanFound("; ".join([*known.notes, _story(rounds)]))
-        margins = _raised(problem, margins, adjustments)
+        margins = raised_margins(problem, margins, adjustments)
 
 
 def _unread_scheme(plan: Plan) -> tuple[str, ...]:
-    """A note where the problem asks for an approach that this plan did not read."""
+    """A note where the problem states an `approach` that this plan did not use."""
     path = with_path(plan.problem).path
     if path.approach is Approach.SHORTEST:
         return ()
@@ -224,88 +200,17 @@ def _unread_scheme(plan: Plan) -> tuple[str, ...]:
 
 
 def _promised(problem: PlanningProblem) -> PlanningProblem:
-    """The problem with what every plan promises besides: a small change per row."""
+    """The problem with the limit of the change per row that every plan keeps."""
     limit = min(problem.max_row_change or np.inf, TOLERANCES.row_change)
     return replace(problem, max_row_change=limit)
 
 
-def _by_coal(
-    robot: RobotModel, plan: Plan, margins: FloatArray, deadline: Deadline
-) -> tuple[Adjustment, ...]:
-    """What Coal finds missing at the waypoints of a plan."""
-    problem = plan.problem
-    return tuple(
-        _adjustment(
-            problem, margins, float(one.waypoint), one.link, one.obstacle,
-            ("Coal", one.distance, one.distance),
-        )
-        for one in coal_missing(robot, problem, plan.trajectory, deadline)
-    )  # fmt: skip
-
-
-def _by_proof(
-    verification: ArmVerification, margins: FloatArray
-) -> tuple[Adjustment, ...]:
-    """What the proof finds missing over the intervals of a plan."""
-    problem = verification.problem
-    names = problem.scene.names
-    return tuple(
-        _adjustment(
-            problem, margins, near.moment, near.pair.link,
-            names.index(near.pair.obstacle), ("proof", near.lower, near.coal),
-        )
-        for near in verification.approaches
-        if near.pair.link  # the feed goes where x0 goes, and nowhere else
-        and near.pair.obstacle
-        and near.lower < problem.required_clearance
-    )  # fmt: skip
-
-
-def _adjustment(
-    problem: PlanningProblem,
-    margins: FloatArray,
-    moment: float,
-    link: int,
-    obstacle: int,
-    found: tuple[Literal["Coal", "proof"], float, float],
-) -> Adjustment:
-    """The margin that is missing.
-
-    Args:
-        problem: Its required clearance.
-        margins: As they were, shape (N, n_obstacles); [m].
-        moment: When it is missed, in waypoints.
-        link: 1 to N.
-        obstacle: Its index.
-        found: By whom; the clearance, under errors where the problem has some; and
-            what Coal measures without them, NaN where it is not known; [m].
-    """
-    measured_by, distance, nominal = found
-    missing = problem.required_clearance - distance
-    more = OVERSHOOT * missing + TOLERANCES.planned_clearance
-    # What errors take, the plan may have kept already without being asked.
-    kept = np.fmax(margins[link - 1, obstacle], nominal - problem.required_clearance)
-    margin = float(kept) + more
-    name = problem.scene.names[obstacle]
-    return Adjustment(moment, link, name, measured_by, distance, margin)
-
-
-def _raised(
-    problem: PlanningProblem, margins: FloatArray, adjustments: tuple[Adjustment, ...]
-) -> FloatArray:
-    """The margins of the next round, shape (N, n_obstacles); [m]."""
-    raised = margins.copy()
-    for one in adjustments:
-        raised[one.link - 1, problem.scene.names.index(one.obstacle)] = one.margin
-    return raised
-
-
 def _chosen(problem: PlanningProblem, plan: Plan, deadline: Deadline) -> Plan:
-    """Of a plan and its rivals the one that is proved to survive the most.
+    """The plan that is proved to survive the largest joint error, of it and its rivals.
 
     Args:
-        problem: As it is asked; a plan's own may have hulls for meshes.
-        plan: With its rivals.
+        problem: The problem as asked; that of the plan may have hulls for meshes.
+        plan: The plan, with its rivals.
         deadline: When to give up.
 
     Raises:
@@ -369,7 +274,7 @@ def _largest(margins: FloatArray) -> float:
 
 
 def _story(rounds: list[Round]) -> str:
-    """The rounds in one sentence."""
+    """All rounds in one sentence, for notes and messages."""
     parts = [
         f"round {k} with a margin of {in_mm(one.margin)} was "
         f"{one.verdict or 'too near'} ({one.reason})"

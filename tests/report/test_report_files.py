@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from vdsm_pin.errors import UnknownName
+from vdsm_pin.margins import Adjustment
 from vdsm_pin.planner.records import Plan
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.refinement import Adjustment, Refinement, Round
+from vdsm_pin.refinement import Refinement, Round
 from vdsm_pin.report.facts import batch_row, plan_file, verification_file
 from vdsm_pin.report.files import (
     SCHEMA_NAMES,
