@@ -16,7 +16,7 @@ from vdsm_pin.units import MM_PER_M
 JointErrors = tuple[tuple[float, float], ...]
 
 NOTHING: Final[Mapping[str, float]] = MappingProxyType({})
-"""No obstacle by name."""
+"""No error of a single obstacle or joint."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,8 @@ class JointError:
 
     Args:
         name: The joint's.
-        turn: Of one that turns; [rad].
-        shift: Of one that slides; [m].
+        turn: Error of a joint that turns; [rad].
+        shift: Error of a joint that slides; [m].
     """
 
     name: str
@@ -52,7 +52,12 @@ class JointError:
     def of(
         cls, turns_deg: Mapping[str, float], shifts: Mapping[str, float]
     ) -> tuple["JointError", ...]:
-        """Those of joints by name: of those that turn [deg], that slide [m]."""
+        """The errors of joints by name.
+
+        Args:
+            turns_deg: Errors of joints that turn; [deg].
+            shifts: Errors of joints that slide; [m].
+        """
         return tuple(
             cls(
                 name,
@@ -113,11 +118,11 @@ class ErrorBox:
         return isinstance(other, ErrorBox) and astuple(self) == astuple(other)
 
     def __hash__(self) -> int:
-        """Of the errors."""
+        """Hash of the errors."""
         return hash(astuple(self))
 
     def with_joint(self, joint: float) -> "ErrorBox":
-        """The same with one error of all joint angles; [rad]."""
+        """A copy with one error of all joint angles; [rad]."""
         return replace(self.widened(ErrorBox()), joint=joint, joints=())
 
     def angles(self, n_links: int) -> FloatArray:
@@ -159,7 +164,7 @@ class ErrorBox:
         return ObstacleError(name, shift, max([0.0, *(one.turn for one in mine)]))
 
     def widened(self, other: "ErrorBox") -> "ErrorBox":
-        """The least box that has both."""
+        """The least box that holds this one and another."""
         nothing = (0.0, 0.0)
         both = zip_longest(self.joints, other.joints, fillvalue=nothing)
         plain = {name: max(getattr(self, name), getattr(other, name)) for name in PLAIN}

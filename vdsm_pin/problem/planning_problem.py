@@ -164,15 +164,18 @@ class PlanningProblem(Summarised):
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of those files one after the other; empty where there are none."""
+        """SHA-256 of the bytes of `files`, one after the other; empty without files."""
         return "" if self.source is None else self.source.sha256
 
     def under(self, errors: ErrorBox) -> "PlanningProblem":
-        """The same, its clearances asked for under more errors.
+        """A copy whose clearances are asked for under more errors.
+
+        Args:
+            errors: The copy has the least box that holds these and its own.
 
         Raises:
-            UnknownName: If they name an obstacle that there is not.
-            InvalidInput: If they are of joints that only other robots have.
+            UnknownName: If they name an obstacle that is not in the scene.
+            InvalidInput: If they name joints or have a slide, as for other robots.
         """
         known = self.scene.names
         for one in errors.obstacles:
@@ -194,7 +197,7 @@ class PlanningProblem(Summarised):
 
     @property
     def packed_obstacles(self) -> "PackedPieces":
-        """The obstacles alone, as views of the same."""
+        """The obstacles alone, as views of `packed`."""
         from vdsm_pin.geometry.pieces import first_groups
 
         return first_groups(self.packed, len(self.scene.obstacles))
@@ -224,7 +227,7 @@ class PlanningProblem(Summarised):
 
     @property
     def begin(self) -> Posture | None:
-        """Where a motion begins; None where anywhere will do."""
+        """Where a motion begins, by tip path or start; None where anywhere will do."""
         if self.tip_path is None:
             return self.start
         return Posture(self.tip_path.start, self.tip_path.start_joints)
@@ -250,7 +253,7 @@ class PlanningProblem(Summarised):
         )
 
     def read_from(self, source: ProblemSource | None) -> "PlanningProblem":
-        """The same problem, known to stand in these files."""
+        """A copy with `source`, the files it was read from."""
         same = replace(self)
         object.__setattr__(same, "source", source)
         return same

@@ -55,8 +55,8 @@ class Moving:
 
     Args:
         solid: In the frame that carries it.
-        carrier: What does; several solids may share one.
-        frame: Which of its frames, from 1.
+        carrier: The joints that move it; several solids may share one carrier.
+        frame: Number of the carrier's frame that the solid is fixed to, from 1.
     """
 
     solid: "Solid | ConvexCover"
@@ -65,7 +65,7 @@ class Moving:
 
     @property
     def name(self) -> str:
-        """The solid's."""
+        """Name of the solid."""
         return self.solid.name
 
     @property
@@ -90,7 +90,7 @@ def solid_of(obstacle: Obstacle) -> Solid:
 def reach_of(obstacle: Obstacle | ConvexCover) -> float:
     """Largest distance of an obstacle from the base's origin, at any time; [m].
 
-    Of a half-space that of the stated point alone.
+    For a half-space it is the distance of the stated point.
     """
     if isinstance(obstacle, Moving):
         return obstacle.solid.reach + obstacle.carrier.reach
@@ -139,7 +139,7 @@ class Scene:
 
     @property
     def at_rest(self) -> "Scene":
-        """The obstacles that do not."""
+        """The scene without the obstacles that move."""
         still = (one for one in self.obstacles if not isinstance(one, Moving))
         return Scene(tuple(still)) if self.moving else self
 
@@ -169,7 +169,7 @@ class Scene:
 
     @property
     def carriers(self) -> tuple[Carrier, ...]:
-        """What carries them, each once."""
+        """The carriers of the obstacles that move, each once."""
         return tuple(dict.fromkeys(one.carrier for one in self.moving))
 
 
@@ -199,7 +199,7 @@ def covers_of(obstacles: Sequence[Obstacle], pieces: "PackedPieces") -> IntArray
 
     Args:
         obstacles: Any.
-        pieces: Theirs, packed.
+        pieces: The packed pieces of these obstacles.
     """
     covers = np.zeros(len(pieces.kind), np.int64)
     for k, mesh in enumerate(obstacles):

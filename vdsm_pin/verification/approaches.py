@@ -18,7 +18,7 @@ from vdsm_pin.verification.records import ClosestApproach, Pair, is_deepest
 from vdsm_pin.verification.task import ball_of
 
 CLOSEST: Final = 10
-"""Pairs listed."""
+"""Most pairs that are listed."""
 
 
 def closest_approaches(
@@ -35,8 +35,8 @@ def closest_approaches(
     Args:
         problem: Arm and scene.
         trajectory: The motion.
-        proof: Of its distances.
-        enclosed: What begins inside the meshes that the arm is inside of.
+        proof: The clearance proof of the motion.
+        enclosed: Bodies that begin inside a mesh, by name of the mesh.
     """
     enclosed = enclosed or {}
     rows = list(enclosed_approaches(problem, enclosed))
@@ -80,7 +80,7 @@ def nearest_pairs(
 def _station(
     problem: PlanningProblem, trajectory: Trajectory, near: ClosestApproach
 ) -> float:
-    """Arc length along a link's axis of the place below its witness; [m]."""
+    """Arc length along the link's axis of the point nearest to the witness; [m]."""
     joints, link = trajectory.joints_at(np.array([near.moment])), near.pair.link
     now = joints[:, 0], joints[:, 1::2], joints[:, 2::2]
     centres = joint_centres(problem.manipulator, *now)[0]

@@ -38,7 +38,8 @@ LINKS: Final = "distances between links by Coal against the closed form"
 
 
 Answer = tuple[CoalDistances, FloatArray, FloatArray]
-"""What Coal measured, when (in waypoints) and how far it is off, shape (m,) each."""
+"""What Coal measured, at which moments in waypoints, and how far each distance lies
+outside its bracket [m]; the arrays have shape (m,)."""
 
 
 @dataclass
@@ -49,8 +50,8 @@ class Evidence:
         name: Of the row.
         count: How many there were.
         worst: The largest disagreement; [m].
-        where: Which bodies these are, and what Coal says.
-        moment: In waypoints.
+        where: The two bodies and their distances, by Coal and proved, in words.
+        moment: When the worst answer was measured, in waypoints.
     """
 
     name: str
@@ -210,7 +211,7 @@ def _words(asked: _Asked, found: CoalDistances, k: int) -> str:
 def _answers(
     asked: _Asked, trajectory: Trajectory, deadline: Deadline, log: CoalLog | None
 ) -> Iterator[Answer]:
-    """Of the closest approaches first, then of the rows."""
+    """Coal's answers: those at the closest approaches first, then those at rows."""
     partners, axes = asked.partners, asked.partners.robot.manipulator.axis_names
     if log is not None and (near := log.asked(asked.near)).size:
         approaches = [log.approaches[k] for k in near]

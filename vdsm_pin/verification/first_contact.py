@@ -23,13 +23,13 @@ from vdsm_pin.verification.protocols import AnyMotion, AnyProblem
 from vdsm_pin.verification.records import Pair
 
 STRETCH: Final = 64
-"""Intervals looked at first; the next stretches are twice as long each."""
+"""Intervals of the first stretch; each later one is twice as long as that before."""
 
 LEAST_SHARE: Final = 2.0**-24
-"""The interval of a contact is halved down to this; [-]."""
+"""Share of an interval down to which the moment of a contact is halved; [-]."""
 
 FINE_SHARE: Final = 2.0**-14
-"""The least one at which a contact may be shallow enough to end there; [-]."""
+"""Share of an interval at which halving ends where the contact is shallow; [-]."""
 
 DIGITS: Final = 6
 """Decimals of a moment, in waypoints; coarser than what halving tells."""
@@ -42,14 +42,15 @@ class FirstContact:
     Args:
         pair: The pair.
         moment: In waypoints: 12.25 is a quarter of the way from 12 to 13.
-        clear_before: Whether every pair of its kind is proved clear before.
+        clear_before: Whether every pair of the same kind (with an obstacle, or of two
+            bodies) is proved clear before.
         last: The last moment at which some pair of its kind is proved to be too close;
             NaN where nobody noted the intervals; in waypoints.
         intervals: How many intervals some pair of its kind is too close in; 0 where
             nobody noted them.
         stretches: How many runs of neighbours they make.
-        time: When `moment` is; NaN where rows have no times; [s].
-        last_time: When `last` is; [s].
+        time: Time of `moment`; NaN where rows have no times; [s].
+        last_time: Time of `last`; [s].
     """
 
     pair: Pair
@@ -62,7 +63,7 @@ class FirstContact:
     last_time: float = nan
 
     def timed(self, trajectory: AnyMotion) -> "FirstContact":
-        """The same with the times of its moments, where there are any."""
+        """A copy with the times of its moments, where the trajectory has times."""
         times = trajectory.times_at(np.array([self.moment, self.last]))
         if times is None:
             return self
@@ -86,7 +87,8 @@ Judge: TypeAlias = Callable[[float, float], Judged]
 
 
 Noted: TypeAlias = Mapping[bool, BoolArray]
-"""By whether pairs are of obstacles: if one is too close in each interval, (n,)."""
+"""True for pairs with obstacles, False for others: in which of the intervals some pair
+is too close, shape (n_intervals,)."""
 
 
 class TooClose:
@@ -112,7 +114,7 @@ class TooClose:
 
     @property
     def noted(self) -> Noted:
-        """Whether each interval is one."""
+        """The intervals in which some pair is too close, for each kind of pair."""
         return {kind: self._noted[int(kind)] for kind in (False, True)}
 
 
@@ -125,20 +127,20 @@ def first_contacts(
     noted: Noted | None = None,
     shallow: float = 0.0,
 ) -> tuple[FirstContact, ...]:
-    """Where the clearance is first lost, from obstacles and between links.
+    """Where the clearance is first lost, from obstacles and between bodies.
 
     Args:
-        problem: What is asked, with what pairs have to keep.
+        problem: With the clearances that pairs have to keep.
         pairs: Every pair.
-        whole: What is proved of the whole motion; what it does not refute has no
-            contact.
+        whole: What is proved of the whole motion; a pair that it does not refute has
+            no contact.
         motion: The motion.
-        judge: Proves the same of its stretches.
-        noted: The intervals that are too close, where the whole motion was noted.
+        judge: Proves stretches of the motion.
+        noted: The intervals that are too close; None where not all were seen.
         shallow: A contact no deeper than this is not told more finely; [m].
 
     Returns:
-        One at most of either kind.
+        At most one contact with an obstacle and one between bodies, in that order.
 
     Raises:
         OutOfTime: If `judge` says that the time is over.
@@ -184,7 +186,12 @@ def arm_contacts(
 
 
 class _Search:
-    """Proofs of stretches of one motion, of the pairs of one kind."""
+    """Search for the first and the last moment at which pairs of one kind are refuted.
+
+    Attributes:
+        clear: Whether all stretches judged so far without refutation were certified.
+        least: Upper bound of the clearance of the last pair that was refuted; [m].
+    """
 
     def __init__(
         self,
@@ -260,9 +267,10 @@ class _Search:
         return times is None or bool((np.diff(times) > 0.0).all())
 
     def _refuted(self, low: float, high: float) -> Pair | None:
-        """The worst pair that is refuted in a stretch; notes by how much.
+        """The refuted pair of least clearance in a stretch; None if none is refuted.
 
-        None is refuted where all are proved; notes if they are.
+        Sets `least` to its clearance; where none is refuted, `clear` turns False unless
+        all are certified.
         """
         found = self.judge(low, high)
         refuted = self.mine & (found.verdict == REFUTED)

@@ -33,7 +33,7 @@ from vdsm_pin.verification.records import Check, Verdict, combine
 
 ARM: Final = "arm outside the meshes"
 LINKS: Final = "links outside the meshes"
-"""Names of the row, of an arm and of a robot."""
+"""Names of the row of evidence: of a snake arm, and of any other robot."""
 
 Enclosed: TypeAlias = Mapping[str, Mapping[str, FloatArray]]
 """Bodies inside a mesh, by its name and theirs, each with a point there; base frame."""
@@ -48,9 +48,13 @@ VERDICTS: Final = {
 def locate_start(
     problem: PlanningProblem, trajectory: Trajectory
 ) -> dict[str, Location]:
-    """Where the arm begins as seen from each mesh that may have an inside.
+    """On which side of each mesh that may have an inside the arm begins.
 
-    The first of the arm's points that is inside, or else unknown, speaks for all.
+    A mesh has the location of the first point of the arm that is inside it; of the
+    first point whose side is not known where none is inside.
+
+    Returns:
+        Locations by name of the mesh.
     """
     return {
         mesh.name: worst_location(
@@ -65,7 +69,11 @@ def locate_start(
 
 
 def worst_location(found: Sequence[Location]) -> Location:
-    """The location that says the most against a motion; outside where there is none."""
+    """The worst of some locations: inside before unknown before outside.
+
+    Args:
+        found: Any number; the result is outside where there are none.
+    """
     order = list(VERDICTS)
     none = Location(Side.OUTSIDE)
     return min(found, key=lambda one: order.index(one.side), default=none)
@@ -124,9 +132,15 @@ def _seen_from(pose: FloatArray, point: FloatArray) -> FloatArray:
 def bodies_inside(
     problem: PlanningProblem, trajectory: Trajectory, meshes: Collection[str]
 ) -> Enclosed:
-    """What of the arm begins inside the meshes that it is inside of.
+    """The bodies of the arm that begin inside some meshes.
 
-    The rest reaches out through their surface, and has its distance from that.
+    A body that is left out reaches out through the surface of the mesh; its clearance
+    is the distance from that surface.
+
+    Args:
+        problem: Arm and scene.
+        trajectory: The motion, of which the first row counts.
+        meshes: Names of meshes that the arm is inside of.
     """
     solids = {one.name: solid_of(one) for one in problem.scene.obstacles}
     middles = _middles(problem, trajectory)
@@ -168,12 +182,12 @@ def locate_arm(
     errors: ErrorBox,
     deadline: Deadline = NO_LIMIT,
 ) -> dict[str, Location]:
-    """Where the arm is as seen from each mesh that may have an inside, by its name.
+    """On which side of each mesh that may have an inside the arm is, by its name.
 
     Args:
         problem: Arm, scene, required clearance.
         trajectory: The motion.
-        errors: Every motion within it is meant.
+        errors: The result holds for every motion within this error box.
         deadline: What is not proved by then stays unknown.
     """
     found = locate_start(problem, trajectory)
@@ -207,7 +221,7 @@ def arm_inside(located: Mapping[str, Location]) -> tuple[str, ...]:
 
 
 def check_inside(located: Mapping[str, Location], name: str = ARM) -> tuple[Check, ...]:
-    """Nothing that is held off a mesh is inside.
+    """The row of evidence that no body held apart from a mesh is inside it.
 
     Args:
         located: What `locate_arm` found.
@@ -239,7 +253,7 @@ def check_inside(located: Mapping[str, Location], name: str = ARM) -> tuple[Chec
 
 
 def surfaces(problem: AnyProblem) -> tuple[str, ...]:
-    """Names of the meshes of which only the surface is meant."""
+    """Names of the meshes that count as surfaces only: the file says `solid: false`."""
     meshes = (s for s in map(solid_of, problem.scene.obstacles) if isinstance(s, Mesh))
     return tuple(mesh.name for mesh in meshes if mesh.is_surface)
 

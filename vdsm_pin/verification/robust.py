@@ -31,19 +31,19 @@ from vdsm_pin.verification.task import ArmPairs, obstacle_growth
 from vdsm_pin.verification.yes_or_no import YesOrNoProof, is_certified
 
 LARGEST: Final = float(np.deg2rad(45.0))
-"""Errors beyond this are not looked at; [rad]."""
+"""Largest joint error that is tried; [rad]."""
 
 STRETCH: Final = 256
-"""Intervals asked about at once."""
+"""Intervals of a stretch that is proved at once."""
 
 FIRST_STEP: Final = 1.0 / 8.0
-"""Part of an error that is not survived by which less is tried first; [-]."""
+"""The next error tried is less by this share of one that is not survived; [-]."""
 
 FACTORS: Final = (1.25, 2.0, 4.0)
 """How far beyond what is proved counterexamples are sought."""
 
 SOUGHT: Final = 3
-"""Pairs for which they are sought."""
+"""Most pairs for which counterexamples are sought."""
 
 AROUND: Final = 16
 """So many intervals before and after the first that is lost are searched."""
@@ -139,7 +139,7 @@ def _largest_of_all(
     most: float,
     deadline: Deadline,
 ) -> float:
-    """As `largest_joint_error`, but not above `most`."""
+    """`largest_joint_error` with errors up to `most` [rad] and all obstacles."""
     proof = YesOrNoProof(problem, trajectory, deadline)
     end, largest = proof.n_intervals, most
     for first in _shuffled(range(0, end, STRETCH)):
@@ -190,7 +190,14 @@ def _shuffled(firsts: range) -> list[int]:
 
 
 def _largest(holds: Callable[[float], bool], most: float) -> float:
-    """The most, where it holds; else what holds and is nearly what does not."""
+    """The largest value up to `most` that holds, to within `TOLERANCES.joint_error`.
+
+    It is 0 where not even 0 holds.
+
+    Args:
+        holds: Whether a joint error is survived; monotone.
+        most: Largest value that is tried; [rad].
+    """
     if holds(most):
         return most
     high, step = most, max(TOLERANCES.joint_error, FIRST_STEP * most)
@@ -252,7 +259,7 @@ def _first_gap(
     errors: ErrorBox,
     deadline: Deadline,
 ) -> int | None:
-    """As `_first_lost`, of a proof that takes its memory with it."""
+    """The first interval that is not proved; frees the proof before it returns."""
     proof = YesOrNoProof(problem, trajectory, deadline)
     return _first_lost(partial(proof.holds, errors), proof.n_intervals)
 

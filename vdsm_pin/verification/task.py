@@ -35,7 +35,8 @@ from vdsm_pin.verification.records import Pair
 class ArmPairs:
     """Which pairs of a problem are judged, in the order of the certificate.
 
-    With every obstacle every body, then the bodies among themselves.
+    First come the pairs of a body and an obstacle, obstacle by obstacle, then those of
+    two bodies.
 
     Args:
         problem: Arm, scene, required clearances.
@@ -58,7 +59,7 @@ class ArmPairs:
 
     @property
     def left_out(self) -> tuple[LeftOut, ...]:
-        """What nobody holds apart, with a reason each."""
+        """Pairs that are not judged, each with the reason."""
         return (*self.between.left_out, *self.ignored)
 
     @cached_property
@@ -87,7 +88,7 @@ class ArmPairs:
         return tuple(rows)
 
     def pair(self, number: int) -> Pair:
-        """One of them; of a hundred thousand obstacles all are a million."""
+        """One pair by its number, without making all, which may be a million."""
         if number < len(self.outer):
             b, o = self.outer[number].tolist()
             obstacle = self.problem.scene.obstacles[o]
@@ -104,7 +105,10 @@ class ArmPairs:
         return "" if body < self.problem.manipulator.n_links else self.bodies[body].name
 
     def numbers(self) -> PairTable:
-        """The same by numbers of bodies: the obstacles, then those of the arm."""
+        """The pairs as the proof takes them, by numbers of bodies.
+
+        Obstacles come first in scene order, then the bodies of the arm.
+        """
         problem, between = self.problem, self.between.held
         outer, n = self.outer, len(problem.scene.obstacles)
         needed = problem.required_clearance, problem.required_self_clearance
@@ -116,7 +120,10 @@ class ArmPairs:
 
 
 def ball_of(problem: PlanningProblem, pair: Pair) -> float:
-    """Radius that grows the core of a pair's own body, as deep as is measured; [m]."""
+    """Radius of the ball that grows the core of a pair's own body; [m].
+
+    No depth beyond it is measured.
+    """
     bodies = arm_bodies(problem.manipulator)
     return next(body.ball for body in bodies if body.name == pair.own)
 
