@@ -35,6 +35,10 @@ BOW: Final = 0.2
 """Part of the room of a narrow place that the way between two points may bow; [-]."""
 BUMPS: Final = 1500
 """Bumps tried on a way for the arm that follows it."""
+TRIED: Final = 150
+"""After so many it is seen whether they were worth it."""
+WORTH: Final = 0.95
+"""They were not where more than this part is still lacking; [-]."""
 WIDTHS: Final = (1.0, 2.0, 4.0, 8.0)
 """How wide they are, in points; [-]."""
 HEIGHTS: Final = (0.03, 0.1, 0.3)
@@ -124,10 +128,14 @@ def followable(room: TipRoom, route: FloatArray, start: FloatArray) -> FloatArra
     if len(route) < 3:
         return route
     rng, number = np.random.default_rng(len(route)), np.arange(len(route))
-    lack = _lack(room, route, start)
-    for _ in range(BUMPS):
+    lack = before = _lack(room, route, start)
+    for count in range(1, BUMPS + 1):
         if lack == 0.0:
             break
+        if count % TRIED == 0:
+            if lack > WORTH * before:
+                break
+            before = lack
         middle, width = rng.integers(1, len(route) - 1), rng.choice(WIDTHS)
         bump = np.exp(-0.5 * ((number - middle) / width) ** 2)
         bump[0] = bump[-1] = 0.0
