@@ -3,12 +3,14 @@
 import numpy as np
 import pinocchio
 import pytest
-from oracles.tree_queries import random_tree
+from oracles.tree_queries import random_pieces, random_tree
 
 from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.proof.packed_tree import TreePoses
+from vdsm_pin.proof.question import _extent
 from vdsm_pin.proof.tree import Joint, Kind, Tree, free_tree, shifted
 
 SEEDS = range(40)
@@ -45,6 +47,16 @@ def test_the_proof_places_frames_as_numpy_does(seed: int) -> None:
     placed, expected = TreePoses(tree)(q), tree.poses(q)
     assert placed.shape == (5, tree.n_frames, 4, 4)
     np.testing.assert_allclose(placed, expected, rtol=0.0, atol=1e-13)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_nothing_is_farther_off_than_rounding_is_allowed_for(seed: int) -> None:
+    rng = np.random.default_rng([3, seed])
+    tree = random_tree(rng, int(rng.integers(1, 8)))
+    pieces = pack_pieces([random_pieces(rng, "box")])
+    at_zero = tree.poses(np.zeros((1, tree.n_columns)))[0]
+    far = np.linalg.norm(at_zero[:, :3, 3], axis=1).max()
+    assert _extent(tree, pieces) >= far + np.abs(pieces.points).max() - 1e-9
 
 
 @pytest.mark.parametrize("seed", SEEDS)
