@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from vdsm_pin import api
-from vdsm_pin.app import subjects
+from vdsm_pin.app import arm_subject
 from vdsm_pin.batch.folders import folder_names
 from vdsm_pin.batch.run import OWN, Batch, run_batch
 from vdsm_pin.batch.task import Settings
@@ -156,8 +156,8 @@ def test_a_trajectory_that_changes_meanwhile_gets_no_result(
         (here / "motion.csv").write_text("x0_m\n0\n")
         return found
 
-    verify = subjects.verify
-    monkeypatch.setattr(subjects, "verify", judged)
+    verify = arm_subject.verify
+    monkeypatch.setattr(arm_subject, "verify", judged)
     words = ["problem.yaml", "--trajectory", "motion.csv", "--out", "out"]
     assert run("verify", *words, "--certificate", "proof") == 2
     assert "motion.csv: changed while it was worked on" in capsys.readouterr().err
