@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 import vdsm_pin.io.problem_file as problem_file
+from vdsm_pin.app import subjects
 from vdsm_pin.cli import app
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.time_limit import GRACE, NO_LIMIT, Deadline, enforced
@@ -106,7 +107,8 @@ def test_work_that_has_nothing_to_write_has_no_grace() -> None:
 def test_a_command_that_hangs_in_reading_ends_with_one_word(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(problem_file, "read_problem", for_ever)
+    for module in (problem_file, subjects):
+        monkeypatch.setattr(module, "read_problem", for_ever)
     words = [command, "paper/obs1", "--out", str(tmp_path / "out")]
     rows = [] if command == "plan" else ["--trajectory", str(tmp_path / "none.csv")]
     found = CliRunner().invoke(app, [*words, *rows, "--time-limit", "0.1"])
