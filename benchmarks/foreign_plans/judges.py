@@ -12,6 +12,7 @@ import numpy as np
 from benchmarks.foreign_plans.sampled import Sampled
 from vdsm_pin.errors import Infeasible
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.repair.robot import repair_robot
@@ -121,7 +122,9 @@ def _repair(cell: Cell, motion: Motion) -> tuple[float, FloatArray]:
     """Processor time of a repair, inf where there is none, and its waypoints."""
     begin = time.process_time()
     try:
-        repaired = repair_robot(cell, motion).verification.trajectory.knots
+        joints = tuple(joint.name for joint in cell.robot.joints)
+        given = JointTrajectory(joints, motion.knots, motion.times)
+        repaired = repair_robot(cell, given).verification.trajectory.knots
     except Infeasible:
         return inf, np.zeros((0, motion.knots.shape[1]))
     return time.process_time() - begin, repaired

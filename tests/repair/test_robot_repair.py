@@ -10,14 +10,17 @@ from typer.testing import CliRunner
 
 from vdsm_pin.cli import app
 from vdsm_pin.errors import Infeasible, InvalidInput
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.problem.error_boxes import ErrorBox, TypedErrorBox
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.repair.robot import repair_robot
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import verify_robot
-from vdsm_pin.robots.trajectory_files import path_text, read_path
+from vdsm_pin.robots.trajectory_csv import csv_text
+from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.robots.urdf import read_robot
 
 URDF = """<robot name="two"><link name="foot"/>
@@ -33,6 +36,10 @@ URDF = """<robot name="two"><link name="foot"/>
 
 OVER = np.array([[0.0, 0.3], [1.2, 0.3]])
 """A sweep whose tip passes a ball just inside of its reach."""
+
+
+def rows_of(q: FloatArray, **more: FloatArray) -> JointTrajectory:
+    return JointTrajectory(("a", "b"), q, **more)
 
 
 def asked(folder: Path, *balls: tuple[float, float, float]) -> Cell:
@@ -57,7 +64,7 @@ def test_grazing_motion_is_repaired(tmp_path: Path) -> None:
     x, y = tip_at(0.6, 0.3)
     this = asked(tmp_path, (1.04 * x, 1.04 * y, 0.03))
     assert verify_robot(this, Motion(OVER)).verdict == "refuted"
-    found = repair_robot(this, Motion(OVER))
+    found = repair_robot(this, rows_of(OVER))
     assert found.verification.verdict == "certified"
     rows = found.verification.trajectory.knots
     assert rows[[0, -1]].tolist() == OVER.tolist()
@@ -78,15 +85,47 @@ def test_errors_are_kept_in_reserve(tmp_path: Path) -> None:
     assert verify_robot(this, Motion(OVER)).verdict == "certified"
     errors = TypedErrorBox(joint_deg=0.5, base_mm=20.0, base_deg=0.5)
     assert verify_robot(this.under(errors), Motion(OVER)).verdict != "certified"
-    found = repair_robot(this.under(errors), Motion(OVER))
+    found = repair_robot(this.under(errors), rows_of(OVER))
     assert found.verification.verdict == "certified"
     assert found.verification.errors == ErrorBox().widened(errors)
     assert 0.0 < found.moved.max() < 0.3
 
 
+@pytest.mark.parametrize("degree", [3, 5])
+def test_smooth_motion_is_repaired_as_a_smooth_one(tmp_path: Path, degree: int) -> None:
+    """The curve that a controller runs is clear, and ends where it did, as fast."""
+    x, y = tip_at(0.6, 0.3)
+    this = asked(tmp_path, (1.04 * x, 1.04 * y, 0.03))
+    times, rates = np.array([0.0, 4.0]), np.array([[0.0, 0.0], [0.05, 0.02]])
+    more = {"times": times, "rates": rates}
+    if degree == 5:
+        more["changes"] = np.array([[0.0, 0.0], [0.01, 0.0]])
+    given = rows_of(OVER, **more)
+    assert verify_robot(this, given.path).verdict == "refuted"
+    found = repair_robot(this, given)
+    motion = found.verification.motion
+    assert found.verification.verdict == "certified"
+    assert motion is not None
+    assert motion.rates is not None
+    assert motion.path.degree == degree
+    assert motion.path.same_as(found.verification.trajectory)
+    assert motion.q[[0, -1]].tolist() == OVER.tolist()
+    assert motion.rates[[0, -1]].tolist() == rates.tolist()
+    assert 0.0 < found.moved.max() < 0.3
+    assert motion.times is not None
+    base = given.path.at(motion.times)
+    np.testing.assert_allclose(found.moved, np.abs(motion.q - base).max(axis=1))
+    for q in motion.path.at(np.linspace(0.0, 4.0, 800)):
+        poses = np.repeat(this.robot.tree.poses(q[None]), len(this.pairs), axis=0)
+        assert this.distances(this.pairs, poses).min() >= 1e-3 - 5e-6
+    # As it is written it is the same motion.
+    (tmp_path / "t.csv").write_text(csv_text(motion, this.robot))
+    assert read_path(tmp_path / "t.csv", this.robot).same_as(motion.path)
+
+
 def test_certified_motion_stays(tmp_path: Path) -> None:
     """Nothing is changed where nothing is wrong."""
-    found = repair_robot(asked(tmp_path, (5.0, 5.0, 0.1)), Motion(OVER))
+    found = repair_robot(asked(tmp_path, (5.0, 5.0, 0.1)), rows_of(OVER))
     assert found.verification.trajectory.knots.tolist() == OVER.tolist()
     assert not found.moved.any()
 
@@ -97,24 +136,24 @@ def test_pinned_waypoint_in_the_way_is_named(tmp_path: Path) -> None:
     rows = np.array([[0.0, 0.3], [0.6, 0.3], [1.2, 0.3]])
     this = asked(tmp_path, (x, y, 0.03))
     with pytest.raises(Infeasible, match="waypoint 1 stays, and there fore and ball0"):
-        repair_robot(this, Motion(rows), pinned=(1,))
+        repair_robot(this, rows_of(rows), pinned=(1,))
     with pytest.raises(InvalidInput, match="pinned waypoint is 3, expected 0 to 2"):
-        repair_robot(this, Motion(rows), pinned=(3,))
+        repair_robot(this, rows_of(rows), pinned=(3,))
 
 
 def test_wall_that_no_small_change_leads_round_is_refused(tmp_path: Path) -> None:
     """A column of balls across the whole reach."""
     wall = [(r * np.cos(0.8), r * np.sin(0.8), 0.05) for r in np.arange(0.1, 0.9, 0.06)]
     with pytest.raises(Infeasible):
-        repair_robot(asked(tmp_path, *wall), Motion(OVER))
+        repair_robot(asked(tmp_path, *wall), rows_of(OVER))
 
 
-def test_path_text_is_read_back_to_the_same_numbers(tmp_path: Path) -> None:
+def test_what_is_written_is_read_back_to_the_same_numbers(tmp_path: Path) -> None:
     """Bit by bit."""
     robot = asked(tmp_path).robot
     rows = np.random.default_rng(1).uniform(-3.0, 3.0, (20, 2))
     file = tmp_path / "t.csv"
-    file.write_text(path_text(Motion(rows), robot))
+    file.write_text(csv_text(rows_of(rows), robot))
     assert read_path(file, robot).knots.tolist() == rows.tolist()
 
 
@@ -127,7 +166,7 @@ def test_command_writes_what_verify_certifies(tmp_path: Path) -> None:
         f"- {{name: ball, shape: sphere, center: [{1.04 * x}, {1.04 * y}, 0], "
         "radius: 0.03}\n"
     )
-    (tmp_path / "t.csv").write_text(path_text(Motion(OVER), this.robot))
+    (tmp_path / "t.csv").write_text(csv_text(rows_of(OVER), this.robot))
     common = ["--urdf", str(tmp_path / "two.urdf"), "--scene"]
     common += [str(tmp_path / "scene.yaml"), "--trajectory"]
     out = tmp_path / "out"

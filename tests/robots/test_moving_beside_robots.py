@@ -12,6 +12,7 @@ from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.problem.error_boxes import TypedErrorBox
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.repair.robot import repair_robot
@@ -192,11 +193,12 @@ def test_a_counterexample_beside_what_moves_is_told_in_rows(tmp_path: Path) -> N
 
 def test_what_is_not_done_beside_what_moves_is_said(tmp_path: Path) -> None:
     cell = cell_with(tmp_path, np.array([0.0, 1.0]), np.ones((2, 3)))
+    joints = tuple(joint.name for joint in cell.robot.joints)
     rows = np.array([[0.0, 0.0], [1.0, 0.0]])
     with pytest.raises(InvalidInput, match="no column 'time_s', but obstacle 'ball'"):
         verify_robot(cell, Motion(rows))
     with pytest.raises(InvalidInput, match="no column 'time_s', but obstacle 'ball'"):
-        repair_robot(cell, Motion(rows))
+        repair_robot(cell, JointTrajectory(joints, rows))
 
 
 def test_a_motion_beside_what_moves_is_repaired_in_its_time(tmp_path: Path) -> None:
@@ -207,8 +209,9 @@ def test_a_motion_beside_what_moves_is_repaired_in_its_time(tmp_path: Path) -> N
     tip += 0.43 * np.array([np.cos(q[1]), np.sin(q[1]), 0.0])
     moves, knots = np.array([0.5, 1.0, 1.5]), np.array([1.5, 1.06, 1.5])[:, None] * tip
     cell = cell_with(tmp_path, moves, knots)
-    motion = Motion(rows, times=times)
-    assert verify_robot(cell, motion).verdict is Verdict.REFUTED
+    joints = tuple(joint.name for joint in cell.robot.joints)
+    motion = JointTrajectory(joints, rows, times)
+    assert verify_robot(cell, motion.path).verdict is Verdict.REFUTED
     found = repair_robot(cell, motion)
     path = found.verification.trajectory
     assert found.verification.verdict is Verdict.CERTIFIED

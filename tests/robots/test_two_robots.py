@@ -12,6 +12,7 @@ from vdsm_pin.certificate_checker import Outcome, check_certificate
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.report.page_data import report_data
@@ -22,7 +23,8 @@ from vdsm_pin.robots.certificate import write_robot_certificate
 from vdsm_pin.robots.files import HULLS, MeshCover, read_cell_file
 from vdsm_pin.robots.judgement import POSES, verify_robot
 from vdsm_pin.robots.second_opinion import link_shapes
-from vdsm_pin.robots.trajectory_files import path_text, read_path
+from vdsm_pin.robots.trajectory_csv import csv_text
+from vdsm_pin.robots.trajectory_files import read_path
 from vdsm_pin.robots.urdf import read_robot
 from vdsm_pin.verification.certificate_lines import Hashes
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
@@ -212,7 +214,9 @@ def test_random_pairs_keep_what_dense_samples_by_coal_say(
         robots.append(read_robot(urdf, solids=solids))
         q = rng.uniform(-0.4, 0.4, (3, len(robots[-1].joints)))
         motions.append(Motion(q, times=times))
-        write(tmp_path, f"{name}.csv", path_text(motions[-1], robots[-1]))
+        joints = tuple(joint.name for joint in robots[-1].joints)
+        text = csv_text(JointTrajectory(joints, q, times), robots[-1])
+        write(tmp_path, f"{name}.csv", text)
     place = [0.12 * seed, 0.2, 0.0]
     text = (
         "vdsm_problem: 1\nlength_unit: m\nrobot: {urdf: a.urdf}\n"

@@ -90,17 +90,12 @@ class RobotSubject:
         """Find a certified motion near a given one."""
         from vdsm_pin.repair.robot import repair_robot
 
-        found = repair_robot(self.problem, motion.path, pinned, self.options.deadline)
-        rows = self.motion_of(found.verification)
-        return replace(found, verification=replace(found.verification, motion=rows))
+        return repair_robot(self.problem, motion, pinned, self.options.deadline)
 
     def motion_of(self, verification: RobotVerification) -> JointTrajectory:
         """The motion that was judged."""
-        if verification.motion is not None:
-            return verification.motion
-        names = tuple(joint.name for joint in self.problem.robot.joints)
-        path = verification.trajectory
-        return JointTrajectory(names, path.knots, path.times)
+        assert verification.motion is not None  # of `judge` or `repair`
+        return verification.motion
 
     def write(self, file: Path, motion: JointTrajectory) -> None:
         """Write a motion as CSV."""

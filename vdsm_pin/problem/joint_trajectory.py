@@ -1,12 +1,12 @@
 """A trajectory of named joints, of any robot."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, freeze
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, freeze
 
 if TYPE_CHECKING:
     from vdsm_pin.proof.paths import Path
@@ -109,3 +109,9 @@ class JointTrajectory:
         return JointTrajectory(
             tuple(names), self.q[:, order], self.times, rates, changes
         )
+
+    def only(self, rows: BoolArray) -> "JointTrajectory":
+        """Some of its waypoints, shape (n_rows,)."""
+        parts = {name: getattr(self, name) for name in ("times", "rates", "changes")}
+        kept = {name: part[rows] for name, part in parts.items() if part is not None}
+        return replace(self, q=self.q[rows], **kept)

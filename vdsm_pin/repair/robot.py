@@ -1,16 +1,16 @@
 """A certified motion of a robot near one that is not."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray
+from vdsm_pin.geometry.bernstein import derivative, value
 from vdsm_pin.problem.error_boxes import ErrorBox
+from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.proof.bodies import Pair
-from vdsm_pin.proof.paths import Path
 from vdsm_pin.repair.rounds import APART, Origins, Places, Repaired, repaired
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
@@ -23,8 +23,17 @@ MARGINS: Final = 1e-3, 8e-3
 PUSHES: Final = 25
 """Most steps of one sample up the slopes."""
 
+BULGES: Final = 100
+"""Most bulges of a smooth motion in one round."""
+
+SLOW: Final = 10.0
+"""Half the least length of a bulge, over its shift at the motion's own speed; [-]."""
+
 LONGEST: Final = 0.1
 """Longest such step; [rad], [m]."""
+
+ROUNDED: Final = 1e-12
+"""How far a sample of a smooth piece may be off where it was; [rad], [m]."""
 
 STEP: Final = 1e-6
 """Of the differences that slopes are taken from; [rad], [m]."""
@@ -36,38 +45,50 @@ class _Motion:
 
     Args:
         cell: Robot and scene.
-        path: Straight lines between its waypoints, which keep their times.
-        origins: Where its waypoints were.
+        given: The motion that is repaired.
+        rows: The motion now; its waypoints keep their times.
+        moments: Where its waypoints were in the given motion, shape (n_rows,).
+        origins: The same as joint values.
     """
 
     cell: Cell
-    path: Path
+    given: JointTrajectory
+    rows: JointTrajectory
+    moments: FloatArray
     origins: Origins
 
     @property
     def q(self) -> FloatArray:
         """Its waypoints, shape (n_rows, n_columns); [rad], [m]."""
-        return self.path.knots
+        return self.rows.q
 
     def pushed(self, margins: dict[int, float], moments: FloatArray) -> "_Motion":
         """The motion sampled closely, its pairs pushed apart by margins; [m]."""
-        steps = np.abs(np.diff(self.q, axis=0)).max(axis=1, initial=0.0)
-        parts = np.maximum(1.0, np.ceil(steps / APART)).astype(np.int64)
-        places = Places.within(parts, moments)
-        q, origins = places.through(self.q), self.origins.at(places)
-        times = self.path.times
-        times = None if times is None else places.through(times)
-        others = self._others(times, len(q))
+        steps = np.abs(np.diff(self.rows.path.controls, axis=1)).sum(axis=1)
+        parts = np.ceil(steps.max(axis=1, initial=0.0) / APART)
+        places = Places.within(np.maximum(1.0, parts).astype(np.int64), moments)
+        origins, at = self.origins.at(places), places.through(self.moments)
+        rows = _sampled(self.rows, places)
+        if rows.rates is not None:
+            base = self.given.path.at_moments(at)
+            q = np.where(np.abs(rows.q - base) <= ROUNDED, base, rows.q)
+            origins, rows = replace(origins, base=base), replace(rows, q=q)
+        others = self._others(rows.times, len(rows.q))
         pairs = [self.cell.pairs[k] for k in margins]
         more = np.array([*margins.values()])
         slopes = _Slopes(self.cell, pairs, more)
         names = [self.cell.names(pair) for pair in pairs]
-        bad = origins.too_near(slopes.gaps(q, others), more, names)
-        kept, q = origins.kept(q, bad), q.copy()
-        for k in np.flatnonzero(bad):
-            q[k] = slopes.up(q[k], others[k : k + 1])
-        path = Path(q[kept], times=None if times is None else times[kept])
-        return _Motion(self.cell, path, origins.only(kept))
+        bad = origins.too_near(slopes.gaps(rows.q, others), more, names)
+        if rows.times is not None and rows.rates is not None:
+            rows, bad = _bulged(rows, slopes, others, origins.fixed)
+            kept = origins.kept(rows.q, bad)
+        else:
+            kept, q = origins.kept(rows.q, bad), rows.q.copy()
+            for k in np.flatnonzero(bad):
+                q[k] = slopes.up(q[k], others[k : k + 1])
+            rows = replace(rows, q=q)
+        rows, origins = rows.only(kept), origins.only(kept)
+        return replace(self, rows=rows, moments=at[kept], origins=origins)
 
     def _others(self, times: FloatArray | None, n_rows: int) -> FloatArray:
         """Columns of what moves beside rows, shape (n_rows, n_more)."""
@@ -79,9 +100,67 @@ class _Motion:
         )
 
 
+def _sampled(motion: JointTrajectory, places: Places) -> JointTrajectory:
+    """The same motion with waypoints at some places, exact where they are rows."""
+    times = None if motion.times is None else places.through(motion.times)
+    if motion.times is None or motion.rates is None:
+        return replace(motion, q=places.through(motion.q), times=times)
+    row, old = places.row, places.old[:, None]
+    k = np.minimum(row, motion.path.n_intervals - 1)
+    share, step = places.moments - k, np.diff(motion.times)[k, None]
+    controls = motion.path.pieces(k)
+    q = np.where(old, motion.q[row], value(controls, share))
+    rates = value(derivative(controls), share) / step
+    rates = np.where(old, motion.rates[row], rates)
+    changes = motion.changes
+    if changes is not None:
+        between = value(derivative(derivative(controls)), share) / step**2
+        changes = np.where(old, changes[row], between)
+    return replace(motion, q=q, times=times, rates=rates, changes=changes)
+
+
+def _bulged(
+    motion: JointTrajectory, slopes: "_Slopes", others: FloatArray, fixed: BoolArray
+) -> tuple[JointTrajectory, BoolArray]:
+    """A smooth motion that bulges out where it is too near, and which rows it moved.
+
+    A bulge is (1 - u^2)^3 of a shift, with u = -1 and 1 at its ends: twice as long as
+    what is too near, and slow as the motion is, unless a fixed row is in its way.
+    """
+    times, rates = motion.times, motion.rates
+    assert times is not None
+    assert rates is not None
+    q, changes = motion.q.copy(), motion.changes
+    moved, fast = np.zeros(len(q), np.bool_), float(np.abs(rates).max()) or np.inf
+    for _ in range(BULGES):
+        gaps = slopes.gaps(q, others).min(axis=1)
+        gaps[fixed] = np.inf
+        k = int(np.argmin(gaps))
+        if not -np.inf < gaps[k] < 0.0:
+            break
+        shift = slopes.up(q[k], others[k : k + 1]) - q[k]
+        clear = np.flatnonzero(gaps >= 0.0)  # the fixed ones, too
+        before, after = clear[clear < k].max(), clear[clear > k].min()
+        ends = np.flatnonzero(fixed)
+        slow = SLOW * float(np.abs(shift).max()) / fast
+        low = max(min(2.0 * times[before] - times[k], times[k] - slow),
+                  times[ends[ends < k].max()])  # fmt: skip
+        high = min(max(2.0 * times[after] - times[k], times[k] + slow),
+                   times[ends[ends > k].min()])  # fmt: skip
+        width = np.where(times < times[k], times[k] - low, high - times[k])
+        u = np.clip((times - times[k]) / width, -1.0, 1.0)
+        rest, moved = 1.0 - u**2, moved | (np.abs(u) < 1.0)
+        q = q + (rest**3)[:, None] * shift
+        rates = rates + (-6.0 * u * rest**2 / width)[:, None] * shift
+        if changes is not None:
+            bend = rest * (24.0 * u**2 - 6.0 * rest) / width**2
+            changes = changes + bend[:, None] * shift
+    return replace(motion, q=q, rates=rates, changes=changes), moved
+
+
 def repair_robot(
     cell: Cell,
-    path: Path,
+    motion: JointTrajectory,
     pinned: Sequence[int] = (),
     deadline: Deadline = NO_LIMIT,
 ) -> Repaired[RobotVerification]:
@@ -89,23 +168,24 @@ def repair_robot(
 
     Args:
         cell: Robot, scene and required clearances.
-        path: Straight lines between waypoints, which keep their times.
+        motion: Its joints; waypoints keep their times, and between them straight lines
+            stay straight lines and smooth pieces smooth ones.
         pinned: Numbers of waypoints, from 0, that stay besides start and goal.
         deadline: When to give up.
 
     Raises:
-        InvalidInput: If the motion is not of straight lines, has no such waypoint, or
-            no times beside what moves.
+        InvalidInput: If there is no such waypoint, or no times beside what moves.
         Infeasible: If none was found; the message says why and where.
     """
-    if path.degree != 1:
-        message = "repair takes straight lines between waypoints, without velocities"
-        raise InvalidInput(message)
-    check_timed(cell.scene, path)
-    origins = Origins.of(path.knots, [0, len(path.knots) - 1], pinned)
+    check_timed(cell.scene, motion)
+    origins = Origins.of(motion.q, [0, len(motion.q) - 1], pinned)
+    moments = np.arange(float(len(motion.q)))
     return repaired(
-        _Motion(cell, path, origins),
-        lambda motion: verify_robot(cell, motion.path, deadline, contacts=False),
+        _Motion(cell, motion, motion, moments, origins),
+        lambda found: replace(
+            verify_robot(cell, found.rows.path, deadline, contacts=False),
+            motion=found.rows,
+        ),
         MARGINS,
         deadline,
         under_errors=cell.errors != ErrorBox(),

@@ -15,7 +15,7 @@ from vdsm_pin.io.tables import listed
 from vdsm_pin.io.trajectory_messages import ENDINGS, STILL, read_joint_trajectory
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.robots.model import Robot, RobotJoint, Values
-from vdsm_pin.robots.trajectory_csv import csv_text, read_csv
+from vdsm_pin.robots.trajectory_csv import read_csv
 
 if TYPE_CHECKING:  # whoever reads waypoints alone needs no pieces
     from vdsm_pin.proof.paths import Path
@@ -220,9 +220,3 @@ def _check_units(file: File, q: FloatArray, joints: Sequence[RobotJoint]) -> Non
                 + ("" if limits else ", at most two turns either way without limits")
             )
             raise InvalidFile(file=file, problem=problem)
-
-
-def path_text(path: "Path", robot: Robot) -> str:
-    """The waypoints of straight lines as CSV."""
-    names = tuple(joint.name for joint in robot.joints)
-    return csv_text(JointTrajectory(names, path.knots, path.times), robot)

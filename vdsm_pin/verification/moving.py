@@ -63,7 +63,7 @@ def untimed(scene: Scene, trajectory: Trajectory | JointTrajectory | Path) -> st
     return f"has no column 'time_s', but obstacle {name!r} moves: rows need their times"
 
 
-def check_timed(scene: Scene, trajectory: Trajectory | Path) -> None:
+def check_timed(scene: Scene, trajectory: Trajectory | JointTrajectory | Path) -> None:
     """Refuse a motion without times in a scene where obstacles move.
 
     Raises:
