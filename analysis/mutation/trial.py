@@ -122,6 +122,9 @@ def _run_tests(folder: Path, tests: list[str], plain: str | None) -> None:
 
     os.chdir(folder)
     os.environ["PYTHONPATH"] = str(folder)
+    # Byte code of one change would pass for the next one of its size and second.
+    sys.dont_write_bytecode = True
+    os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
     if plain is not None:
         os.environ[plain] = "1"
     sys.path.insert(0, str(folder))
