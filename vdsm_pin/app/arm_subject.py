@@ -22,11 +22,7 @@ if TYPE_CHECKING:  # few need repair or a certificate
     from vdsm_pin.verification.certificate_lines import Hashes
 
 LINK_ANGLES: Final = "link_angles.csv"
-
-
 CABLES: Final = "cables.csv"
-
-
 CENTRES: Final = "centres.csv"
 
 

@@ -124,13 +124,12 @@ def _bulged(
 ) -> tuple[JointTrajectory, BoolArray]:
     """A smooth motion that bulges out where it is too near, and which rows it moved.
 
-    A bulge is (1 - u^2)^3 of a shift, with u = -1 and 1 at its ends: twice as long as
-    what is too near, and slow as the motion is, unless a fixed row is in its way.
+    A bulge is (1 - u^2)^3 of a shift, with u = -1 and 1 at its ends, see `_ends`.
     """
     times, rates = motion.times, motion.rates
     assert times is not None
     assert rates is not None
-    q, changes = motion.q.copy(), motion.changes
+    q, changes = motion.q, motion.changes
     moved, fast = np.zeros(len(q), np.bool_), float(np.abs(rates).max()) or np.inf
     for _ in range(BULGES):
         gaps = slopes.gaps(q, others).min(axis=1)
@@ -139,14 +138,8 @@ def _bulged(
         if not -np.inf < gaps[k] < 0.0:
             break
         shift = slopes.up(q[k], others[k : k + 1]) - q[k]
-        clear = np.flatnonzero(gaps >= 0.0)  # the fixed ones, too
-        before, after = clear[clear < k].max(), clear[clear > k].min()
-        ends = np.flatnonzero(fixed)
         slow = SLOW * float(np.abs(shift).max()) / fast
-        low = max(min(2.0 * times[before] - times[k], times[k] - slow),
-                  times[ends[ends < k].max()])  # fmt: skip
-        high = min(max(2.0 * times[after] - times[k], times[k] + slow),
-                   times[ends[ends > k].min()])  # fmt: skip
+        low, high = _ends(times, k, (gaps >= 0.0, fixed), slow)
         width = np.where(times < times[k], times[k] - low, high - times[k])
         u = np.clip((times - times[k]) / width, -1.0, 1.0)
         rest, moved = 1.0 - u**2, moved | (np.abs(u) < 1.0)
@@ -156,6 +149,29 @@ def _bulged(
             bend = rest * (24.0 * u**2 - 6.0 * rest) / width**2
             changes = changes + bend[:, None] * shift
     return replace(motion, q=q, rates=rates, changes=changes), moved
+
+
+def _ends(
+    times: FloatArray, k: int, rows: tuple[BoolArray, BoolArray], slow: float
+) -> tuple[float, float]:
+    """When a bulge about row k begins and ends; [s].
+
+    It is twice as long as what is too near there, and at least `slow` to either side,
+    unless a fixed row is in its way.
+
+    Args:
+        times: Of the rows, shape (n_rows,); [s].
+        k: The row.
+        rows: Which are clear or fixed, and which are fixed, shape (n_rows,) each.
+        slow: Least half of its length; [s].
+    """
+    clear, fixed = (times[which] for which in rows)
+    at = times[k]
+    before, after = clear[clear < at].max(), clear[clear > at].min()
+    begin, end = fixed[fixed < at].max(), fixed[fixed > at].min()
+    low = min(2.0 * before - at, at - slow)
+    high = max(2.0 * after - at, at + slow)
+    return float(max(low, begin)), float(min(high, end))
 
 
 def repair_robot(

@@ -143,7 +143,7 @@ def following(problem: PlanningProblem, route: FloatArray) -> Following:
                 f"links shorter against the turn there or more room at "
                 f"{found.obstacle!r}",
             )
-    return Following(f"{who} comes through", "")
+    return Following(f"{who} is clear at each of its points", "")
 
 
 def _needed(problem: PlanningProblem) -> float:
