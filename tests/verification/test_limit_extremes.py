@@ -12,7 +12,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
-from vdsm_pin.verification import limits
+from vdsm_pin.verification import extremes, limits
 from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.records import Check, Verdict
 
@@ -45,7 +45,7 @@ def random_motion(
 def dense(motion: Trajectory, per_row: int = 400) -> tuple[np.ndarray, np.ndarray]:
     last = motion.n_samples - 1
     moments = np.linspace(0.0, last, last * per_row + 1)
-    return moments, np.asarray(motion.joints_at(moments))
+    return moments, np.asarray(motion.path.at_moments(moments))
 
 
 def assert_judged(
@@ -66,6 +66,7 @@ def test_a_broken_limit_is_told_at_its_worst_of_all_parts(
     degree: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Oracle: the motion at the ends of all parts of all pieces."""
+    monkeypatch.setattr(extremes, "CHUNK", 96)
     monkeypatch.setattr(limits, "CHUNK", 96)
     rng, parts, seen = np.random.default_rng(10 + degree), limits.PARTS, 0
     for _ in range(60):
@@ -98,7 +99,8 @@ def test_a_broken_limit_is_told_at_its_worst_of_all_parts(
 def test_every_limit_is_judged_by_what_the_motion_does(
     degree: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(limits, "CHUNK", 96)  # three intervals at once
+    monkeypatch.setattr(extremes, "CHUNK", 96)  # three intervals at once
+    monkeypatch.setattr(limits, "CHUNK", 96)
     rng, exact = np.random.default_rng(degree), degree == 1
     verdicts: set[tuple[str, Verdict]] = set()
     for _ in range(60):

@@ -76,7 +76,7 @@ def compare(seed: int) -> None:
     ends = rng.choice([-1.0, 1.0], (SAMPLES, 7))
     inside = rng.uniform(-1.0, 1.0, (SAMPLES, 7))
     off = box.joint * np.where(rng.random((SAMPLES, 7)) < 0.5, inside, ends)
-    q = motion.joints_at(moments) + off * (np.arange(7) > 0)
+    q = motion.path.at_moments(moments) + off * (np.arange(7) > 0)
     points = joint_centres(arm, q[:, 0], q[:, 1::2], q[:, 2::2])
     points = np.einsum("sij,skj->ski", turns(rng, box.base_turn), points)
     shift = rng.normal(size=(SAMPLES, 1, 3))

@@ -83,7 +83,9 @@ def centres(problem: PlanningProblem, motion: Trajectory, t: FloatArray) -> Floa
     if motion.n_samples == 1:
         q = np.repeat(motion.joints, len(t), axis=0)
     else:
-        q = motion.joints_at(np.interp(t, motion.times, np.arange(motion.n_samples)))
+        q = motion.path.at_moments(
+            np.interp(t, motion.times, np.arange(motion.n_samples))
+        )
     n, frame = len(t), np.tile(np.eye(3), (len(t), 1, 1))
     points = [np.column_stack([q[:, 0], np.zeros((n, 2))])]
     for link, length in enumerate(problem.manipulator.link_lengths):

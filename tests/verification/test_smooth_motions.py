@@ -9,6 +9,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.limits import check_limits
 from vdsm_pin.verification.records import Check, Verdict, Verification
 from vdsm_pin.verification.robot_model import load_robot
@@ -139,11 +140,18 @@ def test_limits_hold_over_the_curve_and_not_at_its_knots_alone(tmp_path: Path) -
     assert found["base on its rail"].worst == pytest.approx(1.001, abs=1e-4)
 
 
-def test_a_peak_at_the_limit_itself_is_not_decided(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("tolerances", "verdict"),
+    [(0.0, "certified"), (0.99, "certified"), (1.0, "undecided"), (1.02, "refuted")],
+)
+def test_a_peak_at_the_limit_is_held_against_the_tolerance(
+    tolerances: float, verdict: str, tmp_path: Path
+) -> None:
     q, rates = np.zeros((2, 7)), np.zeros((2, 7))
-    q[:, 1], rates[0, 1] = np.deg2rad(49.0), np.deg2rad(1.0) / BULGE
+    over = tolerances * TOLERANCES.joint_limit
+    q[:, 1], rates[0, 1] = np.deg2rad(49.0) + over, np.deg2rad(1.0) / BULGE
     (box, *_) = check_limits(problem_of(tmp_path), motion_of(q, np.arange(2.0), rates))
-    assert box.verdict is Verdict.UNDECIDED
+    assert box.verdict.value == verdict
 
 
 def test_the_change_from_row_to_row_is_that_of_the_curve(tmp_path: Path) -> None:
@@ -292,7 +300,7 @@ def test_parts_of_a_curve_are_the_curve(quintic: bool) -> None:
     t = np.linspace(times[0], times[-1], 400)
     exact = curve(motion, t)
     moments = np.interp(t, times, np.arange(4.0))
-    np.testing.assert_allclose(motion.joints_at(moments), exact, atol=1e-12)
+    np.testing.assert_allclose(motion.path.at_moments(moments), exact, atol=1e-12)
     np.testing.assert_allclose(curve(motion.refined(5), t), exact, atol=1e-12)
     part = motion.between(1.25, 1.7)
     assert part.times is not None

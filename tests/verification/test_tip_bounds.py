@@ -68,7 +68,7 @@ def seen_deviation(problem: PlanningProblem, motion: Trajectory) -> np.ndarray:
             if run[k]:
                 at = (corners - start[k]) / run[k]
                 t = np.append(t, at[(at > 0.0) & (at < 1.0)])
-            tips = tips_of(motion.joints_at(k + t))
+            tips = tips_of(motion.path.at_moments(k + t))
             places = path.at(wrapped(path, start[k] + run[k] * t))
             worst[k] = np.linalg.norm(tips - places, axis=1).max()
     return worst
@@ -84,7 +84,7 @@ def test_the_second_derivative_is_the_sum_of_the_docs(
         _, motion = random_motion(rng, degree)
         found = second_derivatives(ARM, motion)
         assert found.shape == (motion.n_samples - 1,)
-        for k, piece in enumerate(motion.controls):
+        for k, piece in enumerate(motion.path.controls):
             rates = derivative(piece[None])[0]
             changes = derivative(rates[None])[0] if degree > 1 else 0.0 * rates
             expected = np.abs(changes[:, 0]).max() if degree > 1 else 0.0

@@ -83,9 +83,6 @@ class OtherArms:
 def _carrier(
     name: str, arm: Manipulator, motion: Trajectory, pose: FloatArray
 ) -> Carrier:
-    from vdsm_pin.proof.paths import Path as Motion  # compiled code, which few need
-
     joints = list(arm_tree(arm).joints)
     joints[RAIL] = replace(joints[RAIL], placement=pose)
-    path = Motion(motion.joints, motion.inner, motion.times)
-    return Carrier(Tree(tuple(joints)), path, name)
+    return Carrier(Tree(tuple(joints)), motion.path, name)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from vdsm_pin.geometry import bernstein
 from vdsm_pin.geometry.arrays import (
     BoolArray,
     FloatArray,
-    IntArray,
     freeze,
     frozen,
     same_arrays,
@@ -19,6 +18,9 @@ from vdsm_pin.geometry.arrays import (
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
+
+if TYPE_CHECKING:
+    from vdsm_pin.proof.paths import Path
 
 MAX_ROWS: Final = 5_000_000
 """Largest number of rows of one trajectory."""
@@ -194,26 +196,14 @@ class Trajectory(Summarised):
         return "cubic" if self.changes is None else "quintic"
 
     @cached_property
-    def inner(self) -> FloatArray:
-        """Control points of `joints` between two rows, of straight lines none.
+    def path(self) -> "Path":
+        """How `joints` move: the rows and what joins them."""
+        from vdsm_pin.proof.paths import Path  # compiled code, which few need
 
-        Shape (n_samples - 1, degree - 1, 1 + 2N); [m], [rad].
-        """
-        if self.rates is None or self.times is None or self.n_samples == 1:
-            return frozen(np.zeros((0, 0, 1 + 2 * self.n_links)))
-        rows, more = self.joints, self.changes
-        return frozen(bernstein.hermite(rows, self.rates, more, self.times))
-
-    @property
-    def controls(self) -> FloatArray:
-        """Control points of every piece, (n_samples - 1, degree + 1, 1 + 2N)."""
-        return self.pieces(np.arange(self.n_samples - 1))
-
-    def pieces(self, k: IntArray) -> FloatArray:
-        """The same of some pieces, shape (m,)."""
-        rows, inner = self.joints, self.inner
-        between = inner[k] if self.is_smooth else np.zeros((k.size, 0, rows.shape[1]))
-        return np.concatenate([rows[k, None], between, rows[k + 1, None]], axis=1)
+        rows, inner = self.joints, frozen(np.zeros((0, 0, 0)))
+        if self.rates is not None and self.times is not None and self.n_samples > 1:
+            inner = bernstein.hermite(rows, self.rates, self.changes, self.times)
+        return Path(rows, inner, self.times)
 
     def part(self, first: int, last: int) -> "Trajectory":
         """The rows from `first` up to `last`, or to the end where there are fewer."""
@@ -227,29 +217,14 @@ class Trajectory(Summarised):
             None if self.changes is None else self.changes[rows],
         )
 
-    def joints_at(self, moments: FloatArray) -> FloatArray:
-        """Joint values at moments in waypoints, shape (m,): (m, 1 + 2N)."""
-        before = np.minimum(moments.astype(np.int64), self.n_samples - 1)
-        after = np.minimum(before + 1, self.n_samples - 1)
-        share, rows = moments - before, self.joints
-        if not self.is_smooth:
-            steps = rows[after] - rows[before]
-            return np.asarray(rows[before] + share[:, None] * steps)
-        found, within = rows[before], share > 0.0
-        pieces = self.pieces(before[within])
-        found[within] = bernstein.value(pieces, share[within])
-        return found
-
     def times_at(self, moments: FloatArray) -> FloatArray | None:
         """Times of moments in waypoints, shape (m,); [s]. None where not known."""
-        if self.times is None:
-            return None
-        return np.interp(moments, np.arange(self.n_samples), self.times)
+        return self.path.times_at(moments)
 
     def at(self, moments: FloatArray) -> "Trajectory":
         """Rows at moments in waypoints, shape (m,); with times where those rise."""
         before = np.minimum(moments.astype(np.int64), self.n_samples - 1)
-        joints, times = self.joints_at(moments), self.times_at(moments)
+        joints, times = self.path.at_moments(moments), self.times_at(moments)
         if times is not None and not (np.diff(times) > 0.0).all():
             times = None
         return Trajectory.of_joints(
@@ -287,12 +262,12 @@ class Trajectory(Summarised):
         path_m: FloatArray | None = None,
     ) -> "Trajectory":
         """The same motion with rows at rising moments in waypoints."""
-        joints, times = self.joints_at(moments), self.times_at(moments)
+        joints, times = self.path.at_moments(moments), self.times_at(moments)
         if not self.is_smooth or self.times is None:
             return Trajectory.of_joints(joints, on_path, path_m, times)
         k = np.minimum(moments.astype(np.int64), self.n_samples - 2)
         step, share = np.diff(self.times)[k, None], moments - k
-        once = bernstein.derivative(self.pieces(k))
+        once = bernstein.derivative(self.path.pieces(k))
         rates, changes = bernstein.value(once, share) / step, None
         if self.changes is not None:
             twice = bernstein.derivative(once)

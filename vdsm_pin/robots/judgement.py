@@ -31,8 +31,8 @@ from vdsm_pin.robots.inside import (
     locate_links,
     points_inside,
 )
-from vdsm_pin.robots.model import Robot, RobotJoint
-from vdsm_pin.robots.rates import largest_of, rate_checks
+from vdsm_pin.robots.model import Robot
+from vdsm_pin.robots.rates import rate_checks
 from vdsm_pin.robots.second_opinion import pose_difference
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
@@ -44,6 +44,7 @@ from vdsm_pin.verification.clearance_check import LINKS, Evidence, clearance_che
 from vdsm_pin.verification.coal_check import Evidence as CoalEvidence
 from vdsm_pin.verification.coal_shapes import disagreement
 from vdsm_pin.verification.enclosed import enclosed_least
+from vdsm_pin.verification.extremes import range_check
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import LINKS as INSIDE
 from vdsm_pin.verification.inside import check_inside
@@ -196,12 +197,15 @@ def _poses(robot: Robot, path: Path, whose: str = "") -> Check:
 
 
 def _limits(robot: Robot, path: Path) -> list[Check]:
-    """A row for each joint with limits."""
-    return [
-        _limit(joint, path, k)
-        for k, joint in enumerate(robot.joints)
-        if np.isfinite([joint.lower, joint.upper]).all()
-    ]
+    """A row for each joint with limits; slack for the arithmetic of readers."""
+    rows = []
+    for k, joint in enumerate(robot.joints):
+        ends = joint.lower, joint.upper
+        if np.isfinite(ends).all():
+            name, n = LIMITS.format(name=joint.name), len(path.knots)
+            row = Check(name, Verdict.UNDECIDED, n, nan, nan, joint.unit, joint.whose)
+            rows.append(range_check(path, k, ends, TOLERANCES.arithmetic, row))
+    return rows
 
 
 def _limits_of_others(cell: Cell) -> Iterator[Check]:
@@ -210,35 +214,6 @@ def _limits_of_others(cell: Cell) -> Iterator[Check]:
         rates = rate_checks(one.robot.joints, one.path)
         for check in (*_limits(one.robot, one.path), *rates):
             yield replace(check, name=f"{one.name}: {check.name}", moment=nan)
-
-
-def _limit(joint: RobotJoint, path: Path, k: int) -> Check:
-    """Of the joint of column k; control points hold what lies between waypoints."""
-    slack = TOLERANCES.arithmetic
-    knots, between = path.knots[:, k], path.controls[..., k]
-    past = np.maximum(knots - joint.upper, joint.lower - knots)
-    row = int(np.argmax(past))
-    verdict, value, moment = Verdict.CERTIFIED, float(knots[row]), float(row)
-    if not (past <= slack).all():
-        verdict = Verdict.REFUTED
-    elif between.size:
-        middle, room = 0.5 * (joint.lower + joint.upper), joint.upper - joint.lower
-        verdict, _, found = largest_of(between - middle, 0.5 * room + slack)
-        if verdict is not Verdict.CERTIFIED:
-            number = min(int(found), path.n_intervals - 1)
-            there = path.within(np.array([number]), np.array([found - number]))
-            value, moment = float(there[0, k]), found
-    upper = value - joint.upper >= joint.lower - value
-    return Check(
-        LIMITS.format(name=joint.name),
-        verdict,
-        len(past),
-        value,
-        joint.upper if upper else joint.lower,
-        joint.unit,
-        joint.whose,
-        moment,
-    )
 
 
 def _coal(

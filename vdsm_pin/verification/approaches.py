@@ -81,7 +81,7 @@ def _station(
     problem: PlanningProblem, trajectory: Trajectory, near: ClosestApproach
 ) -> float:
     """Arc length along the link's axis of the point nearest to the witness; [m]."""
-    joints, link = trajectory.joints_at(np.array([near.moment])), near.pair.link
+    joints, link = trajectory.path.at_moments(np.array([near.moment])), near.pair.link
     now = joints[:, 0], joints[:, 1::2], joints[:, 2::2]
     centres = joint_centres(problem.manipulator, *now)[0]
     length = float(problem.manipulator.link_lengths[link - 1])

@@ -182,15 +182,14 @@ def whole_path(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Path, 
     Raises:
         InvalidInput: If obstacles move and the trajectory has no times.
     """
-    path = Path(trajectory.joints, trajectory.inner, trajectory.times)
-    return joined_path(path, problem.scene)
+    return joined_path(trajectory.path, problem.scene)
 
 
 def whole_rows(
     problem: PlanningProblem, trajectory: Trajectory, moments: FloatArray
 ) -> FloatArray:
     """Rows of all columns at moments in waypoints, shape (m,): (m, n_columns)."""
-    rows, times = trajectory.joints_at(moments), trajectory.times_at(moments)
+    rows, times = trajectory.path.at_moments(moments), trajectory.times_at(moments)
     if times is None:
         return rows
     carried = (carrier.path.at(times) for carrier in problem.scene.carriers)

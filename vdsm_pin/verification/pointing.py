@@ -79,7 +79,7 @@ class _Motion:
         moves = after > first
         self.pieces = np.repeat(trajectory.joints[first, None], 2, axis=1)
         if moves.any():
-            pieces = trajectory.pieces(first[moves])
+            pieces = trajectory.path.pieces(first[moves])
             shape = len(first), pieces.shape[1], pieces.shape[2]
             self.pieces = np.broadcast_to(self.pieces[:, :1], shape).copy()
             self.pieces[moves] = pieces

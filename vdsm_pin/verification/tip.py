@@ -69,9 +69,11 @@ def second_derivatives(manipulator: Manipulator, trajectory: Trajectory) -> Floa
     As of docs/proof.md: each link counts with the square of how fast all joints before
     it turn, and with how fast that changes.
     """
-    result = np.zeros(max(0, trajectory.n_samples - 1))
+    path, result = trajectory.path, np.zeros(max(0, trajectory.n_samples - 1))
     for first in range(0, result.size, CHUNK):
-        rates = derivative(trajectory.part(first, first + CHUNK + 1).controls)
+        rates = derivative(
+            path.pieces(np.arange(first, min(first + CHUNK, result.size)))
+        )
         most, turns = np.abs(rates).max(axis=1), np.zeros((len(rates), 1))
         turning = np.cumsum(most[:, 1::2] + most[:, 2::2], axis=1) ** 2
         if trajectory.is_smooth:

@@ -1,0 +1,155 @@
+"""Extremes of a motion over its intervals, not at its rows only.
+
+A measure of joint values is largest at an end of every straight line. So the control
+points of a smooth piece bound it there, and pieces are cut where they do not decide.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from math import inf, nan
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.bernstein import part
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.tolerances import TOLERANCES
+from vdsm_pin.verification.records import Check, Verdict
+
+CHUNK: Final = 65_536
+"""Rows treated at once, so that memory stays bounded."""
+
+CUTS: Final = 5
+"""How often a smooth piece is halved that may hold the largest value: the control
+points of its parts lie within a thousandth of its bulge of the curve."""
+
+PARTS: Final = 2**CUTS
+
+MOST_CUTS: Final = 20
+"""How often it is halved where a limit is not decided before."""
+
+Measure: TypeAlias = Callable[[FloatArray], FloatArray]
+"""Of rows of joint values (m, n_columns), shape (m, n)."""
+
+Pieces: TypeAlias = Iterable[tuple[int, FloatArray]]
+"""Control points of some pieces, shape (m, degree + 1, n_columns), and the number of
+the first one. A row by itself is a piece of degree 0."""
+
+
+@dataclass(frozen=True)
+class Largest:
+    """The largest value of a measure that was seen, and a bound of it.
+
+    Args:
+        seen: At a moment of the motion.
+        moment: That moment, in waypoints.
+        column: Which of the values of the measure it is, from 0.
+        bound: From above over the whole motion.
+    """
+
+    seen: float = -inf
+    moment: float = nan
+    column: int = 0
+    bound: float = -inf
+
+    def larger(self, values: FloatArray, moments: FloatArray | IntArray) -> "Largest":
+        """This, or the largest of values (m, n) seen at moments (m,)."""
+        at, column = np.unravel_index(int(np.argmax(values)), values.shape)
+        value = float(values[at, column])
+        if not value > self.seen:
+            return self
+        bound = np.fmax(self.bound, value)
+        return Largest(value, float(moments[at]), int(column), float(bound))
+
+    def bounded(self, values: FloatArray) -> "Largest":
+        """The same where the measure may be as large as some values; NaN may be all."""
+        return replace(self, bound=float(np.max(values, initial=self.bound)))
+
+    def verdict(self, limit: float) -> Verdict:
+        """What this says of a limit."""
+        if self.bound <= limit:
+            return Verdict.CERTIFIED
+        return Verdict.UNDECIDED if self.seen <= limit else Verdict.REFUTED
+
+    def worst(self, limit: float) -> float:
+        """The value that decides."""
+        return self.bound if self.bound <= limit else self.seen
+
+
+def pieces_of(path: Path) -> Iterator[tuple[int, FloatArray]]:
+    """What joins the rows of a motion; of straight lines the rows alone."""
+    if path.degree == 1:
+        for first in range(0, path.n_samples, CHUNK):
+            yield first, path.knots[first : first + CHUNK, None]
+        return
+    step = CHUNK // PARTS
+    for first in range(0, path.n_intervals, step):
+        numbers = np.arange(first, min(first + step, path.n_intervals))
+        yield first, path.pieces(numbers)
+
+
+def largest(pieces: Pieces, measure: Measure, limit: float) -> Largest:
+    """Largest value of a measure over a motion.
+
+    Args:
+        pieces: Of the motion.
+        measure: Of its rows; largest at an end of every straight line.
+        limit: What it is held against.
+    """
+    found = Largest()
+    for first, controls in pieces:
+        found = _with_pieces(found, first, controls, measure, limit)
+    return found
+
+
+def _with_pieces(
+    found: Largest, first: int, controls: FloatArray, measure: Measure, limit: float
+) -> Largest:
+    """The largest value, some pieces included."""
+    start, width = first + np.arange(float(len(controls))), 1.0
+    for cut in range(MOST_CUTS + 1):
+        values = measure(controls.reshape(-1, controls.shape[2]))
+        values = values.reshape(*controls.shape[:2], -1)
+        found = found.larger(values[:, 0], start).larger(values[:, -1], start + width)
+        most = values.max(axis=(1, 2))
+        enough = found.seen + TOLERANCES.arithmetic
+        may_be_larger = ~(most <= (enough if cut < CUTS else max(enough, limit)))
+        settled = cut >= CUTS and found.seen > limit
+        if settled or cut == MOST_CUTS or not may_be_larger.any():
+            break
+        found = found.bounded(most[~may_be_larger])
+        width *= 0.5
+        halves = np.repeat(controls[may_be_larger], 2, axis=0)
+        low = np.tile([0.0, 0.5], len(halves) // 2)
+        controls = part(halves, low, low + 0.5)
+        start = np.repeat(start[may_be_larger], 2) + 2.0 * width * low
+    return found.bounded(most)
+
+
+def range_check(
+    path: Path, column: int, ends: tuple[float, float], slack: float, row: Check
+) -> Check:
+    """Whether a column keeps within its range: what comes nearest to an end of it.
+
+    Args:
+        path: The motion.
+        column: Which one.
+        ends: Of the range; [m] or [rad].
+        slack: How far beyond its ends is allowed; [m] or [rad].
+        row: What is said besides.
+    """
+    low, high = ends
+
+    def beyond(q: FloatArray) -> FloatArray:
+        return np.stack([low - q[:, column], q[:, column] - high], axis=1)
+
+    found = largest(pieces_of(path), beyond, slack)
+    worst = found.worst(slack)
+    return replace(
+        row,
+        verdict=found.verdict(slack),
+        worst=high + worst if found.column else low - worst,
+        limit=high if found.column else low,
+        moment=found.moment,
+    )
