@@ -13,7 +13,7 @@ from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.paths import Path, cubic_path, together
-from vdsm_pin.proof.prover import Proof, prove
+from vdsm_pin.proof.prover import Proof, prove, start_proof, summed, verdicts_of
 from vdsm_pin.proof.stretches import Stretches
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
 from vdsm_pin.proof.tree import Joint, Kind, Tree, free_tree, shifted
@@ -59,10 +59,16 @@ def test_intervals_are_judged_as_each_by_itself(seed: int) -> None:
     )]  # fmt: skip
     pairs = [Pair(k, 0, 0.05) for k in (1, 2, 3)]
     path = Path(rng.uniform(-3.0, 3.0, (7, 1)))
-    stretches = Stretches(turning_arm(), bodies, path, pairs)
+    proving, plan = start_proof(turning_arm(), bodies, path, PairTable.of(pairs))
+    stretches = Stretches(proving, np.arange(proving.n_pairs))
     found = stretches.each()
     assert found is not None
-    verdicts, upper = found
+    # REFUTED is the largest where nothing is undecided.
+    verdicts, upper = (
+        fold.reduceat(parts, np.searchsorted(plan.owner, np.arange(3)), axis=1)
+        for fold, parts in zip((np.maximum, np.minimum), found, strict=True)
+    )
+    assert CERTIFIED < REFUTED and (found[0] != UNDECIDED).all()
     assert len({*verdicts.ravel().tolist()}) == 2
     for k in range(6):
         one = prove(turning_arm(), bodies, path.between(k, k + 1), pairs)
@@ -70,7 +76,9 @@ def test_intervals_are_judged_as_each_by_itself(seed: int) -> None:
         assert (upper[k] >= one.upper - 1e-9).all()
         assert ((upper[k] < 0.05) == (one.verdict == REFUTED)).all()
         halves = [stretches.over(k + low, k + low + 0.5) for low in (0.0, 0.5)]
-        worst = np.maximum(*(half.verdict for half in halves))
+        worst = np.maximum(*(
+            summed(results, plan, 3, in_time).verdict for results, in_time in halves
+        ))  # fmt: skip
         np.testing.assert_array_equal(worst, one.verdict)
 
 
@@ -82,14 +90,20 @@ def test_a_stretch_is_judged_whatever_was_asked_before(seed: int) -> None:
         ball(0, *rng.uniform(-1.0, 1.0, 2), 0.0, 0.2) for _ in range(12)
     )]  # fmt: skip
     pairs = [Pair(k, 0, 0.05) for k in range(1, 13)]
-    asked = turning_arm(), bodies, Path(np.linspace(-3.0, 3.0, 25)[:, None]), pairs
-    stretches, met = Stretches(*asked), 0
+    path = Path(np.linspace(-3.0, 3.0, 25)[:, None])
+    asked, met = (turning_arm(), bodies, path, PairTable.of(pairs)), 0
+
+    def started() -> Stretches:
+        return Stretches(start_proof(*asked)[0], np.arange(12))
+
+    stretches = started()
     for k in range(60):
         low, high = np.sort(rng.uniform(0.0, 24.0, 2))
         low, high = (floor(low), ceil(high)) if k % 2 else (low, high)
-        fresh, found = Stretches(*asked).over(low, high), stretches.over(low, high)
-        np.testing.assert_array_equal(found.verdict, fresh.verdict)
-        met += (found.verdict != CERTIFIED).sum()
+        (fresh, _), (found, _) = started().over(low, high), stretches.over(low, high)
+        verdict = verdicts_of(found.counts)
+        np.testing.assert_array_equal(verdict, verdicts_of(fresh.counts))
+        met += (verdict != CERTIFIED).sum()
     assert met
 
 

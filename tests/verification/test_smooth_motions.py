@@ -302,7 +302,3 @@ def test_parts_of_a_curve_are_the_curve(quintic: bool) -> None:
     moments = np.interp(t, times, np.arange(4.0))
     np.testing.assert_allclose(motion.path.at_moments(moments), exact, atol=1e-12)
     np.testing.assert_allclose(curve(motion.refined(5), t), exact, atol=1e-12)
-    part = motion.between(1.25, 1.7)
-    assert part.times is not None
-    some = np.linspace(*part.times, 50)
-    np.testing.assert_allclose(curve(part, some), curve(motion, some), atol=1e-12)

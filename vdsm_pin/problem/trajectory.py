@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 
 from vdsm_pin.errors import InvalidInput
-from vdsm_pin.geometry import bernstein
 from vdsm_pin.geometry.arrays import (
     BoolArray,
     FloatArray,
@@ -15,6 +14,7 @@ from vdsm_pin.geometry.arrays import (
     frozen,
     same_arrays,
 )
+from vdsm_pin.geometry.bernstein import derivative, hermite, value
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
@@ -202,7 +202,7 @@ class Trajectory(Summarised):
 
         rows, inner = self.joints, frozen(np.zeros((0, 0, 0)))
         if self.rates is not None and self.times is not None and self.n_samples > 1:
-            inner = bernstein.hermite(rows, self.rates, self.changes, self.times)
+            inner = hermite(rows, self.rates, self.changes, self.times)
         return Path(rows, inner, self.times)
 
     def part(self, first: int, last: int) -> "Trajectory":
@@ -231,45 +231,21 @@ class Trajectory(Summarised):
             joints, self.on_path[before], self.path_m[before], times
         )
 
-    def between(self, low: float, high: float) -> "Trajectory":
-        """The motion from one moment to another, both rows or both in one interval.
-
-        Inside an interval it has two rows, and its tip draws nothing. Of a single row
-        the row itself.
-        """
-        if self.n_samples == 1:
-            return self
-        if not (low % 1.0 or high % 1.0):
-            return self.part(int(low), int(high) + 1)
-        return self._through(np.array([low, high]))
-
     def refined(self, parts: int) -> "Trajectory":
         """The same smooth motion with every piece cut into so many equal ones."""
-        if not self.is_smooth:
+        if self.rates is None or self.times is None or self.n_samples == 1:
             return self
-        steps, share = np.divmod(np.arange((self.n_samples - 1) * parts + 1), parts)
-        after = np.minimum(steps + 1, self.n_samples - 1)
+        k, share = np.divmod(np.arange((self.n_samples - 1) * parts + 1), parts)
+        after = np.minimum(k + 1, self.n_samples - 1)
         # A row in between is on the path where both its neighbours are.
-        on_path = self.on_path[steps] & (self.on_path[after] | (share == 0))
+        on_path = self.on_path[k] & (self.on_path[after] | (share == 0))
         share = share / parts
-        way = self.path_m[after] - self.path_m[steps]
-        return self._through(steps + share, on_path, self.path_m[steps] + share * way)
-
-    def _through(
-        self,
-        moments: FloatArray,
-        on_path: BoolArray | None = None,
-        path_m: FloatArray | None = None,
-    ) -> "Trajectory":
-        """The same motion with rows at rising moments in waypoints."""
-        joints, times = self.path.at_moments(moments), self.times_at(moments)
-        if not self.is_smooth or self.times is None:
-            return Trajectory.of_joints(joints, on_path, path_m, times)
-        k = np.minimum(moments.astype(np.int64), self.n_samples - 2)
-        step, share = np.diff(self.times)[k, None], moments - k
-        once = bernstein.derivative(self.path.pieces(k))
-        rates, changes = bernstein.value(once, share) / step, None
+        path_m = self.path_m[k] + share * (self.path_m[after] - self.path_m[k])
+        rows = self.path.at_moments(k + share), on_path, path_m
+        k, share[-1] = np.minimum(k, self.n_samples - 2), 1.0
+        step, once = np.diff(self.times)[k, None], derivative(self.path.pieces(k))
+        rates, changes = value(once, share) / step, None
         if self.changes is not None:
-            twice = bernstein.derivative(once)
-            changes = bernstein.value(twice, share) / step**2
-        return Trajectory.of_joints(joints, on_path, path_m, times, rates, changes)
+            changes = value(derivative(once), share) / step**2
+        times = np.interp(k + share, np.arange(self.n_samples), self.times)
+        return Trajectory.of_joints(*rows, times, rates, changes)

@@ -98,6 +98,11 @@ class Proving:
         return max(1, len(self.motion.knots) - 1)
 
     @property
+    def n_pairs(self) -> int:
+        """Number of pairs."""
+        return len(self.results.best)
+
+    @property
     def share(self) -> float:
         """How much is judged, 0 to 1; may be asked while it is."""
         settled = self.broad.settled[self.broad.number >= 0].sum()
@@ -143,8 +148,8 @@ class Proving:
 
     def new_results(self) -> Results:
         """Where to write what is asked again."""
-        n_pairs, columns = len(self.results.best), self.results.profile.shape[1]
-        return new_results(n_pairs, columns, self.n_intervals, self.budget)
+        columns = self.results.profile.shape[1]
+        return new_results(self.n_pairs, columns, self.n_intervals, self.budget)
 
     def fresh(self, results: Results) -> "Proving":
         """The same question with nothing found yet; the planes are carried on."""

@@ -1,6 +1,5 @@
 """Proofs of stretches of one motion, one after the other, by one task."""
 
-from collections.abc import Sequence
 from math import floor
 from typing import Final
 
@@ -9,9 +8,6 @@ import numpy as np
 from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.geometry.kernels import NEAR, NORMAL
-from vdsm_pin.proof.bodies import Body, Pair, PairTable
-from vdsm_pin.proof.budget import Budget
-from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.layouts import (
     AT_LOWER,
     AT_UPPER,
@@ -32,12 +28,10 @@ from vdsm_pin.proof.layouts import (
     WHEN,
 )
 from vdsm_pin.proof.motions import Motion
-from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import RANK, Proof, start_proof, summed
-from vdsm_pin.proof.proving import dense_rows
+from vdsm_pin.proof.proving import Proving, dense_rows
+from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.search import Slicing, new_witness, resolve
 from vdsm_pin.proof.terms import Task
-from vdsm_pin.proof.tree import Tree
 from vdsm_pin.proof.witnesses import place_witness
 from vdsm_pin.proof.workspace import Workspace
 
@@ -46,43 +40,38 @@ MOST_BRACKETS: Final = 500_000
 
 
 class Stretches:
-    """A motion of which stretches are asked about; arguments as for `prove`.
+    """A motion of which stretches are asked about.
 
-    Raises:
-        ValueError: If bodies, pairs, path and tree do not fit together.
+    Args:
+        proving: Of the whole motion.
+        pairs: Numbers of the pairs that are asked about within intervals; the others
+            are known to be certified.
     """
 
-    def __init__(
-        self,
-        tree: Tree,
-        bodies: Sequence[Body],
-        path: Path,
-        pairs: Sequence[Pair],
-        errors: ErrorBox | None = None,
-        budget: Budget | None = None,
-    ) -> None:
-        self._table = PairTable.of(pairs)
-        started = start_proof(tree, bodies, path, self._table, errors, budget)
-        self._proving, self._plan = started
+    def __init__(self, proving: Proving, pairs: IntArray) -> None:
+        self._proving, self._pairs = proving, pairs
 
-    def over(self, low: float, high: float) -> Proof:
+    def over(self, low: float, high: float) -> tuple[Results, bool]:
         """What is proved of every pair between two moments, no bracket narrowed.
 
         Args:
             low: In knots of the path, as 1.25 is a quarter of the way from 1 to 2.
             high: Not before; both may be one moment.
+
+        Returns:
+            The results, and whether there was time for all.
         """
-        proving, in_time = self._proving, True
+        proving = self._proving
         results = proving.new_results()
         if low == floor(low) < high == floor(high):
             fresh = proving.fresh(results)
             in_time = fresh.judge(int(low), int(high))
             fresh.place_witnesses()
-        else:
-            slices = _slices(low, high, proving.n_intervals)
-            asked = proving.task, proving.motion, proving.work
-            _judge_slices(*asked, results.best, results.counts, slices)
-        return summed(results, self._plan, self._table.size, in_time)
+            return results, in_time
+        slices = _slices(low, high, proving.n_intervals)
+        asked = proving.task, proving.motion, proving.work, self._pairs
+        _judge_slices(*asked, results.best, results.counts, slices)
+        return results, True
 
     def each(self) -> tuple[IntArray, FloatArray] | None:
         """What is proved of every interval by itself.
@@ -91,16 +80,14 @@ class Stretches:
             Verdicts and upper bounds, shape (n_intervals, n_pairs) each; [m]. None
             where they are more than `MOST_BRACKETS`, or the time ended before.
         """
-        n_intervals, owner = self._proving.n_intervals, self._plan.owner
-        if n_intervals * len(owner) > MOST_BRACKETS:
+        n_intervals, n_pairs = self._proving.n_intervals, self._proving.n_pairs
+        if n_intervals * n_pairs > MOST_BRACKETS:
             return None
-        dense = dense_rows(n_intervals, len(owner))
+        dense = dense_rows(n_intervals, n_pairs)
         results = self._proving.new_results()._replace(dense=dense)
         if not self._proving.fresh(results).sweep(0, n_intervals):
             return None
-        first = np.searchsorted(owner, np.arange(self._table.size))
-        worst = np.maximum.reduceat(RANK[dense.verdict], first, axis=1)
-        return RANK[worst], np.minimum.reduceat(dense.upper, first, axis=1)
+        return dense.verdict, dense.upper
 
 
 def _slices(low: float, high: float, n_intervals: int) -> FloatArray:
@@ -116,16 +103,18 @@ def _judge_slices(
     task: Task,
     motion: Motion,
     work: Workspace,
+    pairs: IntArray,
     best: FloatArray,
     counts: IntArray,
     slices: FloatArray,
 ) -> None:
-    """Decide every pair over some slices, each as a whole of its own.
+    """Decide some pairs over some slices, each as a whole of its own.
 
     Args:
         task: The scene, pairs and rules.
         motion: Rows of joint values.
         work: Working space; what the pairs remember is carried on.
+        pairs: Their numbers, shape (m,).
         best: Least bounds of each pair, nothing found yet, shape (n_pairs, BEST).
         counts: Slices of each pair by verdict, shape (n_pairs, 3).
         slices: Interval, start and end of each, shape (n, 3).
@@ -133,7 +122,7 @@ def _judge_slices(
     task, motion, work = borrowed(task), borrowed(motion), borrowed(work)
     row, space = np.zeros(SLICE), work.space
     slicing = Slicing(task, motion, work.ends, space)
-    for pair in range(best.shape[0]):
+    for pair in pairs:
         least, plane = best[pair], work.planes[pair]
         for k in range(slices.shape[0]):
             row[INTERVAL], row[PAIR] = slices[k, 0], pair

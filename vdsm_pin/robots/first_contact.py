@@ -5,10 +5,13 @@ from typing import Final
 
 import numpy as np
 
+from vdsm_pin.geometry.arrays import BoolArray
 from vdsm_pin.proof.bodies import Pair as BodyPair
+from vdsm_pin.proof.bodies import PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.prover import start_proof, summed
 from vdsm_pin.proof.stretches import Stretches
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.robots.cell import Cell
@@ -77,14 +80,16 @@ class _Judge:
     ) -> None:
         self._cell, self._pairs, self._deadline = cell, pairs, deadline
         self._path, self._knots = in_short_parts(*joined_path(path, cell.scene))
-        asked, budget = (self._path, pairs, box), Budget(until=deadline.end)
-        self._stretches = Stretches(cell.tree, cell.bodies, *asked, budget)
+        asked = self._path, PairTable.of(pairs), box, Budget(until=deadline.end)
+        proving, self._plan = start_proof(cell.tree, cell.bodies, *asked)
+        self._stretches = Stretches(proving, np.arange(proving.n_pairs))
 
     def __call__(self, low: float, high: float) -> Judged:
         """What is proved, balls in both bodies included."""
         self._deadline.check()
         span = self._knots.inner(np.array([low, high]))
-        proof = self._stretches.over(*span.tolist())
+        results, in_time = self._stretches.over(*span.tolist())
+        proof = summed(results, self._plan, len(self._pairs), in_time)
         return least_clearances(
             self._cell, self._pairs, self._path, proof, ENOUGH, span
         )
@@ -95,7 +100,7 @@ class _Judge:
         if found is None:
             return None
         refuted, near = (
-            np.logical_or.reduceat(one, self._knots.first[:-1])
+            np.logical_or.reduceat(self._by_pair(one), self._knots.first[:-1])
             for one in (found[0] == REFUTED, found[1] <= MEETING)
         )
         meeting = np.flatnonzero((near & ~refuted).any(axis=1))
@@ -109,3 +114,8 @@ class _Judge:
             np.asarray(refuted[:, outer == k].any(axis=1)) for k in (False, True)
         )
         return dict(zip((False, True), of_kind, strict=True))
+
+    def _by_pair(self, parts: BoolArray) -> BoolArray:
+        """Whether it is so of any part of each pair, of each interval."""
+        first = np.searchsorted(self._plan.owner, np.arange(len(self._pairs)))
+        return np.asarray(np.logical_or.reduceat(parts, first, axis=1))
