@@ -110,8 +110,9 @@ def markdown(rows: list[dict[str, str]], swept: list[dict[str, str]]) -> str:
     """The tables for reading."""
     lines = ["# Plans in closed loop", "", "Made by `python analysis/closed_loop.py`; "
              "what is assumed: [docs/simulation.md](../../docs/simulation.md). \"Any "
-             "motion within that error\": the largest error of any joint at any time "
-             "fed to the proof as the error of every joint.", ""]  # fmt: skip
+             "motion within that error\": the largest error of any joint at any step "
+             "of the controller fed to the proof as the error of every joint, and that "
+             "of x0 as the base's.", ""]  # fmt: skip
     planned, changed = (
         table_lines(list(some[0]), [one.values() for one in some])
         for some in (rows, swept)

@@ -92,6 +92,19 @@ def test_a_kick_is_felt_at_its_joint_and_recovered_from(
     assert np.rad2deg(np.abs(kicked.errors[-5:]).max()) < 0.3
 
 
+def test_largest_errors_and_tension_do_not_depend_on_what_is_recorded(
+    calm: Simulation,
+) -> None:
+    """Recorded at every step of the controller, nothing is larger than what is told."""
+    every = run(record_s=0.005)
+    worst = np.abs(every.executed - every.planned).max(axis=0)
+    np.testing.assert_allclose(every.largest_errors, worst, rtol=0.0, atol=1e-15)
+    assert every.largest_tension == every.tensions.max()
+    np.testing.assert_array_equal(calm.largest_errors, every.largest_errors)
+    assert calm.largest_tension == every.largest_tension
+    assert every.largest_errors[0] > 1e-4  # the rail's drive lags behind
+
+
 def test_half_the_step_changes_angles_by_less_than_a_hundredth_of_a_degree(
     calm: Simulation,
 ) -> None:
@@ -146,6 +159,9 @@ def test_a_folder_holds_what_the_verifier_takes(tmp_path: Path) -> None:
     assert executed.n_links == 8
     assert told.executed.verdict == "certified"
     assert told.executed.min_clearance_m is not None
+    off = ErrorBox(joint=told.largest_error_rad, base=told.largest_base_error_m)
+    plan = vp.read_trajectory(file, problem)
+    assert told.within_error_box == cleared(problem, plan, off)
     content = json.loads((tmp_path / "out" / SUMMARY).read_text())
     assert content["settings"]["cables"]["stiffness_ea_n"] == 3.5e5
     record = (tmp_path / "out" / "simulation.csv").read_text().splitlines()

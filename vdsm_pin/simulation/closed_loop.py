@@ -5,7 +5,7 @@ the measured error, the cable kinematics turns them into lengths, and the tensio
 gravity asks for are taken off as stretch. Or it corrects the lengths themselves.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -48,6 +48,9 @@ class Simulation:
             value; [s], [N m/rad].
         tension_margin: What may be added to every tension before the arm buckles, at
             the same times, shape (k, 2): time and value; [s], [N].
+        largest_errors: Of x0, alpha1, theta1, .., at any step of the controller,
+            recorded or not, shape (1 + 2N,); [m], [rad].
+        largest_tension: Of any cable at any such step; [N].
     """
 
     times: FloatArray
@@ -58,6 +61,8 @@ class Simulation:
     path_m: FloatArray
     least_stiffness: FloatArray
     tension_margin: FloatArray
+    largest_errors: FloatArray
+    largest_tension: float
 
     @property
     def errors(self) -> FloatArray:
@@ -66,8 +71,8 @@ class Simulation:
 
     @property
     def largest_error(self) -> float:
-        """Largest error of any angle at any time; [rad]."""
-        return float(np.abs(self.errors).max())
+        """Largest error of any angle at any step of the controller; [rad]."""
+        return float(self.largest_errors[1:].max())
 
     @property
     def trajectory(self) -> Trajectory:
@@ -163,6 +168,7 @@ class _Loop:
         paid = self._rest(planned[0, 1:], 0.0)
         data.act[:] = paid
         rows, tensions = [], []
+        worst, strongest = np.zeros(planned.shape[1]), 0.0
         for k in range(count):
             error = self._error(planned[k, 1:])
             integral = integral + period * error
@@ -181,10 +187,14 @@ class _Loop:
             if not np.isfinite(data.qpos).all() or np.abs(data.qpos[1:]).max() > np.pi:
                 message = f"the simulation diverges at {times[k]:.3f} s"
                 raise VerificationFailed(message)
+            off = np.abs(data.qpos - planned[min(k + 1, count - 1)])
+            worst, pull = np.maximum(worst, off), 0.0 - data.actuator_force[1:]
+            strongest = max(strongest, float(pull.max()))
             if k % every == 0:
                 rows.append((k, data.qpos.copy()))
-                tensions.append(0.0 - data.actuator_force[1:])
-        return self._recorded(frozen(times + period), rows, tensions)
+                tensions.append(pull)
+        found = self._recorded(frozen(times + period), rows, tensions)
+        return replace(found, largest_errors=frozen(worst), largest_tension=strongest)
 
     def _error(self, planned: FloatArray) -> FloatArray:
         """Planned less measured angles (2N,) or cable lengths (3N,); [rad], [m]."""
@@ -252,4 +262,6 @@ class _Loop:
             path_m=plan.path_m[nearest],
             least_stiffness=np.column_stack([kept[at], stiffness]),
             tension_margin=np.column_stack([kept[at], margin]),
+            largest_errors=np.zeros(0),
+            largest_tension=0.0,
         )

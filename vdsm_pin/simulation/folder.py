@@ -52,25 +52,35 @@ class SimulationFile(FileModel):
     trajectory_sha256: str = Field(description="of the planned trajectory")
     settings: Settings = Field(description="everything that was assumed")
     duration_s: float = Field(description="of the simulated motion")
-    largest_error_rad: float = Field(description="of any joint angle at any time")
+    largest_error_rad: float = Field(
+        description="of any joint angle at any step of the controller"
+    )
     largest_errors_rad: tuple[float, ...] = Field(
         description="of each angle: alpha1, theta1, alpha2, .."
     )
+    largest_base_error_m: float = Field(description="of x0, at any such step")
     within_band_share: float = Field(
-        description="of all angles and times with an error of 0.3 deg or less"
+        description="of all angles and recorded times with an error of 0.3 deg or less"
     )
-    largest_tension_n: float = Field(description="of any cable")
-    slack_share: float = Field(description="of all cables and times below 1 N")
+    largest_tension_n: float = Field(
+        description="of any cable at any step of the controller"
+    )
+    slack_share: float = Field(description="of all cables and recorded times below 1 N")
     least_stiffness_nm_rad: float = Field(
-        description="of the joints along the motion; at 0 or below the arm buckles"
+        description="of the joints, at 24 times of the motion at most; at 0 or below "
+        "the arm buckles"
     )
     least_tension_margin_n: float = Field(
-        description="what may be added to every tension before the arm buckles"
+        description="what may be added to every tension before the arm buckles, at the "
+        "same times"
     )
     planned: Cleared
-    executed: Cleared
+    executed: Cleared = Field(
+        description="the recorded rows of executed.csv, joined by straight lines"
+    )
     within_error_box: Cleared = Field(
-        description="the planned motion with every joint off by the largest error"
+        description="the planned motion with every joint off by the largest error, and "
+        "the base by that of x0"
     )
     versions: dict[str, str] = Field(description="of everything a number depends on")
 
@@ -141,7 +151,8 @@ def summary(
     digest: str,
 ) -> SimulationFile:
     """The simulation in numbers, and what is proved of it."""
-    errors = np.abs(found.errors)
+    errors, worst = np.abs(found.errors), found.largest_errors.tolist()
+    box = ErrorBox(joint=found.largest_error, base=worst[0])
     robot = load_robot(problem.manipulator)
     return SimulationFile(
         problem=problem.name,
@@ -149,15 +160,16 @@ def summary(
         settings=settings,
         duration_s=float(found.times[-1]),
         largest_error_rad=found.largest_error,
-        largest_errors_rad=tuple(errors.max(axis=0).tolist()),
+        largest_errors_rad=tuple(worst[1:]),
+        largest_base_error_m=worst[0],
         within_band_share=float((errors <= BAND).mean()),
-        largest_tension_n=float(found.tensions.max()),
+        largest_tension_n=found.largest_tension,
         slack_share=float((found.tensions < SLACK).mean()),
         least_stiffness_nm_rad=float(found.least_stiffness[:, 1].min()),
         least_tension_margin_n=float(found.tension_margin[:, 1].min()),
         planned=cleared(problem, planned, ErrorBox()),
         executed=cleared(problem, found.trajectory, ErrorBox()),
-        within_error_box=cleared(problem, planned, ErrorBox(joint=found.largest_error)),
+        within_error_box=cleared(problem, planned, box),
         versions=versions() | {"mujoco": _mujoco_version(), "urdf": robot.urdf_sha256},
     )
 

@@ -68,6 +68,8 @@ def thinned(found: Simulation) -> Simulation:
         np.interp(times, found.times, found.path_m),
         at(stiffness, stiffness[:, 0]),
         at(found.tension_margin, found.tension_margin[:, 0]),
+        found.largest_errors,
+        found.largest_tension,
     )
 
 
