@@ -87,7 +87,9 @@ def judge_of(task: PlanningProblem) -> Judge:
 
 def space_of(task: PlanningProblem) -> TipSpace:
     required = judge_of(task).required
-    return TipSpace(task, link_clearance(task), required, 0.06, 60_000)
+    clearance = broad_phase(task, link_clearance(task))
+    exact = replace(clearance, floor=-np.inf)
+    return TipSpace(task, exact, required, 0.06, 60_000)
 
 
 def length_of(route: FloatArray) -> float:

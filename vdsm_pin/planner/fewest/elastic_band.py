@@ -60,7 +60,7 @@ def shortened(room: TipRoom, route: FloatArray) -> FloatArray:
         room: What the tip has to spare.
         route: Shape (k, 3); [m].
     """
-    worth = NARROW * room.arm.most_radius
+    worth, room = NARROW * room.arm.most_radius, room.near
     own = np.minimum(room.spare(route[:-1], route[1:]), worth)
     kept, last = [0], len(route) - 1
     while kept[-1] < last:
@@ -106,7 +106,7 @@ def pulled(
         route: Shape (k, 3), its ends stay; [m].
         sizes: How far away places are tried, over the body's radius; [-].
     """
-    rng, route = np.random.default_rng(len(route)), route.copy()
+    rng, route, room = np.random.default_rng(len(route)), route.copy(), room.near
     for round_ in range(PULLS):
         size = room.arm.most_radius * sizes[round_ % len(sizes)]
         for parity in (1, 2):
@@ -128,6 +128,7 @@ def followable(room: TipRoom, route: FloatArray, start: FloatArray) -> FloatArra
     if len(route) < 3:
         return route
     rng, number = np.random.default_rng(len(route)), np.arange(len(route))
+    room = room.near
     lack = before = _lack(room, route, start)
     for count in range(1, BUMPS + 1):
         if lack == 0.0:

@@ -18,7 +18,6 @@ from vdsm_pin.geometry.mesh_insides import encloses, has_inside
 from vdsm_pin.geometry.obstacles import STACK
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
-from vdsm_pin.geometry.segments import squared_gap
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.problem.scene import Obstacle, covers_of
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -158,61 +157,52 @@ def _from_ball(ball: FloatArray, a: FloatArray, b: FloatArray) -> float:
 
 
 @compiled
-def _from_triangle(corners: FloatArray, a: FloatArray, b: FloatArray) -> float:
-    """Squared distance of a segment from a triangle; [m^2].
+def _from_edges(corners: FloatArray, a: FloatArray, b: FloatArray) -> float:
+    """Squared distance of a segment from the edges of a triangle; [m^2].
 
-    Nearest are an edge and the segment, or one of its ends and the triangle's inside,
-    or the segment passes through it.
+    As `geometry.segments.squared_gap` has it, with what is the same for all edges done
+    once.
     """
-    p, q, r = corners
-    square = min(squared_gap(a, b, p, q), squared_gap(a, b, q, r))
-    square = min(square, squared_gap(a, b, r, p))
-    nx = (q[1] - p[1]) * (r[2] - p[2]) - (q[2] - p[2]) * (r[1] - p[1])
-    ny = (q[2] - p[2]) * (r[0] - p[0]) - (q[0] - p[0]) * (r[2] - p[2])
-    nz = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
-    size = nx * nx + ny * ny + nz * nz
-    if not size > 0.0:
-        return square
-    above = nx * (a[0] - p[0]) + ny * (a[1] - p[1]) + nz * (a[2] - p[2])
-    below = nx * (b[0] - p[0]) + ny * (b[1] - p[1]) + nz * (b[2] - p[2])
-    normal = (nx, ny, nz)
-    if above * below < 0.0 and _over(corners, normal, a, b, above / (above - below)):
-        return 0.0
-    if above * above < square * size and _over(corners, normal, a, b, 0.0):
-        square = above * above / size
-    if below * below < square * size and _over(corners, normal, a, b, 1.0):
-        square = below * below / size
-    return square
+    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    uu, square = ux * ux + uy * uy + uz * uz, np.inf
+    for k in range(3):
+        p, q = corners[k], corners[(k + 1) % 3]
+        vx, vy, vz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+        wx, wy, wz = a[0] - p[0], a[1] - p[1], a[2] - p[2]
+        vv, uv = vx * vx + vy * vy + vz * vz, ux * vx + uy * vy + uz * vz
+        uw, vw = ux * wx + uy * wy + uz * wz, vx * wx + vy * wy + vz * wz
+        cross = uu * vv - uv * uv
+        s = min(1.0, max(0.0, (uv * vw - vv * uw) / cross)) if cross > 0.0 else 0.0
+        t = (uv * s + vw) / vv if vv > 0.0 else 0.0
+        if not 0.0 < t < 1.0:
+            t = min(1.0, max(0.0, t))
+            s = min(1.0, max(0.0, (uv * t - uw) / uu)) if uu > 0.0 else 0.0
+        x, y, z = wx + s * ux - t * vx, wy + s * uy - t * vy, wz + s * uz - t * vz
+        square = min(square, x * x + y * y + z * z)
+    return float(square)
 
 
 @compiled
 def _over(
-    corners: FloatArray,
-    normal: tuple[float, float, float],
-    a: FloatArray,
-    b: FloatArray,
-    t: float,
+    corners: FloatArray, plane: FloatArray, a: FloatArray, b: FloatArray, t: float
 ) -> bool:
     """Whether the place t from a to b is above or below a triangle, not beside it."""
     for k in range(3):
         p, q = corners[k], corners[(k + 1) % 3]
-        side = 0.0
-        for c in range(3):
-            d, e = (c + 1) % 3, (c + 2) % 3
-            x = a[d] + t * (b[d] - a[d]) - p[d]
-            y = a[e] + t * (b[e] - a[e]) - p[e]
-            side += normal[c] * ((q[d] - p[d]) * y - (q[e] - p[e]) * x)
-        if side < 0.0:
+        vx, vy, vz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+        x, y = a[0] + t * (b[0] - a[0]) - p[0], a[1] + t * (b[1] - a[1]) - p[1]
+        z = a[2] + t * (b[2] - a[2]) - p[2]
+        side = plane[0] * (vy * z - vz * y) + plane[1] * (vz * x - vx * z)
+        if side + plane[2] * (vx * y - vy * x) < 0.0:
             return False
     return True
 
 
 @compiled
-def _from_plane(plane: FloatArray, a: FloatArray, b: FloatArray) -> float:
-    """Distance of a segment from a plane; [m]."""
-    above = plane[0] * a[0] + plane[1] * a[1] + plane[2] * a[2] - plane[3]
-    other = plane[0] * b[0] + plane[1] * b[1] + plane[2] * b[2] - plane[3]
-    return float(max(min(above, other), min(-above, -other)))
+def _height(plane: FloatArray, place: FloatArray) -> float:
+    """How high a place is above a plane; [m]."""
+    x, y, z = place
+    return float(plane[0] * x + plane[1] * y + plane[2] * z - plane[3])
 
 
 @compiled
@@ -223,11 +213,28 @@ def _of_leaf(
     b: FloatArray,
     best: float,
 ) -> float:
-    """Distance of a segment to the triangles of a ball, at most `best`; [m]."""
+    """Distance of a segment to the triangles of a ball, at most `best`; [m].
+
+    Nearest are an edge and the segment, or one of its ends and the triangle's inside,
+    or the segment passes through it.
+    """
     corners, planes = triangles
     for k in range(between[0], between[1]):
-        if _from_plane(planes[k], a, b) < best:
-            best = min(best, sqrt(_from_triangle(corners[k], a, b)))
+        nx, ny, nz, offset = planes[k]
+        above = nx * a[0] + ny * a[1] + nz * a[2] - offset
+        below = nx * b[0] + ny * b[1] + nz * b[2] - offset
+        if max(min(above, below), min(-above, -below)) >= best:
+            continue
+        square = _from_edges(corners[k], a, b)
+        if nx != 0.0 or ny != 0.0 or nz != 0.0:
+            t = above / (above - below) if above * below < 0.0 else 0.0
+            if t > 0.0 and _over(corners[k], planes[k], a, b, t):
+                return 0.0
+            if above * above < square and _over(corners[k], planes[k], a, b, 0.0):
+                square = above * above
+            if below * below < square and _over(corners[k], planes[k], a, b, 1.0):
+                square = below * below
+        best = min(best, sqrt(square))
     return best
 
 
@@ -270,7 +277,7 @@ def nearest_triangles(
         if nearest > 0:
             best = _of_leaf(triangles, first[nearest], a, b, best)
         stack[0], gaps[0], waiting = 1, -np.inf, int(nearest > 0)
-        while waiting > 0 and best >= floor:
+        while waiting > 0 and best >= floor and best > 0.0:
             waiting -= 1
             ball = stack[waiting]
             if gaps[waiting] >= best:

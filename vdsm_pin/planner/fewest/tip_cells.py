@@ -122,7 +122,7 @@ class TipCells(Octree):
             route: Cells of the way, shape (k,).
             points: Where it enters and leaves them, shape (k + 1, 3); [m].
         """
-        near = self.room.spare(points[:-1], points[1:]) < 0.0
+        near = self.room.near.spare(points[:-1], points[1:]) < 0.0
         half = self.side / 2.0 ** (self.levels[route] + 1.0)
         picked = np.zeros(self.codes.size, dtype=np.bool_)
         picked[route[near & (half > LEAST * self.radius)]] = True

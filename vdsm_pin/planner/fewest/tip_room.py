@@ -1,12 +1,13 @@
 """What the tip of an arm has to spare."""
 
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.planner.records import LinkClearance
+from vdsm_pin.planner.fewest.broad_phase import BroadPhase
 from vdsm_pin.problem.held import TIP
 
 LEAST: Final = 0.05
@@ -25,8 +26,16 @@ class TipRoom(NamedTuple):
     """
 
     arm: Manipulator
-    clearance: LinkClearance
+    clearance: BroadPhase
     required: float
+
+    @property
+    def near(self) -> "TipRoom":
+        """The same, exact only where the room is not above what is narrow."""
+        radius = self.arm.most_radius
+        # Surfaces are never farther below than all of the body.
+        clearance = replace(self.clearance, floor=-2.0 * radius)
+        return self._replace(clearance=clearance.up_to(self.required + NARROW * radius))
 
     def spare(self, points: FloatArray, ends: FloatArray | None = None) -> FloatArray:
         """At points, or on lines from them to ends, (n, 3) each to (n,); [m]."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.feasibility import curled_reach
+from vdsm_pin.planner.fewest.broad_phase import BroadPhase
 from vdsm_pin.planner.fewest.elastic_band import (
     followable,
     pulled,
@@ -22,7 +23,6 @@ from vdsm_pin.planner.fewest.elastic_band import (
 )
 from vdsm_pin.planner.fewest.tip_cells import TipCells
 from vdsm_pin.planner.fewest.tip_room import TipRoom
-from vdsm_pin.planner.records import LinkClearance
 from vdsm_pin.planner.start import start_centres
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.pointing import angles_between
@@ -43,7 +43,7 @@ class TipSpace:
     def __init__(
         self,
         problem: PlanningProblem,
-        clearance: LinkClearance,
+        clearance: BroadPhase,
         required: float,
         spacing: float,
         most: int,
