@@ -89,6 +89,14 @@ def test_the_hash_of_a_problem_counts_its_path_files(tmp_path: Path) -> None:
             CORNER + "    - {spline: [[1e9, 0, 0]]}\n",
             "points[1] (line 10): lies 1e+09 mm from the base, expected at most",
         ),
+        (
+            CORNER + "  insertion: [[0, 0, 0], [0, 1e11, 0]]\n",
+            "tip_path.insertion[1] (line 10): lies 1e+11 mm from the base, expected at",
+        ),
+        (
+            CORNER + "  insertion: [[5e4, 0, 0], [-5e4, 0, 0]]\n  spacing: 0.02\n",
+            "mm of path into more than 5000000 rows",
+        ),
         ("    - {file: none.csv}\n", "points[0] (line 9): 'none.csv': does not exist"),
         ("    - {file: bad.csv}\n", "'bad.csv': line 2: z is 'a', expected a number"),
         ("    - {file: empty.csv}\n", "'empty.csv': has no row"),

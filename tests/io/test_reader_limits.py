@@ -19,7 +19,6 @@ from vdsm_pin.io import (
     mesh_file,
     path_builder,
     pcd,
-    points_file,
     problem_file,
     tables,
     yaml_reader,
@@ -28,7 +27,7 @@ from vdsm_pin.io.clouds import read_cloud
 from vdsm_pin.io.mesh_file import read_mesh
 from vdsm_pin.io.meshes import dae as dae_format
 from vdsm_pin.io.meshes import glb, obj, ply, raw
-from vdsm_pin.io.points_file import read_points
+from vdsm_pin.io.path_builder import read_points
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.io.waypoint_tables import read_centres
@@ -108,7 +107,7 @@ LIMITS: dict[str, tuple[ModuleType, str, int, Reader, Made]] = {
         tables, "MAX_ROWS", 7, points, lambda f: made(f, "a.csv", "x,y,z\n" + XYZ)
     ),
     "path bytes": (
-        points_file, "MAX_BYTES", 6 + len(XYZ), points,
+        path_builder, "MAX_POINT_BYTES", 6 + len(XYZ), points,
         lambda f: made(f, "a.csv", "x,y,z\n" + XYZ),
     ),
     "rows": (

@@ -345,7 +345,7 @@ def test_failed_writing_leaves_the_old_file(tmp_path: Path) -> None:
     write_trajectory(path, random_trajectory(3, 2))
     before = path.read_bytes()
     broken = random_trajectory(3, 2)
-    object.__setattr__(broken, "theta", None)
+    object.__setattr__(broken, "path_m", None)
     with pytest.raises(TypeError):
         write_trajectory(path, broken)
     assert path.read_bytes() == before

@@ -183,6 +183,16 @@ def distinct_rows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return rows[first]
 
 
+def first_equal(points: FloatArray) -> tuple[IntArray, IntArray]:
+    """Which points (n, 3) differ, by their first ones, and which of these each is."""
+    index = first = np.zeros(len(points), dtype=np.int64)
+    for column in points.T:  # several times faster than numpy's unique rows
+        _, rank = np.unique(column, return_inverse=True)
+        key = index * (int(rank.max(initial=0)) + 1) + rank
+        _, first, index = np.unique(key, return_index=True, return_inverse=True)
+    return first, index
+
+
 def running_sums(values: FloatArray) -> FloatArray:
     """Sums of the first value, the first two and so on, shape (n,).
 

@@ -4,7 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct
+from vdsm_pin.geometry.arrays import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    distinct,
+    first_equal,
+)
 
 
 class Covers(NamedTuple):
@@ -22,12 +28,7 @@ class Covers(NamedTuple):
 def welded(vertices: FloatArray, triangles: IntArray) -> IntArray:
     """For each vertex of triangles the first of theirs equal to it, shape (n,)."""
     used = distinct(triangles)
-    index = np.zeros(len(used), dtype=np.int64)
-    first = index
-    for column in vertices[used].T + 0.0:  # makes -0 and 0 equal
-        _, rank = np.unique(column, return_inverse=True)
-        key = index * (int(rank.max(initial=0)) + 1) + rank
-        _, first, index = np.unique(key, return_index=True, return_inverse=True)
+    first, index = first_equal(vertices[used] + 0.0)  # makes -0 and 0 equal
     names = np.arange(len(vertices))
     names[used] = used[first[index]]
     return names

@@ -21,6 +21,7 @@ from vdsm_pin.geometry.convex import (
 )
 from vdsm_pin.geometry.ordering import coherent_order
 
+EPS: Final = float(np.finfo(float).eps)
 HULL: Final = 0
 CYLINDER: Final = 1
 HALF_SPACE: Final = 2
@@ -145,13 +146,21 @@ def _boxes(
         high[hulls] = np.maximum.reduceat(points, start) + radius
     for k, piece in table.flat.items():
         if isinstance(piece, FlatCylinder):
-            # Not sqrt(1 - axis^2): it loses half the digits along the axis.
-            across = np.hypot(np.roll(piece.axis, 1), np.roll(piece.axis, 2))
-            half = piece.half_length * np.abs(piece.axis) + piece.radius * across
-            # A box must hold the solid: half an ulp lost to the square root is given.
-            half = half * (1.0 + 4.0 * np.finfo(float).eps)
+            half = piece.half_length * np.abs(piece.axis)
+            half = (half + piece.radius * disc_extent(piece.axis)) * (1.0 + 2.0 * EPS)
             low[k], high[k] = piece.centre - half, piece.centre + half
     return low, high
+
+
+def disc_extent(normal: FloatArray) -> FloatArray:
+    """How far a disc of radius 1 reaches along each axis at most, shape (3,); [-].
+
+    Args:
+        normal: Of length 1, shape (3,); [-].
+    """
+    # Not sqrt(1 - normal^2), which loses half the digits along the normal.
+    across = np.hypot(np.roll(normal, 1), np.roll(normal, 2))
+    return np.asarray(across * (1.0 + 2.0 * EPS))
 
 
 def _levels(n: int) -> list[tuple[IntArray, IntArray, IntArray]]:

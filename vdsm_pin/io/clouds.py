@@ -60,8 +60,8 @@ def read_cloud(path: Path, digest: Digest) -> RawCloud:
             point or too many, or one that is infinite.
     """
     kind = check_ending(path, _READERS)
-    with opened(path, limit=MAX_BYTES, digest=digest) as file:
-        stream = MeshStream(path, file.size, file.content)
+    with opened(path, limit=MAX_BYTES, digest=digest) as (size, content):
+        stream = MeshStream(path, size, content)
         points = _READERS[kind](stream)
     grid = points.ndim == 3
     if grid:

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.errors import InvalidFile
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import first_equal
 from vdsm_pin.io.meshes.obj import read_obj
 from vdsm_pin.io.meshes.ply import read_ply
 from vdsm_pin.io.meshes.raw import MeshStream, RawMesh, check_ending
@@ -57,23 +57,13 @@ def read_mesh(path: Path, digest: Digest | None = None) -> RawMesh:
     """
     kind = check_ending(path, _READERS)
     digest = hashlib.sha256() if digest is None else digest
-    with opened(path, limit=MAX_MESH_BYTES, digest=digest) as file:
-        raw = _READERS[kind](MeshStream(path, file.size, file.content))
+    with opened(path, limit=MAX_MESH_BYTES, digest=digest) as (size, content):
+        raw = _READERS[kind](MeshStream(path, size, content))
     if not len(raw.triangles):
         raise InvalidFile(file=path, problem="has no triangle")
     used = np.zeros(len(raw.vertices), dtype=np.bool_)
     used[raw.triangles] = True
-    vertices, index = _joined(raw.vertices[used])
+    vertices = raw.vertices[used]
+    first, index = first_equal(vertices)
     triangles = index[(np.cumsum(used) - 1)[raw.triangles]]
-    return replace(raw, vertices=vertices, triangles=triangles)
-
-
-def _joined(points: FloatArray) -> tuple[FloatArray, IntArray]:
-    """The different points among points, shape (n, 3), and which one each is."""
-    index = np.zeros(len(points), dtype=np.int64)
-    first = index
-    for column in points.T:  # several times faster than numpy's unique rows
-        _, rank = np.unique(column, return_inverse=True)
-        key = index * (int(rank.max()) + 1) + rank
-        _, first, index = np.unique(key, return_index=True, return_inverse=True)
-    return points[first], index
+    return replace(raw, vertices=vertices[first], triangles=triangles)

@@ -1,6 +1,7 @@
 """The tip path of a problem file to a `DesiredPath` in the base frame."""
 
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Final
 
@@ -20,9 +21,9 @@ from vdsm_pin.io.path_schema import (
     SplinePart,
     TipPathModel,
 )
-from vdsm_pin.io.points_file import read_points
 from vdsm_pin.io.posture_builder import PostureBuilder
-from vdsm_pin.io.source import Digest
+from vdsm_pin.io.source import Digest, read_bytes
+from vdsm_pin.io.tables import Table, as_text
 from vdsm_pin.io.yaml_reader import YamlDocument
 from vdsm_pin.problem.desired_path import Approach, Blocked, DesiredPath, Order
 from vdsm_pin.problem.pointing import Pointing
@@ -33,6 +34,9 @@ from vdsm_pin.units import UNITS_PER_METRE
 CURVE_TOLERANCE: Final = 0.00005
 """How far corners may stray from a curve where the file states nothing; [m]."""
 
+MAX_POINT_BYTES: Final = 1 << 29
+"""Some hundred bytes for each of the rows that a motion may have."""
+
 DEFAULT_SPACING: Final = 0.010
 """The paper's spacing of waypoints; [m]."""
 
@@ -42,6 +46,22 @@ def spacing_of(model: TipPathModel, frame: Frame) -> float:
     if model.spacing is None:
         return DEFAULT_SPACING
     return float(frame.metres(model.spacing))
+
+
+def read_points(path: Path, digest: Digest) -> FloatArray:
+    """Points of a path from the CSV of any program, in its order and unit, (n, 3).
+
+    Args:
+        path: A file with the columns x, y and z; others are not read.
+        digest: Gets the bytes of the file.
+
+    Raises:
+        InvalidFile: If the file cannot be read, a column is missing, a value is no
+            finite number, or there are no points or too many.
+    """
+    content = read_bytes(path, limit=MAX_POINT_BYTES)
+    digest.update(content)
+    return Table(path, as_text(BytesIO(content)), ("x", "y", "z")).all_rows()
 
 
 @dataclass(frozen=True)
@@ -65,7 +85,9 @@ class PathBuilder:
         start = postures.start(model.start, ("tip_path", "start"))
         corners, parts = self._corners(model)
         points = self.frame.point(corners)
-        self._check_extent(points, parts)
+        insertion = self.frame.point(np.array(model.insertion).reshape(-1, 3))
+        self._check_extent(points, "points", parts)
+        self._check_extent(insertion, "insertion", np.arange(len(insertion)))
         home = model.retreat == "home"
         path = DesiredPath(
             start.tip,
@@ -80,7 +102,7 @@ class PathBuilder:
             Order(model.order),
             self._pointing(model, points),
             home,
-            self.frame.point(np.array(model.insertion).reshape(-1, 3)),
+            insertion,
         )
         self._check_rows(path)
         return path
@@ -169,7 +191,7 @@ class PathBuilder:
                 through = np.vstack([before[None], np.array(points)])
                 return curves.spline_through(through, tolerance)
 
-    def _check_extent(self, points: FloatArray, parts: IntArray) -> None:
+    def _check_extent(self, points: FloatArray, field: str, parts: IntArray) -> None:
         reach, limit = np.linalg.norm(points, axis=1), TOLERANCES.scene_extent
         if not (reach <= limit).all():
             worst = int(np.argmax(reach))
@@ -177,11 +199,12 @@ class PathBuilder:
                 f"lies {self.frame.shown(float(reach[worst]))} from the base, expected "
                 f"at most {self.frame.shown(limit)}"
             )
-            at = ("tip_path", "points", int(parts[worst]))
+            at = ("tip_path", field, int(parts[worst]))
             raise self.document.invalid(at, problem)
 
     def _check_rows(self, path: DesiredPath) -> None:
-        approach = float(np.linalg.norm(path.points[0] - path.start))
+        way = np.vstack([path.start, path.insertion, path.points[:1]])
+        approach = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
         rows = (path.length + approach) / path.spacing
         if not rows <= MAX_ROWS:
             problem = (

@@ -7,7 +7,6 @@ import os
 import zlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Final, Protocol, cast
 
@@ -32,19 +31,6 @@ class Digest(Protocol):
 
     def hexdigest(self) -> str:
         """The hash so far, in hexadecimal."""
-
-
-@dataclass(frozen=True)
-class OpenFile:
-    """A file that is being read, from the start.
-
-    Args:
-        size: Of the whole file; [bytes].
-        content: Its bytes; what is read goes through the digest.
-    """
-
-    size: int
-    content: "io.BufferedReader[Any]"
 
 
 def check_is_file(path: Path) -> None:
@@ -135,7 +121,9 @@ def decode(data: bytes, path: Path) -> str:
 
 
 @contextmanager
-def opened(path: Path, *, limit: int, digest: Digest) -> Iterator[OpenFile]:
+def opened(
+    path: Path, *, limit: int, digest: Digest
+) -> Iterator[tuple[int, "io.BufferedReader[Any]"]]:
     """A file of bounded size to be read in pieces, all of it into a digest.
 
     Args:
@@ -143,6 +131,9 @@ def opened(path: Path, *, limit: int, digest: Digest) -> Iterator[OpenFile]:
         limit: Largest size accepted; [bytes].
         digest: Gets every byte of the file, in order, also those that are not asked
             for.
+
+    Yields:
+        Its size in bytes, and its bytes from the start.
 
     Raises:
         InvalidFile: If it cannot be read, is empty or is too large.
@@ -152,7 +143,7 @@ def opened(path: Path, *, limit: int, digest: Digest) -> Iterator[OpenFile]:
         size = os.fstat(raw.fileno()).st_size
         _check_size(path, size, limit)
         content = io.BufferedReader(_Hashed(raw, digest, size), BLOCK)
-        yield OpenFile(size, content)
+        yield size, content
         while content.read(BLOCK):
             pass
 
@@ -222,8 +213,7 @@ def sha256_of_file(path: Path) -> str:
     digest = hashlib.sha256()
     for one in inside:
         with one.open("rb") as file:
-            while block := file.read(BLOCK):
-                digest.update(block)
+            hashlib.file_digest(file, lambda: digest)
     return digest.hexdigest()
 
 

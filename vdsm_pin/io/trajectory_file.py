@@ -20,7 +20,6 @@ import pydantic_core
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidFile
-from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.atomic import atomic_path
 from vdsm_pin.io.source import check_is_file, readable
 from vdsm_pin.io.tables import CHUNK_ROWS, Table, open_text
@@ -64,7 +63,7 @@ def write_trajectory(path: str | Path, trajectory: Trajectory) -> None:
         trajectory: What to write.
 
     Raises:
-        InvalidFile: If the file cannot be written.
+        CannotWrite: If the file cannot be written.
     """
     with atomic_path(path) as temporary, temporary.open("wb") as stream:
         names = column_names(trajectory.n_links) + _further_names(trajectory)
@@ -83,8 +82,7 @@ def _further_names(trajectory: Trajectory) -> tuple[str, ...]:
 
 def _rows_text(trajectory: Trajectory, first: int) -> bytes:
     part = slice(first, first + CHUNK_ROWS)
-    angles = np.stack([trajectory.alpha[part], trajectory.theta[part]], axis=2)
-    columns = [trajectory.path_m[part], trajectory.x0[part], *_flat(angles).T]
+    columns = [trajectory.path_m[part], *trajectory.joints[part].T]
     for values in (trajectory.times, trajectory.rates, trajectory.changes):
         columns += [] if values is None else list(np.atleast_2d(values[part].T))
     # As JSON: the same digits as repr at a quarter of the time.
@@ -95,10 +93,6 @@ def _rows_text(trajectory: Trajectory, first: int) -> bytes:
         b"%d,%d,%b\n" % (waypoint, flag, row)
         for waypoint, (flag, row) in enumerate(zip(flags, rows, strict=True), first)
     )
-
-
-def _flat(angles: FloatArray) -> FloatArray:
-    return angles.reshape(len(angles), -1)
 
 
 def read_trajectory(

@@ -55,8 +55,9 @@ def plan_follow_the_leader(
         along = np.append(np.full(len(approach) - 1, stations[0]), stations)
         centres = led_along(tips, start, arm.link_lengths)
         centres[0] = start
-        _check(problem, centres, tips)
+        _check_rail(problem, centres, tips)
         alpha, theta = joint_angles(arm, centres)
+        _check_cone(problem, link_angles(alpha, theta), tips)
         turn = np.abs(np.diff(np.stack([alpha, theta]), axis=1)).max(initial=0.0)
         if turn <= problem.planned_row_change or parts == FINEST:
             break
@@ -86,14 +87,15 @@ def _stepped(corners: FloatArray, step: float) -> FloatArray:
     return np.concatenate(made)
 
 
-def _check(problem: PlanningProblem, centres: FloatArray, tips: FloatArray) -> None:
-    """Refuse a motion that passes a limit.
+def _check_rail(
+    problem: PlanningProblem, centres: FloatArray, tips: FloatArray
+) -> None:
+    """Refuse a motion whose base would leave the rail.
 
     Raises:
-        NoPlanFound: With the joint, its angle and where the tip is.
+        NoPlanFound: With where the tip is.
     """
-    arm = problem.manipulator
-    low, high = arm.base_range
+    low, high = problem.manipulator.base_range
     placed = np.asarray(np.isfinite(centres).all(axis=(1, 2)))
     base = np.where(placed, centres[:, 0, 0], 0.0)
     off: BoolArray = ~placed | (base < low) | (base > high)
@@ -104,7 +106,15 @@ def _check(problem: PlanningProblem, centres: FloatArray, tips: FloatArray) -> N
             "leave its rail to follow"
         )
         raise NoPlanFound(message)
-    psi = link_angles(*joint_angles(arm, centres))
+
+
+def _check_cone(problem: PlanningProblem, psi: FloatArray, tips: FloatArray) -> None:
+    """Refuse link angles beyond their limit.
+
+    Raises:
+        NoPlanFound: With the joint, its angle and where the tip is.
+    """
+    arm = problem.manipulator
     limit = arm.max_link_angle + TOLERANCES.joint_limit
     if not (psi <= limit).all():
         row, joint = divmod(int(np.argmax(psi)), arm.n_links)

@@ -10,7 +10,6 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.io.meshes.faces import cut_faces
 from vdsm_pin.io.meshes.raw import MeshStream, RawMesh
@@ -69,7 +68,7 @@ class _Reader:
         self._by_id = dict[str, list[_Element]]()
         for element in root.iter():
             self._by_id.setdefault(element.get("id", ""), []).append(element)
-        self._parts: dict[str, Part] = {}
+        self._parts: dict[_Element, list[Part]] = {}
         self._placed, self._notes = Placed(stream), dict[str, int]()
         self._bend, self._n_nodes = 0.0, 0
 
@@ -96,7 +95,7 @@ class _Reader:
                 metres = self._floats(unit.get("meter", "1"), 1)[0]
                 if not 1e-9 <= metres <= 1e9:
                     problem = f"its unit is {metres:g} m, expected 1e-9 to 1e9"
-                    raise self._invalid(problem)
+                    raise self._stream.invalid(problem)
                 return float(metres)
         return 1.0
 
@@ -108,14 +107,16 @@ class _Reader:
     def _walk(self, node: _Element, pose: FloatArray, depth: int) -> None:
         self._n_nodes += 1
         if depth > 100 or self._n_nodes > MAX_NODES:
-            raise self._invalid(problem=f"has nodes 100 deep or more than {MAX_NODES}")
+            raise self._stream.invalid(
+                problem=f"has nodes 100 deep or more than {MAX_NODES}"
+            )
         for child in node:
             tag = _tag(child)
             if tag in _MOVES:
                 pose = composed(self._stream, pose, self._move(child))
             elif tag in ("skew", "lookat"):
                 problem = f"places a part by <{tag}>, which is not read"
-                raise self._invalid(problem)
+                raise self._stream.invalid(problem)
         for child in node:
             match _tag(child):
                 case "node":
@@ -126,7 +127,7 @@ class _Reader:
                     self._put(self._named(child, "url"), pose)
                 case "instance_controller":
                     problem = "is bent by a skin; export it as it stands"
-                    raise self._invalid(problem)
+                    raise self._stream.invalid(problem)
 
     def _move(self, element: _Element) -> FloatArray:
         kind = _tag(element)
@@ -134,17 +135,25 @@ class _Reader:
         return matrix(self._floats(element.text or "", count))
 
     def _put(self, geometry: _Element, pose: FloatArray) -> None:
+        if geometry not in self._parts:
+            self._parts[geometry] = self._parts_of(geometry)
+        self._placed.put(self._parts[geometry], pose)
+
+    def _parts_of(self, geometry: _Element) -> list[Part]:
+        """The triangles of a geometry, which many nodes may place."""
         parts = []
         for mesh in geometry:
             if _tag(mesh) in _OTHERS:
-                raise self._invalid(problem=f"has a <{_tag(mesh)}>, which is not read")
+                raise self._stream.invalid(
+                    problem=f"has a <{_tag(mesh)}>, which is not read"
+                )
             for faces in mesh:
                 if _tag(faces) in _LINES:
                     what = "lines and points left out"
                     self._notes[what] = self._notes.get(what, 0) + 1
                 elif _tag(faces) in _FACES:
                     parts.append(self._part(mesh, faces))
-        self._placed.put(parts, pose)
+        return parts
 
     def _part(self, mesh: _Element, faces: _Element) -> Part:
         """The triangles of one list of faces."""
@@ -154,7 +163,7 @@ class _Reader:
         ]
         if next(_children(faces, "ph"), None) is not None:
             problem = "has faces with holes (<ph>), which are not read"
-            raise self._invalid(problem)
+            raise self._stream.invalid(problem)
         match _tag(faces):
             case "polygons":
                 sizes = np.array([len(loop) for loop in loops], dtype=np.int64)
@@ -173,7 +182,7 @@ class _Reader:
             problem = (
                 f"<{_tag(faces)}> names vertices that are not there, or is cut short"
             )
-            raise self._invalid(problem)
+            raise self._stream.invalid(problem)
         corners = corners[np.repeat(sizes >= 3, sizes)]
         self._stream.check_numbers(vertices, "vertex", used=corners)
         cut = cut_faces(vertices, corners, sizes[sizes >= 3])
@@ -191,14 +200,14 @@ class _Reader:
             if one.get("semantic") == "VERTEX":
                 offset, vertices = place, self._vertices(self._named(one, "source"))
         if not 0 <= offset < stride <= 64:
-            raise self._invalid(problem=f"<{_tag(faces)}> names no vertices")
+            raise self._stream.invalid(problem=f"<{_tag(faces)}> names no vertices")
         return offset, stride, vertices
 
     def _vertices(self, element: _Element) -> FloatArray:
         for one in _children(element, "input"):
             if one.get("semantic") == "POSITION":
                 return self._source(self._named(one, "source"))
-        raise self._invalid(problem="has <vertices> without POSITION")
+        raise self._stream.invalid(problem="has <vertices> without POSITION")
 
     def _source(self, source: _Element) -> FloatArray:
         """Points of a source, shape (n, 3)."""
@@ -217,10 +226,10 @@ class _Reader:
                     or start + count * stride > len(values)
                 ):
                     problem = "has a source that is not X, Y, Z, or is cut short"
-                    raise self._invalid(problem)
+                    raise self._stream.invalid(problem)
                 rows = values[start : start + count * stride].reshape(count, stride)
                 return rows[:, :3]
-        raise self._invalid(problem="has a source without accessor")
+        raise self._stream.invalid(problem="has a source without accessor")
 
     def _named(self, element: _Element, key: str) -> _Element:
         """What an element points to in this file."""
@@ -228,7 +237,7 @@ class _Reader:
         found = self._by_id.get(name[1:], []) if name[:1] == "#" != name else []
         if len(found) != 1:
             place = f"there {len(found)} times" if found else "not in this file"
-            raise self._invalid(problem=f"names {name[:60]!r}, which is {place}")
+            raise self._stream.invalid(problem=f"names {name[:60]!r}, which is {place}")
         return found[0]
 
     def _floats(self, text: str, count: int | None = None) -> FloatArray:
@@ -248,11 +257,8 @@ class _Reader:
         good = all(-_LARGEST_INT < x < _LARGEST_INT for x in values if kind is int)
         if not good or len(values) != (len(words) if count is None else count):
             problem = f"found {' '.join(words[:9])[:60]!r} where numbers are meant"
-            raise self._invalid(problem)
+            raise self._stream.invalid(problem)
         return values
-
-    def _invalid(self, problem: str) -> InvalidFile:
-        return self._stream.invalid(problem)
 
 
 def _translated(vector: FloatArray) -> FloatArray:

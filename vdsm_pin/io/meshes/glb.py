@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, rotation_from_quaternion
 from vdsm_pin.io.meshes.raw import MeshStream, RawMesh, doubles
 from vdsm_pin.io.meshes.scene import Part, Placed, composed, strip_triangles
 from vdsm_pin.io.schema_types import LARGEST
@@ -83,14 +83,8 @@ class _Node(_Model):
         if self.matrix is not None:
             return np.array(self.matrix).reshape(4, 4).T
         length = math.hypot(*self.rotation) or 1.0
-        x, y, z, w = (part / length for part in self.rotation)
-        pose = np.eye(4)
-        pose[:3, :3] = [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-        pose[:3, :3] *= self.scale
+        pose, turn = np.eye(4), np.array(self.rotation) / length
+        pose[:3, :3] = rotation_from_quaternion(turn) * self.scale
         pose[:3, 3] = self.translation
         return pose
 

@@ -7,7 +7,7 @@ straight at both corners stays straight. An offset with a corner at joint m is a
 there; where one knee turns into another, both are bent on the way and no third one.
 
 Where a link leans backwards that chart ends. There the directions of the links stand in
-place of the offsets (`directions.py`), and the base may be held to a short rail.
+place of the offsets (`direction_kernels.py`), and the base may be held to a short rail.
 """
 
 import itertools
