@@ -204,6 +204,7 @@ def repair_trajectory(
 
     Raises:
         Infeasible: If none was found; the message says why and where.
+        OutOfTime: If none was found in time.
         InvalidInput: If the trajectory is of another robot, or has no such row.
 
     Example:

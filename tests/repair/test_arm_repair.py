@@ -15,7 +15,7 @@ from vdsm_pin.app.workflow import Verified, VerifyOrder
 from vdsm_pin.arm.kinematics import joint_centres, tip_jacobian
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.cli import app
-from vdsm_pin.errors import Infeasible, InvalidInput
+from vdsm_pin.errors import Infeasible, InvalidInput, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Sphere
 from vdsm_pin.io.problem_file import read_problem
@@ -94,6 +94,13 @@ def test_start_and_pinned_waypoints_in_the_way_are_named() -> None:
             repair_arm(beside("paper/obs2", row, 3, -0.002), motion, pinned)
     with pytest.raises(InvalidInput, match="pinned waypoint is 9999, expected 0 to"):
         repair_arm(planned("paper/obs2")[0], motion, (9999,))
+
+
+def test_no_time_is_the_reason_where_it_ends_the_work() -> None:
+    """Not a check that there was no time for."""
+    problem, deadline = beside("paper/obs2", 700, 3, -0.002), Deadline.after(1e-3)
+    with pytest.raises(OutOfTime, match=r"the time limit of 0\.001 s came first"):
+        repair_arm(problem, planned("paper/obs2")[1], deadline=deadline)
 
 
 def test_ball_on_the_desired_path_is_refused() -> None:

@@ -97,6 +97,7 @@ def repair_arm(
     Raises:
         InvalidInput: If the motion is not of straight lines or has no such waypoint.
         Infeasible: If none was found; the message says why and where.
+        OutOfTime: If none was found in time.
     """
     if trajectory.is_smooth:
         message = "repair takes straight lines between waypoints, without velocities"

@@ -192,6 +192,7 @@ def repair_robot(
     Raises:
         InvalidInput: If there is no such waypoint, or no times beside what moves.
         Infeasible: If none was found; the message says why and where.
+        OutOfTime: If none was found in time.
     """
     check_timed(cell.scene, motion)
     origins = Origins.of(motion.q, [0, len(motion.q) - 1], pinned)

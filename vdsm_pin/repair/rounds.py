@@ -7,6 +7,7 @@ How rows are pushed is told by who knows the robot.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import isnan
 from typing import Final, Generic, Protocol, Self, TypeVar
 
 import numpy as np
@@ -214,6 +215,7 @@ def repaired(
 
     Raises:
         Infeasible: If none was found; the message says why and where.
+        OutOfTime: If none was found in time.
     """
     first, widest = margins
     near, lost = dict[int, float](), dict[int, float]()
@@ -235,6 +237,7 @@ def repaired(
         motion = motion.pushed(wanted, moments[moments >= 0.0])
         found = judge(motion)
     if found.verdict is not Verdict.CERTIFIED:
+        deadline.check()  # else what was not judged in time would be the reason
         raise Infeasible(_why(found))
     moved = np.abs(motion.q - motion.origins.base).max(axis=1)
     return Repaired(found, motion.origins.given, moved)
@@ -250,7 +253,8 @@ def _why(found: Verification) -> str:
     """What is still wrong and where."""
     check = next(c for c in found.checks if c.verdict is not Verdict.CERTIFIED)
     where = f" ({check.where})" if check.where else ""
+    when = "" if isnan(check.moment) else f" at waypoint {check.moment:.3f}"
     return (
-        f"no certified motion was found: {check.name}{where} is {check.verdict.value} "
-        f"at waypoint {check.moment:.3f} of the last attempt"
+        f"no certified motion was found: {check.name}{where} is {check.verdict.value}"
+        f"{when} of the last attempt"
     )
