@@ -10,7 +10,6 @@ deleted where tests have been taken away.
 
 import argparse
 import multiprocessing
-import multiprocessing.synchronize
 import random
 import sys
 import tempfile
@@ -18,12 +17,13 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from multiprocessing.queues import Queue
 from pathlib import Path
 from typing import Final
 
 from analysis.mutation.changes import Change, changes
 from analysis.mutation.coverage_map import PLAIN, Asked, CoverageMap, coverage_map
-from analysis.mutation.trial import Trial, copy_checkout, import_libraries, try_change
+from analysis.mutation.trial import Task, Trial, copy_checkout, try_changes
 
 ROOT: Final = Path(__file__).parents[2]
 EQUIVALENT: Final = Path(__file__).with_name("equivalent.txt")
@@ -36,11 +36,24 @@ BUDGET: Final = 12.0
 
 @dataclass(frozen=True)
 class Group:
-    """Modules that are changed and the tests that shall notice."""
+    """Modules that are changed and the tests that shall notice.
+
+    Args:
+        name: Its name.
+        modules: Patterns of their paths.
+        tests: Files and folders.
+        plain: Whether all of its tests are quick enough without machine code.
+    """
 
     name: str
     modules: tuple[str, ...]
     tests: tuple[str, ...]
+    plain: bool = False
+
+    def runs_plain(self, module: str) -> bool:
+        """Whether changes of a module are tried without machine code."""
+        text = (ROOT / module).read_text(encoding="utf-8")
+        return self.plain or "@compiled" in text
 
 
 GROUPS: Final = (
@@ -87,8 +100,9 @@ GROUPS: Final = (
             "tests/verification/test_pair_slopes.py",
             "tests/verification/test_counterexample.py",
         ),
+        True,
     ),
-    Group("proof", ("vdsm_pin/proof/*.py",), ("tests/proof",)),
+    Group("proof", ("vdsm_pin/proof/*.py",), ("tests/proof",), True),
     Group(
         "arm",
         (
@@ -102,6 +116,7 @@ GROUPS: Final = (
             "tests/arm/test_cables.py",
             "tests/verification/test_cable_check.py",
         ),
+        True,
     ),
 )
 
@@ -121,11 +136,6 @@ def modules_of(group: Group) -> list[str]:
     return [str(path.relative_to(ROOT)) for path in found]
 
 
-def is_compiled(module: str) -> bool:
-    """Whether a module has functions that become machine code."""
-    return "@compiled" in (ROOT / module).read_text(encoding="utf-8")
-
-
 def sampled(groups: list[Group], size: int, seed: int) -> dict[str, list[Change]]:
     """A sample of all changes, by group."""
     every = [
@@ -140,22 +150,20 @@ def maps_of(
 ) -> dict[bool, CoverageMap]:
     """What tests cover, of machine code as Python and of the rest."""
     maps = {}
-    for plain in {is_compiled(change.module) for change in chosen}:
-        modules = [m for m in modules_of(group) if is_compiled(m) is plain]
+    for plain in {group.runs_plain(change.module) for change in chosen}:
+        modules = [m for m in modules_of(group) if group.runs_plain(m) is plain]
         what = Asked(ROOT, modules, plain)
         maps[plain] = coverage_map(what, tests, asked.jobs, asked.maps)
     return maps
 
 
 def _work(
-    folder: Path,
-    tasks: "multiprocessing.Queue[tuple[Change, list[str], float, str | None] | None]",
-    done: "multiprocessing.Queue[Trial]",
-    stop: "multiprocessing.synchronize.Event",
+    folder: Path, files: list[str], plain: str | None, tasks: "Queue", done: "Queue"
 ) -> None:
-    import_libraries()
-    while not stop.is_set() and (task := tasks.get()) is not None:
-        done.put(try_change(folder, *task))
+    try:
+        try_changes(folder, files, tasks, done.put, plain)
+    finally:
+        done.put(None)
 
 
 def _as_it_is(module: str) -> Change:
@@ -169,38 +177,47 @@ def tried(
 ) -> Iterator[Trial]:
     """Try changes on so many processes; as they end."""
     maps = maps_of(group, asked.tests or list(group.tests), chosen, asked)
-    chosen = [_as_it_is(chosen[0].module), *chosen]
-    tasks: multiprocessing.Queue = multiprocessing.Queue()
-    done: multiprocessing.Queue = multiprocessing.Queue()
-    stop = multiprocessing.Event()
-    for change in chosen:
-        plain = is_compiled(change.module)
-        names = maps[plain].asked(change.module, change.lines, asked.budget)
-        usual = sum(maps[plain].seconds[name] for name in names)
-        tasks.put((change, names, usual, PLAIN if plain else None))
+    for plain, seen in maps.items():
+        mine = [one for one in chosen if group.runs_plain(one.module) is plain]
+        tasks = [
+            Task(one, {name: seen.seconds[name] for name in names})
+            for one in [_as_it_is(mine[0].module), *mine, _as_it_is(mine[-1].module)]
+            for names in [seen.asked(one.module, one.lines, asked.budget)]
+        ]
+        for trial in tried_at_once(tasks, PLAIN if plain else None, asked.jobs):
+            if trial.change.line:
+                yield trial
+            elif trial.noticed:
+                message = f"tests of {trial.change.module} fail without a change"
+                raise RuntimeError(message)
+
+
+def tried_at_once(tasks: list[Task], plain: str | None, jobs: int) -> Iterator[Trial]:
+    """Try changes on so many processes; as they end."""
+    waiting: Queue = multiprocessing.Queue()
+    done: Queue = multiprocessing.Queue()
+    files = sorted({name.partition("::")[0] for task in tasks for name in task.tests})
+    for task in [*tasks, *[None] * jobs]:
+        waiting.put(task)
     with tempfile.TemporaryDirectory(prefix="mutants-") as place:
         workers = []
-        for k in range(asked.jobs):
-            copy_checkout(ROOT, Path(place) / str(k))
-            tasks.put(None)
-            words = (Path(place) / str(k), tasks, done, stop)
-            workers.append(
-                multiprocessing.Process(target=_work, args=words, daemon=True)
-            )
+        for k in range(jobs):
+            copy_checkout(ROOT, folder := Path(place) / str(k))
+            words = (folder, files, plain, waiting, done)
+            workers.append(multiprocessing.Process(target=_work, args=words))
             workers[-1].start()
         try:
-            for _ in chosen:
-                trial = done.get()
-                if trial.change.line:
+            ended = 0
+            while ended < jobs:
+                if (trial := done.get()) is None:
+                    ended += 1
+                else:
                     yield trial
-                elif trial.noticed:
-                    message = f"tests of {trial.change.module} fail without a change"
-                    raise RuntimeError(message)
         finally:
-            stop.set()
             for worker in workers:
+                worker.terminate()
                 worker.join()
-            tasks.cancel_join_thread()  # what is left in it is read by nobody
+            waiting.cancel_join_thread()  # what is left in it is read by nobody
 
 
 def noticed_before(path: Path | None) -> set[str]:
@@ -213,10 +230,14 @@ def noticed_before(path: Path | None) -> set[str]:
 def results(
     group: Group, chosen: list[Change], asked: argparse.Namespace, ends: float
 ) -> Iterator[Trial]:
-    """What came of a group's changes until time is up; what is noticed is noted."""
-    before = noticed_before(asked.noticed)
-    yield from (Trial(c, True, 0, 0.0) for c in chosen if c.key in before)
-    left = [c for c in chosen if c.key not in before]
+    """What came of a group's changes until time is up; what is noticed is noted.
+
+    What is known to change nothing is not tried.
+    """
+    before, known = noticed_before(asked.noticed), equivalent_changes()
+    settled = [c for c in chosen if c.key in before or c.key in known]
+    yield from (Trial(c, c.key not in known, 0, 0.0) for c in settled)
+    left = [c for c in chosen if c not in settled]
     for trial in tried(group, left, asked) if left else ():
         yield trial
         if trial.noticed and asked.noticed:

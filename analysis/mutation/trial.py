@@ -1,34 +1,54 @@
-"""A change is tried: its module stands in a copy of the checkout, its tests run there.
+"""A change is tried in a process forked from one that has collected the tests.
 
-Each change has a process of its own, forked from one that has imported the libraries
-already: most of a test run's time would be these imports.
+Where a change lies within functions, the child replaces their code, and nothing is
+imported again. What runs at import (constants, defaults, class bodies) is written to a
+copy of the checkout, and its tests run in a process of their own.
 """
 
+import gc
 import importlib
 import math
 import os
+import queue
 import resource
 import shutil
 import signal
 import sys
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from inspect import CO_OPTIMIZED
 from pathlib import Path
-from typing import Final
+from types import CodeType, FunctionType
+from typing import Any, Final
+
+import pytest
 
 from analysis.mutation.changes import Change
 
-LIBRARIES: Final = (
-    *("numpy", "flint", "pydantic", "pytest", "scipy.spatial", "shapely", "trimesh"),
-    *("yaml", "jsonschema", "typer", "rich"),
-)
 COPIED: Final = ("vdsm_pin", "tests", "urdf", "docs", "analysis", "pyproject.toml")
 PATIENCE: Final = 3.0
-"""A run is ended once it has computed for so many times its usual time, and so many
-seconds: other work on the machine makes no test fail."""
+"""A test is ended once it has computed for so many times its usual time, and a second
+more, which is noticing: other work on the machine makes no test fail."""
 
 SILENCE: Final = 120.0
 """It is ended, too, after so long without computing, as it may wait for ever; [s]."""
+
+WORDS: Final = ("-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--assert=plain")
+
+
+@dataclass(frozen=True)
+class Task:
+    """A change and whom to ask.
+
+    Args:
+        change: The change.
+        tests: Names of the tests with their time on the code as it is, [s]; none:
+            nobody notices.
+    """
+
+    change: Change
+    tests: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -59,52 +79,165 @@ def copy_checkout(root: Path, folder: Path) -> None:
             shutil.copy2(source, target)
 
 
-def import_libraries() -> None:
-    """Import what tests import besides the package."""
-    for name in LIBRARIES:
-        importlib.import_module(name)
+def _within(code: CodeType) -> Iterator[CodeType]:
+    """The code of all that a module or class defines, nested or not."""
+    for part in code.co_consts:
+        if isinstance(part, CodeType):
+            yield part
+            yield from _within(part)
 
 
-def try_change(
-    folder: Path, change: Change, tests: list[str], usual: float, plain: str | None
-) -> Trial:
-    """Run tests on a change.
+def _at_import(code: CodeType) -> tuple[Any, ...]:
+    """What of a module or class body runs at import."""
+    consts = [c if not isinstance(c, CodeType) else
+              _at_import(c) if not c.co_flags & CO_OPTIMIZED else c.co_qualname
+              for c in code.co_consts]  # fmt: skip
+    return code.co_code, code.co_names, repr(consts)
+
+
+def new_code(module: Path, content: str) -> dict[tuple[str, int], CodeType] | None:
+    """The code of a changed module's functions by name and first line.
+
+    Returns:
+        None where something differs that runs at import.
+    """
+    before = compile(module.read_text(encoding="utf-8"), str(module), "exec")
+    after = compile(content, str(module), "exec")
+    if _at_import(before) != _at_import(after):
+        return None
+    every = list(_within(after))
+    found = {(code.co_qualname, code.co_firstlineno): code for code in every}
+    return found if len(found) == len(every) else None
+
+
+class Bench:
+    """A plugin of pytest that tries changes in place of running the tests once.
 
     Args:
         folder: A copy of the checkout, this process's own.
-        change: The change.
-        tests: Names of the tests; none: nobody notices.
-        usual: Their time on the code as it is; [s].
-        plain: Variable that turns machine code off, if it shall be.
+        tasks: What is left to try; None: no more.
+        done: Where trials go.
     """
-    if not tests:
-        return Trial(change, False, 0, 0.0)
-    module, begun = folder / change.module, time.monotonic()
-    kept = module.read_bytes()
-    module.write_text(change.content, encoding="utf-8")
-    try:
-        status = _status(folder, tests, PATIENCE * (1.0 + usual), plain)
-    finally:
-        module.write_bytes(kept)
-    return Trial(change, status != 0, len(tests), time.monotonic() - begun)
+
+    def __init__(
+        self, folder: Path, tasks: "queue.Queue[Task | None]", done: Callable[..., None]
+    ) -> None:
+        self._folder, self._tasks, self._done = folder, tasks, done
+        self._functions: dict[Path, list[FunctionType]] = {}
+        self._failed = False
+        self._noticed_by: dict[tuple[str, str], list[str]] = {}
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        """Try one change after another."""
+        items = {item.nodeid: item for item in session.items}
+        while (task := self._tasks.get()) is not None:
+            self._done(self._try(task, items))
+        return True
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Note that a test failed."""
+        self._failed |= report.failed
+
+    def _try(self, task: Task, items: dict[str, pytest.Item]) -> Trial:
+        change, begun = task.change, time.monotonic()
+        if not task.tests:
+            return Trial(change, False, 0, 0.0)
+        module = self._folder / change.module
+        code = new_code(module, change.content)
+        if code is None:
+            status = self._written(module, task)
+        else:
+            status = self._replaced(module, code, task, items)
+        seconds = time.monotonic() - begun
+        return Trial(change, status != 0, len(task.tests), seconds)
+
+    def _replaced(
+        self, module: Path, code: dict[tuple[str, int], CodeType], task: Task,
+        items: dict[str, pytest.Item],
+    ) -> int:  # fmt: skip
+        """Exit status of the tests in a child whose functions have other code."""
+        functions = self._functions_of(module)
+        place = task.change.module, task.change.function
+        first = [name for name in self._noticed_by.get(place, []) if name in task.tests]
+        names = [*first, *(name for name in task.tests if name not in first)]
+        reading, writing = os.pipe()
+
+        def child() -> int:
+            for function in functions:
+                old = function.__code__
+                function.__code__ = code[old.co_qualname, old.co_firstlineno]
+            for k, name in enumerate(names):
+                item, after = items[name], [items[n] for n in names[k + 1 : k + 2]]
+                nextitem = after[0] if after else None
+                limit = 1.0 + PATIENCE * task.tests[name]
+                signal.setitimer(signal.ITIMER_PROF, limit)  # ends the process
+                item.ihook.pytest_runtest_protocol(item=item, nextitem=nextitem)
+                if self._failed:
+                    os.write(writing, name.encode())
+                    return 1
+            return 0
+
+        status = _status(_forked(child))
+        os.close(writing)
+        with os.fdopen(reading, encoding="utf-8") as told:
+            if name := told.read():
+                known = self._noticed_by.setdefault(place, [])
+                self._noticed_by[place] = [name, *(n for n in known if n != name)]
+        return status
+
+    def _functions_of(self, module: Path) -> list[FunctionType]:
+        """All functions of a module that are alive."""
+        if module not in self._functions:
+            name = module.relative_to(self._folder).with_suffix("").as_posix()
+            importlib.import_module(name.replace("/", ".").removesuffix(".__init__"))
+            self._functions[module] = [
+                found for found in gc.get_objects() if isinstance(found, FunctionType)
+                and found.__code__.co_filename == str(module)
+            ]  # fmt: skip
+        return self._functions[module]
+
+    def _written(self, module: Path, task: Task) -> int:
+        """Exit status of the tests in a process that imports the changed module."""
+        kept = module.read_bytes()
+        module.write_text(task.change.content, encoding="utf-8")
+        words = [sys.executable, "-m", "pytest", "-x", *WORDS, *task.tests]
+        limit = math.ceil(PATIENCE * (2.0 + sum(task.tests.values())))
+
+        def child() -> int:
+            resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+            os.execv(words[0], words)
+
+        try:
+            return _status(_forked(child))
+        finally:
+            module.write_bytes(kept)
 
 
-def _status(folder: Path, tests: list[str], limit: float, plain: str | None) -> int:
-    """Exit status of the tests in a child; above 0 where they fail or do not end."""
+def _forked(work: Callable[[], int]) -> int:
+    """A child that ends with what `work` returns."""
     child = os.fork()
-    if child == 0:
+    if child:
+        return child
+    status = 1
+    try:
         os.setpgid(0, 0)
-        seconds = math.ceil(limit)
-        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-        _run_tests(folder, tests, plain)
-    computed, ends = "", time.monotonic() + SILENCE
+        status = work()
+    finally:
+        os._exit(status)
+
+
+def _status(child: int) -> int:
+    """Exit status of a child; above 0 where its tests fail or do not end."""
+    computed, ends, pause = "", time.monotonic() + SILENCE, 0.001
     while time.monotonic() < ends:
         done, status = os.waitpid(child, os.WNOHANG)
         if done:
             return abs(os.waitstatus_to_exitcode(status))
         if computed != (now := _computed(child)):
             computed, ends = now, time.monotonic() + SILENCE
-        time.sleep(0.02)
+        time.sleep(pause)
+        pause = min(0.02, 1.5 * pause)
     os.killpg(child, signal.SIGKILL)
     os.waitpid(child, 0)
     return signal.SIGKILL
@@ -116,33 +249,30 @@ def _computed(process: int) -> str:
     return " ".join(stat.rpartition(")")[2].split()[11:15])
 
 
-def _run_tests(folder: Path, tests: list[str], plain: str | None) -> None:
-    """In the child: run them, say nothing, end."""
-    import pytest
+def try_changes(
+    folder: Path,
+    files: list[str],
+    tasks: "queue.Queue[Task | None]",
+    done: Callable[[Trial], None],
+    plain: str | None,
+) -> None:
+    """Collect tests in this process, which prints no more, and try changes with them.
 
+    Args:
+        folder: A copy of the checkout, this process's own.
+        files: Of tests.
+        tasks: What to try; None: no more.
+        done: Takes each trial.
+        plain: Variable that turns machine code off, if it shall be.
+    """
     os.chdir(folder)
-    os.environ["PYTHONPATH"] = str(folder)
     # Byte code of one change would pass for the next one of its size and second.
     sys.dont_write_bytecode = True
-    os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
-    if plain is not None:
-        os.environ[plain] = "1"
+    more = {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+    os.environ.update(more if plain is None else more | {plain: "1"})
     sys.path.insert(0, str(folder))
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
     os.dup2(nowhere, 2)
-    status = 1
-    try:
-        # Its libraries are imported already, so pytest rewrites no assertions.
-        words = [
-            "-x",
-            "-q",
-            "-p",
-            "no:cacheprovider",
-            "-p",
-            "no:xdist",
-            "--assert=plain",
-        ]
-        status = int(pytest.main([*words, *tests]))
-    finally:
-        os._exit(status)
+    place = f"--basetemp={folder.with_name(folder.name + '-tests')}"
+    pytest.main(["-s", *WORDS, place, *files], plugins=[Bench(folder, tasks, done)])

@@ -104,31 +104,39 @@ def test_each_file_of_tests_is_asked_before_any_twice() -> None:
 TRIED = """
 import sys
 from pathlib import Path
+from queue import Queue
 from analysis.mutation.changes import changes
-from analysis.mutation.trial import try_change
+from analysis.mutation.trial import Task, try_changes
 
-folder = Path(sys.argv[1])
-for change in changes(folder, "module.py"):
-    trial = try_change(folder, change, ["test_one.py::test_one"], 1.0, None)
-    print(change.before, "->", change.after, trial.noticed)
+folder, tasks, trials = Path(sys.argv[1]), Queue(), []
+for change in [*changes(folder, "module.py"), None]:
+    tasks.put(change and Task(change, {"test_one.py::test_one": 1.0}))
+try_changes(folder, ["test_one.py"], tasks, trials.append, None)
+said = [f"{t.change.before} -> {t.change.after} {t.noticed}" for t in trials]
+(folder / "said").write_text("\\n".join(said))
 """
 
 
 def test_a_change_that_matters_is_noticed_and_the_module_is_put_back(
     tmp_path: Path,
 ) -> None:
-    module = "def one(x):\n    if x < 3:\n        return 0\n    return 5\n"
+    """Within functions and at import, the one as the other."""
+    module = (
+        "M = 3\n\ndef one(x, y=4):\n    if x < M:\n        return 0\n    return 5\n"
+    )
     (tmp_path / "module.py").write_text(module)
     (tmp_path / "test_one.py").write_text(
-        "from module import one\n\ndef test_one():\n    assert one(0) == 0\n"
+        "from module import M, one\n\n"
+        "def test_one():\n    assert (one(0), M) == (0, 3)\n"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", TRIED, str(tmp_path)],
-        cwd=ROOT, capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    said = set(ended.stdout.splitlines())
-    assert "x < 3 -> x >= 3 True" in said
-    assert "x < 3 -> x <= 3 False" in said  # nobody asks about 3
-    assert "0 -> 1 True" in said
-    assert "5 -> 6 False" in said
+    subprocess.run([sys.executable, "-c", TRIED, str(tmp_path)], cwd=ROOT, check=True)
+    said = set((tmp_path / "said").read_text().splitlines())
+    assert said == {
+        "3 -> 4 True",
+        "4 -> 5 False",
+        "x < M -> x >= M True",
+        "x < M -> x <= M False",  # nobody asks about 3
+        "0 -> 1 True",
+        "5 -> 6 False",
+    }
     assert (tmp_path / "module.py").read_text() == module

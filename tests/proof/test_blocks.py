@@ -4,11 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from oracles.plain import plain
 from oracles.tree_queries import random_path, random_tree, unit
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
+from vdsm_pin.proof import bends as slices
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.boxes import body_box, box_gaps, box_reaches
 from vdsm_pin.proof.budget import Budget
@@ -32,6 +34,8 @@ from vdsm_pin.proof.rows import BLOCK
 from vdsm_pin.proof.terms import CERTIFIED, UNDECIDED, Rules, Task, mover_of
 from vdsm_pin.proof.tree import Joint, Kind, Tree
 from vdsm_pin.proof.workspace import new_workspace
+
+new_bends, bend_between = plain(slices.new_bends), plain(slices.bend_between)
 
 RULES = Rules(True, True, 1e-11, 1e-9, 1e-6, 0.02, np.inf)
 INTERVALS = 3
@@ -207,6 +211,7 @@ def test_a_block_has_the_bounds_of_the_formula(degree: int, seed: int) -> None:
             way = way_of(
                 case.tree, case.path, case.box, *ends, task.places.lever[place]
             )
+            check_slices(case, int(task.places.way[place]), ends)
             points = seen(case, place)
             found = rows.tracks.places[place, :, : INTERVALS + 1].T
             np.testing.assert_allclose(found, points, **EXACT)
@@ -230,6 +235,17 @@ def test_a_block_has_the_bounds_of_the_formula(degree: int, seed: int) -> None:
             wide = disc * np.linalg.norm(np.cross(axis, n), axis=1)
             lost = lost + np.maximum(wide[1:], wide[:-1])
         np.testing.assert_allclose(runs.lower[:INTERVALS], 2.0 - lost, **EXACT)
+
+
+def check_slices(case: Case, number: int, ends: tuple[int, int]) -> None:
+    """The same of a way over whole intervals, as subdivision has it."""
+    bends = new_bends(len(case.task.ways.rest), case.tree.n_frames)
+    way = way_of(case.tree, case.path, case.box, *ends, 0.0)
+    truth = np.stack([way.bend, way.turn, way.swing, way.drift])
+    for k in range(INTERVALS):
+        bend_between(case.task, case.path.packed(), bends, number, k, 0.0, 1.0)
+        found = [part[number] for part in bends[:4]]
+        np.testing.assert_allclose(found, truth[:, k], **EXACT)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -376,7 +392,9 @@ def test_how_much_is_judged_is_told_while_it_is() -> None:
     assert proving.share == 1.0
 
 
-@pytest.mark.parametrize("judged", [(1, 0), (0, 1), (1, 1), (0, 0)])
+@pytest.mark.parametrize(
+    "judged", [(BLOCK, 0), (0, BLOCK), (BLOCK, BLOCK), (0, 0), (BLOCK - 1, BLOCK)]
+)
 def test_each_pair_owns_up_to_what_it_was_not_judged(
     judged: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -389,14 +407,14 @@ def test_each_pair_owns_up_to_what_it_was_not_judged(
     proving, _ = start_proof(tree, bodies, path, table)
 
     def cut(*_: int) -> bool:
-        proving.results.counts[:, CERTIFIED] = np.multiply(judged, BLOCK)
+        proving.results.counts[:, CERTIFIED] = judged
         proving.results.best[:, 0] = 1.0
         proving.results.profile[:] = 1.0
         return False
 
     monkeypatch.setattr(type(proving), "sweep", cut)
     assert not proving.run()
-    left = BLOCK * (1 - np.array(judged))
+    left = BLOCK - np.array(judged)
     np.testing.assert_array_equal(proving.results.counts[:, UNDECIDED], left)
     assert (proving.results.best[left > 0, 0] == -np.inf).all()
     assert (proving.results.best[left == 0, 0] == 1.0).all()
