@@ -1,13 +1,15 @@
 """Plans beside obstacles that move: the arm waits until they rest, and it is proved."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from vdsm_pin import refinement
 from vdsm_pin.cli import app
-from vdsm_pin.errors import InvalidInput, NoPlanFound
+from vdsm_pin.errors import InvalidInput, NoPlanFound, OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.geometry.solids import (
     Box,
@@ -22,8 +24,11 @@ from vdsm_pin.geometry.solids import (
     Voxels,
 )
 from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.planner.records import Plan
+from vdsm_pin.planner.waiting import waited
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.refinement import plan_and_verify
+from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
@@ -70,6 +75,21 @@ def test_a_door_that_swings_over_the_start_has_no_plan(tmp_path: Path) -> None:
     problem = problem_of(tmp_path, hinge=500.0)
     with pytest.raises(NoPlanFound, match="where all comes to rest, but not proved"):
         plan_and_verify(problem, "fewest", load_robot(problem.manipulator))
+
+
+def test_a_time_limit_before_the_proof_of_the_wait_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem, deadline = problem_of(tmp_path), Deadline.after(600.0)
+
+    def late(*args: Any) -> Plan:
+        object.__setattr__(deadline, "end", 0.0)
+        return waited(*args)
+
+    monkeypatch.setattr(refinement, "waited", late)
+    with pytest.raises(OutOfTime, match="600 s came first; a motion was found, but"):
+        robot = load_robot(problem.manipulator)
+        plan_and_verify(problem, "fewest", robot, deadline=deadline)
 
 
 def test_what_knows_no_time_refuses(tmp_path: Path) -> None:

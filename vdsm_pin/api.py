@@ -52,7 +52,7 @@ def plan(
 
     Args:
         problem: What is asked.
-        strategy: `fewest`, `clearest`, `sturdiest` or `paper`.
+        strategy: `fewest`, `clearest`, `sturdiest`, `paper` or `follow-the-leader`.
         time_limit: Until there is a plan that is proved; None for none; [s].
 
     Returns:

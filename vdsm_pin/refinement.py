@@ -48,6 +48,9 @@ HANDED_OUT: Final = (Verdict.CERTIFIED, Verdict.INCOMPLETE)
 """Verdicts of motions that are clear and within their limits at every instant."""
 
 
+UNPROVED: Final = "a motion was found, but not proved"
+
+
 @dataclass(frozen=True)
 class Round:
     """One round of planning, measuring and verifying.
@@ -124,7 +127,8 @@ def plan_and_verify(
         centres=plan.centres,
     )
     if verification.verdict not in HANDED_OUT:
-        why = _proved(np.zeros((1, 1)), verification, ()).reason
+        deadline.check(UNPROVED)
+        why = _worst(verification)
         message = f"a plan was found for where all comes to rest, but not proved: {why}"
         raise NoPlanFound(message)
     return Refinement(plan, verification, found.rounds)
@@ -165,8 +169,8 @@ def _plan_at_rest(
                 deadline=deadline,
                 centres=plan.centres,
             )
-            if deadline.passed and verification.verdict not in HANDED_OUT:
-                raise OutOfTime(deadline.limit, "a motion was found, but not proved")
+            if verification.verdict not in HANDED_OUT:
+                deadline.check(UNPROVED)
             adjustments = by_proof(verification, margins)
             rounds.append(_proved(margins, verification, adjustments))
         kept = in_mm(rounds[-1].margin)
@@ -251,22 +255,27 @@ def _proved(
     verification: ArmVerification,
     adjustments: tuple[Adjustment, ...],
 ) -> Round:
-    """A round that was verified; the worst check that failed is its reason."""
+    """A round that was verified."""
+    verdict, clearance = verification.verdict, verification.min_clearance
+    why = _worst(verification)
+    return Round(_largest(margins), verdict, clearance, why, adjustments)
+
+
+def _worst(verification: ArmVerification) -> str:
+    """The worst check that failed, in words."""
     failed = [
         check for check in verification.checks if check.verdict is not Verdict.CERTIFIED
     ]
     failed.sort(key=lambda check: check.verdict is not Verdict.REFUTED)
-    reason = "every check passed"
-    if failed:
-        check = failed[0]
-        worst, limit = (
-            in_mm(value) if check.unit == "m" else f"{value:.6g} {check.unit}"
-            for value in (check.worst, check.limit)
-        )
-        where = f" ({check.where})" if check.where else ""
-        reason = f"{check.name}: {check.verdict} with {worst} against {limit}{where}"
-    verdict, clearance = verification.verdict, verification.min_clearance
-    return Round(_largest(margins), verdict, clearance, reason, adjustments)
+    if not failed:
+        return "every check passed"
+    check = failed[0]
+    worst, limit = (
+        in_mm(value) if check.unit == "m" else f"{value:.6g} {check.unit}"
+        for value in (check.worst, check.limit)
+    )
+    where = f" ({check.where})" if check.where else ""
+    return f"{check.name}: {check.verdict} with {worst} against {limit}{where}"
 
 
 def _largest(margins: FloatArray) -> float:

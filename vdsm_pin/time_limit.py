@@ -60,14 +60,14 @@ class Deadline:
         """The same limit, which ends so much before."""
         return replace(self, end=self.end - seconds)
 
-    def check(self) -> None:
-        """Go on, unless the time is over.
+    def check(self, reached: str = "") -> None:
+        """Go on, unless the time is over; the error says how far the work came.
 
         Raises:
             OutOfTime: If it is.
         """
         if self.passed:
-            raise OutOfTime(self.limit)
+            raise OutOfTime(self.limit, reached)
 
 
 NO_LIMIT: Final = Deadline()

@@ -1,5 +1,6 @@
 """Links inside meshes of a scene: solid angles, checker, and what cannot be told."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.source import sha256_of_file
+from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.certificate import write_robot_certificate
@@ -115,6 +117,19 @@ def test_an_inside_that_cannot_be_told_is_undecided_or_far(tmp_path: Path) -> No
     assert judged(stated, tmp_path).verdict is Verdict.CERTIFIED
     bowl.apply_translation([0.5, 0.0, 0.0])
     assert judged(cell_in(tmp_path, bowl), tmp_path).verdict is Verdict.CERTIFIED
+
+
+def test_the_motion_without_errors_is_located_without_them(tmp_path: Path) -> None:
+    """A bowl whose hull the ball clears by 0.04 m, the bowl itself by 0.27 m."""
+    bowl = trimesh.creation.icosphere(3, 0.3)
+    bowl.update_faces(bowl.triangles_center[:, 0] > -0.1)
+    bowl.apply_translation([0.66, 0.0, 0.0])
+    found = judged(
+        replace(cell_in(tmp_path, bowl), errors=ErrorBox(base=0.3)), tmp_path
+    )
+    assert found.verdict is Verdict.REFUTED
+    assert len(found.counterexamples) == 1
+    assert found.nominal_clear
 
 
 def test_a_mesh_that_moves_over_a_link_is_refuted(tmp_path: Path) -> None:

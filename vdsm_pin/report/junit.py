@@ -10,7 +10,7 @@ from vdsm_pin.report.words import TIME_LIMIT, outcome
 def junit_text(rows: Sequence[BatchRow]) -> str:
     """The batch as JUnit XML; all that did not pass and is no error failed.
 
-    Durations are zero: they would differ from run to run, and timing.csv has them.
+    Durations are zero: they would differ from run to run, and timing.json has them.
     """
     broken = [row for row in rows if row.outcome in ("error", TIME_LIMIT)]
     passed = [row for row in rows if outcome(row.outcome).passed]

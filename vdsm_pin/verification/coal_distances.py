@@ -1,6 +1,6 @@
 """Coal's distances of links at the rows of a trajectory, with our brackets beside them.
 
-Poses come from Pinocchio, shapes from the URDF and distances from Coal; the brackets
+Poses come from Pinocchio, which reads the URDF, and distances from Coal; the brackets
 come from the closed-form kinematics and our own kernels.
 
 Pairs that are far apart add no evidence. A chain of balls along each link against the
