@@ -35,8 +35,8 @@ class CoverageMap:
     tests: dict[str, dict[int, list[str]]]
     seconds: dict[str, float]
 
-    def asked(self, module: str, lines: tuple[int, ...], budget: float) -> list[str]:
-        """Tests of lines that take no more than a budget.
+    def asked(self, module: str, lines: tuple[int, ...]) -> dict[str, float]:
+        """Tests of lines with their seconds.
 
         The quickest of each file come first, then the second of each, and so on, since
         tests of one file notice the same.
@@ -47,16 +47,12 @@ class CoverageMap:
         by_line = self.tests.get(module, {})
         known = set().union(*(by_line.get(line, []) for line in lines))
         known = known or {name for name, used in self.seconds.items() if used < SLOW}
-        chosen, total, turns, rank = [], 0.0, Counter[str](), {}
+        turns, rank = Counter[str](), {}
         for test in sorted(known, key=lambda name: (self.seconds[name], name)):
             file = test.partition("::")[0]
             turns[file] += 1
             rank[test] = (turns[file], self.seconds[test], test)
-        for test in sorted(rank, key=rank.__getitem__):
-            if not chosen or total + self.seconds[test] <= budget:
-                total += self.seconds[test]
-                chosen.append(test)
-        return chosen
+        return {t: self.seconds[t] for t in sorted(rank, key=rank.__getitem__)}
 
 
 class TooSlow(BaseException):

@@ -31,6 +31,9 @@ PATIENCE: Final = 3.0
 """A test is ended once it has computed for so many times its usual time, and a second
 more, which is noticing: other work on the machine makes no test fail."""
 
+REMEMBERED: Final = 12
+"""Tests that noticed changes of one function or module are asked first, so many."""
+
 SILENCE: Final = 120.0
 """It is ended, too, after so long without computing, as it may wait for ever; [s]."""
 
@@ -45,10 +48,23 @@ class Task:
         change: The change.
         tests: Names of the tests with their time on the code as it is, [s]; none:
             nobody notices.
+        budget: They are asked until their times come to this; [s].
     """
 
     change: Change
     tests: dict[str, float]
+    budget: float
+
+    def asked(self, *first: str) -> list[str]:
+        """Names of the tests to ask, some before the others."""
+        names, total = [], 0.0
+        for name in dict.fromkeys(
+            [*(n for n in first if n in self.tests), *self.tests]
+        ):
+            if not names or total + self.tests[name] <= self.budget:
+                total += self.tests[name]
+                names.append(name)
+        return names
 
 
 @dataclass(frozen=True)
@@ -125,7 +141,7 @@ class Bench:
         self._folder, self._tasks, self._done = folder, tasks, done
         self._functions: dict[Path, list[FunctionType]] = {}
         self._failed = False
-        self._noticed_by: dict[tuple[str, str], list[str]] = {}
+        self._noticed_by: dict[str, list[str]] = {}
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
@@ -158,9 +174,9 @@ class Bench:
     ) -> int:  # fmt: skip
         """Exit status of the tests in a child whose functions have other code."""
         functions = self._functions_of(module)
-        place = task.change.module, task.change.function
-        first = [name for name in self._noticed_by.get(place, []) if name in task.tests]
-        names = [*first, *(name for name in task.tests if name not in first)]
+        module_name = task.change.module
+        places = f"{module_name}:{task.change.function}", module_name
+        names = task.asked(*(n for p in places for n in self._noticed_by.get(p, [])))
         reading, writing = os.pipe()
 
         def child() -> int:
@@ -181,9 +197,10 @@ class Bench:
         status = _status(_forked(child))
         os.close(writing)
         with os.fdopen(reading, encoding="utf-8") as told:
-            if name := told.read():
-                known = self._noticed_by.setdefault(place, [])
-                self._noticed_by[place] = [name, *(n for n in known if n != name)]
+            name = told.read()
+        for place in places if name else ():
+            known = [n for n in self._noticed_by.get(place, []) if n != name]
+            self._noticed_by[place] = [name, *known][:REMEMBERED]
         return status
 
     def _functions_of(self, module: Path) -> list[FunctionType]:
@@ -201,8 +218,9 @@ class Bench:
         """Exit status of the tests in a process that imports the changed module."""
         kept = module.read_bytes()
         module.write_text(task.change.content, encoding="utf-8")
-        words = [sys.executable, "-m", "pytest", "-x", *WORDS, *task.tests]
-        limit = math.ceil(PATIENCE * (2.0 + sum(task.tests.values())))
+        names = task.asked()
+        words = [sys.executable, "-m", "pytest", "-x", *WORDS, *names]
+        limit = math.ceil(PATIENCE * (2.0 + sum(task.tests[name] for name in names)))
 
         def child() -> int:
             resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))

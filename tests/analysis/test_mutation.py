@@ -8,8 +8,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from analysis.mutation.changes import changes  # noqa: E402
+from analysis.mutation.changes import Change, changes  # noqa: E402
 from analysis.mutation.coverage_map import Asked, CoverageMap, coverage_map  # noqa: E402
+from analysis.mutation.trial import Task  # noqa: E402
 
 MODULE = '''"""A module."""
 
@@ -89,16 +90,20 @@ def test_the_map_knows_which_test_runs_a_line(tmp_path: Path) -> None:
     asked, kept = Asked(tmp_path, ["module.py"], plain=False), tmp_path / "kept"
     kept.mkdir()
     seen = coverage_map(asked, ["test_one.py"], 1, kept)
-    assert seen.asked("module.py", (2,), budget=1.0) == ["test_one.py::test_one"]
+    assert list(seen.asked("module.py", (2,))) == ["test_one.py::test_one"]
     # No test runs line 3: what a module does at import, any test may see.
-    assert seen.asked("module.py", (3,), budget=1.0) == ["test_one.py::test_one"]
+    assert list(seen.asked("module.py", (3,))) == ["test_one.py::test_one"]
 
 
 def test_each_file_of_tests_is_asked_before_any_twice() -> None:
     seconds = {"a::1": 0.1, "a::2": 0.2, "b::1": 0.5, "b::2": 0.6}
     seen = CoverageMap({"module.py": {1: sorted(seconds)}}, seconds)
-    assert seen.asked("module.py", (1,), 9.0) == ["a::1", "b::1", "a::2", "b::2"]
-    assert seen.asked("module.py", (1,), 0.6) == ["a::1", "b::1"]
+    tests = seen.asked("module.py", (1,))
+    assert list(tests) == ["a::1", "b::1", "a::2", "b::2"]
+    change = Change("module.py", 1, "", "", "", "")
+    assert Task(change, tests, 0.6).asked() == ["a::1", "b::1"]
+    assert Task(change, tests, 0.8).asked("c::1", "b::2") == ["b::2", "a::1"]
+    assert Task(change, tests, 0.01).asked() == ["a::1"]
 
 
 TRIED = """
@@ -110,7 +115,7 @@ from analysis.mutation.trial import Task, try_changes
 
 folder, tasks, trials = Path(sys.argv[1]), Queue(), []
 for change in [*changes(folder, "module.py"), None]:
-    tasks.put(change and Task(change, {"test_one.py::test_one": 1.0}))
+    tasks.put(change and Task(change, {"test_one.py::test_one": 1.0}, 5.0))
 try_changes(folder, ["test_one.py"], tasks, trials.append, None)
 said = [f"{t.change.before} -> {t.change.after} {t.noticed}" for t in trials]
 (folder / "said").write_text("\\n".join(said))

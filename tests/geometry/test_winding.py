@@ -1,6 +1,8 @@
 """Crossings of rays and triangles; oracle: the linear system of ray and corners."""
 
 import numpy as np
+import pytest
+from oracles.closed_solids import solid
 
 from vdsm_pin.geometry import winding
 
@@ -22,3 +24,52 @@ def test_crossings_in_doubt_are_those_of_the_linear_system() -> None:
         assert found[0] == np.sign(np.linalg.det(seen))
         np.testing.assert_allclose(found[1], 1.0 / shares.sum(), rtol=1e-9)
     assert met > 150
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_hits_are_those_of_exact_arithmetic(seed: int) -> None:
+    """Rays past, at and beside edges and corners; points also in planes of faces."""
+    rng = np.random.default_rng([5, seed])
+    corners, counts = solid(rng), np.zeros(3, np.int64)
+    corners = corners[rng.choice(len(corners), min(12, len(corners)), replace=False)]
+    corners = np.rint(64.0 * corners) / 64.0  # differences are exact
+    face = corners[rng.integers(len(corners))]
+    points = [
+        *rng.uniform(-1.2, 1.2, (2, 3)),
+        face.mean(axis=0),
+        2.0 * face[1] - face[0],
+    ]
+    for point in np.rint(64.0 * np.array(points)) / 64.0:
+        view = winding._View(corners, point)
+        aims = [*(corners[rng.integers(len(corners), size=3)] @ np.eye(3))[:, 0]]
+        aims += [
+            corners[k, :2].mean(axis=0) for k in rng.integers(len(corners), size=3)
+        ]
+        aims += [one + 1e-16 * rng.normal(size=3) for one in aims]
+        rays = [aim - point for aim in aims if (aim != point).any()]
+        for ray in [*rays, *(-ray for ray in rays), *winding.RAYS[:3]]:
+            exact = [view._exact(k, ray) for k in range(len(corners))]
+            found = view.hits(ray)
+            counts[0] += found is None
+            if None in exact:
+                assert found is None
+                continue
+            assert found is not None
+            met = [(k, *one) for k, one in enumerate(exact) if one and one[0]]
+            order = np.argsort(found.triangle)
+            told = [part[order] for part in found]
+            assert [*zip(told[0].tolist(), told[1].tolist(), strict=True)] == [
+                one[:2] for one in met
+            ]
+            np.testing.assert_allclose(told[2], [one[2] for one in met], rtol=1e-9)
+            counts[1 if met else 2] += 1
+    assert (counts > 0).all()
+
+
+def test_rays_are_spread_over_all_directions() -> None:
+    rays = winding.RAYS
+    assert rays.shape == (winding.N_RAYS, 3)
+    np.testing.assert_allclose(np.linalg.norm(rays, axis=1), 1.0)
+    any_way = np.random.default_rng(6).normal(size=(2000, 3))
+    any_way /= np.linalg.norm(any_way, axis=1)[:, None]
+    assert np.arccos((any_way @ rays.T).max(axis=1)).max() < 0.55

@@ -32,11 +32,12 @@ class Asked:
     pairs: tuple[Pair, ...]
 
     def recorded(
-        self, room: int = ROOM, first: int = 0
+        self, room: int = ROOM, first: int = 0, until: float = np.inf
     ) -> tuple["Written", FloatArray, tuple[int, int, int]]:
         """What it is about, the planes from an interval on, and how it ended."""
         table = PairTable.of(list(self.pairs))
-        made, plan = start_proof(self.tree, list(self.bodies), self.path, table)
+        args = self.tree, list(self.bodies), self.path, table
+        made, plan = start_proof(*args, None, Budget(until=until))
         work = new_workspace(made.task, self.tree.n_columns, Budget().slices)
         records = np.full((room, RECORD), np.nan)
         ended = record(made.task, made.motion, work, first, INTERVALS, records)
@@ -189,6 +190,13 @@ def test_without_room_whole_intervals_are_written(seed: int) -> None:
     _, records, (written, reached, _) = asked.recorded(first=1)
     assert reached == INTERVALS
     assert set(records[:written, 0]) == set(range(1, INTERVALS))
+
+
+def test_without_time_nothing_is_written_and_nothing_has_failed() -> None:
+    asked = random_asked(np.random.default_rng(55))
+    _, records, ended = asked.recorded(first=1, until=0.0)
+    assert ended == (0, 1, -1)
+    assert np.isnan(records).all()
 
 
 def test_what_is_not_proved_is_named() -> None:

@@ -8,9 +8,10 @@ import pytest
 from oracles.tree_queries import make_query
 
 from vdsm_pin.geometry.convex import FewCorners, Hull
-from vdsm_pin.proof.bodies import Body, Pair
+from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.prover import prove
+from vdsm_pin.proof.rough import with_rough
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.robots.hulls import FEW_CORNERS, few_corners
 from vdsm_pin.tolerances import TOLERANCES
@@ -107,3 +108,23 @@ def test_few_corners_miss_no_more_than_they_tell(n: int) -> None:
 def test_few_corners_of_few_are_none() -> None:
     """They would cost as much as all."""
     assert few_corners(np.random.default_rng(0).normal(size=(31, 3))) == ()
+
+
+def test_bodies_of_one_hull_alone_have_rough_versions() -> None:
+    """What both miss is missed by the version of a pair; all others have none."""
+    rng = np.random.default_rng(7)
+    away = [Hull(rng.normal(size=(4, 3))) for _ in range(3)]
+    one, other = (shrunk(Body(k, (away[k],)), (0.1, 0.01)[: k + 1]) for k in (0, 1))
+    two = Body(2, (one.pieces[0], away[2]))
+    pairs = PairTable.of([Pair(0, 2, 0.5), Pair(2, 2, 0.25), Pair(1, 0, 0.125)])
+    rough = with_rough([one, other, two], pairs)
+    assert rough.original.tolist() == [0, 1, 2, 0, 1, 1]
+    assert rough.pairs.rough.tolist() == [[3, -1], [-1, -1], [4, 5]]
+    assert rough.pairs.one.tolist() == [0, 2, 1, 3, 4, 5]
+    assert rough.pairs.other.tolist() == [2, 2, 0, 2, 3, 0]
+    assert rough.pairs.required.tolist() == [0.5, 0.25, 0.125, 0.5, 0.125, 0.125]
+    missed = [few.missed for body in (one, other) for few in body.pieces[0].few]
+    told = [0.0, 0.0, 0.0, missed[0], missed[0] + missed[1], missed[2]]
+    assert rough.pairs.loose.tolist() == told
+    for k, few in ((3, one.pieces[0].few[0]), (5, other.pieces[0].few[1])):
+        assert np.array_equal(rough.bodies[k].pieces[0].points, few.points)

@@ -48,10 +48,20 @@ from vdsm_pin.proof.layouts import (
 from vdsm_pin.proof.packed_tree import pack_tree
 from vdsm_pin.proof.packing import pack_task, with_errors
 from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.prover import RANK
 from vdsm_pin.proof.proving import new_results, room_for
 from vdsm_pin.proof.results import Results
 from vdsm_pin.proof.rows import new_tracks
-from vdsm_pin.proof.terms import LINKS, OBSTACLES, Rules, Task, mover_of
+from vdsm_pin.proof.terms import (
+    CERTIFIED,
+    LINKS,
+    OBSTACLES,
+    REFUTED,
+    UNDECIDED,
+    Rules,
+    Task,
+    mover_of,
+)
 from vdsm_pin.proof.tree import Joint, Kind, Tree
 from vdsm_pin.proof.ways import WayTable, way_errors
 from vdsm_pin.tolerances import TOLERANCES
@@ -616,3 +626,8 @@ def test_rounding_grows_with_what_is_far() -> None:
     rules = Budget(slack=0.5, until=7.0).rules(0.25)
     told = (TOLERANCES.bracket_gap, TOLERANCES.least_bracket)
     assert rules == Rules(True, True, 0.25, *told, 0.5, 7.0)
+
+
+def test_the_worst_of_verdicts_is_refuted() -> None:
+    assert RANK[CERTIFIED] < RANK[UNDECIDED] < RANK[REFUTED]
+    assert RANK[RANK].tolist() == [CERTIFIED, REFUTED, UNDECIDED]
