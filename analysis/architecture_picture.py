@@ -99,7 +99,7 @@ def main() -> None:
     axes.set(xlim=(0.0, 1.0), ylim=(-1.7, top + 0.6))
     axes.axis("off")
     for box, found in arrows.items():
-        for other in found:
+        for other in sorted(found):
             style = {"arrowstyle": "-|>", "color": ARROW, "lw": 0.8, "shrinkB": 9}
             axes.annotate("", place[other], place[box], arrowprops=style)
     for box, (x, y) in place.items():

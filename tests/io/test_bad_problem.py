@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from problem_texts import EVERYTHING, TETRAHEDRON, binary_stl, edited
 
 from vdsm_pin.cli import main
@@ -424,15 +425,20 @@ def test_the_first_of_several_errors_is_told_and_the_others_counted(
 def test_a_command_tells_every_error_of_a_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    text = edited(edited(OBS1, ("length_unit",), "cm"), ("obstacles", 0, "radius"), 0)
+    data = yaml.safe_load(OBS1)
+    data |= {"length_unit": "cm", "required_clearance": -1}
+    data["obstacles"][0]["radius"] = 0
+    data["tip_path"]["points"] = [[0, 1] for _ in range(30)]
     path = tmp_path / "wrong.yaml"
-    path.write_text(edited(text, ("required_clearance",), -1), encoding="utf-8")
+    path.write_text(yaml.safe_dump(data), encoding="utf-8")
     with pytest.raises(SystemExit) as ended:
         main(["plan", str(path), "--out", str(tmp_path / "out")])
     lines = capsys.readouterr().err.splitlines()
     places = [line.split(": ")[2].split(" (line")[0] for line in lines]
     assert ended.value.code == 2
-    assert places == ["length_unit", "obstacles[0].radius", "required_clearance"]
+    points = [f"tip_path.points[{k}]" for k in range(30)]
+    others = {"length_unit", "obstacles[0].radius", "required_clearance"}
+    assert sorted(places) == sorted([*points, *others])
 
 
 def test_lines_are_those_of_the_file_not_of_the_data(tmp_path: Path) -> None:

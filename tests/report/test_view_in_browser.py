@@ -78,7 +78,12 @@ def test_every_look_shows_the_whole_motion_as_large_as_it_fits(
         assert (seen > 0).all(), name
         assert (seen < [box["width"], box["height"]]).all(), name
         shares = np.ptp(seen, axis=0) / [box["width"], box["height"]]
-        assert shares.max() > 0.3, name
+        assert shares.max() > 0.4, name
+        spots = page.evaluate(f"({SEEN})(vdsm.view.spots.map((p) => p.toArray()))")
+        assert np.all(np.array(spots) > 0), "what stands around is whole"
+        if name != "overview":
+            shares = np.ptp(spots, axis=0) / [box["width"], box["height"]]
+            assert shares.max() > 0.8, name
     page.set_viewport_size({"width": 900, "height": 700})
 
 
@@ -316,6 +321,16 @@ def test_the_motion_plays_at_the_speed_chosen(report: Watched) -> None:
     page.locator("[data-speed]").select_option("4")
     assert page.evaluate("vdsm.motion.speed") == 4
     page.locator("[data-speed]").select_option("1")
+    page.evaluate("vdsm.motion.go(10)")
+    later = page.evaluate("vdsm.motion.later(2)")
+    assert later == pytest.approx(10 + 2 * 199 / 8), "all of it in 8 s"
+    # A motion with times plays as they say.
+    assert page.evaluate(
+        """() => { const timed = Object.create(vdsm.motion);
+        timed.times = Float64Array.from(vdsm.motion.rows, (row) => 3 + row * row / 100);
+        timed.go(10); return [timed.later(3), timed.later(1e9)]; }"""
+    ) == [20.0, 199.0]
+    page.evaluate("vdsm.motion.go(0)")
     assert report.errors == []
 
 

@@ -38,7 +38,12 @@ class Watched:
         self.errors: list[str] = []
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("console", self.said)
         self.page.goto(address)
+
+    def said(self, message: Any) -> None:
+        if message.type == "error" and "load resource" not in message.text:
+            self.errors.append(message.text)
 
     def shot(self, name: str) -> None:
         SHOTS.mkdir(exist_ok=True)

@@ -13,17 +13,11 @@ INTERRUPTED: Final = 130
 PIPE_CLOSED: Final = 141
 """As a shell reports whoever is ended by SIGPIPE; all files are written by then."""
 
-MOST_TOLD: Final = 20
-"""Errors of a file that are told besides the first."""
-
 
 def fail(error: Exception, status: int) -> NoReturn:
     """Say what went wrong, and end."""
-    others = getattr(error, "others", ())
-    for one in (error, *others[:MOST_TOLD]):
+    for one in (error, *getattr(error, "others", ())):
         typer.echo(printable(f"vdsm: {one}"), err=True)
-    if len(others) > MOST_TOLD:
-        typer.echo(f"vdsm: and {len(others) - MOST_TOLD} more", err=True)
     sys.exit(status)
 
 

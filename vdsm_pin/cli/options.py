@@ -6,10 +6,12 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import wraps
 from inspect import Parameter, Signature, signature
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
 import typer
+from typer.core import TyperCommand
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.planner.strategies import STRATEGIES
@@ -20,8 +22,25 @@ if TYPE_CHECKING:
 PASSED: Final = 0
 NOT_PASSED: Final = 1
 
+
+def _strategies_from(incomplete: str) -> list[str]:
+    return [name for name in STRATEGIES if name.startswith(incomplete)]
+
+
+def _problems_from(incomplete: str) -> list[str]:
+    """Built-in problems; where there is none, the shell goes on with files."""
+    from vdsm_pin.io.problem_file import built_in_names
+
+    return [name for name in built_in_names() if name.startswith(incomplete)]
+
+
 ProblemArgument = Annotated[
-    str, typer.Argument(metavar="PROBLEM", help="A built-in name or a problem file.")
+    str,
+    typer.Argument(
+        metavar="PROBLEM",
+        help="A built-in name or a problem file.",
+        autocompletion=_problems_from,
+    ),
 ]
 OutFolder = Annotated[
     Path, typer.Option("--out", metavar="FOLDER", help="Where the results go.")
@@ -36,7 +55,12 @@ ShownMotion = Annotated[
     ),
 ]
 Strategy = Annotated[
-    str, typer.Option(metavar="NAME", help=f"One of {', '.join(STRATEGIES)}.")
+    str,
+    typer.Option(
+        metavar="NAME",
+        help=f"One of {', '.join(STRATEGIES)}.",
+        autocompletion=_strategies_from,
+    ),
 ]
 
 BaseError = Annotated[
@@ -120,10 +144,33 @@ class Answer(NamedTuple):
             typer.echo(text)
 
 
+class _Command(TyperCommand):
+    """A command that takes no option for the value of the option before it."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Take the command line apart.
+
+        Raises:
+            InvalidInput: If an option stands where a value is expected.
+        """
+        named = {name: one for one in self.get_params(ctx) for name in one.opts}
+        for name, word in pairwise(args):
+            needs = name in named and not getattr(named[name], "is_flag", True)
+            if needs and word.partition("=")[0] in named and word[0] == "-":
+                message = f"{name} needs a value; {word} after it is an option"
+                raise InvalidInput(message)
+        return super().parse_args(ctx, args)
+
+
+class _Family(typer.Typer):
+    def command(self, *given: Any, **how: Any) -> Any:
+        return super().command(*given, cls=_Command, **how)
+
+
 def family() -> typer.Typer:
     """What the commands of one module are added to."""
     # Without rich markup the help page is plain text and opens twice as fast.
-    return typer.Typer(rich_markup_mode=None)
+    return _Family(rich_markup_mode=None)
 
 
 def examples(*lines: str) -> str:

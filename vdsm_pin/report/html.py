@@ -1,6 +1,7 @@
 """HTML pages: report.html, the 3D view, index.html; each is one file, no request."""
 
 import hashlib
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -10,7 +11,7 @@ from typing import Any, Final
 
 import jinja2.compiler
 from jinja2.bccache import Bucket
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from vdsm_pin import __version__, kept
 from vdsm_pin.errors import NoPlanFound, OutOfTime, VdsmError, VerificationFailed
@@ -50,6 +51,8 @@ from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.records import ArmVerification, Verification
 
 _TEMPLATES: Final = Path(__file__).parent / "templates"
+_CODE: Final = re.compile(r"`([^`]+)`")
+_TWO_WORDS: Final = re.compile(r"[a-z]+ [a-z]")  # no name of a file's
 
 
 class _Templates(jinja2.BytecodeCache):
@@ -87,7 +90,7 @@ def _environment() -> jinja2.Environment:
     filters = [quantity, depth, at_least, at_most, check_cells, limit, percent,
                errors, outcome, measured, survived,
                lost, counted, term, place, assumption, point, css_text,
-               scene_words]  # fmt: skip
+               scene_words, sentence]  # fmt: skip
     environment.filters |= {one.__name__: one for one in filters}
     environment.globals |= {
         "asset": _asset,
@@ -120,6 +123,14 @@ def point(point: Point | None) -> str:
         return MISSING
     rounded = (round(value * MM_PER_M, 1) + 0.0 for value in point)  # -0 is 0
     return ", ".join(f"{value:.1f}".replace("-", "−") for value in rounded)
+
+
+def sentence(text: str) -> Markup:
+    """A remark as a sentence; names between backticks are set as code."""
+    if _TWO_WORDS.match(text):
+        text = text[0].upper() + text[1:]
+    end = "" if text.endswith((".", "?", "!")) else "."
+    return Markup(_CODE.sub(r"<code>\1</code>", str(escape(text)))) + end
 
 
 def css_text(text: str) -> Markup:

@@ -38,7 +38,6 @@ def robot_links(verification: RobotVerification) -> dict[str, Any]:
     size = max(float(np.ptp(skin.vertices, axis=0).max()) for skin in skins)
     return {
         "radius": 0.1 * size,
-        "margin": 0.5 * size,
         "colours": list(link_colours(len(bodies))),
         "links": [
             {

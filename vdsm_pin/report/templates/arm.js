@@ -90,6 +90,11 @@ class Arm {
     this.tip.position.copy(points[points.length - 1]);
   }
 
+  // Joint centres; the arm is somewhat around them.
+  reach(centres) {
+    return centres.map((p) => new MeshCat.THREE.Vector3(...p));
+  }
+
   // Give some links, counted from 0, another colour.
   mark(links, colour) {
     this.links.forEach((one, i) =>

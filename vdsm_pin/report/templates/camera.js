@@ -63,26 +63,36 @@ class Cameras {
     else this.fit(SIDES[name]);
   }
 
-  // All of the motion from one direction, as large as it can be.
+  // All that has to be seen from one direction, as large as it can be.
   fit(direction) {
     const { Vector3 } = MeshCat.THREE;
-    const away = new Vector3(...direction).transformDirection(this.view.root.matrixWorld);
+    const { root, room, spots } = this.view;
+    const away = new Vector3(...direction).transformDirection(root.matrixWorld);
     const across = new Vector3(0, 1, 0).cross(away).normalize();
     const up = away.clone().cross(across);
-    const middle = this.view.box.getCenter(new Vector3());
-    this.view.root.localToWorld(middle);
-    const corners = boxCorners(this.view.box).map((p) =>
-      this.view.root.localToWorld(p).sub(middle));
-    const size = (axis) => Math.max(...corners.map((p) => Math.abs(p.dot(axis))));
-    this.half = [ROOM * size(across), ROOM * size(up)];
+    const corners = spots.map((p) => root.localToWorld(p.clone()));
+    const [middle, half] = [new Vector3(), []];
+    for (const axis of [across, up, away]) {
+      let [low, high] = [Infinity, -Infinity];
+      for (const p of corners) {
+        const at = p.dot(axis);
+        if (at < low) low = at;
+        if (at > high) high = at;
+      }
+      middle.addScaledVector(axis, (low + high) / 2);
+      half.push(ROOM * ((high - low) / 2 + room));
+    }
+    this.half = half.slice(0, 2);
     this.flat.zoom = 1;
     this.resize();
     const slope = Math.tan((FIELD * Math.PI) / 360);
-    const far = (p) => p.dot(away) + ROOM * Math.max(
-      Math.abs(p.dot(up)) / slope,
-      Math.abs(p.dot(across)) / (slope * this.perspective.aspect),
-    );
-    const distance = Math.max(...corners.map(far), 2 * size(away));
+    let distance = 2 * half[2];
+    for (const p of corners) {
+      const [x, y, z] = [across, up, away].map((axis) => p.dot(axis) - middle.dot(axis));
+      const wide = Math.max((Math.abs(y) + room) / slope,
+        (Math.abs(x) + room) / (slope * this.perspective.aspect));
+      distance = Math.max(distance, z + room + ROOM * wide);
+    }
     this.put(middle.clone().addScaledVector(away, distance), middle);
   }
 

@@ -83,10 +83,26 @@ class Motion {
   }
 
   momentAt(share) {
-    const value = share * this.scale[this.scale.length - 1];
-    const [k, rest] = between(this.scale, value);
+    return this.momentOf(this.scale, share * this.scale[this.scale.length - 1]);
+  }
+
+  // The moment at which a scale has a value.
+  momentOf(scale, value) {
+    const [k, rest] = between(scale, Math.min(value, scale[scale.length - 1]));
     const next = Math.min(k + 1, this.rows.length - 1);
     return this.rows[k] * (1 - rest) + this.rows[next] * rest;
+  }
+
+  // Where the motion is some seconds later: by its own times, where it has any.
+  later(seconds) {
+    if (!this.times) return this.time + seconds * (this.end / this.seconds);
+    return this.momentOf(this.times, this.timeNow() + seconds);
+  }
+
+  timeNow(time = this.time) {
+    const [k, share] = this.place(time);
+    const next = Math.min(k + 1, this.times.length - 1);
+    return this.times[k] * (1 - share) + this.times[next] * share;
   }
 
   // Call `listener(time)` now and whenever the moment changes.
@@ -108,7 +124,7 @@ class Motion {
       let before = performance.now();
       const tick = (now) => {
         if (!this.playing) return;
-        const next = this.time + ((now - before) / 1000) * this.speed * (this.end / this.seconds);
+        const next = this.later((this.speed * Math.max(0, now - before)) / 1000);
         before = now;
         this.go(next);
         if (next >= this.end) this.play(false);
@@ -131,10 +147,7 @@ class Motion {
 
   // When a moment is, in words; nothing where nobody knows.
   timeText(time) {
-    if (!this.times) return "";
-    const [k, share] = this.place(time);
-    const next = Math.min(k + 1, this.times.length - 1);
-    return `, ${(this.times[k] * (1 - share) + this.times[next] * share).toFixed(3)} s`;
+    return this.times ? `, ${this.timeNow(time).toFixed(3)} s` : "";
   }
 
   // Joint centres O_1..O_{N+1} at a time.

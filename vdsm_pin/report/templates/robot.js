@@ -49,7 +49,7 @@ class Robot {
       link.name = solid.name;
       return link;
     });
-    this.group.add(...this.links);
+    for (const link of this.links) this.group.add(link);
   }
 
   // Put the links where their middles and turns are.
@@ -64,6 +64,15 @@ class Robot {
   mark(links, colour) {
     this.links.forEach((one, i) =>
       one.material.color.set(links.includes(i) ? colour : this.colours[i]));
+  }
+
+  // Corners of the boxes around the links where they stand.
+  reach() {
+    return this.links.flatMap((link) => {
+      link.updateMatrix();
+      if (!link.geometry.boundingBox) link.geometry.computeBoundingBox();
+      return boxCorners(link.geometry.boundingBox).map((p) => p.applyMatrix4(link.matrix));
+    });
   }
 
   hideEnd() {} // no view is from its tip

@@ -6,6 +6,7 @@ const GLASS = 0.42; // how opaque an obstacle is that is seen through
 const GHOST = 0.5; // and an arm with errors
 const GREY = 0x8a94a6;
 const MARKED = { short: 0xe03131, kept: 0x2f8ae5 }; // the two that come near each other
+const WHOLE = 1.6; // times the motion's size: what is larger is not shown whole
 const DUE = 1.5; // waypoints around its moment during which a gap is shown
 
 class ArmView {
@@ -27,10 +28,12 @@ class ArmView {
     this.root.matrixAutoUpdate = false;
     this.root.matrix = new Matrix4().set(...scene.pose);
     this.viewer.scene.add(this.root);
-    this.box = new Box3(); // what the side views have to show, in the base frame
-    this.addPaths();
+    this.spots = []; // what has to be seen, in the base frame, but for some room around
+    this.room = scene.links ? 0 : scene.radius;
     this.arm = this.body();
     this.root.add(this.arm.group);
+    this.addPaths();
+    this.box = new Box3().setFromPoints(this.spots).expandByScalar(this.room);
     this.addGhosts();
     this.addObstacles();
     this.addFloor();
@@ -88,15 +91,18 @@ class ArmView {
     this.stretchBox();
   }
 
-  // Let the side views show what stands around the motion, but not all of a long pipe.
+  // Let the views show what stands around the motion, but not all of a long pipe.
   stretchBox() {
     const { Box3, Vector3 } = this.three;
-    const reach = this.box.getSize(new Vector3());
-    const near = this.box.clone().expandByScalar(0.12 * Math.max(reach.x, reach.y, reach.z));
+    const reach = longest(this.box);
+    const near = this.box.clone().expandByScalar(0.12 * reach);
     for (const { geometry, matrix } of this.obstacles) {
       geometry.computeBoundingBox();
-      const part = new Box3().copy(geometry.boundingBox).applyMatrix4(matrix).intersect(near);
-      if (!part.isEmpty()) this.box.union(part);
+      const part = new Box3().copy(geometry.boundingBox).applyMatrix4(matrix);
+      if (longest(near.clone().union(part)) > WHOLE * reach) part.intersect(near);
+      if (part.isEmpty()) continue;
+      this.box.union(part);
+      this.spots.push(...boxCorners(part));
     }
   }
 
@@ -123,13 +129,15 @@ class ArmView {
     }
     this.desired.add(this.rods, this.line(corners.map((p) => p.toArray()), 0xd9480f));
     this.root.add(this.desired);
-    corners.forEach((corner) => this.box.expandByPoint(corner));
+    this.spots.push(...corners);
 
     const tracks = this.motion.centres(0).map(() => []);
-    for (const moment of this.motion.drawn.moments)
-      this.motion.centres(moment).forEach((point, j) => tracks[j].push(point));
-    tracks.flat().forEach((point) => this.box.expandByPoint(new Vector3(...point)));
-    this.box.expandByScalar(this.scene.margin || this.scene.radius);
+    for (const moment of this.motion.drawn.moments) {
+      const [centres, frames] = this.motion.poses(moment);
+      centres.forEach((point, j) => tracks[j].push(point));
+      this.arm.pose(centres, frames);
+      for (const spot of this.arm.reach(centres)) this.spots.push(spot);
+    }
     const colours = ["#7a7f87", ...this.scene.colours];
     this.tracks = new Group();
     tracks.forEach((points, j) => this.tracks.add(this.line(points, colours[j], 0.75)));
@@ -272,6 +280,12 @@ class ArmView {
       pen.drawImage(layer, 0, 0, sheet.width, sheet.height);
     return sheet.toDataURL(type, quality);
   }
+}
+
+// The longest side of a box.
+function longest(box) {
+  const { x, y, z } = box.getSize(new MeshCat.THREE.Vector3());
+  return Math.max(x, y, z);
 }
 
 // Poses of an obstacle at moments, and all that lie between.
