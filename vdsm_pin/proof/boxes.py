@@ -14,7 +14,7 @@ from vdsm_pin.geometry.bodies import RADIUS
 from vdsm_pin.proof.error_growth import crude_growth
 from vdsm_pin.proof.row_places import seen
 from vdsm_pin.proof.rows import Rows
-from vdsm_pin.proof.terms import Task
+from vdsm_pin.proof.terms import Task, finer
 
 
 @compiled
@@ -28,7 +28,8 @@ def body_box(
 ) -> None:
     """Box of a body's core over a block and the error box, shape (3,) each; [m].
 
-    Its ball and shifts are left to what every plane of a pair loses.
+    Its ball and shifts are left to what every plane of a pair loses. Of many corners
+    few are looked at.
 
     Args:
         task: The bodies and the error box.
@@ -41,9 +42,10 @@ def body_box(
     apart()
     low[:], high[:] = np.inf, -np.inf
     bodies, places, tracks = task.bodies, task.places, rows.tracks
-    body = task.pairs.body[pair]
-    for place in seen(task, rows, pair).slots:
-        grown, sag = bodies.discs[body, RADIUS], tracks.sags[place]
+    body, few = task.pairs.body[pair], finer(task.pairs, pair, pair)
+    loose = task.pairs.loose[few]
+    for place in seen(task, rows, few).slots:
+        grown, sag = bodies.discs[body, RADIUS] + loose, tracks.sags[place]
         drift = 0.0
         for r in range(count):
             drift = max(drift, sag[r])

@@ -279,7 +279,7 @@ def sweep_pair(
         goal = max(rules.goal, ROUGH * rules.slack * required)
     slack = np.inf if yes_or_no else rules.slack
     local, tried, fresh, proved = 0, count, False, -np.inf
-    row = int(plane[ROW])
+    row = int(plane[ROW]) if plane[SUPPORT] > -np.inf else finer(task.pairs, pair, pair)
     mover = seen(task, rows, row)
     place_disc(mover, rows, runs, count)
     place_own(mover, rows, runs, plane, count)
