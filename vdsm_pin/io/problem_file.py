@@ -17,7 +17,8 @@ from vdsm_pin.io.problem_errors import first_error
 from vdsm_pin.io.problem_schema import ProblemModel
 from vdsm_pin.io.source import check_is_file, decode, read_bytes
 from vdsm_pin.io.yaml_reader import read_yaml
-from vdsm_pin.problem.planning_problem import PlanningProblem, ProblemSource
+from vdsm_pin.problem.any_problem import ProblemSource
+from vdsm_pin.problem.planning_problem import PlanningProblem
 
 MAX_PROBLEM_BYTES: Final = 32 << 20
 

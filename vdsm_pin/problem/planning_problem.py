@@ -1,16 +1,15 @@
 """The planning problem: arm, scene, desired tip path, required clearance."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidInput, UnknownName
-from vdsm_pin.geometry.arrays import FloatArray, check_numbers, freeze, is_rigid
-from vdsm_pin.notebook import Summarised
+from vdsm_pin.geometry.arrays import FloatArray, check_numbers, freeze
+from vdsm_pin.problem.any_problem import AnyProblem, ProblemSource
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.held import HeldApart
@@ -21,32 +20,6 @@ from vdsm_pin.units import MM_PER_M, in_mm
 
 if TYPE_CHECKING:  # it brings compiled code, for which readers need not wait
     from vdsm_pin.geometry.pieces import PackedPieces
-
-
-@dataclass(frozen=True)
-class ProblemSource:
-    """The files a problem was read from.
-
-    Args:
-        path: The problem file.
-        sha256: Of its bytes followed by those of the files it names.
-        named: The files it names: the arm's URDF, then meshes in the order of the
-            obstacles.
-        of_obstacles: Names of the obstacles that have a file of their own, with it.
-        is_whole: Whether `path` is a problem file, which asks all that is asked; else
-            it is the URDF of a robot that was named by itself.
-    """
-
-    path: Path
-    sha256: str
-    named: tuple[Path, ...] = ()
-    of_obstacles: tuple[tuple[str, Path], ...] = ()
-    is_whole: bool = True
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """Everything that was read."""
-        return (self.path, *self.named)
 
 
 @dataclass(frozen=True)
@@ -69,7 +42,7 @@ class Posture:
 
 
 @dataclass(frozen=True, repr=False)
-class PlanningProblem(Summarised):
+class PlanningProblem(AnyProblem):
     """All the planner may read, in the base frame: x along the rail.
 
     Args:
@@ -118,20 +91,11 @@ class PlanningProblem(Summarised):
     source: ProblemSource | None = field(default=None, init=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Freeze the pose and check the values."""
-        freeze(self, "T_world_base")
-        check_numbers(self, "required_clearance", "required_self_clearance")
+        """Check the values."""
+        self.check_asked()
         check_numbers(self, "tip_tolerance")
         if self.max_row_change is not None:
             check_numbers(self, "max_row_change")
-        if not is_rigid(self.T_world_base):
-            message = "T_world_base is no rigid motion, shape (4, 4)"
-            raise InvalidInput(message)
-        for name in ("required_clearance", "required_self_clearance"):
-            value = getattr(self, name)
-            if not 0.0 <= value < np.inf:
-                message = f"{name} is {value} m, expected 0 or more"
-                raise InvalidInput(message)
         if not 0.0 < self.tip_tolerance < np.inf:
             message = f"tip_tolerance is {self.tip_tolerance} m, expected above 0"
             raise InvalidInput(message)
@@ -157,33 +121,19 @@ class PlanningProblem(Summarised):
             message = f"joint values are {joints.tolist()}, expected {count} numbers"
             raise InvalidInput(message)
 
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """The files it was read from, the problem file first."""
-        return () if self.source is None else self.source.files
-
-    @property
-    def sha256(self) -> str:
-        """SHA-256 of the bytes of `files`, one after the other; empty without files."""
-        return "" if self.source is None else self.source.sha256
-
-    def under(self, errors: ErrorBox) -> "PlanningProblem":
-        """A copy whose clearances are asked for under more errors.
-
-        Args:
-            errors: The copy has the least box that holds these and its own.
+    def check_errors(self, errors: ErrorBox) -> None:
+        """Refuse errors of what there is not.
 
         Raises:
             UnknownName: If they name an obstacle that is not in the scene.
-            InvalidInput: If they name joints or have a slide, as for other robots.
+            InvalidInput: If they are of as many joints as the arm has not, name joints
+                or have a slide, as for other robots.
         """
         known = self.scene.names
         for one in errors.obstacles:
             if one.name not in known:
                 raise UnknownName(kind="obstacle", name=one.name, known=known)
-        widened = self.errors.widened(errors)
-        widened.angles(self.manipulator.n_links)
-        return replace(self, errors=widened).read_from(self.source)
+        errors.angles(self.manipulator.n_links)
 
     @cached_property
     def packed(self) -> "PackedPieces":
@@ -251,9 +201,3 @@ class PlanningProblem(Summarised):
             ("required clearance", in_mm(self.required_clearance)),
             ("file", str(self.source.path) if self.source else "built in Python"),
         )
-
-    def read_from(self, source: ProblemSource | None) -> "PlanningProblem":
-        """A copy with `source`, the files it was read from."""
-        same = replace(self)
-        object.__setattr__(same, "source", source)
-        return same

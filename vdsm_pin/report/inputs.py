@@ -6,11 +6,11 @@ from typing import Final
 from vdsm_pin.arm.bodies import convex_cover
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import FromFile, Mesh
+from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import solid_of
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.inside import mesh_notes
-from vdsm_pin.verification.protocols import AnyProblem
 
 _NAMED: Final = 3
 """Sizes that one line names; the JSON files have all of them."""

@@ -10,6 +10,7 @@ import numpy as np
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Solid
+from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, solid_of
@@ -27,7 +28,7 @@ from vdsm_pin.report.thinning import (
     thinned,
 )
 from vdsm_pin.report.words import finite
-from vdsm_pin.verification.protocols import AnyMotion, AnyProblem
+from vdsm_pin.verification.protocols import AnyMotion
 from vdsm_pin.verification.records import (
     ArmVerification,
     ClosestApproach,

@@ -10,7 +10,7 @@ from importlib import metadata
 from typing import Final
 
 from vdsm_pin import __version__
-from vdsm_pin.problem.planning_problem import ProblemSource
+from vdsm_pin.problem.any_problem import ProblemSource
 from vdsm_pin.text import printable
 
 _LIBRARIES: Final = ("pin", "coal", "numpy", "numba", "yourdfpy", "meshcat")

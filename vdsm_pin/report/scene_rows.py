@@ -7,10 +7,9 @@ from typing import Final
 
 from vdsm_pin.geometry.solids import ConvexCover, Mesh, Solid
 from vdsm_pin.io.source import BLOCK
-from vdsm_pin.problem.planning_problem import ProblemSource
+from vdsm_pin.problem.any_problem import AnyProblem, ProblemSource
 from vdsm_pin.problem.scene import Moving, Obstacle, Scene, solid_of
 from vdsm_pin.report.words import counted
-from vdsm_pin.verification.protocols import AnyProblem
 
 MOST_LISTED: Final = 200
 """Obstacles that a page lists."""

@@ -18,13 +18,13 @@ from vdsm_pin.geometry.decimals import WORD
 from vdsm_pin.io.tables import quoted
 from vdsm_pin.io.waypoint_rows import PLACE, WAYPOINT
 from vdsm_pin.io.waypoint_tables import cable_columns, centre_columns
+from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.row_text import Form
 from vdsm_pin.verification.brackets import ClearanceChunk, LeastClearances
 from vdsm_pin.verification.coal_rows import NOTHING_MEASURED, CoalIndex
-from vdsm_pin.verification.protocols import AnyProblem
 from vdsm_pin.verification.records import ArmVerification, Pair, Verification
 
 _VERDICTS: Final = ("certified", "refuted", "undecided")

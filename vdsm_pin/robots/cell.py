@@ -3,18 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import inf
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, check_numbers, freeze, frozen, is_rigid
+from vdsm_pin.geometry.arrays import FloatArray, frozen
 from vdsm_pin.geometry.solids import ConvexCover, Solid
-from vdsm_pin.notebook import Summarised
+from vdsm_pin.problem.any_problem import AnyProblem, ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.problem.scene import Obstacle, Scene, solid_of
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.packed_tree import TreePoses
@@ -28,7 +26,7 @@ from vdsm_pin.robots.other_robots import OtherRobot, read_other
 from vdsm_pin.robots.scene_files import read_scene_with_files
 from vdsm_pin.robots.second_opinion import coal_parts, link_shapes
 from vdsm_pin.robots.urdf import robot_of
-from vdsm_pin.units import MM_PER_M, in_mm
+from vdsm_pin.units import in_mm
 from vdsm_pin.verification.coal_bodies import CoalObstacle, coal_bodies
 from vdsm_pin.verification.coal_shapes import CoalShapes, Sides
 from vdsm_pin.verification.moving import joined_tree, obstacle_frames
@@ -39,7 +37,7 @@ ROOT_FRAME: Final = 1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cell(Summarised):
+class Cell(AnyProblem):
     """A robot among its obstacles, and what its motions are held to.
 
     Args:
@@ -47,7 +45,7 @@ class Cell(Summarised):
         scene: Obstacles in its base frame.
         required_clearance: Least clearance from obstacles; [m].
         required_self_clearance: Least clearance between links that are held apart; [m].
-        stated_name: Of the problem; empty for the robot's.
+        name: Of the problem; empty for the robot's.
         T_world_base: The robot's root link in the frame of the files, (4, 4); [m].
         errors: What every clearance is asked for under.
         others: Robots whose links are the last obstacles.
@@ -63,7 +61,7 @@ class Cell(Summarised):
     scene: Scene
     required_clearance: float = 0.0
     required_self_clearance: float = 0.0
-    stated_name: str = ""
+    name: str = ""
     T_world_base: FloatArray = field(default_factory=lambda: np.eye(4))
     errors: ErrorBox = field(default_factory=ErrorBox)
     others: tuple[OtherRobot, ...] = ()
@@ -71,29 +69,13 @@ class Cell(Summarised):
 
     def __post_init__(self) -> None:
         """Check clearances, pose and errors."""
-        freeze(self, "T_world_base")
-        check_numbers(self, "required_clearance", "required_self_clearance")
-        if not is_rigid(self.T_world_base):
-            message = "T_world_base is no rigid motion, shape (4, 4)"
-            raise InvalidInput(message)
-        check_errors(self.robot, self.scene, self.errors)
-        for value in (self.required_clearance, self.required_self_clearance):
-            if not 0.0 <= value < inf:
-                millimetres = value * MM_PER_M
-                message = (
-                    f"required clearance is {millimetres:g} mm, expected 0 or more"
-                )
-                raise InvalidInput(message)
+        object.__setattr__(self, "name", self.name or self.robot.name)
+        self.check_asked()
+        self.check_errors(self.errors)
 
-    @property
-    def name(self) -> str:
-        """Of the problem, or of the robot."""
-        return self.stated_name or self.robot.name
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """What it was read from, the robot or the problem first."""
-        return () if self.source is None else self.source.files
+    def check_errors(self, errors: ErrorBox) -> None:
+        """Refuse errors of what there is not: see `robots.errors.check_errors`."""
+        check_errors(self.robot, self.scene, errors)
 
     @cached_property
     def tree(self) -> Tree:
@@ -173,21 +155,6 @@ class Cell(Summarised):
             Placed(one.pieces, poses[one.frame]),
             Placed(other.pieces, poses[other.frame]),
         )
-
-    def under(self, errors: ErrorBox) -> "Cell":
-        """The same, its clearances asked for under more errors.
-
-        Raises:
-            InvalidInput: If they are of what there is not.
-        """
-        widened = self.errors.widened(errors)
-        return replace(self, errors=widened).read_from(self.source)
-
-    def read_from(self, source: ProblemSource | None) -> "Cell":
-        """The same, known to stand in these files."""
-        same = replace(self)
-        object.__setattr__(same, "source", source)
-        return same
 
     def summary(self) -> tuple[tuple[str, str], ...]:
         """Robot, scene and what is required."""
@@ -271,7 +238,7 @@ def read_cell(path: str | Path) -> Cell:
         scene=scene,
         required_clearance=required,
         required_self_clearance=required_self,
-        stated_name=file.model.name or "",
+        name=file.model.name or "",
         T_world_base=frozen(pose),
         others=others,
     ).read_from(file.source((*robot.more_files, *more), of_obstacles))

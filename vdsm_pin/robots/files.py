@@ -27,8 +27,8 @@ from vdsm_pin.io.problem_schema import BasePoseModel, not_bool
 from vdsm_pin.io.schema_types import FileModel, FileName, Name, NotNegative, Number
 from vdsm_pin.io.source import check_is_file, read_text
 from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
+from vdsm_pin.problem.any_problem import ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.problem.planning_problem import ProblemSource
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.robots.scene_files import MAX_BYTES, SceneModel, read_scene_with_files
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import IntArray
+from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.proof.terms import REFUTED, UNDECIDED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
@@ -16,7 +17,6 @@ from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.clearance import ClearanceProof, least_clearances
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import surfaces
-from vdsm_pin.verification.protocols import AnyProblem
 from vdsm_pin.verification.records import (
     Check,
     Counterexample,

@@ -8,6 +8,7 @@ from typing import Final, NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
@@ -19,7 +20,7 @@ from vdsm_pin.proof.terms import CERTIFIED, REFUTED
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.brackets import ClearanceChunk
 from vdsm_pin.verification.clearance import ClearanceProof, least_clearances
-from vdsm_pin.verification.protocols import AnyMotion, AnyProblem
+from vdsm_pin.verification.protocols import AnyMotion
 from vdsm_pin.verification.proving import prove_problem
 from vdsm_pin.verification.records import Pair
 

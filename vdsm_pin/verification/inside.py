@@ -19,6 +19,7 @@ from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.geometry.winding import Location, Side, locate
+from vdsm_pin.problem.any_problem import AnyProblem
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Moving, Scene, solid_of, with_hulls
@@ -28,7 +29,6 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import MM_PER_M
 from vdsm_pin.verification.clearance import ClearanceProof, prove_clearance
-from vdsm_pin.verification.protocols import AnyProblem
 from vdsm_pin.verification.records import Check, Verdict, combine
 
 ARM: Final = "arm outside the meshes"

@@ -7,7 +7,7 @@ from math import nan
 
 import numpy as np
 
-from vdsm_pin.errors import InvalidInput, UnknownName
+from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.winding import Location, Side
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -322,10 +322,4 @@ def _check_input(
     check_timed(problem.scene, trajectory)
     for pair in problem.manipulator.ignore_pairs:
         problem.manipulator.check_ignored(pair, problem.scene.names)
-    if len(errors.joints) not in (0, expected):
-        message = f"errors of {len(errors.joints)} joints, expected {expected}"
-        raise InvalidInput(message)
-    for one in errors.obstacles:
-        if one.name not in problem.scene.names:
-            known = problem.scene.names
-            raise UnknownName(kind="obstacle", name=one.name, known=known)
+    problem.check_errors(errors)
