@@ -12,11 +12,12 @@ import numpy as np
 from vdsm_pin.arm.manipulator import FEED, PART, Manipulator
 from vdsm_pin.arm.mounted import LinkBody
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct_rows
-from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece
+from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece, ends_of
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import pack_pieces
 from vdsm_pin.geometry.row_bounds import row_brackets
 from vdsm_pin.geometry.solids import Mesh
+from vdsm_pin.proof.bodies import LeftOut
 from vdsm_pin.tolerances import TOLERANCES
 
 DIRECTIONS: Final = 256
@@ -52,10 +53,7 @@ class ArmBody:
     @property
     def corners(self) -> FloatArray:
         """Corners of a hull, or the centres of a cylinder's ends, shape (n, 3); [m]."""
-        if isinstance(self.piece, Hull):
-            return self.piece.points
-        offset = self.piece.half_length * self.piece.axis
-        return np.stack([self.piece.centre - offset, self.piece.centre + offset])
+        return ends_of(self.piece)
 
     @property
     def disc(self) -> float:
@@ -70,15 +68,6 @@ class ArmBody:
 
 BY_FILE = "left out by the problem file"
 """Why two things are not held apart that `ignore_pairs` names."""
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """Two bodies, or a body and an obstacle, that nobody holds apart, and why."""
-
-    body: str
-    other: str
-    reason: str
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
 """The checker as a program: files in, one verdict out.
 
 The files are read by the readers that everybody uses, into their records; from there on
-nothing is shared with planner or verifier. The certificate itself is read here, line by line.
+nothing is shared with planner or verifier. The certificate itself is read here, line by
+line.
 
     python -m vdsm_pin.certificate_checker CERTIFICATE PROBLEM TRAJECTORY
 """

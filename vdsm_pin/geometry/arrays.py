@@ -225,6 +225,14 @@ def rotation_from_rpy(rpy: FloatArray) -> FloatArray:
     )
 
 
+def turn_z_to(axis: FloatArray) -> FloatArray:
+    """A rotation whose third column is the axis, shape (3, 3); [-]."""
+    start = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    x = np.cross(start, axis)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(axis, x), axis], axis=1)
+
+
 def rotation_from_quaternion(quaternion: FloatArray) -> FloatArray:
     """Rotation matrix of a quaternion (x, y, z, w) of length 1, shape (3, 3); [-]."""
     x, y, z, w = quaternion

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias, overload
 
+import numpy as np
+
 from vdsm_pin.geometry.arrays import FloatArray, frozen
 
 
@@ -54,6 +56,14 @@ class FlatCylinder:
     axis: FloatArray
     half_length: float
     radius: float
+
+
+def ends_of(piece: Hull | FlatCylinder) -> FloatArray:
+    """Corners of a hull, or the centres of a cylinder's ends, shape (n, 3); [m]."""
+    if isinstance(piece, Hull):
+        return piece.points
+    along = piece.half_length * piece.axis
+    return np.stack([piece.centre - along, piece.centre + along])
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct_rows, frozen
 from vdsm_pin.geometry.closed_meshes import ClosedMesh, close_mesh
-from vdsm_pin.geometry.convex import FlatCylinder, Hull, Hulls
+from vdsm_pin.geometry.convex import FlatCylinder, Hull, Hulls, ends_of
 from vdsm_pin.geometry.primitives import BOX_CORNERS, NamedSolid
 
 
@@ -104,7 +104,7 @@ class ConvexCover:
     @property
     def corners(self) -> FloatArray:
         """Those of its pieces, ends of cylinders among them, shape (n, 3); [m]."""
-        return np.concatenate([_ends(piece) for piece in self.pieces])
+        return np.concatenate([ends_of(piece) for piece in self.pieces])
 
     @property
     def grown(self) -> float:
@@ -115,14 +115,6 @@ class ConvexCover:
     def reach(self) -> float:
         """Its largest distance from its frame's origin, at most; [m]."""
         return float(np.linalg.norm(self.corners, axis=1).max()) + self.grown
-
-
-def _ends(piece: Hull | FlatCylinder) -> FloatArray:
-    """Corners of a hull, or the centres of a cylinder's ends, shape (n, 3); [m]."""
-    if isinstance(piece, Hull):
-        return piece.points
-    along = piece.half_length * piece.axis
-    return np.array([piece.centre - along, piece.centre + along])
 
 
 @dataclass(frozen=True)

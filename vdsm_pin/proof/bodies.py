@@ -47,6 +47,15 @@ class Pair:
 
 
 @dataclass(frozen=True)
+class LeftOut:
+    """Two bodies, or a body and an obstacle, that nobody holds apart, and why."""
+
+    body: str
+    other: str
+    reason: str
+
+
+@dataclass(frozen=True)
 class PairTable:
     """Pairs as columns, one row each, perhaps followed by rough versions of some.
 

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
-from vdsm_pin.geometry.convex import FlatCylinder, Hull
+from vdsm_pin.geometry.convex import FlatCylinder, Hull, ends_of
 from vdsm_pin.geometry.pieces import PackedPieces, pack_pieces
 from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.error_box import ErrorBox
@@ -25,14 +25,6 @@ from vdsm_pin.proof.tree import Tree
 from vdsm_pin.proof.ways import WayErrors, Ways, WayTable, way_errors
 
 
-def corners_of(solid: Hull | FlatCylinder) -> FloatArray:
-    """Corners of a hull, or the centres of a cylinder's ends, shape (n, 3); [m]."""
-    if isinstance(solid, Hull):
-        return solid.points
-    offset = solid.half_length * solid.axis
-    return np.stack([solid.centre - offset, solid.centre + offset])
-
-
 def _only_piece(body: Body) -> Hull | FlatCylinder:
     """The solid of a body that moves past another one."""
     if len(body.pieces) == 1:
@@ -47,7 +39,7 @@ def _pack_bodies(every: Sequence[Body], numbers: IntArray, columns: IntArray) ->
     """Some bodies, each convex, and where the profile has the bounds of all."""
     bodies = [every[k] for k in numbers.tolist()]
     solids = [_only_piece(body) for body in bodies]
-    corners = [corners_of(solid) for solid in solids]
+    corners = [ends_of(solid) for solid in solids]
     discs, radius = np.zeros((len(solids), 4)), np.zeros(len(solids))
     for k, solid in enumerate(solids):
         if isinstance(solid, FlatCylinder):

@@ -1,5 +1,6 @@
 """Records to file models: one place where a verification becomes words and rows."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, Final
 
@@ -7,7 +8,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.proof.bodies import LeftOut
 from vdsm_pin.report.files import BatchRow, PlanFile, VerificationFile
 from vdsm_pin.report.inputs import assumed_sizes, assumption, input_notes
 from vdsm_pin.report.motion_facts import motion_facts
@@ -147,10 +148,9 @@ def error_box(errors: ErrorBox, n_links: int | None = None) -> ErrorBoxRow:
     )
 
 
-def left_out(problem: PlanningProblem) -> tuple[LeftOutRow, ...]:
+def left_out_rows(left_out: Sequence[LeftOut]) -> tuple[LeftOutRow, ...]:
     """The bodies of an arm, and the obstacles, that are not held apart."""
-    rows = ArmPairs(problem).left_out
-    return tuple(LeftOutRow.model_validate(row, from_attributes=True) for row in rows)
+    return tuple(LeftOutRow(**asdict(one)) for one in left_out)
 
 
 def min_clearance(verification: Verification) -> MinClearance | None:
@@ -181,7 +181,7 @@ def _own_facts(verification: Verification) -> dict[str, Any]:
         "path_length_m": None if path is None else path.length,
         "undrawn_m": tuple((float(a), float(b)) for a, b in verification.undrawn),
         "error_box": error_box(verification.errors, rows.n_links),
-        "left_out": left_out(problem),
+        "left_out": left_out_rows(ArmPairs(problem).left_out),
         "motion": motion_facts(problem, rows),
     }
 

@@ -4,9 +4,9 @@ from typing import Any, Final
 
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.report.facts import error_box
+from vdsm_pin.report.facts import error_box, left_out_rows
 from vdsm_pin.report.inputs import file_notes, longer_motions
-from vdsm_pin.report.rows import ErringJointRow, JointRow, LeftOutRow, RobotFacts
+from vdsm_pin.report.rows import ErringJointRow, JointRow, RobotFacts
 from vdsm_pin.report.words import finite
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification
@@ -32,10 +32,7 @@ def robot_facts(verification: RobotVerification) -> dict[str, Any]:
         "path_length_m": None,
         "undrawn_m": (),
         "error_box": error_box(cell.errors),
-        "left_out": tuple(
-            LeftOutRow(body=pair.one, other=pair.other, reason=pair.reason)
-            for pair in cell.robot.left_out
-        ),
+        "left_out": left_out_rows(cell.robot.left_out),
         "motion": _motion(cell, path),
     }
 

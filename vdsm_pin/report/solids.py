@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct_rows
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct_rows, turn_z_to
 from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
 from vdsm_pin.geometry.solids import (
     BOX_CORNERS,
@@ -92,7 +92,7 @@ def surface(
             frame, half_length = np.eye(3), 0.0
             return _capsule(obstacle, frame, half_length, fine)
         case Capsule():
-            frame = frame_along(obstacle.axis)
+            frame = turn_z_to(obstacle.axis)
             return _capsule(obstacle, frame, obstacle.half_length, fine)
         case Cylinder():
             return _cylinder(obstacle, fine.around)
@@ -141,14 +141,6 @@ def obj_text(solid: Solid) -> str:
     return "\n".join([*corners, *faces]) + "\n"
 
 
-def frame_along(axis: FloatArray) -> FloatArray:
-    """A right-handed frame whose third column is the axis, shape (3, 3); [-]."""
-    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    first = np.cross(helper, axis)
-    first /= np.linalg.norm(first)
-    return np.column_stack([first, np.cross(axis, first), axis])
-
-
 def _rings(radii: FloatArray, heights: FloatArray, around: int) -> FloatArray:
     """Circles about z, shape (rings * around, 3); [m]."""
     turn = 2.0 * np.pi * np.arange(around) / around
@@ -184,7 +176,7 @@ def _cylinder(solid: Cylinder, around: int) -> Surface:
     tube = _rings(np.full(2, solid.radius), heights[[0, 2]], around)
     caps = [_rings(np.array([0.0, solid.radius]), heights[:2], around),
             _rings(np.array([solid.radius, 0.0]), heights[2:], around)]  # fmt: skip
-    points = np.vstack([tube, *caps]) @ frame_along(solid.axis).T
+    points = np.vstack([tube, *caps]) @ turn_z_to(solid.axis).T
     strip, count = _between(2, around), 2 * around
     triangles = np.concatenate([strip, strip + count, strip + 2 * count])
     return Surface(solid.centre + points, triangles, round=True)
@@ -227,7 +219,7 @@ def joined(parts: list[Surface]) -> Surface:
 
 
 def _plane(solid: HalfSpace, extent: float) -> Surface:
-    across = frame_along(solid.normal)[:, :2]
+    across = turn_z_to(solid.normal)[:, :2]
     middle = solid.normal * float(solid.normal @ solid.point)
     signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * extent
     return _polygons(middle + signs @ across.T, ((0, 1, 2, 3),))

@@ -15,7 +15,7 @@ from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.counterexample import (
     Moment,
     Question,
-    Undecided,
+    counterexamples,
     grown_by,
     moments_of,
 )
@@ -51,13 +51,14 @@ def robot_counterexamples(
         nearest = Moment(int(least.interval[k]), float(least.share[k]))
         return moments_of(nearest, int(weakest[k]))
 
-    return Undecided(
-        pairs=pairs,
-        verdict=least.verdict,
-        lower=least.lower,
-        question=lambda k: _question(cell, path, k, pairs[k]),
-        moments=moments,
-    ).counterexamples(deadline)
+    return counterexamples(
+        pairs,
+        least.verdict,
+        least.lower,
+        lambda k: _question(cell, path, k, pairs[k]),
+        moments,
+        deadline,
+    )
 
 
 def _question(cell: Cell, path: Path, k: int, named: Pair) -> Question:

@@ -11,7 +11,7 @@ import numpy as np
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.io.tables import listed
-from vdsm_pin.proof.bodies import Body
+from vdsm_pin.proof.bodies import Body, LeftOut
 from vdsm_pin.proof.packed_tree import TreePoses
 from vdsm_pin.proof.tree import Tree
 from vdsm_pin.robots.files import HULLS, MeshCover
@@ -62,21 +62,6 @@ class RobotJoint:
         """Whose limits count besides its own, in words; empty if none do."""
         names = listed(self.narrowed_by)
         return f"narrowed by limits of what mimics it: {names}" if names else ""
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """Two links that are not held apart.
-
-    Args:
-        one: Name of a link.
-        other: Name of another.
-        reason: Why.
-    """
-
-    one: str
-    other: str
-    reason: str
 
 
 @dataclass(frozen=True, eq=False)

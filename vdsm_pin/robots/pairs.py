@@ -4,9 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from vdsm_pin.proof.bodies import Body
+from vdsm_pin.proof.bodies import Body, LeftOut
 from vdsm_pin.proof.tree import Tree
-from vdsm_pin.robots.model import LeftOut
 
 
 def held_pairs(

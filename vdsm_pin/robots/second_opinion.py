@@ -8,12 +8,12 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from vdsm_pin.errors import VerificationFailed
-from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy, turn_z_to
 from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
 from vdsm_pin.robots.hulls import coal_hull
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.srdf import Base
-from vdsm_pin.verification.coal_bodies import CoalBody, turn_z_to
+from vdsm_pin.verification.coal_bodies import CoalBody
 
 KEPT: Final = 8
 """Robots whose models are kept for their next motion."""

@@ -20,7 +20,7 @@ from vdsm_pin.verification.clearance import ClearanceProof
 from vdsm_pin.verification.counterexample import (
     Moment,
     Question,
-    Undecided,
+    counterexamples,
     grown_by,
     moments_of,
 )
@@ -91,10 +91,11 @@ def find_counterexamples(
     if errors == ErrorBox():
         return ()
     lost, left = (proof.counts[:, k] > 0 for k in (REFUTED, UNDECIDED))
-    return Undecided(
-        pairs=proof.pairs,
-        verdict=np.select([lost, left], [REFUTED, UNDECIDED], CERTIFIED),
-        lower=proof.best[:, LOW],
-        question=lambda k: arm_question(problem, trajectory, proof.pairs[k], errors),
-        moments=lambda k: of_best(proof.best[k]),
-    ).counterexamples(deadline)
+    return counterexamples(
+        proof.pairs,
+        np.select([lost, left], [REFUTED, UNDECIDED], CERTIFIED),
+        proof.best[:, LOW],
+        lambda k: arm_question(problem, trajectory, proof.pairs[k], errors),
+        lambda k: of_best(proof.best[k]),
+        deadline,
+    )

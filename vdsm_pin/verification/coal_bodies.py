@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple, TypeAlias
 import numpy as np
 
 from vdsm_pin.errors import VerificationFailed
-from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, frozen, turn_z_to
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.solids import (
     Box,
@@ -197,14 +197,6 @@ def _placed(
 ) -> CoalBody:
     rotation = np.eye(3) if R is None else R
     return CoalBody(geometry, coal.Transform3s(np.array(rotation), np.array(p)))
-
-
-def turn_z_to(axis: FloatArray) -> FloatArray:
-    """A rotation whose third column is the axis, shape (3, 3); [-]."""
-    start = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    x = np.cross(start, axis)
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(axis, x), axis], axis=1)
 
 
 def _prism_corners(prism: Prism, section: FloatArray) -> FloatArray:

@@ -234,43 +234,40 @@ def moments_of(nearest: Moment, weakest: int) -> tuple[Moment, ...]:
     return (nearest, *(Moment(weakest, float(share)) for share in SHARES))
 
 
-@dataclass(frozen=True)
-class Undecided:
-    """What a proof for an error box says of the pairs of a motion.
+def counterexamples(
+    pairs: Sequence[Pair],
+    verdict: IntArray,
+    lower: FloatArray,
+    question: Callable[[int], Question],
+    moments: Callable[[int], tuple[Moment, ...]],
+    deadline: Deadline,
+) -> tuple[Counterexample, ...]:
+    """Motions within an error box that miss what its proof left undecided.
 
     Args:
-        pairs: All of them.
+        pairs: Every pair of the motion.
         verdict: CERTIFIED, REFUTED or UNDECIDED, shape (n_pairs,).
         lower: Least proved clearances, shape (n_pairs,); [m].
         question: Of the pair of a number.
         moments: Where to start with it.
+        deadline: When to give up.
+
+    Returns:
+        One against obstacles and one between links, at most; none where the nominal
+        motion itself is refuted.
+
+    Raises:
+        OutOfTime: If the time is over.
     """
-
-    pairs: Sequence[Pair]
-    verdict: IntArray
-    lower: FloatArray
-    question: Callable[[int], Question]
-    moments: Callable[[int], tuple[Moment, ...]]
-
-    def counterexamples(self, deadline: Deadline) -> tuple[Counterexample, ...]:
-        """Motions within the box that miss what the proof left undecided.
-
-        Returns:
-            One against obstacles and one between links, at most; none where the nominal
-            motion itself is refuted.
-
-        Raises:
-            OutOfTime: If the time is over.
-        """
-        outer = np.array([bool(pair.obstacle) for pair in self.pairs], dtype=bool)
-        found = []
-        for mine in (outer, ~outer):
-            if (self.verdict[mine] == REFUTED).any():
-                continue
-            among = np.flatnonzero(mine & (self.verdict == UNDECIDED))
-            for k in among[np.argsort(self.lower[among], kind="stable")][:PAIRS]:
-                deadline.check()
-                if one := Search(self.question(k)).find(self.moments(k)):
-                    found.append(one)
-                    break
-        return tuple(found)
+    outer = np.array([bool(pair.obstacle) for pair in pairs], dtype=bool)
+    found = []
+    for mine in (outer, ~outer):
+        if (verdict[mine] == REFUTED).any():
+            continue
+        among = np.flatnonzero(mine & (verdict == UNDECIDED))
+        for k in among[np.argsort(lower[among], kind="stable")][:PAIRS]:
+            deadline.check()
+            if one := Search(question(k)).find(moments(k)):
+                found.append(one)
+                break
+    return tuple(found)

@@ -8,7 +8,6 @@ import numpy as np
 from vdsm_pin.arm.bodies import (
     BY_FILE,
     ArmBody,
-    LeftOut,
     SelfPairs,
     arm_bodies,
     self_pairs,
@@ -21,7 +20,7 @@ from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.held import held_pairs
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Obstacle, solid_of
-from vdsm_pin.proof.bodies import Body, PairTable
+from vdsm_pin.proof.bodies import Body, LeftOut, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.error_box import ErrorBox as ProofBox
 from vdsm_pin.proof.packing import pack_task
