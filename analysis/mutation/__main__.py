@@ -90,6 +90,7 @@ GROUPS: Final = (
         (
             "tests/verification",
             "tests/geometry/test_closed_meshes.py",
+            "tests/geometry/test_mesh_parts.py",
             "tests/geometry/test_winding.py",
         ),
     ),
