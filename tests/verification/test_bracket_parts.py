@@ -1,0 +1,394 @@
+"""How brackets are cut, merged, corrected and written; oracle: loops over intervals."""
+
+import json
+from dataclasses import fields, replace
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.errors import CertificateTooLarge
+from vdsm_pin.geometry.solids import Sphere
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Scene
+from vdsm_pin.proof.layouts import (
+    AT_LOWER,
+    AT_UPPER,
+    BEST,
+    CLAIM,
+    FIRST,
+    LAST,
+    LOW,
+    PLANE_NORMAL,
+    RECORD,
+    TIME,
+)
+from vdsm_pin.proof.paths import Path
+from vdsm_pin.proof.prover import RANK
+from vdsm_pin.proof.terms import REFUTED
+from vdsm_pin.verification import certificate_lines, proved_lowers
+from vdsm_pin.verification.brackets import ClearanceChunk, ClearanceProfile
+from vdsm_pin.verification.clearance import _merged, _steps, profile_of
+from vdsm_pin.verification.coal_distances import _Moved
+from vdsm_pin.verification.enclosed import EnclosedSink, enclosed_profile
+from vdsm_pin.verification.moving import Knots
+from vdsm_pin.verification.proved_lowers import LowersSink, ProvedLowers
+from vdsm_pin.verification.task import all_pairs
+
+ARM = built_in("hrm8")
+NAMES = ("a", "b", "c")
+
+
+def problem() -> PlanningProblem:
+    balls = tuple(Sphere(name, np.full(3, 9.0), 0.1) for name in NAMES)
+    return PlanningProblem("p", ARM, Scene(balls), None, 0.0, np.eye(4))
+
+
+def random_knots(rng: np.random.Generator, n: int) -> Knots:
+    """Of n intervals, each with some knots of what moves beside within it."""
+    times = np.arange(n + 1.0)
+    more = rng.uniform(0.0, n, int(rng.integers(1, 9)))
+    path = Path(np.zeros((n + 1, 1)), times=times)
+    return Knots.of(path, np.unique(np.append(times, more)))
+
+
+def random_chunk(
+    rng: np.random.Generator, first: int, n: int, pairs: int
+) -> ClearanceChunk:
+    """Upper bounds are alike often."""
+    shape = (n, pairs)
+    return ClearanceChunk(
+        first, rng.normal(size=shape), rng.integers(0, 3, shape).astype(float),
+        rng.uniform(size=shape), rng.integers(0, 3, shape),
+        rng.normal(size=(*shape, 3)), rng.normal(size=(*shape, 3)), np.arange(pairs),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_knots_lie_in_the_intervals_of_their_motion(seed: int) -> None:
+    rng = np.random.default_rng([1, seed])
+    n = int(rng.integers(1, 6))
+    knots = random_knots(rng, n)
+    moments = knots.moment
+    counts = rng.integers(1, 4, len(moments) - 1)
+    for _ in range(2):
+        assert moments[0] == 0.0 and moments[-1] == n
+        assert moments[knots.first] == pytest.approx(np.arange(n + 1.0))
+        assert knots.are_rows == (len(moments) == n + 1)
+        for k in range(len(moments) - 1):
+            within = int(np.floor(moments[k] + 1e-9))
+            assert knots.interval(np.array([k])) == [within]
+            for share in (0.0, 0.25, 1.0):
+                told = np.array([k]), np.array([share])
+                at = moments[k] + share * (moments[k + 1] - moments[k])
+                assert knots.moments(*told) == pytest.approx([at])
+                assert knots.share(*told) == pytest.approx([np.clip(at - within, 0, 1)])
+                assert knots.inner(np.array([at])) == pytest.approx([k + share])
+        parts = [np.linspace(a, b, c + 1)[:-1] for a, b, c in zip(
+            moments[:-1], moments[1:], counts, strict=True)]  # fmt: skip
+        finer = knots.cut(counts)
+        assert finer.moment == pytest.approx(np.append(np.concatenate(parts), n))
+        knots, moments = finer, finer.moment
+        counts = rng.integers(1, 3, len(moments) - 1)
+    best = rng.normal(size=(5, BEST))
+    best[:, [AT_LOWER, AT_UPPER]] = rng.integers(0, len(moments) - 1, (5, 2))
+    best[:, TIME] = rng.uniform(size=5)
+    found = knots.in_rows(best)
+    for row, told in zip(found, best, strict=True):
+        k = int(told[AT_UPPER])
+        at = moments[k] + told[TIME] * (moments[k + 1] - moments[k])
+        assert row[AT_UPPER] + row[TIME] == pytest.approx(at)
+        assert row[AT_UPPER] == knots.interval(np.array([k]))[0]
+        rest = np.delete(told, [AT_LOWER, AT_UPPER, TIME])
+        assert np.array_equal(np.delete(row, [AT_LOWER, AT_UPPER, TIME]), rest)
+
+
+def test_without_times_knots_are_the_rows() -> None:
+    path = Path(np.zeros((4, 1)))
+    for knots in (Knots.of(path, None), Knots.of(path, np.zeros(2))):
+        assert knots.moment.tolist() == knots.first.tolist() == [0, 1, 2, 3]
+        assert knots.are_rows
+    alone = Knots.of(Path(np.zeros((1, 1))), None)
+    assert (alone.moment.tolist(), alone.first.tolist()) == ([0.0], [0, 1])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_chunks_end_where_no_more_intervals_fit(seed: int) -> None:
+    rng = np.random.default_rng([2, seed])
+    for _ in range(20):
+        first = np.cumsum(rng.integers(1, 9, int(rng.integers(2, 30)))) - 1
+        length, expected = int(rng.integers(1, 30)), [0]
+        while expected[-1] < len(first) - 1:
+            end = expected[-1] + 1
+            while (
+                end < len(first) - 1 and first[end + 1] - first[expected[-1]] <= length
+            ):
+                end += 1
+            expected.append(end)
+        assert _steps(first, length) == expected
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_intervals_of_the_joint_path_are_merged_to_those_of_the_motion(
+    seed: int,
+) -> None:
+    rng = np.random.default_rng([3, seed])
+    knots = random_knots(rng, 6)
+    first = int(rng.integers(0, 4))
+    last = int(rng.integers(first + 1, 7))
+    count = int(knots.first[last] - knots.first[first])
+    chunk = random_chunk(rng, first, count, 3)
+    found = _merged(chunk, knots, last)
+    assert found.first_interval == first
+    for k in range(first, last):
+        rows = np.arange(knots.first[k], knots.first[k + 1]) - knots.first[first]
+        for pair in range(3):
+            upper = chunk.upper[rows, pair]
+            at = int(rows[np.flatnonzero(upper == upper.min())[-1]])
+            place = k - first, pair
+            assert found.lower[place] == chunk.lower[rows, pair].min()
+            assert found.upper[place] == upper.min()
+            inner = np.array([at + knots.first[first]])
+            share = knots.share(inner, chunk.share[at : at + 1, pair])
+            assert found.share[place] == share[0]
+            assert found.verdict[place] == max(
+                chunk.verdict[rows, pair], key=lambda v: RANK[v]
+            )
+            assert np.array_equal(found.link_point[place], chunk.link_point[at, pair])
+            assert np.array_equal(found.other_point[place], chunk.other_point[at, pair])
+
+
+@pytest.mark.parametrize("stride", [1, 2, 5])
+def test_a_profile_is_by_intervals_of_the_motion(stride: int) -> None:
+    rng = np.random.default_rng(stride)
+    knots = random_knots(rng, 7)
+    bins = -(-int(knots.first[-1]) // stride)
+    profile = rng.normal(size=(2, 5, bins))
+    found = profile_of(profile.copy(), stride, knots, 3)
+    begins = [int(knots.interval(np.array([k * stride]))[0]) for k in range(bins)]
+    assert found.first_interval.tolist() == sorted({*begins})
+    for row, begin in enumerate(found.first_interval):
+        mine = profile[:, :, np.array(begins) == begin].min(axis=2)
+        told = np.array([
+            [*found.link_lower[row], *found.obstacle_lower[row]],
+            [*found.link_upper[row], *found.obstacle_upper[row]],
+        ])  # fmt: skip
+        assert np.array_equal(told, mine)
+    rows = Knots.of(Path(np.zeros((bins + 1, 1))), None)
+    plain = profile_of(profile.copy(), stride, rows, 3)
+    assert plain.first_interval.tolist() == [k * stride for k in range(bins)]
+    assert np.array_equal(plain.link_lower, profile[0, :3].T)
+
+
+# ---- meshes that the arm is inside of ----------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_arm_is_inside_until_its_axis_may_meet_the_surface(seed: int) -> None:
+    rng, asked = np.random.default_rng([4, seed]), problem()
+    pairs, least = all_pairs(asked), -ARM.least_radius
+    blank: Any = np.zeros(3)
+    enclosed: Any = {
+        "a": {"link 2": blank, "link 3": blank},
+        "b": {},
+        "c": {"link 1": blank},
+    }
+    got: list[ClearanceChunk] = []
+    sink, left = (
+        EnclosedSink(got.append, asked, enclosed),
+        {name: False for name in NAMES},
+    )
+    for part in range(4):
+        chunk = random_chunk(rng, 5 * part, 5, len(pairs))
+        lower = np.abs(chunk.lower) + rng.choice(
+            [0.0, least - 9.0], (5, 1), p=[0.9, 0.1]
+        )
+        lower[rng.random(lower.shape) < 0.01] = least
+        chunk = replace(chunk, lower=lower)
+        sink(chunk)
+        expected = {f.name: np.array(getattr(chunk, f.name)) for f in fields(chunk)}
+        for k in range(5):
+            for name, bodies in enclosed.items():
+                mine = [
+                    i
+                    for i, p in enumerate(pairs)
+                    if p.obstacle == name and p.own in bodies
+                ]
+                left[name] |= any(lower[k, i] <= least for i in mine)
+                for i in mine:
+                    expected["lower"][k, i] = least
+                    if not left[name]:
+                        expected["upper"][k, i] = least
+                        expected["verdict"][k, i] = REFUTED
+                        expected["other_point"][k, i] = chunk.link_point[k, i]
+        for name, truth in expected.items():
+            assert np.array_equal(getattr(got[-1], name), truth), name
+
+
+def test_a_profile_has_the_depth_of_what_is_inside() -> None:
+    rng, asked = np.random.default_rng(5), problem()
+    least, blank = -ARM.least_radius, np.zeros(3)
+    for _ in range(20):
+        lower, upper = rng.uniform(-0.02, 1.0, (2, 7, 3))
+        lower[rng.random((7, 3)) < 0.1] = least
+        links = rng.uniform(-0.2, 0.5, (2, 7, ARM.n_links))
+        profile = ClearanceProfile(*links, lower, upper, np.arange(7))
+        assert enclosed_profile(profile, asked, {}) is profile
+        enclosed: Any = {
+            "c": {"link 2": blank},
+            "a": {"link 1": blank, "link 8": blank},
+        }
+        found = enclosed_profile(profile, asked, enclosed)
+        for name, inside in (("a", (0, 7)), ("b", ()), ("c", (1,))):
+            column, left = NAMES.index(name), not inside
+            for k in range(7):
+                left = left or lower[k, column] <= least
+                low, high = (
+                    (least, upper[k, column]) if inside else (lower[k, 1], upper[k, 1])
+                )
+                assert found.obstacle_lower[k, column] == low
+                assert found.obstacle_upper[k, column] == (high if left else least)
+        for link in range(ARM.n_links):
+            name = {0: "a", 7: "a", 1: "c"}.get(link)
+            out = name is None
+            for k in range(7):
+                out = out or bool(name and lower[k, NAMES.index(name)] <= least)
+                low, high = links[:, k, link]
+                assert found.link_lower[k, link] == (min(low, least) if name else low)
+                assert found.link_upper[k, link] == (high if out else min(high, least))
+
+
+# ---- proved bounds that Coal is held against ----------------------------------------
+
+
+def test_a_row_has_the_larger_bound_of_the_intervals_that_meet_there() -> None:
+    rng = np.random.default_rng(6)
+    proved = ProvedLowers(
+        rng.normal(size=4), np.array([1, -1, 0, -1]), rng.normal(size=(5, 2))
+    )
+    for row in range(6):
+        for pair in range(4):
+            found = proved.at(np.array([row]), np.array([pair]))[0]
+            column = proved.column[pair]
+            near = [k for k in (row - 1, row) if 0 <= k < 5]
+            best = max(proved.lower[k, column] for k in near)
+            assert found == (best if column >= 0 else proved.least[pair])
+
+
+@pytest.mark.parametrize("spare", [0, -1])
+def test_bounds_are_kept_where_they_fit(
+    spare: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng, asked = np.random.default_rng(7), problem()
+    motion: Any = SimpleNamespace(n_samples=6)
+    columns = 3 * ARM.axis_radii.size
+    monkeypatch.setattr(proved_lowers, "COMPARED", 5 * columns + spare)
+    sink = LowersSink(asked, motion)
+    assert sink.fits is (spare == 0)
+    monkeypatch.setattr(proved_lowers, "COMPARED", 5 * 4 + spare)
+    pairs, parts = (
+        np.array([3, 1, 6, 2]),
+        [random_chunk(rng, k, n, 4) for k, n in ((0, 2), (2, 3))],
+    )
+    for part in parts:
+        sink.keep(replace(part, pairs=pairs))
+    for sent in (5, 4):
+        proof: Any = SimpleNamespace(
+            best=rng.normal(size=(8, BEST)), sent=sent, n_intervals=5
+        )
+        found = sink.proved(proof)
+        assert np.array_equal(found.least, proof.best[:, LOW])
+        if spare or sent < 5:
+            assert (found.column == -1).all()
+            assert found.lower.shape == (1, 1)
+            continue
+        assert found.column.tolist() == [-1, 1, 3, 0, -1, -1, 2, -1]
+        assert np.array_equal(found.lower, np.concatenate([p.lower for p in parts]))
+    none: Any = SimpleNamespace(n_samples=1)
+    assert LowersSink(replace(asked, scene=Scene()), none).fits is False
+
+
+@pytest.mark.parametrize("travel", [0.0, 0.3, 2.0])
+def test_rows_are_looked_at_where_the_arm_has_moved_on(travel: float) -> None:
+    """The first, and each at which the way since then passes a multiple of a length."""
+    rng = np.random.default_rng(9)
+    centres = rng.normal(0.0, 0.1, (40, 4, 3)).cumsum(axis=0)
+    moved, found = _Moved(travel), []
+    for first, last in ((0, 1), (1, 9), (9, 10), (10, 40)):
+        found += moved(centres[first:last]).tolist()
+    way, expected = 0.0, [True]
+    for before, after in pairwise(centres):
+        now = way + max(np.linalg.norm(after - before, axis=1))
+        expected.append(travel == 0.0 or now // travel > way // travel)
+        way = now
+    assert found == expected
+
+
+# ---- lines of a certificate ----------------------------------------
+
+
+@pytest.mark.parametrize("at_once", [1, 2, 4, 9])
+def test_lines_hold_all_planes_in_order(
+    at_once: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Read back: of each interval and pair its slices by time, its planes by pieces."""
+    monkeypatch.setattr(certificate_lines, "PAIRS", at_once)
+    rng, n = np.random.default_rng([8, at_once]), 4
+    pairs: Any = SimpleNamespace(rough=np.zeros((n, 0)), required=np.zeros(n))
+    task: Any = SimpleNamespace(pairs=pairs)
+    rows, expected = [], []
+    for k in range(3, 6):
+        proofs = []
+        for pair in range(n):
+            cuts = [0.0, *np.sort(rng.uniform(size=rng.integers(3))), 1.0]
+            slices = []
+            for start, end in pairwise(cuts):
+                planes, pieces = [], int(rng.integers(1, 4))
+                for first in range(pieces):
+                    normal = [rng.choice([2.0, -0.5, 0.25]) for _ in range(3)]
+                    claim = float(rng.uniform(0.1, 1.0))
+                    row = np.zeros(RECORD)
+                    row[:4] = k, pair, start, end
+                    row[[FIRST, LAST]] = first, first + 1
+                    row[PLANE_NORMAL:CLAIM], row[CLAIM] = normal, claim
+                    rows.append(row)
+                    lower = certificate_lines._counted(claim, 0.0)
+                    planes.append([first, first + 1, *normal, lower])
+                slices.append([start, end, planes])
+            proofs.append(slices)
+        expected.append({"k": k, "proofs": proofs})
+    records = np.array(rows)[rng.permutation(len(rows))]
+    text = "".join(certificate_lines._interval_lines(task, records, 3, 6))
+    assert [json.loads(line) for line in text.splitlines()] == expected
+    assert " " not in text
+    assert text.endswith("\n")
+    whole = json.dumps(expected, separators=(",", ":"))[1:-1]
+    for value in ("2.0", "1.0,[", "0.0,"):
+        whole = whole.replace(value, value.replace(".0", "", 1))
+    assert text.splitlines() == [line if line.startswith('{"k"') else '{"k"' + line
+                                 for line in whole.split(',{"k"')]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("pairs", "intervals", "most", "line", "refused"),
+    [(6, 5, 30, 10**9, False), (6, 5, 29, 10**9, True), (6, 0, 6, 10**9, False),
+     (6, 5, 99, 6 * certificate_lines.SHORTEST, False),
+     (6, 5, 99, 6 * certificate_lines.SHORTEST - 1, True)],
+)  # fmt: skip
+def test_what_nobody_would_read_is_refused(
+    pairs: int, intervals: int, most: int, line: int, refused: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.setattr(certificate_lines, "MOST_CLEARANCES", most)
+    monkeypatch.setattr(certificate_lines, "MAX_LINE", line)
+    task = SimpleNamespace(pairs=SimpleNamespace(rough=np.zeros((pairs, 0))))
+    motion = SimpleNamespace(knots=np.zeros((intervals + 1, 1)))
+    proof: Any = SimpleNamespace(task=task, motion=motion)
+    if refused:
+        with pytest.raises(CertificateTooLarge):
+            certificate_lines._check_size(proof)
+    else:
+        certificate_lines._check_size(proof)
