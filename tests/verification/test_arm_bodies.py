@@ -4,6 +4,7 @@ Oracles: distances by Coal at many instants, and problems whose answer is known.
 """
 
 from dataclasses import replace
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,20 @@ import pytest
 import yaml
 from oracles.certificate_cases import certificate_lines
 from oracles.certificate_oracle import sealed, sha256
+from scipy.spatial import Delaunay
 
-from vdsm_pin.arm.bodies import arm_bodies, convex_cover, self_pairs
+from vdsm_pin.arm.bodies import (
+    arm_bodies,
+    convex_cover,
+    self_pairs,
+    triangle_groups,
+)
 from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.arm.mounted import LinkBody, Tool
 from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.certificate_checker.solids import solid as checker_solid
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry import solids
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
@@ -269,6 +277,76 @@ def test_a_mesh_is_covered_by_the_hulls_of_its_own_triangles() -> None:
         every = (mesh.vertices[mesh.triangles] @ normals.T).max(axis=1)
         held = (every[:, None] <= reach[None] + 1e-12).any(axis=1)
         assert held.all()
+
+
+def box_mesh(low: FloatArray, high: FloatArray) -> FloatArray:
+    """The triangles of a box, each side cut finely, shape (n, 3, 3)."""
+    found, cells = [], np.linspace(0.0, 1.0, 5)
+    for axis, end in product(range(3), (0.0, 1.0)):
+        for (a, b), (c, d) in product(pairwise(cells), repeat=2):
+            flat = np.array([(a, c), (b, c), (b, d), (a, c), (b, d), (a, d)])
+            flat = flat if end else flat[::-1]
+            found.append(np.insert(flat, axis, end, axis=1).reshape(2, 3, 3))
+    return low + np.concatenate(found) * (high - low)
+
+
+ELL = np.array([[0.0, 0.0, 0.0], [0.3, 0.1, 0.1], [0.0, 0.1, 0.0], [0.1, 0.3, 0.1]])
+APART = ELL + np.repeat([[0.0], [0.5]], 2, axis=0)
+
+
+@pytest.mark.parametrize(
+    ("parts", "solid"), [(2, None), (12, None), (256, None), (256, False)]
+)
+@pytest.mark.parametrize("boxes", [ELL, APART], ids=["ell", "apart"])
+def test_hulls_of_a_mesh_hold_its_inside(
+    parts: int, boxes: FloatArray, solid: bool | None
+) -> None:
+    """By package and checker: points inside of boxes lie in one of the hulls.
+
+    Unless only the surface is meant; and what lies between parts that are far apart
+    stays free.
+    """
+    rng = np.random.default_rng(parts)
+    pairs = boxes.reshape(2, 2, 3)
+    corners = np.concatenate([box_mesh(low, high) for low, high in pairs])
+    faces = np.arange(3 * len(corners)).reshape(-1, 3)
+    mesh = solids.Mesh("part", corners.reshape(-1, 3), faces, solid)
+    body = LinkBody(2, mesh, parts)
+    groups = [group.tolist() for group in triangle_groups(body)]
+    checked = checker_solid(mesh).parts(groups)
+    inside = np.concatenate(
+        [low + rng.uniform(0.0, 1.0, (400, 3)) * (high - low) for low, high in pairs]
+    )
+    between = np.array([[0.36, 0.38, 0.3]])  # of the two that are apart
+    for cover in (
+        [piece.points for piece in convex_cover(body)],
+        [part.points[0] for part in checked],
+    ):
+        assert len(cover) == parts
+        held = np.zeros(len(inside), bool)
+        free = True
+        for points in cover:
+            if np.linalg.matrix_rank(points - points[0], tol=1e-9) == 3:
+                hull = Delaunay(points)
+                held |= hull.find_simplex(inside, tol=1e-9) >= 0
+                free &= bool((hull.find_simplex(between) < 0).all())
+        assert held.all() == (solid is None)
+        assert free
+
+
+def test_an_obstacle_in_the_middle_of_a_mesh_on_a_link_is_refuted() -> None:
+    """However many hulls stand for it: a ball in a box that nothing fills."""
+    corners = box_mesh(np.array([0.1, 0.2, -0.1]), np.array([0.3, 0.4, 0.1]))
+    faces = np.arange(3 * len(corners)).reshape(-1, 3)
+    ball = solids.Sphere("ball", np.array([0.7, 0.3, 0.0]), 0.01)
+    for parts, solid in product((1, 12, 200), (None, False)):
+        mesh = solids.Mesh("part", corners.reshape(-1, 3), faces, solid)
+        arm = arm_with(bodies=(LinkBody(2, mesh, parts),))
+        problem = problem_with(arm, ball)
+        rows = Trajectory.of_joints(np.zeros((1, 9)))
+        proof = prove_clearance(replace(problem, tip_path=None), rows, ErrorBox())
+        clear = bool((proof.counts[:, [1, 2]] == 0).all())
+        assert clear == (solid is False and parts > 1)
 
 
 # ---- files ---------------------------------------------------------------------------

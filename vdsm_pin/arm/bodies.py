@@ -1,9 +1,10 @@
 """The convex bodies that ride on an arm's links, and which of them are held apart.
 
 A body of several convex pieces becomes several bodies, `camera part 1` and so on. A
-mesh is covered by the hulls of groups of its own triangles.
+mesh is covered by the hulls of groups of its own triangles, which hold its inside too.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from vdsm_pin.arm.manipulator import FEED, PART, Manipulator
 from vdsm_pin.arm.mounted import LinkBody
-from vdsm_pin.geometry.arrays import FloatArray, IntArray, distinct_rows
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray, distinct_rows
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull, Piece, ends_of
 from vdsm_pin.geometry.ordering import coherent_order
 from vdsm_pin.geometry.pieces import pack_pieces
@@ -19,6 +20,9 @@ from vdsm_pin.geometry.row_bounds import row_brackets
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.proof.bodies import LeftOut
 from vdsm_pin.tolerances import TOLERANCES
+
+NEAR: Final = 5.0 * TOLERANCES.mesh_gap
+"""Boxes of triangles that near, over the mesh's size, may be of one surface; [-]."""
 
 DIRECTIONS: Final = 256
 """Directions in which the corners of a hull are sought first."""
@@ -104,13 +108,15 @@ def arm_bodies(arm: Manipulator) -> tuple[ArmBody, ...]:
 
 
 def convex_cover(body: LinkBody) -> tuple[Hull | FlatCylinder, ...]:
-    """Convex pieces that together hold a body; a mesh's have all of its triangles."""
+    """Convex pieces that together hold a body.
+
+    A mesh's have all of its triangles and, unless it is a surface only, its inside.
+    """
     if isinstance(body.solid, Mesh):
         corners = body.solid.vertices[body.solid.triangles]
-        groups = triangle_groups(body)
-        return tuple(
-            Hull(outer_points(corners[group].reshape(-1, 3))) for group in groups
-        )
+        solid = not body.solid.is_surface
+        points = covering_points(corners, triangle_groups(body), solid=solid)
+        return tuple(Hull(outer_points(each)) for each in points)
     return tuple(_bounded(piece) for piece in body.solid.pieces)
 
 
@@ -123,6 +129,50 @@ def triangle_groups(body: LinkBody) -> tuple[IntArray, ...]:
     """Numbers of the triangles under each hull of a mesh body."""
     assert isinstance(body.solid, Mesh)
     return grouped(body.solid.vertices[body.solid.triangles], body.parts)
+
+
+def covering_points(
+    corners: FloatArray, groups: Sequence[IntArray], *, solid: bool = True
+) -> Iterator[FloatArray]:
+    """Points of hulls that hold triangles and, of a solid, what they enclose.
+
+    Hulls of a solid that are near one another have a point in common. Tetrahedra over
+    the triangles of a closed surface that have their tip there wind round any point as
+    often as the surface does: each point of its inside is in one of them.
+
+    Args:
+        corners: Of the triangles, shape (m, 3, 3); [m].
+        groups: Numbers of the triangles under each hull.
+        solid: Whether the inside is to be held.
+
+    Yields:
+        Of each hull, shape (n, 3); [m].
+    """
+    found = [corners[group].reshape(-1, 3) for group in groups]
+    if not solid or len(groups) == 1:
+        yield from found
+        return
+    together = _near(found)
+    counts = np.array([len(points) for points in found])
+    sums = np.array([points.sum(axis=0) for points in found])
+    tips = (together @ sums) / (together @ counts)[:, None]
+    for points, tip in zip(found, tips, strict=True):
+        yield np.vstack([points, tip])
+
+
+def _near(found: Sequence[FloatArray]) -> BoolArray:
+    """Which groups of points are near, or near one that is, and so on, (k, k).
+
+    Triangles that share an edge, or are joined there over a gap, are of such groups.
+    """
+    low = np.array([points.min(axis=0) for points in found])
+    high = np.array([points.max(axis=0) for points in found])
+    gap = NEAR * float(np.linalg.norm(high.max(axis=0) - low.min(axis=0)))
+    reaches = (low[:, None] <= high + gap).all(axis=2)
+    near = np.asarray(reaches & reaches.T)
+    while (near != (farther := near @ near)).any():
+        near = farther
+    return near
 
 
 def grouped(corners: FloatArray, parts: int) -> tuple[IntArray, ...]:

@@ -14,10 +14,7 @@ Matrix: TypeAlias = Any  # a vector is a column
 
 MM: Final = 1000  # messages tell lengths in millimetres
 SLACK: Final = 1e-9  # limits may be passed by this; [m], [rad], [-]
-COMMON: Final = (
-    "vdsm_certificate problem_sha256 trajectory_sha256 versions interpolation pairs "
-    "pieces"
-)
+COMMON: Final = "vdsm_certificate problem_sha256 trajectory_sha256 versions"
 UP: Final = 1 + 2.0**-40  # lifts bounds above what rounding loses of all made of them
 
 
@@ -45,11 +42,10 @@ def number(value: Any) -> float:
 
 def belongs(header: Any, keys: str, problem: str, trajectory: str) -> None:
     """Reject a header with other keys, or of other files than those of two hashes."""
-    wanted = {*f"{COMMON} {keys}".split()}
+    wanted = {*f"{COMMON} interpolation pairs pieces {keys}".split()}
     claim(set(header) == wanted, f"has other keys than {sorted(wanted)}")
     for kind, sha256 in (("problem", problem), ("trajectory", trajectory)):
-        known = header[f"{kind}_sha256"] == sha256
-        claim(known, f"the certificate is of another {kind} file")
+        claim(header[f"{kind}_sha256"] == sha256, f"is of another {kind} file")
 
 
 def column(x: Ball, y: Ball, z: Ball) -> Matrix:

@@ -222,10 +222,8 @@ class Model:
                     cover = covers.pop(0) if covers else None
                     yield from self._covered(name, corners, cover)
                     continue
-                size, radius, length = (
-                    np.array(numbers(shape.get(word, "0")))
-                    for word in ("size", "radius", "length")
-                )
+                words = (shape.get(x, "0") for x in ("size", "radius", "length"))
+                size, radius, length = (np.array(numbers(word)) for word in words)
                 points = {"box": CUBE * size / 2, "sphere": np.zeros((1, 3))}
                 points = points.get(shape.tag, np.array([-Z, Z]) * length / 2)
                 far = np.abs(points).max() + np.abs(shift).max()

@@ -16,6 +16,7 @@ from vdsm_pin.certificate_checker.inside import Surface
 from vdsm_pin.geometry import solids
 from vdsm_pin.problem import scene
 
+MAX_PARTS: Final = 256  # hulls of a mesh at most
 CUBE: Final = np.array([*product((-1.0, 1.0), repeat=3)])
 
 
@@ -68,7 +69,7 @@ class Solid:
                 the whole is one piece.
         """
         if isinstance(self, Mesh):
-            parts = hulls(self.name, self.points, pieces)
+            parts = hulls(self.name, self.points, pieces, not self.surface_only)
         else:
             if pieces is not None:
                 self.cut(pieces)
@@ -114,14 +115,25 @@ def boundary(loops: Iterable[Sequence[int]]) -> dict[tuple[int, int], int]:
     return {edge: times for edge, times in chain.items() if times}
 
 
-def hulls(name: str, corners: Any, groups: Any) -> list[Any]:
-    """Corners of hulls of groups of triangles (n, 3, 3), which are all of them."""
+def hulls(name: str, corners: Any, groups: Any, inside: bool = True) -> list[Any]:
+    """Corners of hulls of groups of triangles (n, 3, 3), which are all of them.
+
+    To hold the inside too, those whose boxes are near one another have a point in
+    common: the tetrahedra over a closed surface that have their tip there wind round
+    any point as often as the surface does, and what is far apart shares no edge.
+    """
     every = range(len(corners))
-    groups = [every] if groups is None else groups
+    groups = [every] if groups is None else groups[:MAX_PARTS]
     missing = {*every} - {k for group in groups for k in group}
     claim(not missing, f"pieces of {name} do not make up the whole")
-    found = (corners[np.array(group, dtype=int)] for group in groups)
-    return [np.unique(one.reshape(-1, 3), axis=0) for one in found]
+    found = [corners[np.array(group, dtype=int)].reshape(-1, 3) for group in groups]
+    low, high = (np.array([f(one, axis=0) for one in found]) for f in (np.min, np.max))
+    gap = np.linalg.norm(high.max(axis=0) - low.min(axis=0)) / 1000
+    near = ((low[:, None] <= high + gap) & (low <= high[:, None] + gap)).all(axis=2)
+    near = np.linalg.matrix_power(near, MAX_PARTS)  # or near to one that is, and so on
+    tips = near @ np.array([[*one.sum(axis=0), len(one)] for one in found])
+    tips = tips[:, :3] / tips[:, 3:] if inside else np.zeros((len(found), 0, 3))
+    return [np.unique(np.vstack(x), axis=0) for x in zip(found, tips, strict=True)]
 
 
 def named_parts(parts: "list[Solid]") -> "list[Solid]":

@@ -42,7 +42,7 @@ class PrismBody(_OnLink, shapes.PrismModel):
 
 
 class MeshBody(_OnLink, shapes.MeshModel):
-    """A mesh on a link: what is proved clear are hulls that hold all of it."""
+    """A mesh on a link: what is proved clear are hulls that hold it and its inside."""
 
     parts: int = Field(
         default=1,

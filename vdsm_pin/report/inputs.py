@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from vdsm_pin.arm.bodies import convex_cover
+from vdsm_pin.arm.mounted import LinkBody
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import FromFile, Mesh
 from vdsm_pin.problem.any_problem import AnyProblem
@@ -93,11 +94,15 @@ def _covers(problem: PlanningProblem) -> tuple[str, ...]:
     bodies = problem.manipulator.bodies
     meshes = [body for body in bodies if isinstance(body.solid, Mesh)]
     return tuple(
-        f"{body.name!r} is judged by {_hulls(len(convex_cover(body)))} around its "
-        "triangles"
+        f"{body.name!r} is judged by {_hulls(body, len(convex_cover(body)))}"
         for body in meshes
     )
 
 
-def _hulls(count: int) -> str:
-    return f"{count} convex hulls" if count > 1 else "the convex hull"
+def _hulls(body: LinkBody, count: int) -> str:
+    if count == 1:
+        return "the convex hull around its triangles"
+    assert isinstance(body.solid, Mesh)
+    if body.solid.is_surface:
+        return f"{count} convex hulls around its triangles, as a surface only"
+    return f"{count} convex hulls, which hold its triangles and what they enclose"

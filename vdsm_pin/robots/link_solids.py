@@ -8,7 +8,7 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from vdsm_pin.arm.bodies import grouped
+from vdsm_pin.arm.bodies import covering_points, grouped
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import (
     FloatArray,
@@ -103,8 +103,8 @@ class LinkReader:
         count = self.solids.parts if self.solids.cover == "parts" else 1
         groups = grouped(corners, count)
         covers.append(groups)
-        for group in groups:
-            yield covering_hull(distinct_rows(corners[group].reshape(-1, 3)))
+        for points in covering_points(corners, groups):
+            yield covering_hull(distinct_rows(points))
 
     def _triangles(self, link: str, shape: ET.Element) -> FloatArray:
         """The corners of a link's mesh, scaled, shape (n, 3, 3); [m]."""
