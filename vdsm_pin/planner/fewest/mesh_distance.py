@@ -199,13 +199,6 @@ def _over(
 
 
 @compiled
-def _height(plane: FloatArray, place: FloatArray) -> float:
-    """How high a place is above a plane; [m]."""
-    x, y, z = place
-    return float(plane[0] * x + plane[1] * y + plane[2] * z - plane[3])
-
-
-@compiled
 def _of_leaf(
     triangles: tuple[FloatArray, FloatArray],
     between: IntArray,
