@@ -54,7 +54,6 @@ def plan_follow_the_leader(
         on_path = np.arange(len(tips)) >= len(approach) - 1
         along = np.append(np.full(len(approach) - 1, stations[0]), stations)
         centres = led_along(tips, start, arm.link_lengths)
-        centres[0] = start
         _check_rail(problem, centres, tips)
         alpha, theta = joint_angles(arm, centres)
         _check_cone(problem, link_angles(alpha, theta), tips)

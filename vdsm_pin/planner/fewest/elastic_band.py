@@ -151,7 +151,7 @@ def followable(room: TipRoom, route: FloatArray, start: FloatArray) -> FloatArra
 def _lack(room: TipRoom, route: FloatArray, start: FloatArray) -> float:
     """What the arm that follows a way lacks of clearance and bends too much; [-]."""
     arm = room.arm
-    laid = led_along(np.ascontiguousarray(route), start, arm.link_lengths)
+    laid = led_along(route, start, arm.link_lengths)
     laid = laid[np.isfinite(laid).all(axis=(1, 2))]
     spare = (room.clearance(laid) - room.required) / arm.most_radius
     narrow = np.clip(RESERVE - spare, 0.0, 1.0).sum()

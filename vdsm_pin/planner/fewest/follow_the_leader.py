@@ -1,9 +1,14 @@
-"""Compiled: follow-the-leader, the arm laid on the curve that its tip has run along."""
+"""Follow-the-leader: the arm laid on the curve that its tip has run along."""
+
+from typing import Final
 
 import numpy as np
 
 from vdsm_pin.compiled import compiled
 from vdsm_pin.geometry.arrays import FloatArray
+
+PARTS: Final = 8
+"""Pieces of the curve between two joints."""
 
 
 @compiled
@@ -101,6 +106,54 @@ def followed(centres: FloatArray, tips: FloatArray, lengths: FloatArray) -> Floa
 
 
 @compiled
+def _laid_along(route: FloatArray, own: FloatArray, lengths: FloatArray) -> FloatArray:
+    """As `led_along` has it; `own` is what `own_curve` returns for the start."""
+    count, points = lengths.size, route.shape[0]
+    curve = np.zeros((points + own.shape[0], 3))
+    for k in range(points):
+        curve[k] = route[points - 1 - k]
+    curve[points:] = own
+    result = np.zeros((points, count + 1, 3))
+    for k in range(points):
+        result[k, count] = route[k]
+        _lay(curve, points - k, lengths, result[k])
+    return result
+
+
+def own_curve(centres: FloatArray) -> FloatArray:
+    """What an arm lies on: smooth through its joints, from behind the tip to the rail.
+
+    On chords joints that move on would cut the corners; an arm on an arc moves on along
+    the arc.
+
+    Args:
+        centres: Joint centres, shape (N + 1, 3); [m].
+
+    Returns:
+        Shape (k, 3), far back on the rail at its end; [m].
+    """
+    joints = centres[::-1]
+    sides = np.diff(joints, axis=0)
+    size = np.linalg.norm(sides, axis=1, keepdims=True)
+    chords = sides / size
+    tangents = np.zeros_like(joints)
+    # Of the circle through three joints; ahead of the tip it goes on.
+    tangents[1:-1] = chords[:-1] * size[1:] + chords[1:] * size[:-1]
+    tangents[-1, 0] = -1.0
+    tangents[1:-1] /= np.linalg.norm(tangents[1:-1], axis=1, keepdims=True)
+    tangents[0] = 2.0 * (chords[0] @ tangents[1]) * chords[0] - tangents[1]
+    # Cubic, with tangents so long that it is nearly an arc between two of a circle.
+    begin, end = (
+        size * tangents[ends] * 2.0 / (1.0 + (chords * tangents[ends]).sum(1)[:, None])
+        for ends in (slice(None, -1), slice(1, None))
+    )
+    t = np.arange(1, PARTS + 1)[:, None] / PARTS
+    curve = joints[:-1, None] + t * t * (3.0 - 2.0 * t) * sides[:, None]
+    curve += t * (1.0 - t) * ((1.0 - t) * begin[:, None] - t * end[:, None])
+    far = joints[-1:] - [2.0 * float(size.sum()), 0.0, 0.0]
+    return np.concatenate([curve.reshape(-1, 3), far])
+
+
 def led_along(route: FloatArray, start: FloatArray, lengths: FloatArray) -> FloatArray:
     """The arm at every point of its tip's route, laid on what the tip has run along.
 
@@ -112,16 +165,6 @@ def led_along(route: FloatArray, start: FloatArray, lengths: FloatArray) -> Floa
     Returns:
         Joint centres, shape (k, N + 1, 3), NaN where there is no such arm; [m].
     """
-    count, points = lengths.size, route.shape[0]
-    curve = np.zeros((points + count + 1, 3))
-    for k in range(points):
-        curve[k] = route[points - 1 - k]
-    for i in range(count):
-        curve[points + i] = start[count - 1 - i]
-    curve[-1] = curve[-2]
-    curve[-1, 0] -= 2.0 * lengths.sum()
-    result = np.zeros((points, count + 1, 3))
-    for k in range(points):
-        result[k, count] = route[k]
-        _lay(curve, points - k, lengths, result[k])
-    return result
+    laid = _laid_along(np.ascontiguousarray(route), own_curve(start), lengths)
+    laid[0] = start
+    return laid

@@ -194,7 +194,7 @@ class Population:
         """
         tips, judge, root = self.layers.tips, self.judge, self.grown
         centres = standing(self.arm, root.tips, root.offsets)[0]
-        laid = led_along(np.ascontiguousarray(tips), centres, self.arm.link_lengths)
+        laid = led_along(tips, centres, self.arm.link_lengths)
         fits = np.isfinite(laid).all(axis=(1, 2))
         layer = np.arange(len(tips) if fits.all() else int(np.argmin(fits)))
         directed = is_directed(root.offsets)

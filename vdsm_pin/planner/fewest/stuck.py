@@ -110,9 +110,7 @@ def following(problem: PlanningProblem, route: FloatArray) -> Following:
         route: Of the tip from its start on, shape (k, 3); [m].
     """
     arm, who = problem.manipulator, "an arm that follows its tip along it"
-    laid = led_along(
-        np.ascontiguousarray(route), start_centres(problem), arm.link_lengths
-    )
+    laid = led_along(route, start_centres(problem), arm.link_lengths)
     for tip, centres in zip(route, laid, strict=True):
         place = f"with the tip at {problem.in_file(tip)}"
         if not np.isfinite(centres).all():
