@@ -29,12 +29,13 @@ from vdsm_pin.proof.layouts import (
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.prover import RANK
 from vdsm_pin.proof.terms import REFUTED
-from vdsm_pin.verification import certificate_lines, proved_lowers
+from vdsm_pin.verification import certificate_lines, coal_missing, proved_lowers
 from vdsm_pin.verification.brackets import ClearanceChunk, ClearanceProfile
 from vdsm_pin.verification.clearance import _merged, _steps, profile_of
 from vdsm_pin.verification.coal_distances import _Moved
+from vdsm_pin.verification.coal_missing import NEAR
 from vdsm_pin.verification.enclosed import EnclosedSink, enclosed_profile
-from vdsm_pin.verification.moving import Knots
+from vdsm_pin.verification.moving import MOST_PARTS, PART, Knots, in_short_parts
 from vdsm_pin.verification.proved_lowers import LowersSink, ProvedLowers
 from vdsm_pin.verification.task import all_pairs
 
@@ -104,6 +105,35 @@ def test_knots_lie_in_the_intervals_of_their_motion(seed: int) -> None:
         assert row[AT_UPPER] == knots.interval(np.array([k]))[0]
         rest = np.delete(told, [AT_LOWER, AT_UPPER, TIME])
         assert np.array_equal(np.delete(row, [AT_LOWER, AT_UPPER, TIME]), rest)
+
+
+@pytest.mark.parametrize("degree", [1, 3, 5])
+def test_long_intervals_are_cut_and_short_ones_stay(degree: int) -> None:
+    """By the longest way of a column, along its control points, in parts of `PART`."""
+    rng = np.random.default_rng([11, degree])
+    sizes = np.array([0.0, 0.3, 1.0, 1.7, 2.5, 9.0, 1e3, 1e3]) * PART
+    for _ in range(6):
+        steps = rng.permutation(sizes)[:, None] * rng.choice([-1.0, 1.0, 0.5], (8, 2))
+        knots = np.concatenate([np.zeros((1, 2)), steps.cumsum(axis=0)])
+        inner = np.zeros((0, 0, 2))
+        if degree > 1:
+            share = np.sort(rng.uniform(-0.2, 1.2, (8, degree - 1, 2)), axis=1)
+            inner = knots[:-1, None] + share * steps[:, None]
+        path = Path(knots, inner, np.arange(9.0))
+        counts = []
+        for piece in path.controls:
+            way = max(np.abs(np.diff(column)).sum() for column in piece.T)
+            counts.append(int(min(max(1, np.ceil(way / PART)), MOST_PARTS)))
+        cut, where = in_short_parts(path, Knots.of(path, path.times))
+        assert cut.n_intervals == sum(counts)
+        assert np.diff(where.first).tolist() == counts
+        assert max(counts) == MOST_PARTS
+        slow = Path(knots / 1e4, inner / 1e4)
+        rows = Knots.of(slow, None)
+        assert in_short_parts(slow, rows) == (slow, rows)
+    alone = Path(np.zeros((1, 2)))
+    rows = Knots.of(alone, None)
+    assert in_short_parts(alone, rows) == (alone, rows)
 
 
 def test_without_times_knots_are_the_rows() -> None:
@@ -309,6 +339,54 @@ def test_bounds_are_kept_where_they_fit(
         assert np.array_equal(found.lower, np.concatenate([p.lower for p in parts]))
     none: Any = SimpleNamespace(n_samples=1)
     assert LowersSink(replace(asked, scene=Scene()), none).fits is False
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_of_each_link_and_obstacle_the_row_that_lacks_most_is_told(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng, asked = (
+        np.random.default_rng([10, seed]),
+        replace(problem(), required_clearance=0.5),
+    )
+    held = rng.random((ARM.n_links + 1, 3)) < 0.8
+    told: Any = SimpleNamespace(
+        scene=asked.scene, manipulator=ARM, required_clearance=0.5,
+        held=SimpleNamespace(axes=held),
+    )  # fmt: skip
+    parts, expected = [], dict[tuple[int, int], tuple[Any, ...]]()
+    for part in range(3):
+        n = 60
+        gaps = rng.choice([-0.2, 0.0, 0.1, 0.3, 0.5, 0.7, -np.inf], n)
+        link, other = rng.integers(0, ARM.n_links + 1, n), rng.integers(0, 3, n)
+        points = rng.normal(size=(2, n, 3))
+        points[1, ::7] = points[0, ::7]
+        parts.append(SimpleNamespace(
+            distance=gaps, link=link, other=other, waypoint=np.arange(n) + n * part,
+            link_point=points[0], other_point=points[1],
+        ))  # fmt: skip
+        for k in range(n):
+            if not (np.isfinite(gaps[k]) and gaps[k] < 0.5 and held[link[k], other[k]]):
+                continue
+            key = min(int(link[k]) + 1, ARM.n_links), int(other[k])
+            if key not in expected or gaps[k] < expected[key][1]:
+                way = (points[0, k] - points[1, k]) * (1.0 if gaps[k] >= 0.0 else -1.0)
+                size = np.linalg.norm(way)
+                expected[key] = k + n * part, gaps[k], way / size if size else way
+
+    def distances(motion: str, reach: float, **_: Any) -> Any:
+        assert reach == 0.5 + NEAR * ARM.most_radius
+        return parts
+
+    at_rest = SimpleNamespace(distances=distances)
+    monkeypatch.setattr(coal_missing, "obstacles_at_rest", lambda *_: at_rest)
+    blank: Any = None
+    found = coal_missing.coal_missing(blank, told, blank)
+    assert [(one.link, one.obstacle) for one in found] == sorted(expected)
+    for one in found:
+        waypoint, gap, normal = expected[one.link, one.obstacle]
+        assert (one.waypoint, one.distance) == (waypoint, gap)
+        np.testing.assert_allclose(one.normal, normal, atol=1e-15)
 
 
 @pytest.mark.parametrize("travel", [0.0, 0.3, 2.0])

@@ -226,6 +226,7 @@ def test_within_errors_the_cone_is_proved_or_undecided(seed: int) -> None:
         past = replace(task.path, pointing=replace(pointing, cone=nominal - 0.01))
         (row,) = check_pointing(replace(task, tip_path=past), told, errors=box)
         assert row.verdict is Verdict.REFUTED
+        assert (row,) == check_pointing(replace(task, tip_path=past), told)
 
 
 def test_a_target_within_reach_of_the_errors_is_never_green() -> None:
