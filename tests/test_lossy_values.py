@@ -18,7 +18,7 @@ from vdsm_pin.geometry.arrays import frozen
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.pointing import Pointing
 from vdsm_pin.problem.scaling import OtherRatios, ScalingCentre
-from vdsm_pin.proof.paths import Path, cubic_path, quintic_path
+from vdsm_pin.proof.paths import Path
 
 ORIGIN: Final = np.zeros(3)
 ALONG: Final = np.array([1.0, 0.0, 0.0])
@@ -102,10 +102,10 @@ def test_no_argument_loses_anything(kind: str) -> None:
     q, times = np.zeros((2, 3)), np.arange(2.0)
     lossy = LOSSY[kind](q)
     for make in (
-        lambda: cubic_path(lossy, q, times),
-        lambda: cubic_path(q, lossy, times),
-        lambda: cubic_path(q, q, LOSSY[kind](times)),
-        lambda: quintic_path(q, q, lossy, times),
+        lambda: Path.through(lossy, times, q),
+        lambda: Path.through(q, times, lossy),
+        lambda: Path.through(q, LOSSY[kind](times), q),
+        lambda: Path.through(q, times, q, lossy),
         lambda: vp.Trajectory.of_joints(lossy),
     ):
         with pytest.raises(vp.InvalidInput):

@@ -15,7 +15,7 @@ from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hull
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.error_box import ErrorBox
-from vdsm_pin.proof.paths import Path, cubic_path, quintic_path
+from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.tree import Joint, Kind, Tree
 
 SHAPES = ("ball", "capsule", "box", "cylinder", "triangle", "half-space", "pieces")
@@ -67,8 +67,8 @@ def random_path(rng: Random, tree: Tree, n_rows: int, degree: int) -> Path:
     if degree == 1:
         return Path(q, times=times)
     if degree == 3:
-        return cubic_path(q, rates, times)
-    return quintic_path(q, rates, changes, times)
+        return Path.through(q, times, rates)
+    return Path.through(q, times, rates, changes)
 
 
 def random_box(rng: Random, tree: Tree) -> ErrorBox:

@@ -7,7 +7,7 @@ import pytest
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.proof.motions import bound_column, interpolate
-from vdsm_pin.proof.paths import Path, cubic_path, quintic_path, together
+from vdsm_pin.proof.paths import Path, together
 
 
 def value(path: Path, k: int, t: float) -> FloatArray:
@@ -24,8 +24,8 @@ def made(degree: int, rng: np.random.Generator) -> tuple[Path, FloatArray]:
     if degree == 1:
         return Path(q, times=times), p
     if degree == 3:
-        return cubic_path(q, rates, times), p
-    return quintic_path(q, rates, changes, times), p
+        return Path.through(q, times, rates), p
+    return Path.through(q, times, rates, changes), p
 
 
 @pytest.mark.parametrize("degree", [1, 3, 5])
@@ -107,7 +107,10 @@ def test_paths_together_move_as_each_does_alone() -> None:
         (lambda: Path(np.zeros((3, 1)), np.zeros((2, 1, 1))), "control points"),
         (lambda: Path(np.zeros((2, 1)), times=np.zeros(2)), "rise"),
         (lambda: Path(np.zeros((2, 1)), times=np.zeros(3)), "times have shape"),
-        (lambda: cubic_path(np.zeros((2, 1)), np.zeros((2, 2)), np.arange(2)), "rates"),
+        (
+            lambda: Path.through(np.zeros((2, 1)), np.arange(2), np.zeros((2, 2))),
+            "rates",
+        ),
         (lambda: together(Path(np.zeros((2, 1)))), "need times"),
     ],
 )
@@ -120,7 +123,7 @@ def test_rows_within_intervals_are_those_at_their_times() -> None:
     """Also at the ends, and of a single row."""
     rng = np.random.default_rng(7)
     times = np.cumsum(rng.uniform(0.1, 1.0, 6))
-    path = cubic_path(rng.normal(size=(6, 3)), rng.normal(size=(6, 3)), times=times)
+    path = Path.through(rng.normal(size=(6, 3)), times, rng.normal(size=(6, 3)))
     intervals = rng.integers(0, 5, 200)
     shares = np.concatenate([np.zeros(20), np.ones(20), rng.uniform(size=160)])
     moments = times[intervals] + shares * np.diff(times)[intervals]

@@ -12,7 +12,7 @@ from vdsm_pin.geometry.convex import HalfSpacePiece, Hull
 from vdsm_pin.proof.bodies import Body, Pair, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.error_box import ErrorBox
-from vdsm_pin.proof.paths import Path, cubic_path, together
+from vdsm_pin.proof.paths import Path, together
 from vdsm_pin.proof.prover import Proof, prove, start_proof, summed, verdicts_of
 from vdsm_pin.proof.stretches import Stretches
 from vdsm_pin.proof.terms import CERTIFIED, REFUTED, UNDECIDED
@@ -167,7 +167,7 @@ def test_a_spline_overshoots_between_clear_knots() -> None:
     wall = Body(0, (HalfSpacePiece(np.array([0.0, -1.0, 0.0]), -0.56),), "wall")
     bodies, pairs = [ball(2, 0.0, 0.0, 0.0, 0.05), wall], [Pair(0, 1, 0.0)]
     assert prove(tree, bodies, Path(q), pairs).is_certified
-    proof = prove(tree, bodies, cubic_path(q, rates, times), pairs)
+    proof = prove(tree, bodies, Path.through(q, times, rates), pairs)
     assert proof.verdict[0] == REFUTED
     assert proof.interval[0] == 1
     assert 0.1 < proof.share[0] < 0.6

@@ -18,7 +18,7 @@ from vdsm_pin.proof.error_growth import crude_growth
 from vdsm_pin.proof.motions import interpolate
 from vdsm_pin.proof.packed_tree import place_tree
 from vdsm_pin.proof.packing import pack_task, with_errors
-from vdsm_pin.proof.paths import Path, cubic_path, quintic_path
+from vdsm_pin.proof.paths import Path
 from vdsm_pin.proof.plane_bounds import place_disc
 from vdsm_pin.proof.row_places import fill_rows
 from vdsm_pin.proof.slices import Space
@@ -148,8 +148,8 @@ def curved(degree: int) -> Case:
     q, times = np.zeros((2, 1)), np.array([0.0, 1.0])
     rates, changes = np.array([[-0.5], [0.5]]), np.ones((2, 1))
     if degree == 3:
-        return corner_case(tree, cubic_path(q, rates, times))
-    return corner_case(tree, quintic_path(q, rates, changes, times))
+        return corner_case(tree, Path.through(q, times, rates))
+    return corner_case(tree, Path.through(q, times, rates, changes))
 
 
 def corner_case(tree: Tree, path: Path) -> Case:

@@ -19,7 +19,7 @@ from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.io.trajectory_messages import of_message, text_of
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.trajectory import Trajectory
-from vdsm_pin.proof.paths import cubic_path, quintic_path
+from vdsm_pin.proof.paths import Path as Motion
 from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.robots.rates import rate_checks
 from vdsm_pin.robots.trajectory_csv import csv_text
@@ -262,9 +262,9 @@ def test_rates_agree_with_dense_samples() -> None:
         q, rates, changes = rng.normal(size=(3, rows, 1))
         times = np.cumsum(rng.uniform(0.1, 2.0, rows))
         path = (
-            cubic_path(q, rates, times)
+            Motion.through(q, times, rates)
             if trial % 2
-            else quintic_path(q, rates, changes, times)
+            else Motion.through(q, times, rates, changes)
         )
         dense = np.linspace(times[0], times[-1], 20_001)
         step = dense[1] - dense[0]

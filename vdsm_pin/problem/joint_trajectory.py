@@ -93,13 +93,9 @@ class JointTrajectory:
             ValueError: If times do not rise, or a value is not finite.
         """
         # Whoever reads waypoints alone needs no pieces.
-        from vdsm_pin.proof.paths import Path, cubic_path, quintic_path
+        from vdsm_pin.proof.paths import Path
 
-        if self.times is None or self.rates is None:
-            return Path(self.q, times=self.times)
-        if self.changes is None:
-            return cubic_path(self.q, self.rates, self.times)
-        return quintic_path(self.q, self.rates, self.changes, self.times)
+        return Path.through(self.q, self.times, self.rates, self.changes)
 
     def of(self, names: Sequence[str]) -> "JointTrajectory":
         """The columns of some of its joints, in their order."""

@@ -14,7 +14,7 @@ from vdsm_pin.geometry.arrays import (
     frozen,
     same_arrays,
 )
-from vdsm_pin.geometry.bernstein import derivative, hermite, value
+from vdsm_pin.geometry.bernstein import derivative, value
 from vdsm_pin.notebook import Summarised
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
@@ -200,10 +200,7 @@ class Trajectory(Summarised):
         """How `joints` move: the rows and what joins them."""
         from vdsm_pin.proof.paths import Path  # compiled code, which few need
 
-        rows, inner = self.joints, frozen(np.zeros((0, 0, 0)))
-        if self.rates is not None and self.times is not None and self.n_samples > 1:
-            inner = hermite(rows, self.rates, self.changes, self.times)
-        return Path(rows, inner, self.times)
+        return Path.through(self.joints, self.times, self.rates, self.changes)
 
     def part(self, first: int, last: int) -> "Trajectory":
         """The rows from `first` up to `last`, or to the end where there are fewer."""

@@ -60,6 +60,39 @@ class Path:
             _check_rising(self.times, len(knots))
         object.__setattr__(self, "inner", inner)
 
+    @classmethod
+    def through(
+        cls,
+        knots: FloatArray,
+        times: FloatArray | None,
+        rates: FloatArray | None = None,
+        changes: FloatArray | None = None,
+    ) -> "Path":
+        """Straight lines, or Hermite pieces as trajectory controllers run them.
+
+        Args:
+            knots: Shape (n_rows, n_columns); [rad], [m].
+            times: Of the knots, rising, shape (n_rows,); [s]. None where not known.
+            rates: Of the knots, which makes pieces cubic where times are known; the
+                same shape; per [s].
+            changes: Of the rates, which makes them quintic; the same shape; per [s^2].
+
+        Raises:
+            ValueError: If shapes disagree or times do not rise.
+        """
+        if times is None or rates is None:
+            return cls(knots, times=times)
+        knots, times = frozen(knots), frozen(times)
+        given = {"rates": rates, "accelerations": changes}
+        more = {k: frozen(v) for k, v in given.items() if v is not None}
+        for name, values in more.items():
+            if values.shape != knots.shape:
+                message = f"{name} have shape {values.shape}, expected {knots.shape}"
+                raise ValueError(message)
+        _check_rising(times, len(knots))
+        inner = hermite(knots, more["rates"], more.get("accelerations"), times)
+        return cls(knots, inner, times)
+
     @property
     def degree(self) -> int:
         """Of the pieces: 1, 3 or 5."""
@@ -238,45 +271,3 @@ def together(*paths: Path, within: tuple[float, float] | None = None) -> Path:
     controls = np.concatenate([_resampled(p, times, degree) for p in paths], axis=2)
     knots = np.concatenate([controls[:, 0], controls[-1:, -1]])
     return Path(knots, controls[:, 1:-1], times)
-
-
-def cubic_path(q: FloatArray, rates: FloatArray, times: FloatArray) -> Path:
-    """Cubic Hermite pieces, as trajectory controllers run them.
-
-    Args:
-        q: Knots, shape (n_rows, n_columns); [rad], [m].
-        rates: Their rates, the same shape; per [s].
-        times: Of the knots, rising, shape (n_rows,); [s].
-    """
-    return _smooth(times, q, rates=rates)
-
-
-def quintic_path(
-    q: FloatArray, rates: FloatArray, changes: FloatArray, times: FloatArray
-) -> Path:
-    """Quintic Hermite pieces.
-
-    Args:
-        q: Knots, shape (n_rows, n_columns); [rad], [m].
-        rates: Their rates, the same shape; per [s].
-        changes: Their accelerations, the same shape; per [s^2].
-        times: Of the knots, rising, shape (n_rows,); [s].
-    """
-    return _smooth(times, q, rates=rates, accelerations=changes)
-
-
-def _smooth(times: FloatArray, q: FloatArray, **derivatives: FloatArray) -> Path:
-    """Pieces by the derivatives at the knots, in their order.
-
-    Raises:
-        ValueError: If shapes disagree or times do not rise.
-    """
-    q, times = frozen(q), frozen(times)
-    given = {name: frozen(values) for name, values in derivatives.items()}
-    for name, values in given.items():
-        if values.shape != q.shape:
-            message = f"{name} have shape {values.shape}, expected {q.shape}"
-            raise ValueError(message)
-    _check_rising(times, len(q))
-    inner = hermite(q, given["rates"], given.get("accelerations"), times)
-    return Path(q, inner, times)
