@@ -113,6 +113,24 @@ def test_rates_make_another_motion(tmp_path: Path, cell: vp.Cell) -> None:
         vp.write_certificate(result, tmp_path / "proof", file)
 
 
+def test_what_is_read_can_be_judged_and_written_and_read_again(
+    tmp_path: Path, cell: vp.Cell
+) -> None:
+    """Many turns stated in degrees; velocities without times, which join nothing."""
+    urdf = cell.files[1]
+    urdf.write_text(URDF.replace("revolute", "continuous"))
+    turned, first, again = vp.read_cell(cell.files[0]), tmp_path / "a", tmp_path / "b"
+    first.write_text("turn_deg\n0\n1800\n")
+    still = vp.JointTrajectory(SWEEP.names, SWEEP.q, rates=np.zeros((2, 1)))
+    for motion in (vp.read_trajectory(first, turned), still):
+        judged = vp.verify(turned, motion).motion
+        assert judged is not None
+        assert judged.q.tolist() == motion.q.tolist()
+        vp.write_trajectory(again, motion, turned)
+        read = vp.read_trajectory(again, turned)
+        np.testing.assert_allclose(read.q, motion.q, rtol=1e-15)
+
+
 def test_rates_of_an_arm_make_another_motion(tmp_path: Path) -> None:
     problem = vp.read_problem("paper/free")
     still = np.zeros((2, 8))

@@ -187,6 +187,13 @@ def test_a_certificate_of_a_mesh_with_gaps_says_how_they_are_joined(
     below = box(0.5) - np.array([0.0, 0.0, 2.0])  # the arm is within the hull of both
     corners = np.concatenate([corners[1:], [[a, middle, c], [middle, b, c]], below])
     assert hold(tmp_path, corners) == "certified"
+    for radius, verdict in ((2e-5, "certified"), (5e-6, "undecided")):
+        # A feed thinner than a gap might pass through it.
+        problem = json.loads((tmp_path / "None.yaml").read_text())
+        problem["manipulator"]["feed"] = {"length": 0.01, "radius": radius}
+        thin = tmp_path / "thin.yaml"
+        thin.write_text(json.dumps(problem))
+        assert verified(thin, tmp_path / "t.csv")[1].verdict == verdict
     lines = certificate_lines(tmp_path / "c.certificate")
     moved, seams = lines[0]["joined"]["housing"]
     assert moved

@@ -1,5 +1,6 @@
 """Where the last link looks: proved against dense sampling and closed forms."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.arm.manipulator import built_in
+from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -143,6 +145,17 @@ def test_directions_that_turn_back_on_themselves_are_never_green() -> None:
     ends = np.array([[1.0, 0, 0], [-1.0, 0, 0]])
     task = asked(tips[[0, -1]], Pointing(1.5, directions=ends))
     assert the_row(task, told).verdict is not Verdict.CERTIFIED
+
+
+def test_a_closed_path_has_one_direction_where_it_closes() -> None:
+    """Of two the one at its end would not be asked for."""
+    corners = np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+    known = np.eye(3)[[0, 1, 1]]
+    for last, good in (([1.0, 0.0, 0.0], True), ([1.0, 1e-9, 0.0], False)):
+        looks = Pointing(0.1, directions=np.vstack([known, [last]]))
+        context = nullcontext() if good else pytest.raises(InvalidInput, match="closed")
+        with context:
+            DesiredPath(corners[0], corners, True, pointing=looks)
 
 
 def test_without_rows_on_the_path_nothing_is_proved() -> None:

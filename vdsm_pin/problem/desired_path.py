@@ -121,6 +121,13 @@ class DesiredPath:
     def _check_pointing(self) -> None:
         directions = None if self.pointing is None else self.pointing.directions
         if directions is None or len(directions) in (1, len(self.corners)):
+            ends = np.zeros((2, 3)) if directions is None else directions[[0, -1]]
+            if self.closed and (ends[0] != ends[1]).any():
+                message = (
+                    "pointing has another direction at the last corner of a closed "
+                    "path than at the first, which it is"
+                )
+                raise InvalidInput(message)
             return
         message = (
             f"pointing has {len(directions)} directions for a path of "

@@ -103,7 +103,12 @@ class JointTrajectory:
         parts = (self.rates, self.changes)
         rates, changes = (None if part is None else part[:, order] for part in parts)
         return JointTrajectory(
-            tuple(names), self.q[:, order], self.times, rates, changes
+            tuple(names),
+            self.q[:, order],
+            self.times,
+            rates,
+            changes,
+            in_degrees=tuple(name for name in names if name in self.in_degrees),
         )
 
     def only(self, rows: BoolArray) -> "JointTrajectory":

@@ -157,6 +157,7 @@ def csv_text(motion: JointTrajectory, robot: Robot) -> str:
     """Waypoints as CSV, which `read_motion` reads back to the same numbers.
 
     What turns too far to be taken for radians is in degrees, to their last digit.
+    Velocities without times, which join nothing, are left out.
     """
     far = np.abs(motion.q).max(axis=0) > [j.most_unstated for j in robot.joints]
     units = ["deg" if f else j.unit for f, j in zip(far, robot.joints, strict=True)]
@@ -166,7 +167,7 @@ def csv_text(motion: JointTrajectory, robot: Robot) -> str:
         heads.append(TIME)
         parts.append(motion.times[:, None])
     for values, (what, per) in ((motion.rates, RATES), (motion.changes, CHANGES)):
-        if values is not None:
+        if values is not None and motion.times is not None:
             heads += [f"{j.name}_{what}_{j.unit}_{per}" for j in robot.joints]
             parts.append(values)
     rows = [json.dumps(row)[1:-1].replace(" ", "") for row in np.hstack(parts).tolist()]

@@ -92,7 +92,8 @@ def _points(
     own = [body for body, _ in bodies if not body.carried]
     points = []
     if not any(arm.ignores(body.name, mesh) for body in own):
-        points.append((_origin(problem, trajectory), arm.least_radius))
+        thinnest = min(body.ball for body in own)
+        points.append((_origin(problem, trajectory), thinnest))
         bodies = [one for one in bodies if one[0].carried]
     points += [
         (middle, body.ball + problem.required_clearance)
