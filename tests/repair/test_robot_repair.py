@@ -74,7 +74,8 @@ def test_grazing_motion_is_repaired(tmp_path: Path) -> None:
         for share in np.linspace(0.0, 1.0, 40):
             poses = this.robot.tree.poses((a + share * (b - a))[None])
             all_poses = np.repeat(poses, len(this.pairs), axis=0)
-            distances = this.distances(this.pairs, all_poses)
+            table = this.pair_table
+            distances = this.distances(table.one, table.other, all_poses)
             assert distances.min() >= 1e-3 - 5e-6
 
 
@@ -117,7 +118,9 @@ def test_smooth_motion_is_repaired_as_a_smooth_one(tmp_path: Path, degree: int) 
     np.testing.assert_allclose(found.moved, np.abs(motion.q - base).max(axis=1))
     for q in motion.path.at(np.linspace(0.0, 4.0, 800)):
         poses = np.repeat(this.robot.tree.poses(q[None]), len(this.pairs), axis=0)
-        assert this.distances(this.pairs, poses).min() >= 1e-3 - 5e-6
+        table = this.pair_table
+        near = this.distances(table.one, table.other, poses)
+        assert near.min() >= 1e-3 - 5e-6
     # As it is written it is the same motion.
     (tmp_path / "t.csv").write_text(csv_text(motion, this.robot))
     assert read_path(tmp_path / "t.csv", this.robot).same_as(motion.path)

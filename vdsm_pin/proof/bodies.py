@@ -1,15 +1,17 @@
 """Bodies that ride on frames, and which of them are held apart."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
-from vdsm_pin.geometry.convex import HalfSpacePiece, Hulls, Piece
+from vdsm_pin.geometry.convex import HalfSpacePiece, Hull, Hulls, Piece
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Body:
     """Convex pieces that ride on one frame of a tree.
 
@@ -29,6 +31,38 @@ class Body:
         if isinstance(self.pieces, Hulls):
             return True
         return not any(isinstance(piece, HalfSpacePiece) for piece in self.pieces)
+
+    @cached_property
+    def parts(self) -> tuple["Body", ...]:
+        """Its pieces as bodies; itself where it is one piece."""
+        if len(self.pieces) == 1:
+            return (self,)
+        return tuple(Body(self.frame, (piece,), self.name) for piece in self.pieces)
+
+    @cached_property
+    def few(self) -> tuple["FewCorners", ...]:
+        """Versions of few corners, the roughest first, where it is a hull of many."""
+        piece = self.pieces[0] if len(self.pieces) == 1 else None
+        if not isinstance(piece, Hull):
+            return ()
+        return tuple(
+            FewCorners(
+                replace(self, pieces=(Hull(few.points, piece.radius),)), few.missed
+            )
+            for few in piece.few
+        )
+
+
+class FewCorners(NamedTuple):
+    """A body by few of its corners.
+
+    Args:
+        body: Those.
+        missed: How far the body is from them at most; [m].
+    """
+
+    body: Body
+    missed: float
 
 
 @dataclass(frozen=True)

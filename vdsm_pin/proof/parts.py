@@ -37,64 +37,62 @@ class PartPlan:
     n_obstacles: int
 
 
-def _mover(one: Body, other: Body, apart: bool) -> bool:
-    """Whether the second of two bounded bodies moves past the first, not reversed.
-
-    Args:
-        one: The first.
-        other: The second.
-        apart: Whether they are of two branches of the tree.
-    """
-    if WORLD in (one.frame, other.frame):
-        return one.frame == WORLD
-    return apart or len(other.pieces) < len(one.pieces)
-
-
 def planned_parts(tree: Tree, bodies: Sequence[Body], pairs: PairTable) -> PartPlan:
     """Which side of each pair moves, and its convex parts.
 
     Raises:
         ValueError: If both have a half-space.
     """
-    branches = tree.branches[[body.frame for body in bodies]].tolist()
+    swapped = _swapped(tree, bodies, pairs)
+    mover = np.where(swapped, pairs.other, pairs.one)
+    partner = np.where(swapped, pairs.one, pairs.other)
     order = sorted(range(len(bodies)), key=lambda k: bodies[k].frame != WORLD)
-    place = {number: k for k, number in enumerate(order)}
     all_bodies, number = [bodies[k] for k in order], list(order)
-    parts: dict[int, range] = {}
-    bounded = [body.is_bounded for body in bodies]
-    rows: list[tuple[int, int, float, int, bool]] = []
-    asked = zip(
-        pairs.one.tolist(), pairs.other.tolist(), pairs.required.tolist(), strict=True
-    )
-    for row, (one, other, required) in enumerate(asked):
-        if not (bounded[one] or bounded[other]):
-            names = f"{bodies[one].name!r} and {bodies[other].name!r}"
-            message = f"{names} are both unbounded: they always meet"
-            raise ValueError(message)
-        swapped = not bounded[one]
-        if bounded[one] and bounded[other]:
-            apart = branches[one] != branches[other]
-            swapped = _mover(bodies[one], bodies[other], apart)
-        mover, partner = (other, one) if swapped else (one, other)
-        body, first = bodies[mover], len(all_bodies)
-        if mover not in parts and len(body.pieces) == 1:
-            parts[mover] = range(place[mover], place[mover] + 1)
-        elif mover not in parts:
-            parts[mover] = range(first, first + len(body.pieces))
-            all_bodies += [Body(body.frame, (p,), body.name) for p in body.pieces]
-            number += [mover] * len(body.pieces)
-        partner = place[partner]
-        rows += [(k, partner, required, row, swapped) for k in parts[mover]]
+    place = np.argsort(order, kind="stable")
+    first, n_parts = place.copy(), np.ones(len(bodies), np.int64)
+    for k in dict.fromkeys(mover.tolist()):
+        parts = bodies[k].parts
+        if len(parts) > 1:
+            first[k], n_parts[k] = len(all_bodies), len(parts)
+            all_bodies += parts
+            number += [k] * len(parts)
+    counts = n_parts[mover]
+    owner = np.repeat(np.arange(pairs.size), counts)
+    within = np.arange(owner.size) - np.repeat(np.cumsum(counts) - counts, counts)
     table = PairTable(
-        np.array([row[0] for row in rows], dtype=np.int64),
-        np.array([row[1] for row in rows], dtype=np.int64),
-        np.array([row[2] for row in rows], dtype=np.float64),
+        first[mover][owner] + within, place[partner][owner], pairs.required[owner]
     )
     return PartPlan(
         bodies=all_bodies,
         pairs=table,
-        owner=np.array([row[3] for row in rows], dtype=np.int64),
-        swapped=np.array([row[4] for row in rows], dtype=np.bool_),
+        owner=owner,
+        swapped=swapped[owner],
         number=np.array(number, dtype=np.int64),
         n_obstacles=sum(body.frame == WORLD for body in bodies),
     )
+
+
+def _swapped(tree: Tree, bodies: Sequence[Body], pairs: PairTable) -> BoolArray:
+    """Of which pairs the second body moves past the first one, shape (n_pairs,).
+
+    Raises:
+        ValueError: If both have a half-space.
+    """
+    bounded = np.array([body.is_bounded for body in bodies], bool)
+    frames = np.array([body.frame for body in bodies], np.int64)
+    n_pieces, branches = np.array([len(b.pieces) for b in bodies]), tree.branches
+    one, other = pairs.one, pairs.other
+    for k in np.flatnonzero(~(bounded[one] | bounded[other]))[:1]:
+        names = f"{bodies[one[k]].name!r} and {bodies[other[k]].name!r}"
+        message = f"{names} are both unbounded: they always meet"
+        raise ValueError(message)
+    rests, apart = (
+        frames[one] == WORLD,
+        branches[frames[one]] != branches[frames[other]],
+    )
+    later = np.where(
+        rests | (frames[other] == WORLD),
+        rests,
+        apart | (n_pieces[other] < n_pieces[one]),
+    )
+    return np.where(bounded[one] & bounded[other], later, ~bounded[one])

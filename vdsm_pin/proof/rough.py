@@ -5,12 +5,11 @@ what they come to can be proved of all. So most pairs never ask for all corners.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from vdsm_pin.geometry.arrays import IntArray
-from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.proof.bodies import Body, PairTable
 
 
@@ -31,19 +30,17 @@ class Rough:
 
 def with_rough(bodies: Sequence[Body], pairs: PairTable) -> Rough:
     """Pairs and, where bodies have many corners, their rough versions."""
-    hulls = [_only_hull(body) for body in bodies]
-    n_levels = max((len(hull.few) for hull in hulls if hull), default=0)
+    n_levels = max((len(body.few) for body in bodies), default=0)
     every, original = list(bodies), list(range(len(bodies)))
     one, other, needed = [pairs.one], [pairs.other], [pairs.required]
     loose, n = [np.zeros(pairs.size)], pairs.size
     rough = np.full((n, n_levels), -1)
     for level in range(n_levels):
         number, missed = np.arange(len(bodies)), np.zeros(len(bodies))
-        for k, (body, hull) in enumerate(zip(bodies, hulls, strict=True)):
-            if hull is not None and level < len(hull.few):
-                number[k], missed[k] = len(every), hull.few[level].missed
-                few = Hull(hull.few[level].points, hull.radius)
-                every.append(replace(body, pieces=(few,)))
+        for k, body in enumerate(bodies):
+            if level < len(body.few):
+                number[k], missed[k] = len(every), body.few[level].missed
+                every.append(body.few[level].body)
                 original.append(k)
         both = missed[pairs.one] + missed[pairs.other]
         has = np.flatnonzero(both > 0.0)
@@ -61,9 +58,3 @@ def with_rough(bodies: Sequence[Body], pairs: PairTable) -> Rough:
         np.concatenate(loose),
     )
     return Rough(every, np.array(original, dtype=np.int64), table)
-
-
-def _only_hull(body: Body) -> Hull | None:
-    """The hull that a body is, if it is one."""
-    piece = body.pieces[0] if len(body.pieces) == 1 else None
-    return piece if isinstance(piece, Hull) else None

@@ -95,7 +95,7 @@ def shifted(x: float, y: float, z: float) -> FloatArray:
     return placement
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tree:
     """Joints and the frames that they carry; a forest is a tree with branches at 0.
 

@@ -252,6 +252,7 @@ class _Slopes:
         """Room of one pair at rows of q, shape (n_rows,); [m]."""
         others = np.broadcast_to(others, (len(q), others.shape[1]))
         poses = self._cell.poses(np.hstack([q, others]))
-        pairs = [self._pairs[k]] * len(q)
-        found = self._cell.distances(pairs, poses)
+        one, other = self._pairs[k].one, self._pairs[k].other
+        both = np.full(len(q), one), np.full(len(q), other)
+        found = self._cell.distances(*both, poses)
         return np.asarray(found - self._target[k])

@@ -1,6 +1,5 @@
 """A robot among its obstacles: from files named one by one, or from a problem file."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.errors import InvalidFile, InvalidInput
-from vdsm_pin.geometry.arrays import FloatArray, frozen
+from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.geometry.solids import ConvexCover, Solid
 from vdsm_pin.problem.any_problem import AnyProblem, ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -106,6 +105,11 @@ class Cell(AnyProblem):
         return pairs + [Pair(i, k, own) for i, k in self.robot.held]
 
     @cached_property
+    def pair_table(self) -> PairTable:
+        """The same as columns."""
+        return PairTable.of(self.pairs)
+
+    @cached_property
     def named_pairs(self) -> tuple[NamedPair, ...]:
         """The pairs by the names of their bodies, a link first."""
         n, found = len(self.robot.bodies), []
@@ -122,9 +126,9 @@ class Cell(AnyProblem):
     @cached_property
     def question(self) -> Question:
         """All pairs under the errors, packed for any motion."""
-        pairs, columns = PairTable.of(self.pairs), np.arange(len(self.bodies))
+        columns = np.arange(len(self.bodies))
         box = proof_box(self.robot, self.scene, self.errors)
-        return Question.of(self.tree, self.bodies, pairs, box, columns)
+        return Question.of(self.tree, self.bodies, self.pair_table, box, columns)
 
     @cached_property
     def coal(self) -> CoalShapes:
@@ -133,20 +137,21 @@ class Cell(AnyProblem):
         frames = [body.frame for body in self.bodies]
         return CoalShapes(frames, [*link_shapes(self.robot), *things])
 
-    def distances(self, pairs: Sequence[Pair], poses: FloatArray) -> FloatArray:
-        """Coal's of each pair at poses of its own, (n_pairs,); [m]. NaN for none.
+    def distances(
+        self, one: IntArray, other: IntArray, poses: FloatArray
+    ) -> FloatArray:
+        """Coal's of pairs of bodies, shape (m,); [m]. NaN for none.
 
         Args:
-            pairs: The pairs.
-            poses: Of all frames, shape (n_pairs, n_frames, 4, 4); [m].
+            one: Their first bodies, shape (m,).
+            other: The second ones, shape (m,).
+            poses: Of all frames, for each pair, shape (m, n_frames, 4, 4); [m].
         """
-        both = np.array([(pair.one, pair.other) for pair in pairs], np.int64)
-        both = both.reshape(-1, 2)
         # Seen from the obstacle, the first body of its pairs: a cloud has no pose.
-        outer = both[:, :1] >= len(self.robot.bodies)
-        one, other = np.where(outer, both[:, ::-1], both).T
-        sides = Sides(np.arange(len(pairs)), one, other)
-        return self.coal.distances(poses[:, :, :3], sides).distance
+        outer = one >= len(self.robot.bodies)
+        sides = np.where(outer, other, one), np.where(outer, one, other)
+        placed = Sides(np.arange(len(poses)), *sides)
+        return self.coal.distances(poses[:, :, :3], placed).distance
 
     def placed(self, pair: Pair, poses: FloatArray) -> tuple[Placed, Placed]:
         """Both bodies at poses of all frames, shape (n_frames, 4, 4); [m]."""

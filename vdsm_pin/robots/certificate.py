@@ -70,7 +70,7 @@ def write_robot_certificate(
     check_certified(verification)
     _check_scene(verification.problem.scene)
     cell, motion = verification.problem, verification.trajectory
-    table, budget = PairTable.of(cell.pairs), Budget(until=deadline.end)
+    table, budget = cell.pair_table, Budget(until=deadline.end)
     bodies, errors = cell.bodies, verification.errors
     whole, _ = joined_path(motion, cell.scene)
     box = proof_box(cell.robot, cell.scene, errors)

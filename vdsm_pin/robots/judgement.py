@@ -236,16 +236,17 @@ def _coal(
     Returns:
         The check, and the distances, NaN where there is none, shape (n_pairs,); [m].
     """
-    found = np.full(len(cell.pairs), nan)
+    table, found = cell.pair_table, np.full(len(cell.pairs), nan)
     seen = np.flatnonzero(np.isfinite(proof.upper))
     poses = cell.poses(path.within(proof.interval[seen], proof.share[seen]))
-    found[seen] = cell.distances([cell.pairs[k] for k in seen], poses)
+    found[seen] = cell.distances(table.one[seen], table.other[seen], poses)
     off = disagreement(found, proof.lower, proof.upper)
     moments = knots.moments(proof.interval, proof.share)
-    evidence = CoalEvidence(COAL)
-    for k in np.flatnonzero(~np.isnan(found)).tolist():
-        evidence.count += 1
-        evidence.add(float(off[k]), "", float(moments[k]))
+    measured = np.flatnonzero(~np.isnan(found))
+    evidence = CoalEvidence(COAL, count=len(measured))
+    if measured.size:
+        worst = measured[np.argmax(off[measured])]
+        evidence.add(float(off[worst]), "", float(moments[worst]))
     where = f"{evidence.count} of {len(cell.pairs)} pairs measured"
     check = evidence.check(f"{where}, each where it was found nearest")
     if not evidence.count:

@@ -119,18 +119,19 @@ class CoalShapes:
         part = first[sides.one][pair] + within
         places = self._places(poses, Sides(*(side[pair] for side in sides)), part)
         request, best = distance_request(), [NOTHING] * count
+        shapes, partners = self._parts.shapes, [self._bodies[k] for k in sides.other]
         calls = zip(pair.tolist(), part.tolist(), *places, strict=True)
-        other = sides.other.tolist()
-        for k, number, *place in calls:
-            partner = self._bodies[other[k]]
-            if partner is not None:
-                shape, pose = self._parts.shapes[number], coal.Transform3s(*place)
-                answer = measure(request, shape, pose, partner)
+        for k, number, turn, shift in calls:
+            if (partner := partners[k]) is not None:
+                pose = coal.Transform3s(turn, shift)
+                answer = measure(request, shapes[number], pose, partner)
                 if answer.distance < best[k].distance:
                     best[k] = answer
-        for k in np.flatnonzero(n_parts).tolist():
-            if self._bodies[other[k]] is not None:
-                found.distance[k], found.near[k], found.far[k] = best[k]
+        known = np.array([partner is not None for partner in partners], bool)
+        seen = np.flatnonzero(known & (n_parts > 0)).tolist()
+        answers = zip(*(best[k] for k in seen), strict=True) if seen else ()
+        for one, values in zip(found, answers, strict=bool(seen)):
+            one[seen] = values
         return found
 
     def _places(
