@@ -18,7 +18,11 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.run_record import RunRecord
-from vdsm_pin.verification.brackets import ClearanceChunk, ClearanceProfile
+from vdsm_pin.verification.brackets import (
+    ClearanceChunk,
+    ClearanceProfile,
+    LeastClearances,
+)
 from vdsm_pin.verification.records import (
     ArmVerification,
     Check,
@@ -116,10 +120,20 @@ def verification(
         checks=checks,
         approaches=closest,
         profile=profile,
+        least=least(len(pairs)),
         coverage=0.873,
         undrawn=np.array([[1.0, 1.5]]),
         tip_deviation=2e-6,
         joint_error=joint_error,
+    )
+
+
+def least(pairs: int) -> LeastClearances:
+    """One pair after the other, each farther off than that before."""
+    lower, points = 0.0041 + 0.01 * np.arange(pairs), np.full((2, pairs, 3), 1.5)
+    none = np.zeros(pairs, np.int64)
+    return LeastClearances(
+        none, 0.25 + 0.0 * lower, lower, lower + 0.0001, none, *points
     )
 
 

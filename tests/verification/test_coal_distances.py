@@ -313,7 +313,6 @@ def test_coal_stands_beside_every_closest_approach_and_measured_row() -> None:
         assert near.lower - gap <= near.coal <= near.upper + gap
         assert near.coal == pytest.approx(near.upper, abs=1e-5)
     assert judged.coal is not None
-    assert judged.least is not None
     assert set(judged.coal.pair.tolist()) == set(range(len(judged.pairs)))
     least = judged.least.lower[judged.coal.pair]
     assert (judged.coal.distance >= least - gap).all()

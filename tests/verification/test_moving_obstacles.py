@@ -301,7 +301,6 @@ def compare(seed: int, tmp_path: Path) -> Verdict:
         )
         gaps = distances(case, axis, t).min(axis=1) - 0.040
         index = next(k for k, p in enumerate(found.pairs) if p.link == link + 1)
-        assert found.least is not None
         lower, upper = found.least.lower[index], found.least.upper[index]
         assert lower <= max(gaps.min(), -0.040) + 1e-9
         # Where it says that it is, it is: by the distance at the witness's moment.

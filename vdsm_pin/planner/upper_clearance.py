@@ -1,6 +1,6 @@
 """Upper bounds of a clearance: what proves that a link is too near an obstacle."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -13,7 +13,6 @@ from vdsm_pin.geometry.kernels import NORMAL, UPPER
 from vdsm_pin.geometry.obstacles import new_measuring, obstacle_bracket
 from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
 
@@ -86,13 +85,7 @@ def held_from(problem: PlanningProblem, axes: slice = WHOLE_ARM) -> PlanningProb
         problem: Arm and scene.
         axes: Numbers from 0, links first, then the tool.
     """
-    held = problem.held.axes[axes].all(axis=0)
-    if held.all():
-        return problem  # with what it keeps packed
-    obstacles = problem.scene.obstacles
-    return replace(
-        problem, scene=Scene(tuple(obstacles[o] for o in np.flatnonzero(held)))
-    )
+    return problem.among(np.all(problem.held.axes[axes], axis=0))
 
 
 def last_link(problem: PlanningProblem) -> slice:

@@ -1,6 +1,6 @@
 """The planning problem: arm, scene, desired tip path, required clearance."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.errors import InvalidInput, UnknownName
-from vdsm_pin.geometry.arrays import FloatArray, check_numbers, freeze
+from vdsm_pin.geometry.arrays import BoolArray, FloatArray, check_numbers, freeze
 from vdsm_pin.problem.any_problem import AnyProblem, ProblemSource
 from vdsm_pin.problem.desired_path import DesiredPath
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -151,6 +151,14 @@ class PlanningProblem(AnyProblem):
         from vdsm_pin.geometry.pieces import first_groups
 
         return first_groups(self.packed, len(self.scene.obstacles))
+
+    def among(self, chosen: BoolArray) -> "PlanningProblem":
+        """The same with those obstacles alone, (n_obstacles,); itself with all."""
+        if chosen.all():
+            return self  # with what it keeps packed
+        obstacles = self.scene.obstacles
+        kept = Scene(tuple(obstacles[k] for k in np.flatnonzero(chosen)))
+        return replace(self, scene=kept)
 
     @cached_property
     def held(self) -> HeldApart:

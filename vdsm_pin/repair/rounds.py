@@ -222,7 +222,6 @@ def repaired(
     found, settled = judge(motion), False
     for _ in range(ROUNDS):
         least = found.least
-        assert least is not None
         bad = np.flatnonzero(least.verdict != CERTIFIED).tolist()
         if found.verdict is Verdict.CERTIFIED or deadline.passed:
             break

@@ -117,11 +117,9 @@ class ClearanceCsv:
                 return
             yield table.reshape(-1, _SPOOLED)
 
-    def _rest(
-        self, least: LeastClearances | None
-    ) -> Iterator[tuple[IntArray, FloatArray]]:
+    def _rest(self, least: LeastClearances) -> Iterator[tuple[IntArray, FloatArray]]:
         """The pairs without a row, with the least clearance of each, in parts."""
-        rest = np.flatnonzero(~self._written) if least else np.zeros(0, np.int64)
+        rest = np.flatnonzero(~self._written)
         for first in range(0, rest.size, _CHUNK):
             pairs = rest[first : first + _CHUNK]
             values = (

@@ -23,13 +23,10 @@ MOST_PLOTTED: Final = 100
 
 
 def nearest_obstacles(verification: Verification, most: int) -> IntArray:
-    """Numbers of the obstacles that come nearest, in file order; `most` of them.
-
-    The first ones where nobody knows how near they come.
-    """
+    """Numbers of the obstacles that come nearest, in file order; `most` of them."""
     count, least = len(verification.problem.scene.obstacles), verification.least
-    if count <= most or least is None:
-        return np.arange(min(count, most))
+    if count <= most:
+        return np.arange(count)
     lowers = dict.fromkeys(verification.problem.scene.names, np.inf)
     for pair, lower in zip(verification.pairs, least.lower.tolist(), strict=True):
         if pair.obstacle:

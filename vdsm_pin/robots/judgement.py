@@ -38,7 +38,6 @@ from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification.approaches import nearest_pairs
 from vdsm_pin.verification.best_effort import BestEffort
-from vdsm_pin.verification.brackets import LeastClearances
 from vdsm_pin.verification.clearance import profile_of
 from vdsm_pin.verification.clearance_check import LINKS, Evidence, clearance_checks
 from vdsm_pin.verification.coal_check import Evidence as CoalEvidence
@@ -72,13 +71,11 @@ class RobotVerification(Verification):
     Args:
         problem: The robot, its obstacles, the clearances asked for.
         trajectory: What was judged.
-        least: The least clearance of every pair.
         motion: The waypoints it was made of; None where a path alone was given.
     """
 
     problem: Cell
     trajectory: Path
-    least: LeastClearances
     motion: JointTrajectory | None = None
 
 

@@ -1,6 +1,5 @@
 """What the proof for an error box leaves undecided of an arm, as the search asks it."""
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -10,7 +9,6 @@ from vdsm_pin.arm.tree import arm_tree, link_frame
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.bodies import Body
 from vdsm_pin.proof.layouts import AT_LOWER, AT_UPPER, LOW, TIME
@@ -33,8 +31,8 @@ def arm_question(
     problem: PlanningProblem, trajectory: Trajectory, pair: Pair, errors: ErrorBox
 ) -> Question:
     """What is asked of a pair of an arm."""
-    mine = tuple(o for o in problem.scene.obstacles if o.name == pair.obstacle)
-    problem, arm = replace(problem, scene=Scene(mine)), problem.manipulator
+    mine = np.array([name == pair.obstacle for name in problem.scene.names], bool)
+    problem, arm = problem.among(mine), problem.manipulator
     own, required = arm_tree(arm), problem.required_self_clearance
     tree = joined_tree(own, problem.scene)
     bodies = {
@@ -44,7 +42,7 @@ def arm_question(
     if pair.obstacle:
         required = problem.required_clearance
         (frame,) = obstacle_frames(own, problem.scene)
-        bodies[pair.label] = Body(frame, mine[0].pieces, pair.label)
+        bodies[pair.label] = Body(frame, problem.scene.obstacles[0].pieces, pair.label)
     sizes, angles = np.zeros(tree.n_columns), errors.angles(arm.n_links)
     sizes[1 : 1 + angles.size] = angles.reshape(-1)
     return Question(

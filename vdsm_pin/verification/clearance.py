@@ -15,7 +15,6 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray, IntArray, frozen
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.progress import step, watched
 from vdsm_pin.proof.budget import Budget
@@ -217,8 +216,7 @@ def _send(
     near = np.flatnonzero(np.bincount(obstacle[outer & (known.best[:, LOW] <= reach)]))
     pairs = frozen(np.flatnonzero(~outer | np.isin(obstacle, near)), np.int64)
     if near.size < len(obstacles):
-        scene = Scene(tuple(obstacles[k] for k in near))
-        near_problem = replace(problem, scene=scene)
+        near_problem = problem.among(np.isin(np.arange(len(obstacles)), near))
         budget = proving.budget
         proof = prove_problem(near_problem, trajectory, errors, budget)
         proving = proof.proving

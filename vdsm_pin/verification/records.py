@@ -211,6 +211,7 @@ class Verification(Summarised):
         approaches: The closest approaches over the whole motion, nearest first, one per
             pair at most, ten at most; the first is the minimum clearance.
         profile: Brackets along the motion.
+        least: The least clearance of every pair.
         joint_error: Largest joint error still certified; 0 if none is; NaN if nobody
             looked for it or the time was over; [rad].
         refuted_joint_error: A joint error at which the clearance is lost, with a
@@ -222,7 +223,6 @@ class Verification(Summarised):
         not_done: What the time limit left out besides checks, which have their rows;
             in words, one thing each.
         time_limit: How long all of it was allowed to take; [s].
-        least: The least clearance of every pair; None where nobody worked it out.
         coal: What Coal measured; None where it was not asked.
     """
 
@@ -233,13 +233,13 @@ class Verification(Summarised):
     checks: tuple[Check, ...]
     approaches: tuple[ClosestApproach, ...]
     profile: ClearanceProfile
+    least: LeastClearances
     joint_error: float = nan
     refuted_joint_error: float = nan
     counterexamples: tuple[Counterexample, ...] = ()
     nominal_clear: bool = False
     not_done: tuple[str, ...] = ()
     time_limit: float = float("inf")
-    least: LeastClearances | None = None
     coal: CoalRows | None = None
 
     @property

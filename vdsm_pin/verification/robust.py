@@ -7,7 +7,6 @@ clearance.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from math import nan
 from typing import Final
@@ -17,7 +16,6 @@ import numpy as np
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.layouts import LOW
@@ -89,7 +87,7 @@ def largest_joint_error(
     if clearances is not None and len(clearances) > MANY:
         # No motion survives more than what the nearest obstacles leave it.
         bound = float(np.partition(clearances, FEW)[FEW])
-        some = _without_far(problem, clearances, bound)
+        some = problem.among(~(clearances > bound))
         largest = _largest_of_all(some, trajectory, errors, largest, deadline)
         problem = within_reach(problem, clearances, errors.with_joint(largest))
     return _largest_of_all(problem, trajectory, errors, largest, deadline)
@@ -118,18 +116,8 @@ def within_reach(
     )
     far = float(np.abs(arm.base_range).max()) + arm.total_length + arm.most_radius
     moved += errors.base_turn * (far + moved)
-    return _without_far(problem, clearances, problem.required_clearance + moved + SPARE)
-
-
-def _without_far(
-    problem: PlanningProblem, clearances: FloatArray, bound: float
-) -> PlanningProblem:
-    """The problem without the obstacles of more clearance than a bound."""
-    near = np.flatnonzero(~(clearances > bound))
-    obstacles = problem.scene.obstacles
-    if near.size == len(obstacles):
-        return problem  # with what it keeps packed
-    return replace(problem, scene=Scene(tuple(obstacles[k] for k in near)))
+    bound = problem.required_clearance + moved + SPARE
+    return problem.among(~(clearances > bound))
 
 
 def _largest_of_all(

@@ -1,6 +1,5 @@
 """The paper's method from problem to plan: seven steps, one call each."""
 
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -19,7 +18,6 @@ from vdsm_pin.planner.spacing import row_steps
 from vdsm_pin.planner.start import check_start
 from vdsm_pin.problem.desired_path import Blocked
 from vdsm_pin.problem.planning_problem import PlanningProblem
-from vdsm_pin.problem.scene import Scene
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.units import in_mm
 
@@ -73,17 +71,6 @@ def _by_link(problem: PlanningProblem, margin: Margin) -> FloatArray:
     return np.array(given.max(axis=1))
 
 
-def _met(problem: PlanningProblem) -> PlanningProblem:
-    """The problem with those obstacles alone that a part of the arm may not touch."""
-    met = np.isfinite(problem.held.radii).any(axis=0)
-    if met.all():
-        return problem
-    obstacles = problem.scene.obstacles
-    return replace(
-        problem, scene=Scene(tuple(obstacles[o] for o in np.flatnonzero(met)))
-    )
-
-
 def _check_straight(problem: PlanningProblem) -> None:
     """Refuse a start with a bend past joint 1: the paper's arm starts straight.
 
@@ -123,7 +110,8 @@ def _best_motion(
         _refuse_scaled(problem, straight.clearance(motion.centres))
     best: PaperSteps | None = None
     missing, reason, grazing = np.inf, None, np.inf
-    met = _met(problem)
+    # Those that a part of the arm may not touch.
+    met = problem.among(np.any(np.isfinite(problem.held.radii), axis=0))
     for avoidance in avoidances(met, margins):
         try:
             route = avoidance.route(missing)  # Step 4
