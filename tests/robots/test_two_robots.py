@@ -11,6 +11,7 @@ from tests.robots.test_robots import write
 from vdsm_pin.certificate_checker import Outcome, check_certificate
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy
+from vdsm_pin.io import bags
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.proof.paths import Path as Motion
@@ -187,6 +188,42 @@ def test_certificate_is_of_both_trajectories(tmp_path: Path) -> None:
     assert not outcome().accepted
     write(tmp_path, "right.csv", "turn_rad\n0\n1\n")
     assert "no times" in outcome().reason
+
+
+def test_another_robot_moves_by_a_topic_of_a_bag(tmp_path: Path) -> None:
+    """As by the same rows in CSV; the certificate is bound to the topic's motion."""
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    types = pytest.importorskip("rosbags.typesys")
+    q = {"left": np.array([1.2, 0.3, 1.2]), "right": np.array([1.0, 0.9, 1.1])}
+    cell, file = two(tmp_path, q)
+    by_rows = verify_robot(cell, read_path(file, cell.robot))
+    store = types.get_typestore(types.Stores.ROS2_HUMBLE)
+    with rosbag2.Writer(tmp_path / "right", version=9) as writer:
+        for topic, turned in (("/far", 0.9), ("/plan", 0.0)):
+            rows = (q["right"] + turned)[:, None]
+            motion = JointTrajectory(("turn",), rows, TIMES["right"])
+            data = store.serialize_cdr(bags._typed(store, motion), bags.PLANS[0])
+            told = writer.add_connection(topic, bags.PLANS[0], typestore=store)
+            writer.write(told, 0, data)
+    problem, proof = tmp_path / "left.yaml", tmp_path / "proof"
+    text = problem.read_text("utf-8")
+    with pytest.raises(InvalidFile, match=r"has several; topics: /far .*, /plan "):
+        read_cell(write(tmp_path, "left.yaml", text.replace("right.csv", "right")))
+    with pytest.raises(InvalidFile, match="is no bag, so topic '/plan' has no meaning"):
+        read_cell(
+            write(tmp_path, "left.yaml", text.replace(".csv}", ".csv, topic: /plan}"))
+        )
+    chosen = text.replace("right.csv}", "right, topic: /plan}")
+    cell = read_cell(write(tmp_path, "left.yaml", chosen))
+    found = verify_robot(cell, read_path(file, cell.robot))
+    np.testing.assert_array_equal(found.least.lower, by_rows.least.lower)
+    assert cell.source is not None
+    assert {one.name for one in cell.source.files} >= {"metadata.yaml", "right.db3"}
+    hashes = Hashes(cell.source.sha256, sha256_of_file(file))
+    write_robot_certificate(proof, found, hashes)
+    assert check_certificate(proof, problem, file).accepted
+    write(tmp_path, "left.yaml", chosen.replace("/plan", "/far"))
+    assert "of another problem file" in check_certificate(proof, problem, file).reason
 
 
 def test_what_is_wrong_with_another_robot_is_said(tmp_path: Path) -> None:

@@ -281,7 +281,7 @@ class Robot:
         self.own, self.timed = Path(own), own.timed and len(own.knots) > 1
         self.links, obstacles = model.links(told), [*self.scene.obstacles]
         for one, files in zip(models, file.others, strict=True):
-            rides: Any = Tree(one.joints), one.branch(files.trajectory)
+            rides: Any = Tree(one.joints), one.branch(files.trajectory, files.topic)
             carrier = Carrier(*rides)
             for name, (frame, parts) in one.links(told, f"{files.name}: ").items():
                 whole: Any = Compound(name, parts, told)

@@ -81,7 +81,7 @@ def _read(file: Path, topic: str | None) -> JointTrajectory:
             known = ", ".join(sorted({f"{c.topic} ({c.msgtype})" for c in found}))
             what = f"has no trajectory under topic {name!r}" if name else "has several"
             what = "has no trajectory" if not found else what
-            problem = f"{what}; topics: {known or 'none'}; choose with --topic"
+            problem = f"{what}; topics: {known or 'none'}; choose one by its topic"
             raise InvalidFile(file=file, problem=problem)
         if sum(one.msgcount for one in wanted) > MOST:
             problem = f"has more than {MOST} messages under topic {topics.pop()}"
@@ -104,7 +104,7 @@ def _chosen(
         problem = f"topic {topic} has messages 0 to {count - 1}, not {number!r}"
         raise InvalidFile(file=file, problem=problem)
     if count != 1 and not number:
-        problem = f"topic {topic} has {count} messages; choose with --topic {topic}#K"
+        problem = f"topic {topic} has {count} messages; choose by topic {topic}#K"
         raise InvalidFile(file=file, problem=problem)
     return of_message(file, _plain(messages[int(number or 0)]))
 

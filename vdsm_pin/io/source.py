@@ -207,11 +207,15 @@ def _unpacked(path: Path) -> Iterator[IO[bytes]]:
             yield cast("IO[bytes]", gzip.GzipFile(fileobj=raw)) if packed else raw
 
 
+def files_in(path: Path) -> list[Path]:
+    """A file, or the files in a bag's folder, in order."""
+    return sorted(filter(Path.is_file, path.rglob("*"))) if path.is_dir() else [path]
+
+
 def sha256_of_file(path: Path) -> str:
     """SHA-256 of a file's bytes, or of those in a bag's folder, in hexadecimal."""
-    inside = sorted(filter(Path.is_file, path.rglob("*"))) if path.is_dir() else [path]
     digest = hashlib.sha256()
-    for one in inside:
+    for one in files_in(path):
         with one.open("rb") as file:
             hashlib.file_digest(file, lambda: digest)
     return digest.hexdigest()

@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Final, Literal, TypeAlias, get_args
 
@@ -25,7 +26,7 @@ from vdsm_pin.io.problem_errors import first_error
 from vdsm_pin.io.problem_file import files_of_obstacles
 from vdsm_pin.io.problem_schema import BasePoseModel, not_bool
 from vdsm_pin.io.schema_types import FileModel, FileName, Name, NotNegative, Number
-from vdsm_pin.io.source import check_is_file, read_text
+from vdsm_pin.io.source import check_is_file_or_bag, files_in, read_text
 from vdsm_pin.io.yaml_reader import YamlDocument, read_yaml
 from vdsm_pin.problem.any_problem import ProblemSource
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -214,7 +215,10 @@ class OtherRobotModel(FileModel):
         "the origin.",
     )
     trajectory: FileName = Field(
-        description="Its trajectory, with times, relative to this file; no folder."
+        description="Its trajectory, with times, relative to this file."
+    )
+    topic: str | None = Field(
+        default=None, description="Of a bag, where it has several: NAME or NAME#K."
     )
 
 
@@ -262,12 +266,14 @@ class OtherFile:
         name: Of the robot here.
         robot: Its files.
         trajectory: Its motion.
+        topic: Of a bag.
         pose: T_base_root: its root link as seen from that of the robot, (4, 4); [m].
     """
 
     name: str
     robot: RobotFiles
     trajectory: Path
+    topic: str | None
     pose: FloatArray
 
 
@@ -307,15 +313,17 @@ class CellFile:
         folder, found = self.path.parent, []
         for i, model in enumerate(self.model.others):
             try:
-                check_is_file(folder / model.trajectory)
+                check_is_file_or_bag(folder / model.trajectory)
             except InvalidFile as error:
                 at, name = ("others", i, "trajectory"), model.trajectory
                 raise self.document.invalid_file(at, name, error) from None
             pose = np.eye(4)
             pose[:3, :3] = self.frame.orientation(model.base.rpy_deg)
             pose[:3, 3] = self.frame.point(model.base.position)
-            files = model.robot.files(folder), folder / model.trajectory
-            found.append(OtherFile(model.name, *files, frozen(pose)))
+            robot, motion = model.robot.files(folder), folder / model.trajectory
+            found.append(
+                OtherFile(model.name, robot, motion, model.topic, frozen(pose))
+            )
         return tuple(found)
 
     @property
@@ -364,8 +372,8 @@ class CellFile:
         """All files that it is read from, those of links and obstacles too."""
         names = filter(None, [self.model.scene])
         scene = (self.path.parent / name for name in names)
-        others = (x for one in self.others for x in (*one.robot.files, one.trajectory))
-        named = (*more, *scene, *others)
+        others = ((*x.robot.files, *files_in(x.trajectory)) for x in self.others)
+        named = (*more, *scene, *chain.from_iterable(others))
         return source_of((self.path, *self.robot.files, *named), of_obstacles)
 
 

@@ -52,7 +52,7 @@ def read_other(file: CellFile, number: int) -> OtherRobot:
     """
     one = file.others[number]
     robot = robot_of(one.robot)
-    motion = read_motion(one.trajectory, robot.joints, values=robot.values)
+    motion = read_motion(one.trajectory, robot.joints, one.topic, robot.values)
     path = path_of(one.trajectory, motion)
     if path.times is None:
         problem = f"{one.trajectory.name!r} has no times, which it needs"

@@ -49,7 +49,7 @@ def read_motion(
     """
     values = values or {}
     if topic is not None and not is_bag(file):
-        problem = f"is no bag, so --topic {topic} has no meaning"
+        problem = f"is no bag, so topic {topic!r} has no meaning"
         raise InvalidFile(file=file, problem=problem)
     if is_bag(file):
         whole = read_bag(file, topic)
