@@ -54,7 +54,7 @@ def test_what_is_called_clear_is_clear_by_shapely() -> None:
     for one in choices()[::3]:
         core = shapely.MultiPoint(one.region.corners).convex_hull
         reference = scale(ARM, project(POINTS))
-        planar = one._moved(reference, rng.uniform(0.0, 0.6, len(POINTS)))
+        planar = one._moved(reference, one.side * rng.uniform(0.0, 0.6, len(POINTS)))
         told = one.clear(planar, POINTS[:, 0])
         for row, able in zip(range(len(POINTS)), told, strict=True):
             try:

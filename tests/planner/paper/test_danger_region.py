@@ -7,7 +7,6 @@ import shapely
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.region_kernels import leave_along, reach_along_circle
 from vdsm_pin.planner.paper.sections import Section
-from vdsm_pin.planner.paper.shadow import Shadow
 
 SHAPES = {
     "disc": [[0.7, 0.6]],
@@ -104,7 +103,7 @@ def test_the_shadow_is_where_the_straight_arm_meets_the_region(name: str) -> Non
     arms = np.stack([np.zeros_like(points), points], axis=1)
     gap = mine.core_distance(arms) - mine.radius
     clear_cut = np.abs(gap) > 1e-6
-    covered = Shadow(mine).covers(points)
+    covered = mine.covers(points)
     np.testing.assert_array_equal(covered[clear_cut], (gap < 0.0)[clear_cut])
     assert covered.sum() > 200
 

@@ -15,7 +15,6 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
-import shapely
 
 from vdsm_pin.errors import PathBlocked
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
@@ -29,7 +28,13 @@ from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.lift import largest_angles
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.scale import scale
-from vdsm_pin.planner.paper.sections import VIEWS, Section, grown_by, planned_gap
+from vdsm_pin.planner.paper.sections import (
+    VIEWS,
+    Section,
+    grown_by,
+    hull_corners,
+    planned_gap,
+)
 from vdsm_pin.planner.paper.tip_path import Route, drawn_rows, straight_route
 from vdsm_pin.problem.planning_problem import PlanningProblem
 
@@ -113,15 +118,13 @@ class AcrossRail:
         planar = reference.copy()
         blocked = np.flatnonzero(~self.clear(reference, tip_x))
         if len(blocked):
-            planar[blocked] = self._bent(reference[blocked], tip_x[blocked])
+            move = self._least_move(reference[blocked], tip_x[blocked])
+            planar[blocked] = self._moved(reference[blocked], move)
         return planar
 
-    def _bent(self, reference: FloatArray, tip_x: FloatArray) -> FloatArray:
-        return self._moved(reference, self._least_move(reference, tip_x))
-
     def _least_move(self, reference: FloatArray, tip_x: FloatArray) -> FloatArray:
-        """Smallest move of the bends that clears the region, (n,); [m]."""
-        farthest = self.side * self._farthest(reference)
+        """Smallest move of the bends that clears the region, signed, (n,); [m]."""
+        farthest = self._farthest(reference)
         bends = self._arms(reference, tip_x)
         moves = least_moves(self._passing, bends, farthest, SCAN, HALVINGS)
         if np.isnan(moves).any():
@@ -133,25 +136,25 @@ class AcrossRail:
                 f"the tip at {self.problem.in_file(tip)}"
             )
             raise PathBlocked(obstacle=self.region.name, reason=reason)
-        return np.asarray(self.side * moves)
+        return np.asarray(moves)
 
     def _farthest(self, reference: FloatArray) -> FloatArray:
-        """Largest move of the bends that leaves psi_1 within its cone, (n,); [m]."""
+        """Largest move to their side that leaves psi_1 within its cone, (n,); [m]."""
         manipulator, first = self.problem.manipulator, self.bends[0] - 1
         at = reference[:, first]
         cone = np.sin(manipulator.max_link_angle)
         reach = manipulator.stations[first] * cone
         along, across = at[:, self.axis], at[:, 1 - self.axis]
         room = np.sqrt(np.maximum(reach**2 - across**2, 0.0))
-        return np.asarray(self.side * (self.side * room - along))
+        return np.asarray(self.side * room - along)
 
     def _moved(self, reference: FloatArray, move: FloatArray) -> FloatArray:
-        """Bends moved to their side, the others in proportion, as `reference`; [m]."""
+        """Bends moved, the others in proportion, as `reference`; [m]."""
         stations = self.problem.manipulator.stations
         knots = stations[self._ends]
         part = np.interp(stations, knots, [0.0, *[1.0] * len(self.bends), 0.0])
         planar = reference.copy()
-        planar[..., self.axis] += self.side * move[:, None] * part
+        planar[..., self.axis] += move[:, None] * part
         return planar
 
     def clear(self, planar: FloatArray, tip_x: FloatArray) -> BoolArray:
@@ -199,7 +202,8 @@ class AcrossRail:
         reference, tip_x = scale(manipulator, project(points)), points[:, 0]
         blocked = ~self.clear(reference, tip_x)
         try:
-            planar = self._bent(reference[blocked], tip_x[blocked])
+            move = self._least_move(reference[blocked], tip_x[blocked])
+            planar = self._moved(reference[blocked], move)
         except PathBlocked:
             return np.inf
         angles = largest_angles(planar[:, self._ends], self._pieces)
@@ -240,8 +244,5 @@ def _with_lee(
     """The section drawn out to beyond the arm's reach on the side not to be passed."""
     far = 4.0 * problem.manipulator.total_length
     drawn_out = section.points - np.array([0.0, side * far])
-    hull = shapely.MultiPoint(np.vstack([section.points, drawn_out])).convex_hull
-    oriented = shapely.orient_polygons(hull) if hull.geom_type == "Polygon" else hull
-    ring = shapely.get_coordinates(oriented)
-    corners = ring[:-1] if hull.geom_type == "Polygon" else ring
+    corners = hull_corners(np.vstack([section.points, drawn_out]))
     return DangerRegion(section.name, corners, section.radius + growth)

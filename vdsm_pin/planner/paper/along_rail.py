@@ -20,7 +20,7 @@ from vdsm_pin.planner.paper.joint_paths import SideRule, slide_joints
 from vdsm_pin.planner.paper.project import project
 from vdsm_pin.planner.paper.region_kernels import core_gaps
 from vdsm_pin.planner.paper.sections import Section, grown_by, planned_gap
-from vdsm_pin.planner.paper.shadow import Shadow
+from vdsm_pin.planner.paper.shadow import visits
 from vdsm_pin.planner.paper.side_rules import anchors, bends, choose_rule
 from vdsm_pin.planner.paper.tip_path import Route
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -158,10 +158,9 @@ def _sequences(
     """For each side the projected tips wanted on it, going into the shadow."""
     path = problem.path
     rows = path_rows(path, first_station(path, region)[0], region)
-    shadow = Shadow(region)
     wanted: dict[int, list[FloatArray]] = {1: [], -1: []}
     tip = project(rows.points)
-    for visit in shadow.visits(tip):
+    for visit in visits(region, tip):
         points = tip[visit.first : visit.last + 1]
         sides = {visit.entry, visit.exit} - {0}
         if len(sides) == 2:

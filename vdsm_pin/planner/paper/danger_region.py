@@ -68,14 +68,11 @@ class DangerRegion:
 
     def core_distance(self, chains: FloatArray) -> FloatArray:
         """Distance of polylines to the core, shape (n, m, 2) to (n,); [m]."""
-        return core_distances(self.corners, read_only(chains))
+        return np.asarray(self.link_distances(chains).min(axis=1))
 
     def link_distances(self, chains: FloatArray) -> FloatArray:
         """Distance of each link of polylines to the core, (n, m, 2) to (n, m - 1)."""
-        links = [
-            self.core_distance(chains[:, i : i + 2]) for i in range(chains.shape[1] - 1)
-        ]
-        return np.stack(links, axis=1)
+        return core_distances(self.corners, read_only(chains))
 
     def contains(self, points: FloatArray) -> BoolArray:
         """Whether points lie inside, shape (n, 2) to (n,); the boundary is outside."""

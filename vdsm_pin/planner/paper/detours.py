@@ -20,7 +20,7 @@ from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.planner.paper.approach import first_station
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 from vdsm_pin.planner.paper.project import project
-from vdsm_pin.planner.paper.shadow import Shadow, Visit
+from vdsm_pin.planner.paper.shadow import Visit, visits
 from vdsm_pin.planner.paper.tip_path import (
     Route,
     Rows,
@@ -84,10 +84,9 @@ def detour_route(
         PathBlocked: If nothing or too little of the path can be drawn, or a way cannot
             be joined.
     """
-    shadow = Shadow(region)
     station, note = first_station(path, region)
     rows = path_rows(path, station, region)
-    pieces = _drawable(rows, shadow, judge)
+    pieces = _drawable(rows, region, judge)
     if not pieces:
         raise PathBlocked(
             obstacle=region.name, reason="no point of the path can be drawn"
@@ -97,14 +96,14 @@ def detour_route(
         reason = f"{in_mm(undrawn)} of the path cannot be drawn"
         raise PathBlocked(obstacle=region.name, reason=reason)
     start = _End(path.start, 0, path.start[None, 1:])
-    walk = _Walk(path, shadow, judge, _largest_angle(pieces, judge))
+    walk = _Walk(path, region, judge, _largest_angle(pieces, judge))
     ways: list[Rows] = []
     here = start
     for piece in pieces:
         left_at = float(ways[-1].stations[-1] if ways else piece.stations[0])
-        there = _end(piece, shadow, last=False)
+        there = _end(piece, region, last=False)
         ways += [_connect(walk, here, there, left_at), piece]
-        here = _end(piece, shadow, last=True)
+        here = _end(piece, region, last=True)
     if path.closed:
         ways.append(_connect(walk, here, start, float(ways[-1].stations[-1])))
     return join(path, ways, (note,) if note else ())
@@ -118,16 +117,16 @@ def _largest_angle(rows: list[Rows], judge: Judge) -> float:
     return float(np.concatenate(angles).max(initial=0.0))
 
 
-def _drawable(rows: Rows, shadow: Shadow, judge: Judge) -> list[Rows]:
+def _drawable(rows: Rows, region: DangerRegion, judge: Judge) -> list[Rows]:
     """The parts of the path that are drawn in one go, each with its sides."""
     points = project(rows.points)
-    inside = shadow.region.contains(points)
+    inside = region.contains(points)
     # Two layers: waypoint k as the end of one part and as the beginning of the next.
     leaving, joining = np.zeros(len(rows), int), np.zeros(len(rows), int)
     drawn, cut = ~inside, np.zeros(len(rows), bool)
-    for visit in shadow.visits(points):
+    for visit in visits(region, points):
         span = slice(visit.first, visit.last + 1)
-        before, after = _sides_drawn(rows, visit, shadow, judge)
+        before, after = _sides_drawn(rows, visit, region, judge)
         leaving[span], joining[span] = before, after
         drawn[span] = (before != 0) | (after != 0)
         both = np.flatnonzero((before != 0) & (after != 0) & (before != after))
@@ -144,7 +143,7 @@ def _drawable(rows: Rows, shadow: Shadow, judge: Judge) -> list[Rows]:
 
 
 def _sides_drawn(
-    rows: Rows, visit: Visit, shadow: Shadow, judge: Judge
+    rows: Rows, visit: Visit, region: DangerRegion, judge: Judge
 ) -> tuple[IntArray, IntArray]:
     """On which side each waypoint of a visit is drawn; 0 for not at all.
 
@@ -170,7 +169,7 @@ def _sides_drawn(
     n_after = _leading(judge(points, exit_)[::-1]) if exit_ else 0
     first_after = count - n_after
     if n_before > first_after:
-        gaps = np.linalg.norm(project(points) - shadow.region.centre, axis=1)
+        gaps = np.linalg.norm(project(points) - region.centre, axis=1)
         change = first_after + int(np.argmin(gaps[first_after:n_before]))
         n_before, first_after = change + 1, change
     before[:n_before] = entry
@@ -201,11 +200,11 @@ class _End:
     retreat: FloatArray
 
 
-def _end(rows: Rows, shadow: Shadow, last: bool) -> _End:
+def _end(rows: Rows, region: DangerRegion, last: bool) -> _End:
     """The last or the first waypoint of a drawn part as an end."""
     inwards = slice(None, None, -1) if last else slice(None)
     points = project(rows.points)[inwards]
-    covered = shadow.covers(points)
+    covered = region.covers(points)
     out = len(points) - 1 if covered.all() else int(np.argmin(covered))
     side = rows.side[inwards]
     return _End(rows.points[inwards][0], int(side[0]), points[: out + 1])
@@ -217,13 +216,13 @@ class _Walk:
 
     Args:
         path: The desired path.
-        shadow: Of the region that is gone round.
+        region: What is gone round.
         judge: Which tip positions the arm can take on a side.
         gentle: Largest link angle on the path, which ways should not exceed; [rad].
     """
 
     path: DesiredPath
-    shadow: Shadow
+    region: DangerRegion
     judge: Judge
     gentle: float
 
@@ -235,7 +234,7 @@ def _connect(walk: _Walk, begin: _End, end: _End, station: float) -> Rows:
     it first goes back along the path it can draw, out of the shadow. A way that needs
     no larger link angles than the path itself is preferred.
     """
-    region, shortest = walk.shadow.region, None
+    region, shortest = walk.region, None
     lines = []
     for k, m in product(*map(_retreats, (begin, end))):
         out, back = begin.retreat[:k], end.retreat[:m][::-1]
@@ -247,7 +246,7 @@ def _connect(walk: _Walk, begin: _End, end: _End, station: float) -> Rows:
     from_x, to_x = float(begin.point[0]), float(end.point[0])
     for line in lines:
         way = off_path_rows(walk.path, line, from_x, to_x, station)
-        side = _sides_on_way(way, walk.shadow, begin.side, end.side, walk.judge)
+        side = _sides_on_way(way, walk.region, begin.side, end.side, walk.judge)
         if side is None:
             continue
         way = way.part(0, len(way) - 1, side)
@@ -282,11 +281,11 @@ def _ways_round(
 
 
 def _sides_on_way(
-    way: Rows, shadow: Shadow, leaving: int, arriving: int, judge: Judge
+    way: Rows, region: DangerRegion, leaving: int, arriving: int, judge: Judge
 ) -> IntArray | None:
     """The arm's side along a way; None where it cannot follow or would change side."""
     side = np.zeros(len(way), int)
-    for visit in shadow.visits(project(way.points)):
+    for visit in visits(region, project(way.points)):
         needs = {visit.entry, visit.exit}
         if visit.first == 0:
             needs.add(leaving)

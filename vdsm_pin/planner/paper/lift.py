@@ -1,13 +1,14 @@
 """Step 6: 2D to 3D (paper, 4.4, Eq. 7)."""
 
+from math import sqrt
 from typing import NoReturn
 
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
+from vdsm_pin.compiled import compiled
 from vdsm_pin.errors import LinkTooShort
 from vdsm_pin.geometry.arrays import FloatArray, read_only
-from vdsm_pin.planner.row_kernels import lift_rows
 
 
 def lift(manipulator: Manipulator, planar: FloatArray, tip_x: FloatArray) -> FloatArray:
@@ -30,9 +31,44 @@ def lift(manipulator: Manipulator, planar: FloatArray, tip_x: FloatArray) -> Flo
     n_samples = len(planar)
     centres = np.zeros((n_samples, manipulator.n_links + 1, 3))
     points, x = read_only(planar), read_only(tip_x)
-    if not lift_rows(points, x, manipulator.link_lengths, centres):
+    if not _lift_rows(points, x, manipulator.link_lengths, centres):
         _refuse_gap(manipulator, planar)
     return centres
+
+
+@compiled
+def _lift_rows(
+    planar: FloatArray, tip_x: FloatArray, lengths: FloatArray, centres: FloatArray
+) -> bool:
+    """Joint centres from their projections (Eq. 7).
+
+    Args:
+        planar: P_1..P_{N+1}, shape (n_samples, N + 1, 2); [m].
+        tip_x: x of the tip, shape (n_samples,); [m].
+        lengths: Of the links, shape (N,); [m].
+        centres: Set to O_1..O_{N+1}, shape (n_samples, N + 1, 3); [m].
+
+    Returns:
+        Whether all links are long enough.
+    """
+    n_links = lengths.size
+    enough = True
+    for k in range(planar.shape[0]):
+        extent = 0.0
+        for i in range(n_links, -1, -1):
+            y, z = planar[k, i, 0], planar[k, i, 1]
+            if i < n_links:
+                gap_y, gap_z = planar[k, i + 1, 0] - y, planar[k, i + 1, 1] - z
+                square = lengths[i] * lengths[i] - gap_y * gap_y - gap_z * gap_z
+                if not square >= 0.0:
+                    enough = False
+                extent += sqrt(square)
+            centres[k, i, 0], centres[k, i, 1], centres[k, i, 2] = (
+                tip_x[k] - extent,
+                y,
+                z,
+            )
+    return enough
 
 
 def largest_angles(planar: FloatArray, lengths: FloatArray) -> FloatArray:

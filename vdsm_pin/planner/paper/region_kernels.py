@@ -171,13 +171,12 @@ def point_to_core(corners: FloatArray, x: float, y: float) -> float:
 
 @compiled
 def core_distances(corners: FloatArray, chains: FloatArray) -> FloatArray:
-    """Distance of each polyline from the hull of the corners, (n, m, 2) to (n,)."""
-    result = np.full(chains.shape[0], np.inf)
+    """Distance of each side of polylines from the hull, (n, m, 2) to (n, m - 1)."""
+    result = np.zeros((chains.shape[0], chains.shape[1] - 1))
     for k in range(chains.shape[0]):
         for i in range(chains.shape[1] - 1):
             a, b = chains[k, i], chains[k, i + 1]
-            distance = segment_to_core(corners, a[0], a[1], b[0], b[1])
-            result[k] = min(result[k], distance)
+            result[k, i] = segment_to_core(corners, a[0], a[1], b[0], b[1])
     return result
 
 

@@ -76,15 +76,9 @@ def merged(sections: Sequence[Section]) -> Section:
     """
     if len(sections) == 1:
         return sections[0]
-    hull = shapely.MultiPoint(
-        np.vstack([section.points for section in sections])
-    ).convex_hull
-    corners = shapely.get_coordinates(hull)
-    if hull.geom_type == "Polygon":
-        corners = shapely.get_coordinates(shapely.orient_polygons(hull))[:-1]
     return Section(
         " and ".join(section.name for section in sections),
-        corners,
+        hull_corners(np.vstack([section.points for section in sections])),
         max(section.radius for section in sections),
         np.stack([section.centre for section in sections]),
     )
@@ -114,9 +108,15 @@ def section_along(obstacle: Obstacle, axis: str) -> Section | None:
         case _:
             return None
     corners = np.vstack([piece.points for piece in obstacle.pieces])  # type: ignore[union-attr]
-    hull = shapely.MultiPoint(corners[:, view]).convex_hull
-    ring = shapely.get_coordinates(shapely.orient_polygons(hull))[:-1]
-    return Section(obstacle.name, ring, 0.0)
+    return Section(obstacle.name, hull_corners(corners[:, view]), 0.0)
+
+
+def hull_corners(points: FloatArray) -> FloatArray:
+    """Corners of the convex hull of points in a plane, counterclockwise, (n, 2)."""
+    hull = shapely.MultiPoint(points).convex_hull
+    if hull.geom_type != "Polygon":
+        return np.asarray(shapely.get_coordinates(hull))
+    return np.asarray(shapely.get_coordinates(shapely.orient_polygons(hull))[:-1])
 
 
 def grown_by(problem: PlanningProblem) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdsm_pin.geometry.arrays import BoolArray, FloatArray, IntArray
+from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.paper.danger_region import DangerRegion
 
 
@@ -29,37 +29,19 @@ class Visit:
     exit: int
 
 
-@dataclass(frozen=True)
-class Shadow:
-    """What the danger region hides from P_1.
-
-    Args:
-        region: The danger region; P_1, the origin, lies outside.
-    """
-
-    region: DangerRegion
-
-    def side(self, points: FloatArray) -> IntArray:
-        """1 left of the ray from P_1 through the region's centre, else -1, (n,)."""
-        centre = self.region.centre
-        left = centre[0] * points[:, 1] - centre[1] * points[:, 0]
-        return np.where(left > 0.0, 1, -1)
-
-    def covers(self, points: FloatArray) -> BoolArray:
-        """Whether the straight arm to points outside the region would meet it, (n,)."""
-        return self.region.covers(points)
-
-    def visits(self, points: FloatArray) -> list[Visit]:
-        """Stays in the shadow along a sequence of points outside or inside, (n, 2)."""
-        covered = self.covers(points)
-        inside, side = self.region.contains(points), self.side(points)
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], covered, [False]])))
-        found = []
-        for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
-            entry = exit_ = 0
-            if first > 0 and not inside[first - 1]:
-                entry = int(side[first - 1])
-            if last + 1 < len(points) and not inside[last + 1]:
-                exit_ = int(side[last + 1])
-            found.append(Visit(int(first), int(last), entry, exit_))
-        return found
+def visits(region: DangerRegion, points: FloatArray) -> list[Visit]:
+    """Stays in the shadow along a sequence of points outside or inside, (n, 2)."""
+    covered, inside = region.covers(points), region.contains(points)
+    x, y = region.centre
+    # Left or right of the ray from P_1 through the region's centre.
+    side = np.where(x * points[:, 1] - y * points[:, 0] > 0.0, 1, -1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], covered, [False]])))
+    found = []
+    for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
+        entry = exit_ = 0
+        if first > 0 and not inside[first - 1]:
+            entry = int(side[first - 1])
+        if last + 1 < len(points) and not inside[last + 1]:
+            exit_ = int(side[last + 1])
+        found.append(Visit(int(first), int(last), entry, exit_))
+    return found
