@@ -66,6 +66,27 @@ def test_a_library_that_the_system_cannot_load_is_told(
     assert found("coal").works
 
 
+@pytest.mark.parametrize(
+    ("said", "told"), [("", ""), ("no room for 9 GiB", "; no room for 9 GiB")]
+)
+def test_a_command_that_runs_out_of_memory_says_so_in_one_line(
+    said: str,
+    told: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """And ends as no verdict does: 1 would be taken for refuted or undecided."""
+
+    def large(*_: object) -> None:
+        raise MemoryError(said)
+
+    monkeypatch.setattr(doctor, "examine", large)
+    with pytest.raises(SystemExit) as ended:
+        main(["doctor"])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err == f"vdsm: there is too little memory{told}\n"
+
+
 def test_a_command_that_cannot_load_a_library_says_so_in_one_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -93,6 +93,10 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except OSError as error:
         where, why = error.filename, error.strerror or error
         fail(OSError(f"{where}: {why}" if where else str(why)), BAD_INPUT)
+    except MemoryError as error:
+        fail(
+            MemoryError(f"there is too little memory; {error}".rstrip("; ")), BAD_INPUT
+        )
     except ImportError as error:
         if (error.name or "").startswith("vdsm_pin"):
             raise
