@@ -83,14 +83,14 @@ def order_of(
             ahead = (place(cells[b], True) - place(cells[a], True)) % CELLS
             step = ahead - CELLS if ahead >= CELLS - same else ahead
         steps.append(step)
-    back = max([0, *(-step for step in steps)])
-    row = rows[steps.index(min(steps)) + 1] if steps else 0
+    totals = [0, *np.cumsum(steps).tolist()]
+    behind = [max(totals[: k + 1]) - total for k, total in enumerate(totals)]
+    back, row = max(behind), rows[behind.index(max(behind))]
     left = any(b > a + 1 for a, b in pairwise(rows))
     if closed and left and back <= same:
-        totals = np.cumsum(steps).tolist()
-        back = max(back, totals[-1] - CELLS)
+        back = max(back, max(totals) - CELLS)
         beyond = [k for k, total in enumerate(totals) if total > CELLS + same]
-        row = rows[beyond[0] + 1] if beyond else row
+        row = rows[beyond[0]] if beyond else row
     return back, row
 
 
@@ -124,6 +124,17 @@ def test_the_order_is_what_the_cells_say(closed: bool, same: int) -> None:
         assert bool(row.where) == (back > same)
         np.testing.assert_equal(row.moment, moment if back > same else np.nan)
     assert 40 < refuted < 560
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_small_steps_back_add_up(closed: bool) -> None:
+    """Each within the tolerance: a path drawn from its end to its start is refused."""
+    cells = np.arange(CELLS, -1, -1)
+    (row,) = check_order(asked(closed, 1), motion(np.ones(CELLS + 1, bool), cells))
+    assert row.verdict is Verdict.REFUTED
+    assert (row.worst * CELLS, row.moment) == (CELLS, CELLS)
+    (row,) = check_order(asked(closed, 1), motion(np.ones(2, bool), cells[:2]))
+    assert row.verdict is Verdict.CERTIFIED
 
 
 def test_a_path_of_one_point_is_drawn_by_any_row_there() -> None:

@@ -56,9 +56,9 @@ def checkers_run(path: DesiredPath, begin: float, end: float) -> float:
     with ctx.workprec(PRECISION):
         drawing, tip = Drawing(path), column(3, 0, 0)
         stations = [arb(begin), arb(end)]
-        start, run = drawing.begin(stations[0]), drawing.step(*stations)
+        start, run = drawing.local(stations[0]), drawing.step(*stations)
         drawing.draw(start, run, [tip, tip], arb(0))
-        return float(drawing.last - stations[0])
+        return float(drawing.last - start)
 
 
 def exact_run(length: Fraction, begin: float, end: float) -> Fraction:

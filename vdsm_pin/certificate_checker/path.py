@@ -27,7 +27,8 @@ class Drawing:
         self.stretches: list[tuple[Ball, Ball]] = []
         self.last: Ball | None = None  # station of the row before; None off the path
         self.here: Ball | None = None  # station of the latest row on the path
-        self.advanced = arb(0)  # from the first row on the path to that one
+        # How far drawn from the first row on the path; how far the latest lies behind.
+        self.farthest = self.behind = arb(0)
         self.left = False  # whether rows off the path lie in between
         self.looks = looks = path.pointing
         self.target = None if looks is None else looks.target
@@ -78,10 +79,6 @@ class Drawing:
             found = found.max(norm(b - a) / self._side(i))
         return found
 
-    def begin(self, station: Ball) -> Ball:
-        """Where an interval begins to draw."""
-        return station if self.closed else self.local(station)
-
     def step(self, a: Ball, b: Ball) -> Ball:
         """How far an interval between two stations advances.
 
@@ -100,7 +97,7 @@ class Drawing:
             same: Stations no farther apart are the same place; [m].
 
         Returns:
-            How far the row lies beyond the one on the path before it; where the tip has
+            How far the row lies beyond all on the path before it; where the tip has
             left a closed path in between, on the way forward; [m].
         """
         last, self.here = self.here, station
@@ -112,14 +109,16 @@ class Drawing:
             if self.length - advance <= same:  # a hair backwards is not once round
                 advance -= self.length
         self.left |= not joined
-        self.advanced += advance
-        return advance
+        ahead = advance - self.behind
+        self.behind = (-ahead).max(arb(0))
+        self.farthest += ahead + self.behind
+        return ahead
 
     def draw(self, begin: Ball, run: Ball, tips: list[Matrix], bend: Ball) -> None:
         """Take in an interval with both rows on the path, or a part of one.
 
         Args:
-            begin: Station where it begins, as `begin` has it; [m].
+            begin: Station where it begins, within the path; [m].
             run: How far it advances, as `step` has it; [m].
             tips: The tip at both ends.
             bend: How far it may lie off the chord in between; [m].

@@ -131,7 +131,7 @@ class Rows:
         if not on.all():
             drawing.last = None
             return
-        begin, run = drawing.begin(stations[0]), drawing.step(*stations)
+        begin, run = drawing.local(stations[0]), drawing.step(*stations)
         self._look(drawing, motion, (begin, run), (0.0, 1.0))
         parts = len(tips) - 1
         times = [(k / parts, (k + 1) / parts) for k in range(parts)]
@@ -205,7 +205,7 @@ class Rows:
     def _drawn(self, drawing: Drawing) -> None:
         """Check how much of the path is drawn, how well, and that it is drawn once."""
         path, drawn = self.problem.path, drawing.coverage()
-        past = drawing.advanced - drawing.length - self.problem.tip_tolerance
+        past = drawing.farthest - drawing.length - self.problem.tip_tolerance
         again = self.ordered and drawing.left and drawing.closed
         once = past <= SLACK or not again
         claim(once, "the path is begun again, {} mm past its end", MM * past)

@@ -150,8 +150,9 @@ def progress(problem: PlanningProblem, trajectory: Trajectory) -> FloatArray:
 def check_order(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Check, ...]:
     """Whether the path is drawn from its start to its end, nowhere backwards.
 
-    A closed path may be begun anywhere. Whoever leaves it must come back within one
-    turn of where it was begun: a piece drawn later than one behind it is out of order.
+    No waypoint lies behind any before it, however small the steps back are. A closed
+    path may be begun anywhere. Whoever leaves it must come back within one turn of
+    where it was begun: a piece drawn later than one behind it is out of order.
 
     Args:
         problem: With the desired path.
@@ -164,15 +165,14 @@ def check_order(problem: PlanningProblem, trajectory: Trajectory) -> tuple[Check
     if path.order is Order.FREE:
         return ()
     steps, same = progress(problem, trajectory), problem.tip_tolerance
-    back, moment = max(0.0, float(-steps.min(initial=0.0))), 0
-    if steps.size:
-        moment = int(on[int(np.argmin(steps)) + 1])
+    total = np.append(0.0, np.cumsum(steps))
+    behind = np.maximum.accumulate(total) - total
+    back, first = float(behind.max()), int(np.argmax(behind))
     left = bool((np.diff(on) > 1).any())
     if path.closed and left and back <= same:
-        total = np.cumsum(steps)
-        back = max(back, float(total[-1]) - path.length)
-        beyond = np.flatnonzero(total > path.length + same)
-        moment = int(on[beyond[0] + 1]) if beyond.size else moment
+        back = max(back, float(total.max()) - path.length)
+        first = int(np.argmax(total > path.length + same))
+    moment = on[first] if on.size else 0
     kept = back <= same
     verdict = Verdict.CERTIFIED if kept else Verdict.REFUTED
     return (
