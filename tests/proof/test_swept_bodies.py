@@ -157,7 +157,8 @@ def corner_case(tree: Tree, path: Path) -> Case:
     corner = np.array([[1.0, 0.0, 0.0]])
     bodies = [Body(1, (Hull(corner),)), Body(0, (Hull(np.zeros((1, 3))),))]
     task = pack_task(tree, bodies, PairTable.of([Pair(0, 1)]), RULES, path.reach)
-    return Case(tree, path, ErrorBox.none(tree), task, corner, 1, 0)
+    none = ErrorBox(*np.zeros((3, len(tree.joints))))
+    return Case(tree, path, none, task, corner, 1, 0)
 
 
 @pytest.mark.parametrize("case", [straight(), curved(3), curved(5)])

@@ -86,22 +86,6 @@ def test_a_snake_arm_is_a_tree() -> None:
     np.testing.assert_allclose(poses[:, 3::2, :3, :3], frames, atol=1e-13)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_no_frame_turns_faster_than_its_rate_allows(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    tree = random_tree(rng, int(rng.integers(1, 21)))
-    q, rates = rng.normal(size=(2, 1, tree.n_columns))
-    step = 1e-6
-    rest = int(rng.integers(tree.n_frames))
-    poses = tree.poses(np.concatenate([q, q + step * rates]))[:, :, :3, :3]
-    seen = poses[:, rest].transpose(0, 2, 1)[:, None] @ poses
-    turned = seen[1] @ seen[0].transpose(0, 2, 1)
-    angle = np.linalg.norm(turned - np.eye(3), axis=(1, 2)) / np.sqrt(2.0)
-    allowed = tree.turning(np.abs(rates), rest)[0]
-    assert (angle <= step * allowed * (1.0 + 1e-5) + 1e-14).all()
-    assert allowed[rest] == 0.0
-
-
 def test_the_way_goes_over_the_nearest_common_ancestor() -> None:
     tree = Tree(tuple(Joint(parent) for parent in (0, 1, 2, 1, 4, 0)))
     up, down = tree.way(3, 5)

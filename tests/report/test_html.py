@@ -125,7 +125,7 @@ def test_the_index_links_every_finished_problem(tmp_path: Path) -> None:
     lost = BatchRow.model_validate(
         {"folder": "c", "problem": "<c>", "strategy": "paper", "outcome": "time-limit"}
     )
-    write_index(tmp_path / "index.html", [good, lost])
+    write_index(tmp_path / "index.html", [good, lost], {"a-b": "report.html"})
     text = (tmp_path / "index.html").read_text(encoding="utf-8")
     page = Page(text)
     assert "1 of 2 problems certified" in page.text
@@ -139,7 +139,8 @@ def test_the_index_links_every_finished_problem(tmp_path: Path) -> None:
 def test_problems_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
     file = verification_file(made_up.verification(), made_up.RECORD)
     rows = [batch_row(folder, "paper", file) for folder in ("a-b", "a-c")]
-    write_index(tmp_path / "index.html", rows)
+    pages = {row.folder: "report.html" for row in rows}
+    write_index(tmp_path / "index.html", rows, pages)
     text = Page((tmp_path / "index.html").read_text(encoding="utf-8")).text
     assert "in a-b" in text
     assert "in a-c" in text

@@ -290,7 +290,8 @@ def test_an_index_of_a_thousand_problems_sorts_at_once(
         (tmp_path / f"p{i:04}").mkdir()
         (tmp_path / f"p{i:04}" / "picture.svg").write_text(picture(judged))
     (tmp_path / "timing.js").write_text('window.vdsmTiming = {"p0003": 1.5};')
-    write_index(tmp_path / "index.html", rows)
+    pages = {row.folder: "report.html" for row in rows}
+    write_index(tmp_path / "index.html", rows, pages)
     watched = Watched(browser, (tmp_path / "index.html").as_uri())
     page = watched.page
     assert "1.50 s" in page.locator("tr[data-folder=p0003]").text_content()

@@ -37,7 +37,6 @@ class ArmBody:
         link: The link that it rides on, 1 to N; 0 for the feed, which moves with O_1
             and never turns.
         piece: The solid.
-        axial: Whether it is the whole axis of its link, grown by a radius.
         carried: Whether it is none of the arm's own: links, tool and feed.
         of: The body that it is a part of; empty where it is no part.
     """
@@ -45,7 +44,6 @@ class ArmBody:
     name: str
     link: int
     piece: Hull | FlatCylinder
-    axial: bool = False
     carried: bool = False
     of: str = ""
 
@@ -93,9 +91,8 @@ def arm_bodies(arm: Manipulator) -> tuple[ArmBody, ...]:
     for k, (name, span) in enumerate(zip(arm.axis_names, arm.axis_spans, strict=True)):
         link, axis = min(k + 1, arm.n_links), np.zeros((2, 3))
         axis[:, 0] = span
-        whole = span[0] == 0.0 and span[1] == arm.link_lengths[link - 1]
         solid = Hull(axis, float(arm.axis_radii[k]))
-        found.append(ArmBody(name, link, solid, axial=bool(whole)))
+        found.append(ArmBody(name, link, solid))
     if arm.feed:
         axis = np.array([[-arm.feed.length, 0.0, 0.0], [0.0, 0.0, 0.0]])
         found.append(ArmBody(FEED, 0, Hull(axis, arm.feed.radius)))

@@ -2,10 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.proof.tree import Tree
 
 
 @dataclass(frozen=True)
@@ -24,9 +21,3 @@ class ErrorBox:
     shifts: FloatArray
     tilts: FloatArray
     surfaces: FloatArray | None = None
-
-    @classmethod
-    def none(cls, tree: Tree) -> "ErrorBox":
-        """No errors."""
-        blank = np.zeros(len(tree.joints))
-        return cls(blank, blank, blank)

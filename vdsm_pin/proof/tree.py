@@ -198,26 +198,6 @@ class Tree:
                 end = self.joints[end - 1].parent
         return np.array(up, dtype=np.int64), np.array(down[::-1], dtype=np.int64)
 
-    def turning(self, rates: FloatArray, rest: int = 0) -> FloatArray:
-        """How fast each frame may turn as seen from one of them.
-
-        Args:
-            rates: Bounds of |dq/dt|, shape (n_rows, n_columns); [rad], [m] per unit.
-            rest: The frame from which it is seen.
-
-        Returns:
-            The sum of |ratio| rate over the revolute joints between, shape (n_rows,
-            n_frames); [rad] per unit.
-        """
-        turns = np.zeros((len(rates), len(self.joints)))
-        for number, joint in enumerate(self.joints):
-            if joint.kind is Kind.REVOLUTE and joint.column is not None:
-                turns[:, number] = np.abs(joint.ratio * rates[:, joint.column])
-        total = np.zeros((len(rates), self.n_frames))
-        for frame in range(self.n_frames):
-            total[:, frame] = turns[:, np.concatenate(self.way(rest, frame))].sum(1)
-        return total
-
 
 def _motions(joint: Joint, values: FloatArray) -> FloatArray:
     """What a joint does at each of its values, shape (n, 4, 4)."""

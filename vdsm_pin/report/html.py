@@ -245,19 +245,14 @@ def message_page(message: str, live: str) -> str:
     return rendered("message.html.j2", message=message, live=live)
 
 
-def write_index(
-    path: Path, rows: Sequence[BatchRow], pages: Mapping[str, str] | None = None
-) -> None:
+def write_index(path: Path, rows: Sequence[BatchRow], pages: Mapping[str, str]) -> None:
     """index.html of a batch; durations stand in timing.js beside it.
 
     Args:
         path: The page.
         rows: One per problem.
-        pages: The page of each problem that has one, by its folder; None for the
-            report of each that was verified.
+        pages: The page of each problem that has one, by its folder.
     """
-    if pages is None:
-        pages = {row.folder: "report.html" for row in rows if row.waypoints}
     counts = {word: sum(row.outcome == word for row in rows) for word in OUTCOMES}
     passed = sum(count for word, count in counts.items() if outcome(word).passed)
     names = Counter(row.problem for row in rows)
