@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from paper_figures import style
-from paper_figures.scenery import draw_arm, draw_obstacles
+from paper_figures.scenery import draw_arm, draw_obstacles, faces
 from paper_figures.views import oblique
 
 from vdsm_pin.arm.kinematics import joint_centres
@@ -29,7 +29,9 @@ def poses(problem: PlanningProblem, found: Simulation) -> Figure:
     path = VIEW(problem.path.corners)
     drawn = np.vstack([VIEW(centres.reshape(-1, 3)), path])
     low, high = drawn.min(axis=0), drawn.max(axis=0)
-    across, up = (low[0] - 150.0, high[0] + 150.0), (low[1] - 150.0, high[1] + 350.0)
+    tops = [faces(VIEW, one)[0].bounds[3] for one in problem.scene.obstacles]
+    across = (low[0] - 150.0, high[0] + 150.0)
+    up = (low[1] - 150.0, max(high[1] + 150.0, *(top + 30.0 for top in tops)))
     for k, row in enumerate(rows):
         axes = style.place(
             figure, 0.1 + 2.38 * (k % 3), 2.35 - 2.25 * (k // 3), 2.28, 1.95

@@ -31,7 +31,7 @@ def draw(runs: Runs) -> dict[str, Figure]:
             ("16 traditional frames: x along the link, z the axis of the turn", _old),
             ("8 frames of Table 1: x along the link, yaw α about z, pitch θ about y",
              _new),
-            ("the arm on its rail", _arm),
+            ("the arm on its rail; lengths in mm", _arm),
         )
     ):  # fmt: skip
         axes = style.place(figure, 0.12, 2.85 - 1.34 * row, style.WIDTH - 0.24, 1.05)

@@ -56,7 +56,8 @@ def draw(runs: Runs) -> dict[str, Figure]:
     gamma = np.rad2deg(position_angles(np.array(ALPHA), np.array(THETA)))
     figure.text(
         0.03, 0.05,
-        f"α = {np.rad2deg(ALPHA):.0f}°, θ = {np.rad2deg(THETA):.0f}° (up is negative): "
+        f"α = {np.rad2deg(ALPHA):.0f}°, "
+        f"θ = −{np.rad2deg(-THETA):.0f}° (up is negative): "
         f"ψ = arccos(cos θ cos α) = {psi:.1f}°,\n"
         f"γ = atan2(−sin θ, cos θ sin α) = {gamma:.1f}°, seen against x",
         size=6.5,

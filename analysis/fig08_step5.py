@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from paper_figures import style
 from paper_figures.labels import label_dots
 from paper_figures.marks import row_of
-from paper_figures.projections import HIGH, LOW, draw_background
+from paper_figures.projections import HIGH, LOW, draw_background, region
 from paper_figures.runs import Run, Runs
 from paper_figures.steps import Slide, slides, sliding_region
 from paper_figures.style import save_all
@@ -71,7 +71,7 @@ def _draw_slide(axes: Axes, run: Run, row: int, slide: Slide) -> None:
         axes.plot(*at, "x", color=style.INK, markersize=4.0, zorder=6)
         dots.append(at)
         names.append(f"P′{style.subscript(i)}")
-    label_dots(axes, np.array(dots), names, lines, size=6.5)
+    label_dots(axes, np.array(dots), names, lines, region(run, row), size=6.5)
 
 
 def _draw_cross(axes: Axes, run: Run, row: int, at: FloatArray) -> list[FloatArray]:

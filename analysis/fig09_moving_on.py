@@ -32,8 +32,7 @@ def draw(runs: Runs) -> dict[str, Figure]:
             left = 0.50 + k * (style.WIDTH - 0.42) / 3.0
             axes = style.place(figure, left, low, size[1], size[2])
             draw_background(axes, run, row)
-            draw_trails(axes, run, first, row)
-            draw_chain(axes, run, row)
+            draw_chain(axes, run, row, draw_trails(axes, run, first, row))
             style.panel_title(axes, "abcdef"[3 * r + k], f"{name}, ‘{run.strategy}’")
             if k > 0:
                 axes.set_ylabel("")

@@ -30,7 +30,7 @@ def draw(runs: Runs) -> dict[str, Figure]:
     axes = style.place(figure, 3.75, 0.15, 3.15, 3.0)
     _holes(axes, arm)
     style.panel_title(axes, "b", "the holes of joint 1, seen along the arm")
-    figure.text(0.016, 0.945, "(a) joint 1 with its 24 cables", weight="bold", size=7.5)
+    figure.text(0.016, 0.922, "(a) joint 1 with its 24 cables", weight="bold", size=7.5)
     return {NAME: figure}
 
 

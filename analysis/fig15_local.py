@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from paper_figures import style
 from paper_figures.curves import (
+    MM_PER_DEG,
     angle_legend,
     draw_link_angles,
     draw_moments,
@@ -44,6 +45,7 @@ def draw(runs: Runs) -> dict[str, Figure]:
             if k == len(PLACES) - 1:
                 axes.set_xlabel("waypoint")
     lines, names = angle_legend(first["obs1"][0])
+    names[names.index("x₀")] = f"x₀, {MM_PER_DEG:.0f} mm to 1°"
     figure.legend(
         lines, names, loc="upper center", bbox_to_anchor=(0.5, 0.995), ncols=10,
         columnspacing=1.1,

@@ -65,8 +65,8 @@ def _bars(axes: Axes, run: Run, shift: float) -> None:
     x, side = at[-1] + np.sign(shift) * 0.03, "right" if shift < 0.0 else "left"
     for value, up in ((high[-1], 0.9), (low[-1], -0.9)):
         axes.text(
-            x, value + up, f"{value * MM_PER_DEG:.0f}", ha=side, size=6.0, bbox=box,
-            va="bottom" if up > 0.0 else "top", zorder=6,
+            x, value + up, f"{value * MM_PER_DEG:.0f}".replace("-", "−"), ha=side,
+            va="bottom" if up > 0.0 else "top", size=6.0, bbox=box, zorder=6,
         )  # fmt: skip
     names = [f"ψ{style.subscript(i)}" for i in range(1, len(at))]
     axes.set_xticks(at, [*names, "x₀"])

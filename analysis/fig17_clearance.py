@@ -96,9 +96,9 @@ def _surface_panel(axes: Axes, run: Run) -> None:
 
 
 def _note(axes: Axes, text: str) -> None:
-    """A number in the upper right corner."""
+    """A number in the lower right corner, which no curve comes to."""
     axes.text(
-        0.97, 0.93, text, transform=axes.transAxes, ha="right", va="top", size=6.3,
+        0.97, 0.05, text, transform=axes.transAxes, ha="right", va="bottom", size=6.3,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8},
         zorder=7,
     )  # fmt: skip

@@ -4,12 +4,14 @@ import itertools
 from typing import Final
 
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
 
+from paper_figures import style
 from vdsm_pin.geometry.arrays import FloatArray
 
 POINTS_PER_INCH: Final = 72.0
-RADII: Final = (6.5, 9.0, 12.0)
+RADII: Final = (6.5, 9.0, 12.0, 16.0, 20.0)
 """Distances from a dot at which its label is tried; [pt]."""
 
 TURNS: Final = 24
@@ -18,12 +20,22 @@ TURNS: Final = 24
 ROOM: Final = 7.0
 """Free space beyond this makes a place no better; [pt]."""
 
+LED: Final = 12.0
+"""From this distance on, a thin line leads from a dot to its label; [pt]."""
+
+COVERED: Final = 5.0
+"""How much more a point of overlap counts than one of distance; [-]."""
+
+WITHIN: Final = 7.0
+"""What a place within the region to avoid is worth less; [pt]."""
+
 
 def label_dots(
     axes: Axes,
     dots: FloatArray,
     names: list[str],
     lines: list[FloatArray],
+    avoid: shapely.Geometry | None = None,
     size: float = 6.3,
 ) -> None:
     """Write a name beside each dot. The limits of the axes must be final.
@@ -33,11 +45,13 @@ def label_dots(
         dots: Shape (n, 2); [mm].
         names: One per dot.
         lines: Polylines to keep clear of, each of shape (m, 2); [mm].
+        avoid: A region to keep out of and whose edges to keep clear of; [mm].
         size: Of the letters; [pt].
     """
     to_points = axes.transData.transform
     scale = POINTS_PER_INCH / axes.figure.dpi
-    busy = [to_points(_sampled(line)) * scale for line in lines]
+    edges = [] if avoid is None else _edges(avoid)
+    busy = [to_points(_sampled(line)) * scale for line in [*lines, *edges]]
     obstacles = np.vstack([*busy, to_points(dots) * scale])
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     frame = to_points([[left, bottom], [right, top]]) * scale
@@ -56,14 +70,24 @@ def label_dots(
             for offset in tries
         ]
         far = np.linalg.norm(tries, axis=1)
+        gaps = np.where(np.array(gaps) < 0.0, COVERED * np.array(gaps), gaps)
         score = np.minimum(gaps, ROOM) - 0.35 * far - 20.0 * ~np.array(inside)
+        if avoid is not None:
+            back = axes.transData.inverted().transform((here + tries) / scale)
+            score -= WITHIN * shapely.contains_xy(avoid, *back.T)
         offset = tries[int(np.argmax(score))]
+        leader = {"arrowstyle": "-", "color": style.INK, "linewidth": 0.35,
+                  "shrinkA": 0.0, "shrinkB": 1.5}  # fmt: skip
         axes.annotate(
             name, at, offset, textcoords="offset points", ha="center", va="center",
             size=size, zorder=9,
+            arrowprops=leader if np.linalg.norm(offset) >= LED else None,
         )  # fmt: skip
         grid = np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1)])
-        obstacles = np.vstack([obstacles, here + offset + grid * half])
+        taken = [obstacles, here + offset + grid * half]
+        if np.linalg.norm(offset) >= LED:
+            taken.append(here + np.linspace(0.0, 1.0, 9)[:, None] * offset)
+        obstacles = np.vstack(taken)
 
 
 def _gap(obstacles: FloatArray, centre: FloatArray, half: FloatArray) -> float:
@@ -71,6 +95,12 @@ def _gap(obstacles: FloatArray, centre: FloatArray, half: FloatArray) -> float:
     beyond = np.abs(obstacles - centre) - half
     outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
     return float((outside + np.minimum(beyond.max(axis=1), 0.0)).min())
+
+
+def _edges(region: shapely.Geometry) -> list[FloatArray]:
+    """The outlines of a region, each of shape (m, 2)."""
+    lines = shapely.get_parts(region.boundary)
+    return [shapely.get_coordinates(line) for line in lines]
 
 
 def _sampled(line: FloatArray) -> FloatArray:
