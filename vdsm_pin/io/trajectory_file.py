@@ -27,7 +27,7 @@ from vdsm_pin.io.waypoint_rows import LENGTH, PLACE, WAYPOINT, Waypoints, read_w
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 
-Interpolation: TypeAlias = Literal["linear", "cubic", "quintic", "auto"]
+Interpolation: TypeAlias = Literal["auto", "linear", "cubic", "quintic"]
 """What joins the rows: straight lines; cubic pieces, by their velocities; quintic ones,
 by their accelerations too; or whichever the file has columns for."""
 

@@ -1,8 +1,9 @@
 """A trajectory: rows of joint values, joined by straight lines or by smooth pieces."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal, TypeAlias
 
 import numpy as np
 
@@ -21,6 +22,12 @@ from vdsm_pin.units import in_mm
 
 if TYPE_CHECKING:
     from vdsm_pin.proof.paths import Path
+
+Joined: TypeAlias = Literal["linear", "cubic", "quintic"]
+"""What joins the rows of a motion."""
+
+JOINED: Final[Mapping[int, Joined]] = {1: "linear", 3: "cubic", 5: "quintic"}
+"""The same by the degree of the pieces."""
 
 MAX_ROWS: Final = 5_000_000
 """Largest number of rows of one trajectory."""
@@ -189,7 +196,7 @@ class Trajectory(Summarised):
         return self.rates is not None and self.n_samples > 1
 
     @property
-    def interpolation(self) -> Literal["linear", "cubic", "quintic"]:
+    def interpolation(self) -> Joined:
         """What joins the rows: linear, cubic or quintic pieces."""
         if self.rates is None:
             return "linear"

@@ -1,8 +1,9 @@
 """What verification.json says of a robot of a URDF: joints, links, notes."""
 
-from typing import Any, Final
+from typing import Any
 
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.problem.trajectory import JOINED
 from vdsm_pin.proof.paths import Path
 from vdsm_pin.report.facts import error_box, left_out_rows
 from vdsm_pin.report.inputs import file_notes, longer_motions
@@ -12,8 +13,6 @@ from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.judgement import RobotVerification
 from vdsm_pin.robots.model import Robot, RobotJoint
 from vdsm_pin.verification.inside import mesh_notes
-
-_PIECES: Final = {1: "linear", 3: "cubic", 5: "quintic"}
 
 
 def robot_facts(verification: RobotVerification) -> dict[str, Any]:
@@ -52,7 +51,7 @@ def _motion(cell: Cell, path: Path) -> RobotFacts:
         {
             "waypoints": path.n_samples,
             "robot": robot.name,
-            "interpolation": _PIECES[path.degree],
+            "interpolation": JOINED[path.degree],
             "bodies": robot.solids.words,
             "links": tuple(body.name for body in robot.bodies),
             "joints": tuple(rows),

@@ -4,6 +4,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from vdsm_pin.problem.trajectory import Joined
 from vdsm_pin.report.words import BASE_ERROR
 
 Point = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
@@ -275,9 +276,7 @@ class RobotFacts(FileModel):
 
     waypoints: int = Field(description="rows of the trajectory")
     robot: str = Field(description="its name in the URDF")
-    interpolation: Literal["linear", "cubic", "quintic"] = Field(
-        description="what joins the waypoints"
-    )
+    interpolation: Joined = Field(description="what joins the waypoints")
     bodies: str = Field(description="what stands for the solids of its links")
     links: tuple[str, ...] = Field(description="those with solids, link 1 first")
     joints: tuple[JointRow, ...] = Field(description="those that the motion moves")

@@ -14,6 +14,7 @@ from vdsm_pin.geometry.pieces import PackedPieces
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.problem.scene import Scene, solid_of
+from vdsm_pin.problem.trajectory import JOINED
 from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.prover import start_proof
@@ -23,7 +24,6 @@ from vdsm_pin.robots.files import HULLS
 from vdsm_pin.robots.judgement import RobotVerification
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.certificate_file import (
-    Joined,
     LinkPieces,
     Pair,
     Primitive,
@@ -39,7 +39,6 @@ from vdsm_pin.verification.certificate_lines import (
 from vdsm_pin.verification.certificate_writer import errors_beside, pieces_of_obstacles
 from vdsm_pin.verification.moving import joined_path
 
-DEGREES: Final[Mapping[int, Joined]] = {1: "linear", 3: "cubic", 5: "quintic"}
 UNCLEAR: Final = "the inside of {!r} has gaps, and then none is written"
 EDGES: Final[Mapping[int, tuple[int, ...]]] = {1: (), 2: (1,), 8: (1, 2, 4)}
 """By the number of a primitive's corners those at the ends of the first one's edges."""
@@ -84,7 +83,7 @@ def write_robot_certificate(
     links = places[:n_links] + of_obstacles[first:]
     header = RobotHeaderLine(
         **hashes.as_json(),
-        interpolation=DEGREES[motion.degree],
+        interpolation=JOINED[motion.degree],
         pairs=_pairs(plan.bodies[len(bodies) :], plan.bodies, plan.pairs),
         pieces=pieces_of_obstacles(obstacles, pieces),
         errors=_errors(cell, errors),

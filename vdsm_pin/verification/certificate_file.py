@@ -4,13 +4,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, RootModel
 
+from vdsm_pin.problem.trajectory import Joined
+
 Number = Annotated[int, Field(ge=0)]
 Share = Annotated[FiniteFloat, Field(ge=0.0, le=1.0)]
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Error = Annotated[FiniteFloat, Field(ge=0.0)]
 ShiftAndTurn = tuple[Error, Error]
 Pair = tuple[str, str]
-Joined = Literal["linear", "cubic", "quintic"]
 Normal = FiniteFloat
 Point = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 Plane = tuple[Number, Number, Normal, Normal, Normal, int | FiniteFloat]
