@@ -48,7 +48,7 @@ from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import LINKS as INSIDE
 from vdsm_pin.verification.inside import check_inside
 from vdsm_pin.verification.moving import Knots, in_short_parts, joined_path
-from vdsm_pin.verification.records import Check, Counterexample, Verdict, Verification
+from vdsm_pin.verification.records import Check, Verdict, Verification
 
 POSES: Final = "link poses by Pinocchio against the tree's"
 LIMITS: Final = "joint {name!r} in its limits"
@@ -101,28 +101,15 @@ def verify_robot(
     coal, measured = _coal(cell, whole, proof, knots)
     least, extras = enclosed_least(proved, points_inside(located), 0.0), BestEffort()
     profile = profile_of(proof.profile, proof.stride, knots, len(robot.bodies))
-    none: tuple[Counterexample, ...] = ()
-    lost = extras.take(
-        "search for counterexamples",
-        lambda: robot_counterexamples(
-            cell, whole, named, least, proof.lower_interval, deadline
-        ),
-        none,
-    )
-    nowhere: tuple[FirstContact, ...] = ()
-    met = nowhere
+    asked = cell, whole, named, least, proof.lower_interval, deadline
+    lost = extras.take("search for counterexamples", (), robot_counterexamples, *asked)
+    met: tuple[FirstContact, ...] = ()
     if contacts:
-        met = extras.take(
-            "first contact",
-            lambda: robot_contacts(cell, path, named, proved, box, deadline),
-            nowhere,
-        )
+        of_all = cell, path, named, proved, box, deadline
+        met = extras.take("first contact", (), robot_contacts, *of_all)
     lost, least = in_rows(lost, knots), least_in_rows(least, knots)
-    clear = bool(lost) and extras.take(
-        "proof of the motion without errors",
-        lambda: _is_clear(cell, whole, deadline),
-        False,
-    )
+    name = "proof of the motion without errors"
+    clear = bool(lost) and extras.take(name, False, _is_clear, cell, whole, deadline)
     evidence = Evidence(
         pairs=named,
         least=least,

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from math import nan
-from typing import TypeVar
+from typing import ParamSpec, TypeVar
 
 from vdsm_pin.errors import OutOfTime, VdsmError
 from vdsm_pin.progress import step
@@ -10,6 +10,7 @@ from vdsm_pin.time_limit import Deadline
 from vdsm_pin.verification.records import Check, Verdict
 
 T = TypeVar("T")
+P = ParamSpec("P")
 
 
 class BestEffort:
@@ -22,17 +23,26 @@ class BestEffort:
     def __init__(self) -> None:
         self.not_done: list[str] = []
 
-    def take(self, name: str, run: Callable[[], T], otherwise: T) -> T:
+    def take(
+        self,
+        name: str,
+        otherwise: T,
+        run: Callable[P, T],
+        *args: P.args,
+        **kw: P.kwargs,
+    ) -> T:
         """What `run` returns, or `otherwise` and a note if it raises `OutOfTime`.
 
         Args:
             name: What is worked out, for the note and the progress bar.
-            run: Works it out.
             otherwise: What stands for the result if the time is over.
+            run: Works it out.
+            args: What it is given.
+            kw: The same by name.
         """
         step("%s", name)
         try:
-            return run()
+            return run(*args, **kw)
         except OutOfTime as error:
             self.not_done.append(f"{name}: {error}")
             return otherwise

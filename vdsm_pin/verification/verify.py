@@ -225,13 +225,9 @@ class _Judgement:
 
     def counterexamples(self, proof: ClearanceProof) -> tuple[Counterexample, ...]:
         """Motions within the errors that come too close."""
-        problem, motion, box = self.problem, self.trajectory, self.errors
-        none: tuple[Counterexample, ...] = ()
-        return self.extras.take(
-            "search for counterexamples",
-            lambda: find_counterexamples(problem, motion, box, proof, self.deadline),
-            none,
-        )
+        motion = self.problem, self.trajectory, self.errors
+        name, asked = "search for counterexamples", (*motion, proof, self.deadline)
+        return self.extras.take(name, (), find_counterexamples, *asked)
 
     def is_nominally_clear(self) -> bool:
         """Whether the motion without errors is proved clear of everything."""
@@ -243,19 +239,13 @@ class _Judgement:
             return outside and is_certified(*motion)
 
         name = "proof of the motion without errors"
-        return self.extras.take(name, is_clear, False)
+        return self.extras.take(name, False, is_clear)
 
     def contacts(self, proved: _Proved) -> tuple[FirstContact, ...]:
         """When pairs first come too close."""
         motion = self.problem, self.trajectory, self.errors
-        nowhere: tuple[FirstContact, ...] = ()
-        return self.extras.take(
-            "first contact",
-            lambda: arm_contacts(
-                *motion, proved.proof, self.deadline, proved.too_close
-            ),
-            nowhere,
-        )
+        asked = *motion, proved.proof, self.deadline, proved.too_close
+        return self.extras.take("first contact", (), arm_contacts, *asked)
 
     def planned(
         self, robot: RobotModel, centres: FloatArray | None
@@ -297,19 +287,14 @@ class _Judgement:
         lower = np.append(proof.best[:, LOW], np.inf)  # -1 is no pair
         least = lower[ArmPairs(problem).number].min(axis=0)
         least[[name in hulls for name in problem.scene.names]] = -math.inf
-        known = self.deadline, least
-        largest = self.extras.take(
-            "largest joint error",
-            lambda: largest_joint_error(hulled, motion, errors, *known),
-            nan,
-        )
+        known, take = (self.deadline, least), self.extras.take
+        asked = hulled, motion, errors, *known
+        largest = take("largest joint error", nan, largest_joint_error, *asked)
         if np.isnan(largest):
             return nan, nan
-        return largest, self.extras.take(
-            "joint error that loses the clearance",
-            lambda: refuted_joint_error(problem, motion, errors, largest, *known),
-            nan,
-        )
+        name = "joint error that loses the clearance"
+        more = problem, motion, errors, largest, *known
+        return largest, take(name, nan, refuted_joint_error, *more)
 
 
 def _check_input(
