@@ -386,6 +386,7 @@ def test_how_much_is_judged_is_told_while_it_is() -> None:
     )
     proving, _ = start_proof(tree, bodies, path, table)
     assert (proving.n_intervals, proving.share) == (4 * BLOCK, 0.0)
+    assert proving.new_results().profile.shape == proving.results.profile.shape
     proving.sweep(0, BLOCK)
     assert proving.share == 0.25
     proving.sweep(BLOCK, 4 * BLOCK)

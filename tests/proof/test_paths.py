@@ -103,7 +103,13 @@ def test_paths_together_move_as_each_does_alone() -> None:
     ("make", "words"),
     [
         (lambda: Path(np.zeros(3)), "expected"),
+        (lambda: Path(np.zeros((0, 2))), r"shape \(0, 2\)"),
         (lambda: Path(np.full((2, 1), np.nan)), "not finite"),
+        (lambda: Path(np.zeros((2, 1)), np.full((1, 2, 1), np.nan)), "not finite"),
+        (lambda: Path(np.zeros((2, 1)), np.zeros((1, 3, 1))), "2 or 4, 1"),
+        (lambda: Path(np.zeros((2, 1)), np.zeros((1, 2, 2))), "control points"),
+        (lambda: Path(np.zeros((2, 1)), times=np.array([0, np.inf])), "all finite"),
+        (lambda: Path(np.zeros((2, 1))).at(np.zeros(1)), "need times"),
         (lambda: Path(np.zeros((3, 1)), np.zeros((2, 1, 1))), "control points"),
         (lambda: Path(np.zeros((2, 1)), times=np.zeros(2)), "rise"),
         (lambda: Path(np.zeros((2, 1)), times=np.zeros(3)), "times have shape"),
@@ -135,6 +141,52 @@ def test_rows_within_intervals_are_those_at_their_times() -> None:
     np.testing.assert_array_equal(
         one.within(intervals[:2], shares[:2])[1], one.knots[0]
     )
+
+
+@pytest.mark.parametrize("degree", [1, 3, 5])
+def test_a_path_says_how_far_it_goes_and_rests_outside_of_its_times(
+    degree: int,
+) -> None:
+    rng = np.random.default_rng([degree, 8])
+    for _ in range(20):
+        path, _ = made(degree, rng)
+        assert (path.degree, path.n_samples, path.n_intervals) == (degree, 4, 3)
+        assert path.reach.tolist() == [np.abs(path.controls).max()]
+        before, after = path.times[0] - 1.0, path.times[-1] + 1.0
+        outside = path.at(np.array([before, after, *path.times]))[:, 0]
+        ends = path.knots[[0, -1, 0, 1, 2, 3], 0]
+        np.testing.assert_allclose(outside, ends, atol=1e-12)
+        moments = rng.uniform(0.0, 3.0, 9)
+        told = path.times_at(moments)
+        assert told == pytest.approx(np.interp(moments, np.arange(4), path.times))
+        intervals, shares = path.split(np.append(moments, 3.0))
+        assert (intervals[-1], shares[-1]) == (2, 1.0)
+        assert intervals[:-1].tolist() == np.floor(moments).tolist()
+        assert shares[:-1] == pytest.approx(moments % 1.0)
+        assert path.same_as(Path(path.knots, path.inner, path.times))
+        assert not path.same_as(Path(path.knots, path.inner, path.times + 1.0))
+        assert not path.same_as(Path(path.knots + 1.0, path.inner, path.times))
+        assert Path(path.knots).times_at(moments) is None
+    one = Path(path.knots[:1], times=np.zeros(1))
+    assert (one.n_intervals, one.degree) == (1, 1)
+    assert np.array_equal(one.at(np.array([-1.0, 0.0, 2.0])), path.knots[[0, 0, 0]])
+    assert one.between(0, 0) is one
+
+
+def test_paths_together_begin_and_end_where_they_are_asked_to() -> None:
+    rng = np.random.default_rng(9)
+    for _ in range(20):
+        (one, _), (other, _) = made(3, rng), made(1, rng)
+        low, high = np.sort(rng.uniform(-1.0, 8.0, 2)).tolist()
+        both = together(one, other, within=(low, high))
+        knots = {*one.times.tolist(), *other.times.tolist()}
+        inside = sorted(t for t in knots if low < t < high)
+        assert both.times.tolist() == [low, *inside, high]
+        t = np.append(rng.uniform(low, high, 9), [low, high])
+        np.testing.assert_allclose(both.at(t)[:, 0], one.at(t)[:, 0], atol=1e-9)
+        np.testing.assert_allclose(both.at(t)[:, 1], other.at(t)[:, 0], atol=1e-9)
+        (at_once,) = together(one, other, within=(low, low)).knots
+        assert at_once == pytest.approx([one.at(t[-2:])[0, 0], other.at(t[-2:])[0, 0]])
 
 
 @pytest.mark.parametrize("degree", [1, 3, 5])
