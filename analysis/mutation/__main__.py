@@ -1,6 +1,6 @@
 """Counts how many small changes of the code the fast tests notice.
 
-    python -m analysis.mutation --sample 1000 --seed 0 --save reports/mutants.md
+    python -m analysis.mutation --sample 1000 --seed 0 --save out/mutants.md
 
 A change that no test can notice, since it changes nothing that is promised, stands in
 `equivalent.txt` with its reason. With `--noticed FILE` a run takes up where another one
@@ -320,6 +320,7 @@ def main() -> None:
                 print(f"not noticed: {trial.change.key} (line {line})", flush=True)
     text = page(trials, known, asked.seed)
     if asked.save:
+        asked.save.parent.mkdir(parents=True, exist_ok=True)
         asked.save.write_text(text, encoding="utf-8")
     print(text)
 
