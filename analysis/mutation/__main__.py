@@ -16,116 +16,21 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
 from multiprocessing.queues import Queue
 from pathlib import Path
 from typing import Final
 
 from analysis.mutation.changes import Change, changes
 from analysis.mutation.coverage_map import PLAIN, Asked, CoverageMap, coverage_map
+from analysis.mutation.groups import GROUPS, ROOT, Group, modules_of
 from analysis.mutation.trial import Task, Trial, copy_checkout, try_changes
 
-ROOT: Final = Path(__file__).parents[2]
 EQUIVALENT: Final = Path(__file__).with_name("equivalent.txt")
 MAPS: Final = Path(tempfile.gettempdir()) / "mutation-maps"
 """Which tests run which lines, kept for the next run."""
 
 BUDGET: Final = 12.0
 """Tests are asked for a change until their usual times come to this; [s]."""
-
-
-@dataclass(frozen=True)
-class Group:
-    """Modules that are changed and the tests that shall notice.
-
-    Args:
-        name: Its name.
-        modules: Patterns of their paths.
-        tests: Files and folders.
-        plain: Whether all of its tests are quick enough without machine code.
-    """
-
-    name: str
-    modules: tuple[str, ...]
-    tests: tuple[str, ...]
-    plain: bool = False
-
-    def runs_plain(self, module: str) -> bool:
-        """Whether changes of a module are tried without machine code."""
-        text = (ROOT / module).read_text(encoding="utf-8")
-        return self.plain or "@compiled" in text
-
-
-GROUPS: Final = (
-    Group(
-        "checker",
-        ("vdsm_pin/certificate_checker/*.py",),
-        (
-            "tests/certificate_checker",
-            "tests/test_certificate_checker.py",
-            "tests/verification/test_certificate_accepted.py",
-            "tests/verification/test_half_laps.py",
-            "tests/verification/test_inside.py",
-            "tests/io/test_two_readers.py",
-        ),
-    ),
-    Group(
-        "readers",
-        ("vdsm_pin/io/**/*.py",),
-        (
-            "tests/io",
-            "tests/verification/test_other_arms.py",
-            "tests/robots/test_trajectories.py",
-        ),
-    ),
-    Group(
-        "verification",
-        (
-            "vdsm_pin/verification/[!p]*.py",
-            "vdsm_pin/verification/p[!a]*.py",
-            "vdsm_pin/geometry/closed_meshes.py",
-            "vdsm_pin/geometry/mesh_[!i]*.py",
-            "vdsm_pin/geometry/winding.py",
-        ),
-        (
-            "tests/verification",
-            "tests/geometry/test_closed_meshes.py",
-            "tests/geometry/test_mesh_parts.py",
-            "tests/geometry/test_winding.py",
-        ),
-    ),
-    Group(
-        "slopes",
-        ("vdsm_pin/verification/pair_slopes.py",),
-        (
-            "tests/verification/test_pair_slopes.py",
-            "tests/verification/test_counterexample.py",
-        ),
-        True,
-    ),
-    Group(
-        "insides",
-        ("vdsm_pin/geometry/mesh_insides.py",),
-        ("tests/geometry/test_crossings.py",),
-        True,
-    ),
-    Group("proof", ("vdsm_pin/proof/*.py",), ("tests/proof",), True),
-    Group(
-        "arm",
-        (
-            "vdsm_pin/arm/kinematics.py",
-            "vdsm_pin/arm/cables.py",
-            "vdsm_pin/geometry/cable_kernels.py",
-            "vdsm_pin/geometry/joint_kernels.py",
-        ),
-        (
-            "tests/arm/test_kinematics.py",
-            "tests/arm/test_cables.py",
-            "tests/verification/test_cable_check.py",
-        ),
-        True,
-    ),
-)
 
 
 def equivalent_changes() -> dict[str, str]:
@@ -140,12 +45,6 @@ def equivalent_changes() -> dict[str, str]:
 def is_equivalent(key: str, known: dict[str, str]) -> bool:
     """Whether a change is known to change nothing, by itself or as one of several."""
     return key in known or key.partition(" (no. ")[0] + " (all)" in known
-
-
-def modules_of(group: Group) -> list[str]:
-    """Paths of a group's modules, from the root of the checkout."""
-    found = (path for pattern in group.modules for path in sorted(ROOT.glob(pattern)))
-    return [str(path.relative_to(ROOT)) for path in found]
 
 
 def sampled(groups: list[Group], size: int, seed: int) -> dict[str, list[Change]]:
