@@ -32,6 +32,9 @@ MAPS: Final = Path(tempfile.gettempdir()) / "mutation-maps"
 BUDGET: Final = 12.0
 """Tests are asked for a change until their usual times come to this; [s]."""
 
+WIDER: Final = 5
+"""Of a change at import nobody knows who may see it: so many times the budget."""
+
 
 def equivalent_changes() -> dict[str, str]:
     """Reason by key of each change that is known to change nothing."""
@@ -91,8 +94,13 @@ def tried(
     for plain, seen in maps.items():
         mine = [one for one in chosen if group.runs_plain(one.module) is plain]
         tasks = [
-            Task(one, seen.asked(one.module, one.lines), asked.budget)
+            Task(
+                one,
+                seen.asked(*place),
+                asked.budget * (1 if seen.runs(*place) else WIDER),
+            )
             for one in [_as_it_is(mine[0].module), *mine, _as_it_is(mine[-1].module)]
+            for place in [(one.module, one.lines)]
         ]
         for trial in tried_at_once(tasks, PLAIN if plain else None, asked.jobs):
             if trial.change.line:

@@ -35,6 +35,11 @@ class CoverageMap:
     tests: dict[str, dict[int, list[str]]]
     seconds: dict[str, float]
 
+    def runs(self, module: str, lines: tuple[int, ...]) -> bool:
+        """Whether some test runs one of the lines."""
+        by_line = self.tests.get(module, {})
+        return any(by_line.get(line) for line in lines)
+
     def asked(self, module: str, lines: tuple[int, ...]) -> dict[str, float]:
         """Tests of lines with their seconds.
 

@@ -78,7 +78,7 @@ class _Reading:
         joints = self._chain()
         rail, turning, end = joints[0], joints[1:-1], joints[-1]
         self._expect(rail, "prismatic", X)
-        if len(turning) % 2 or len(turning) < 4:
+        if len(turning) % 2:  # a chain has four at least
             problem = (
                 f"has {len(turning)} joints between the rail and the tip, expected two "
                 "revolutes for each of 2 or more links"
