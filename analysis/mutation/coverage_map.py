@@ -43,8 +43,8 @@ class CoverageMap:
     def asked(self, module: str, lines: tuple[int, ...]) -> dict[str, float]:
         """Tests of lines with their seconds.
 
-        The quickest of each file come first, then the second of each, and so on, since
-        tests of one file notice the same.
+        The quickest of each file come first, since tests of one file notice the same,
+        then all others, the quickest first: these hold functions to formulas.
 
         Where no test runs any of the lines, all may be asked: what runs at import has
         an effect anywhere.
@@ -56,7 +56,7 @@ class CoverageMap:
         for test in sorted(known, key=lambda name: (self.seconds[name], name)):
             file = test.partition("::")[0]
             turns[file] += 1
-            rank[test] = (turns[file], self.seconds[test], test)
+            rank[test] = (turns[file] > 1, self.seconds[test], test)
         return {t: self.seconds[t] for t in sorted(rank, key=rank.__getitem__)}
 
 

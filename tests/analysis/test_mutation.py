@@ -96,10 +96,10 @@ def test_the_map_knows_which_test_runs_a_line(tmp_path: Path) -> None:
 
 
 def test_each_file_of_tests_is_asked_before_any_twice() -> None:
-    seconds = {"a::1": 0.1, "a::2": 0.2, "b::1": 0.5, "b::2": 0.6}
+    seconds = {"a::1": 0.1, "a::2": 0.2, "b::1": 0.5, "b::2": 0.6, "a::3": 0.7}
     seen = CoverageMap({"module.py": {1: sorted(seconds)}}, seconds)
     tests = seen.asked("module.py", (1,))
-    assert list(tests) == ["a::1", "b::1", "a::2", "b::2"]
+    assert list(tests) == ["a::1", "b::1", "a::2", "b::2", "a::3"]
     change = Change("module.py", 1, "", "", "", "")
     assert Task(change, tests, 0.6).asked() == ["a::1", "b::1"]
     assert Task(change, tests, 0.8).asked("c::1", "b::2") == ["b::2", "a::1"]

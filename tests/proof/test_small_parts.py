@@ -13,6 +13,7 @@ from vdsm_pin.geometry import bernstein
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.bodies import new_body
 from vdsm_pin.geometry.convex import FlatCylinder, Hull
+from vdsm_pin.geometry.kernels import LOWER, NORMAL
 from vdsm_pin.proof import (
     bends,
     cached_clearances,
@@ -23,6 +24,7 @@ from vdsm_pin.proof import (
     plane_bounds,
     results,
     rows,
+    slices,
     swept_bodies,
     terms,
     witnesses,
@@ -83,6 +85,8 @@ keep_least, new_runs = plain(far_pairs.keep_least), plain(plane_bounds.new_runs)
 any_below, nominate = plain(results.any_below), plain(results.nominate)
 note_block, note_upper = plain(results.note_block), plain(results.note_upper)
 witness_at, mover_in = plain(witnesses.witness_at), plain(mover_of)
+new_space, loaded_bound = plain(slices.new_space), plain(slices.loaded_bound)
+new_ends, load_body = plain(swept_bodies.new_ends), plain(swept_bodies.load_body)
 errors_along, loaded_body = plain(way_errors), plain(new_body)
 
 RULES = Rules(True, True, 1e-11, 1e-9, 1e-6, 0.02, np.inf)
@@ -552,6 +556,36 @@ def test_a_held_clearance_falls_as_the_body_moves() -> None:
 
 
 # ---- versions, witnesses, sizes ----------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_of_many_pieces_the_bound_is_the_least_but_for_half_of_the_slack(
+    seed: int,
+) -> None:
+    """Where that is enough, else the least of all."""
+    rng = np.random.default_rng([14, seed])
+    tree, away = Tree(free_joints(1)), rng.normal(size=(40, 3))
+    balls = tuple(Hull(3.0 * one[None] / np.linalg.norm(one), 0.1) for one in away)
+    balls += tuple(Hull(1.02 * ball.points, 0.1) for ball in balls)
+    bodies = [Body(1, (Hull(0.3 * unit(rng)[None], 0.2),)), Body(0, balls)]
+    rules = RULES._replace(slack=0.2)
+    task = pack_task(tree, bodies, PairTable.of([Pair(0, 1)]), rules, np.ones(1))
+    space, ends = new_space(1, 1), new_ends(2, len(task.ways.rest), 1)
+    place_tree(task.tree, np.zeros(1), ends.start)
+    load_body(task, mover_in(task, 0), ends, space.body, 0.0)
+    own = bodies[0].pieces[0].points[0]
+    gaps = [np.linalg.norm(ball.points[0] - own) - 0.3 for ball in balls]
+    least, eased = min(gaps), 0
+    for enough in (-1.0, 0.5 * least, 0.97 * least, np.inf):
+        space.out[:] = 0.0
+        space.out[NORMAL] = 1.0
+        loaded_bound(task, space, 0, False, enough)
+        found = space.out[LOWER]
+        assert found <= least + 1e-9
+        part = least if enough > least else max(enough, (1.0 - 0.5 * 0.2) * least)
+        assert found >= part - 1e-8
+        eased += found < least - 1e-6
+    assert eased
 
 
 def test_versions_go_from_the_roughest_to_the_pair_itself() -> None:
