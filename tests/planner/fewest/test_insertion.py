@@ -27,7 +27,7 @@ from vdsm_pin.planner.fewest.growth import Layers, Population
 from vdsm_pin.planner.fewest.insertion import insert, tip_space
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.levels import Insert
-from vdsm_pin.planner.fewest.motion import Intervals
+from vdsm_pin.planner.fewest.motion import Corners, Intervals, standing
 from vdsm_pin.planner.fewest.route import path_rows
 from vdsm_pin.planner.fewest.sparsify import sparser
 from vdsm_pin.planner.fewest.strategy import plan_fewest
@@ -421,6 +421,27 @@ def test_knees_are_taken_away_and_the_motion_stays_clear() -> None:
         for corners in (found.corners, fewer)
     ]
     assert counts[1].mean() < 0.7 * counts[0].mean()
+
+
+def test_knees_of_an_arm_whose_base_is_fixed_are_taken_away() -> None:
+    """Many small bends become few; base and tips stay where they are."""
+    arm = replace(ARM, base_range=(0.0, 0.0))
+    task = replace(problem(points=LOOP, start=START), manipulator=arm)
+    size = np.linspace(0.5, 1.0, 9)[:, None]
+    alpha, theta = size * np.full(8, 0.2), size * np.linspace(-0.1, 0.2, 8)
+    centres = joint_centres(arm, np.zeros(9), alpha, theta)
+    corners = Corners(
+        centres[:, -1], coordinates(arm, centres, directed=True), np.arange(9.0),
+        np.ones(8, dtype=np.bool_), np.full((8, 2), -1),
+    )  # fmt: skip
+    judge = judge_of(task)
+    fewer = sparser(judge, corners)
+    assert judge.clear(fewer.pick(np.arange(8))).all()
+    np.testing.assert_array_equal(fewer.tips, corners.tips)
+    placed = standing(arm, fewer.tips, fewer.offsets)
+    np.testing.assert_allclose(placed[:, 0], 0.0, atol=1e-12)
+    # The first corner is the start.
+    assert judge.look(fewer.tips[1:], fewer.offsets[1:])[1].max() <= 4
 
 
 @pytest.mark.parametrize("half", [0.09, 0.075])

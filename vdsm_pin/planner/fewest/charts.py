@@ -10,10 +10,15 @@ import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import BoolArray, FloatArray
-from vdsm_pin.planner.fewest.direction_kernels import mutated_directions
+from vdsm_pin.planner.fewest.direction_kernels import (
+    lined_up_directions,
+    mutated_directions,
+)
 from vdsm_pin.planner.fewest.motion import is_directed, standing
-from vdsm_pin.planner.fewest.offset_kernels import SCALES, mutated_offsets
+from vdsm_pin.planner.fewest.offset_kernels import SCALES, lined_up, mutated_offsets
 
+SETTLED: Final = 3
+"""Times arms are lined up and brought back onto the rail, which bends a little."""
 TURNS: Final = (0.02, 0.08, 0.25)
 """Sizes of a turn of links; [rad]."""
 
@@ -70,6 +75,18 @@ def settled(arm: Manipulator, tips: FloatArray, shapes: FloatArray) -> FloatArra
     centres = standing(arm, tips, shapes)
     found = np.asarray(np.isfinite(centres).all(axis=(1, 2)))[:, None, None]
     return np.where(found, coordinates(arm, centres, directed=True), shapes)
+
+
+def in_line(
+    arm: Manipulator, tips: FloatArray, shapes: FloatArray, joint: int
+) -> FloatArray:
+    """Arms with one joint in line with the bent joints before and after it."""
+    if not is_directed(shapes):
+        return lined_up(shapes, arm.stations, joint)
+    for _ in range(SETTLED):
+        lined = lined_up_directions(shapes, arm.link_lengths, joint)
+        shapes = settled(arm, tips, lined)
+    return shapes
 
 
 def turned_towards(

@@ -13,11 +13,15 @@ import numpy as np
 from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.planner.fewest.pose_kernels import Lines, Places
+from vdsm_pin.tolerances import TOLERANCES
 
 ROUNDS = 30
 """Newton steps at which a configuration is given up."""
 ENOUGH = 4e-15
 """Distance of the base from its rail over the arm's length that is rounding; [-]."""
+
+STRAIGHT = TOLERANCES.changed_angle
+"""Difference of directions up to which a joint may be put in line with others; [-]."""
 
 COPIED, TURNED, ALIGNED = 0.05, 0.75, 0.87
 """Up to where a child is its parent, has some links turned, has a link in line with the
@@ -169,6 +173,46 @@ def mutated_directions(
             row[i, 1] = y + w[2] * x - w[0] * z
             row[i, 2] = z + w[0] * y - w[1] * x
         _normalised(row)
+    return result
+
+
+@compiled
+def _bends(axes: FloatArray, joint: int) -> bool:
+    """Whether an arm given by directions, shape (N, 3), bends at a joint."""
+    turn = 0.0
+    for c in range(3):
+        turn = max(turn, abs(axes[joint, c] - axes[joint - 1, c]))
+    return turn > STRAIGHT
+
+
+@compiled
+def lined_up_directions(
+    axes: FloatArray, lengths: FloatArray, joint: int
+) -> FloatArray:
+    """Arms with one joint in line with the bent joints before and after it.
+
+    The base may be off its rail.
+
+    Args:
+        axes: Directions of the links, shape (n, N, 3); [-].
+        lengths: Of the links, shape (N,); [m].
+        joint: The joint, counted from 0.
+
+    Returns:
+        Shape (n, N, 3).
+    """
+    result = axes.copy()
+    for r in range(axes.shape[0]):
+        row, low, high = result[r], joint - 1, joint + 1
+        while low > 0 and not _bends(row, low):
+            low -= 1
+        while high < lengths.size and not _bends(row, high):
+            high += 1
+        chord = np.zeros(3)
+        for i in range(low, high):
+            chord += lengths[i] * row[i]
+        row[low:high] = chord
+        _normalised(row[low:high])
     return result
 
 

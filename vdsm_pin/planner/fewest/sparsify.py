@@ -11,10 +11,9 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import BoolArray, IntArray
-from vdsm_pin.planner.fewest.charts import coordinates
+from vdsm_pin.planner.fewest.charts import coordinates, in_line
 from vdsm_pin.planner.fewest.judge import Judge
 from vdsm_pin.planner.fewest.motion import Corners, is_directed, standing
-from vdsm_pin.planner.fewest.offset_kernels import lined_up
 
 ROUNDS: Final = 3
 """Rounds over all joints."""
@@ -30,8 +29,6 @@ def sparser(judge: Judge, corners: Corners) -> Corners:
     """
     corners = projected(judge, corners)
     arm = judge.problem.manipulator
-    if is_directed(corners.offsets):
-        return corners
     on = np.append(corners.drawn, False) | np.append(False, corners.drawn)
     for _ in range(ROUNDS):
         before = corners
@@ -61,7 +58,7 @@ def _without(judge: Judge, corners: Corners, joint: int, on: BoolArray) -> Corne
     arm = judge.problem.manipulator
     trial = corners.offsets.copy()
     rows = np.flatnonzero(on)
-    trial[rows] = lined_up(corners.offsets[rows], arm.stations, joint)
+    trial[rows] = in_line(arm, corners.tips[rows], corners.offsets[rows], joint)
     _, before, _ = judge.look(corners.tips[rows], corners.offsets[rows])
     clearances, after, _ = judge.look(corners.tips[rows], trial[rows])
     better = np.zeros(len(on), dtype=np.bool_)
