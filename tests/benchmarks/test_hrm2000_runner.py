@@ -159,7 +159,11 @@ def test_distances_from_solids_agree_with_the_nearest_of_many_points() -> None:
 
 @pytest.mark.parametrize(
     "family",
-    ["windows", "port", "short_rail", pytest.param("blades", marks=pytest.mark.slow)],
+    [
+        "windows",
+        "short_rail",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("port", "blades")),
+    ],
 )
 def test_sampling_finds_no_fault_in_a_witness_and_each_kind_in_a_spoiled_one(
     family: str, tmp_path: Path
