@@ -51,6 +51,9 @@ LIMIT: Final = 60.0
 """Processor time for one plan of a paper's scene; [s]."""
 SAMPLE_LIMIT: Final = 5.0
 """The same for a problem of the sample; [s]."""
+
+PER_FAMILY: Final = 112
+"""Problems of HRM-1000 in a family."""
 INTELLIGENT: Final = tuple(
     name for name, where in REFERENCES.items() if where.startswith("intelligent:")
 )
@@ -164,13 +167,17 @@ def markdown(lines: list[Line], sampled: list[Line]) -> str:
     rows = table_lines(names, cells)
     if not sampled:
         return "\n".join([*head, *rows, ""])
+    problems, families = len(sampled) // len(METHODS), len(FAMILIES) - 1
+    hours = len(METHODS) * families * PER_FAMILY * SAMPLE_LIMIT / 3600.0
     words = [
         "",
         "## A sample of HRM-1000",
         "",
-        f"Whole paths drawn and certified, {SAMPLE_LIMIT:.0f} s of processor time for",
-        "each plan; the first problems of every feasible family; medians over the",
-        "problems drawn.",
+        f"The first {problems // families} of the {PER_FAMILY} problems of each of the",
+        f"{families} feasible families: {problems} of {families * PER_FAMILY}, since",
+        f"all of them take up to {hours:.0f} hours of processor time. Whole paths",
+        f"drawn and certified, {SAMPLE_LIMIT:.0f} s of processor time for each plan;",
+        "medians over the problems drawn.",
         "",
     ]
     names = ("method", "drawn", *MEASURED)

@@ -19,6 +19,7 @@ from vdsm_pin.report.files import BatchRow
 from vdsm_pin.report.html import (
     message_page,
     point,
+    sentence,
     view_page,
     write_index,
     write_report,
@@ -65,6 +66,21 @@ def test_a_report_loads_nothing_and_stays_small(tmp_path: Path) -> None:
     text = report(tmp_path, made_up.verification(n=1000))
     assert len(text.encode()) < 6_000_000
     assert Page(text).loads == ["data:,"]
+
+
+@pytest.mark.parametrize(
+    ("remark", "words"),
+    [
+        ("drew 3 mm of `path`", "Drew 3 mm of <code>path</code>."),
+        ("arm_1 is < 'wall'", "arm_1 is &lt; &#39;wall&#39;."),
+        ("panda: held", "panda: held."),
+        ("Already told.", "Already told."),
+    ],
+)
+def test_remarks_are_sentences_and_names_stay_as_they_are(
+    remark: str, words: str
+) -> None:
+    assert sentence(remark) == words
 
 
 @pytest.mark.parametrize("verdict", list(Verdict))

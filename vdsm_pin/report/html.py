@@ -52,7 +52,7 @@ from vdsm_pin.verification.records import ArmVerification, Verification
 
 _TEMPLATES: Final = Path(__file__).parent / "templates"
 _CODE: Final = re.compile(r"`([^`]+)`")
-_TWO_WORDS: Final = re.compile(r"[a-z]+ [a-z]")  # no name of a file's
+_TWO_WORDS: Final = re.compile(r"[a-z]+ [a-z\d]")  # no name of a file's
 
 
 class _Templates(jinja2.BytecodeCache):
