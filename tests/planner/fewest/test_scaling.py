@@ -7,8 +7,17 @@ import numpy as np
 import pytest
 from scenes_for_fewest import problem
 
+from benchmarks.hrm2000.solids import Opening, plate_with_hole
 from vdsm_pin.arm.manipulator import Manipulator
-from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, Prism, Sphere
+from vdsm_pin.geometry.solids import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Prism,
+    Sphere,
+)
 from vdsm_pin.planner.fewest.broad_phase import broad_phase
 from vdsm_pin.planner.fewest.explore import explore
 from vdsm_pin.planner.fewest.levels import QUICK, THOROUGH, Effort, Insert
@@ -19,6 +28,7 @@ from vdsm_pin.planner.fewest.strategy import CLEAREST, FEWEST
 from vdsm_pin.planner.fewest.unbend import unbend
 from vdsm_pin.problem.desired_path import DesiredPath, Order
 from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.pointing import Pointing
 from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.verification.link_clearance import link_clearance
 
@@ -28,10 +38,13 @@ LENGTHS = {
     Cylinder: ("centre", "half_length", "radius"),
     Box: ("centre", "half_size"),
     Prism: ("origin", "polygon", "span"),
+    HalfSpace: ("point",),
+    Mesh: ("vertices",),
 }
 """The fields of each shape that are lengths."""
 
 PILLAR = Cylinder("pillar", np.array([1.6, 0.45, 0.0]), np.array([0.0, 0, 1]), 2.0, 0.1)
+OFF, HALF = np.array([-0.06, 0.05]), np.array([0.1, 0.1])
 BENT = np.zeros(17)
 BENT[[4, 6, 8, 10]] = 0.7
 
@@ -81,7 +94,14 @@ def scaled_path(path: DesiredPath, factor: float) -> DesiredPath:
         spacing=path.spacing * factor,
         retreat=path.retreat * factor,
         start_joints=joints,
+        pointing=path.pointing and scaled_pointing(path.pointing, factor),
     )
+
+
+def scaled_pointing(pointing: Pointing, factor: float) -> Pointing:
+    """What is looked at in another size."""
+    target = pointing.target
+    return pointing if target is None else replace(pointing, target=target * factor)
 
 
 def scaled(task: PlanningProblem, factor: float) -> PlanningProblem:
@@ -130,6 +150,29 @@ def through_a_window() -> PlanningProblem:
     return problem(*frame(), points=points, closed=False, start=(-0.3, 0.0, 0.0))
 
 
+def through_a_port() -> PlanningProblem:
+    plate = plate_with_hole("plate", Opening(0.65, 0.06, OFF, HALF), 16, 3.0)
+    return replace(through_a_window(), scene=Scene((plate,)))
+
+
+def round_a_core() -> PlanningProblem:
+    """Ahead of a front, by 75 deg about a core that the arm's own bend goes round."""
+    middle, turn = np.array([0.15, 0.78, 0.0]), np.deg2rad(75.0)
+    end = middle + 0.78 * np.array([np.sin(turn), -np.cos(turn), 0.0])
+    ahead = np.array([np.cos(turn), np.sin(turn), 0.0])
+    points = end + np.outer([0.2, 0.3], ahead)
+    core = Cylinder("core", middle, np.array([0.0, 0.0, 1.0]), 2.0, 0.6)
+    front = HalfSpace("front", np.array([1.25, 0.0, 0.0]), np.array([-1.0, 0.0, 0.0]))
+    start = (-0.3, 0.0, 0.0)
+    return problem(core, front, points=points, closed=False, start=start)
+
+
+def looking_through_a_window() -> PlanningProblem:
+    task = through_a_window()
+    looks = Pointing(0.4, target=np.array([2.5, -0.2, 0.1]))
+    return replace(task, tip_path=replace(task.path, pointing=looks))
+
+
 ROADMAPS = Effort(THOROUGH[:2], proves=True)
 INSERTED = tuple(one for one in THOROUGH if isinstance(one, Insert))
 IN_BY_PROJECTIONS = Effort(INSERTED[:1], proves=False)
@@ -143,6 +186,9 @@ CASES = [
     # powers of two there is none.
     (through_a_window, FEWEST, IN_BY_PROJECTIONS, (0.125, 8.0)),
     (through_a_window, FEWEST, IN_BY_DIRECTIONS, (0.125, 8.0)),
+    (through_a_port, FEWEST, IN_BY_PROJECTIONS, (0.125, 8.0)),
+    (round_a_core, FEWEST, IN_BY_DIRECTIONS, (0.125, 8.0)),
+    (looking_through_a_window, FEWEST, IN_BY_DIRECTIONS, (0.125, 8.0)),
 ]
 
 
