@@ -1,15 +1,27 @@
 """What the certificate checker says of the motion between rows, by closed forms."""
 
 import json
+from collections import Counter
+from contextlib import suppress
+from dataclasses import replace
+from math import comb
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from flint import arb, ctx
 from oracles.certificate_cases import Case
 from oracles.certificate_oracle import frames_and_centres, sealed
 
+from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.certificate_checker import check_certificate
+from vdsm_pin.certificate_checker.balls import Rejected
+from vdsm_pin.certificate_checker.program import PRECISION
+from vdsm_pin.certificate_checker.rows import Rows
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Scene
 
 ARM = {
     "link_lengths": [0.4, 0.3, 0.3],
@@ -193,3 +205,38 @@ def test_a_change_is_counted_from_the_row_before(tmp_path: Path) -> None:
         assert found == (
             "" if good else "interval 0: a joint turns by 1.14591559026 deg"
         )
+
+
+@pytest.mark.parametrize("degree", [1, 3, 5])
+def test_limits_of_smooth_motions_are_those_of_the_curve(degree: int) -> None:
+    """A peak a hair below a limit is kept and one above is not, wherever it is.
+
+    Control points lie far outside, both angles of a joint beyond 90 deg among them,
+    where the product of the cosines is large again. Oracle: samples.
+    """
+    rng, said = np.random.default_rng(degree), Counter[tuple[bool, bool]]()
+    arm = replace(built_in("hrm8"), max_joint_angle=1.4, max_link_angle=1.5)
+    rows = Rows.__new__(Rows)
+    rows.problem = PlanningProblem("p", arm, Scene(), None, 0.0, np.eye(4))
+    time = np.linspace(0.0, 1.0, 20_001)
+    weights = [comb(degree, i) * time**i * (1 - time) ** (degree - i)
+               for i in range(degree + 1)]  # fmt: skip
+    for _ in range(60):
+        pair = rng.normal(size=(2, degree + 1))
+        alpha, theta = pair @ np.array(weights)
+        low, high = 0.0, 100.0
+        for _ in range(60):  # the largest factor that keeps all limits at the samples
+            f = 0.5 * (low + high)
+            inside = max(abs(f * alpha).max(), abs(f * theta).max()) <= 1.4
+            cone = np.cos(f * alpha) * np.cos(f * theta) >= np.cos(1.5)
+            low, high = (f, high) if inside and cone.all() else (low, f)
+        for more in (1.0 - 1e-6, 1.0 + 1e-6):
+            columns = [[arb(0)] * (degree + 1) for _ in range(17)]
+            columns[5:7] = [[arb(more * low * x) for x in row] for row in pair.tolist()]
+            motion = SimpleNamespace(controls=columns, degree=degree)
+            with ctx.workprec(PRECISION), suppress(Rejected):
+                kept = False
+                rows._limits(motion)
+                kept = True
+            said[more < 1.0, kept] += 1
+    assert said == {(True, True): 60, (False, False): 60}

@@ -33,6 +33,15 @@ def part(points: Points, low: Ball, high: Ball) -> Points:
     return [blossom(points, [low] * (n - i) + [high] * i) for i in range(n + 1)]
 
 
+def kept(columns: Sequence[Points], good: Any, halvings: int = 20) -> bool:
+    """Whether columns keep what their polygons keep if their control points do."""
+    found = [good(*values) for values in zip(*columns, strict=True)]
+    if all(found) or not (halvings and found[0] and found[-1]) or len(found) < 3:
+        return all(found)
+    parts = ([part(p, a, a + arb(0.5)) for p in columns] for a in (arb(0), arb(0.5)))
+    return all(kept(each, good, halvings - 1) for each in parts)
+
+
 def raised(points: Points, degree: int) -> Points:
     """The same by control points of a higher degree."""
     while (n := len(points)) <= degree:

@@ -5,7 +5,7 @@ The URDF is read here once more; joint 0 is fixed and holds the root link.
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
-from itertools import combinations, pairwise, product
+from itertools import combinations, product
 from pathlib import Path as File
 from typing import Any, Final
 
@@ -15,7 +15,7 @@ from flint import arb, arb_mat
 from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.certificate_checker.balls import SLACK, Ball, belongs, claim
 from vdsm_pin.certificate_checker.errors import grown
-from vdsm_pin.certificate_checker.motion import Branch, Path, beside, derivative, part
+from vdsm_pin.certificate_checker.motion import Branch, Path, beside, derivative, kept
 from vdsm_pin.certificate_checker.solids import (
     CUBE,
     Body,
@@ -51,8 +51,6 @@ MOVES: Final = {
     "floating": (*PLANE, ("/z", SLIDES, Z), *TURN),
 }
 """What each type of joint is made of: suffix, movement and axis, None for its own."""
-
-HALVINGS: Final = 20  # of a piece whose control points do not decide
 
 
 def numbers(words: str) -> list[float]:
@@ -366,13 +364,7 @@ def primitive(name: str, points: Any, cover: Any) -> Solid:
     return Solid(name, [corners], far, radius)
 
 
-def within(points: Any, low: float, high: float, halvings: int = HALVINGS) -> bool:
+def within(points: Any, low: float, high: float) -> bool:
     """Whether a polynomial keeps within limits."""
     slack = SLACK * max(1.0, min(abs(low), abs(high)))
-    good = [low - slack <= q <= high + slack for q in points]
-    if all(good) or not (halvings and good[0] and good[-1]) or len(points) < 3:
-        return all(good)
-    ends = arb(0), arb(0.5), arb(1)
-    return all(
-        within(part(points, a, b), low, high, halvings - 1) for a, b in pairwise(ends)
-    )
+    return kept([points], lambda q: low - slack <= q <= high + slack)

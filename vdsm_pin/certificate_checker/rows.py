@@ -16,13 +16,13 @@ from vdsm_pin.certificate_checker.balls import (
     dot,
     norm,
 )
-from vdsm_pin.certificate_checker.motion import Interval, Slices, Sweep, part
+from vdsm_pin.certificate_checker.motion import Interval, Slices, Sweep, kept
 from vdsm_pin.certificate_checker.path import Drawing
 from vdsm_pin.certificate_checker.tree import Pose, frame_of
 from vdsm_pin.problem.planning_problem import Posture
 from vdsm_pin.problem.trajectory import Trajectory
 
-PARTS: Final = 32  # of a smooth piece, whose control points hold what lies between
+PARTS: Final = 32  # of a smooth piece, with a chord each
 HALVINGS: Final = 24
 
 
@@ -69,19 +69,22 @@ class Rows:
             for points in columns[1:]:
                 turn = max(points, key=float) - min(points, key=float)
                 claim(turn <= most + SLACK, "a joint turns by {} deg", _deg(turn))
-        if motion.degree > 1:
-            edges = [(arb(i) / PARTS, arb(i + 1) / PARTS) for i in range(PARTS)]
-            columns = [[q for e in edges for q in part(p, *e)] for p in columns]
         low, high = arm.base_range
-        for x0 in columns[0]:
-            claim(low - SLACK <= x0 <= high + SLACK, "x0 is {} mm", MM * x0)
+        x0, on_rail = columns[0], lambda q: low - SLACK <= q <= high + SLACK
+        claim(kept([x0], on_rail), "x0 is {} mm", MM * max(x0, key=abs))
         most, link = arm.max_joint_angle + SLACK, arb(arm.max_link_angle + SLACK).cos()
+
+        def in_cone(a: Ball, b: Ball) -> Ball:  # convex within the box alone
+            return abs(a).max(abs(b)) <= most and a.cos() * b.cos() >= link
+
         for i in range(1, len(columns), 2):
-            for alpha, theta in zip(*columns[i : i + 2], strict=True):
-                for name, q in (("alpha", alpha), ("theta", theta)):
-                    claim(abs(q) <= most, f"{name}{i // 2 + 1} is {{}} deg", _deg(q))
-                psi = alpha.cos() * theta.cos()
-                claim(psi >= link, f"psi{i // 2 + 1} is {{}} deg", _deg(psi.acos()))
+            both = columns[i : i + 2]
+            for name, q in zip(("alpha", "theta"), both, strict=True):
+                told = f"{name}{i // 2 + 1} is {{}} deg"
+                claim(kept([q], lambda q: abs(q) <= most), told, _deg(max(q, key=abs)))
+            psi = [(a.cos() * b.cos()).acos() for a, b in zip(*both, strict=True)]
+            told = f"psi{i // 2 + 1} is {{}} deg"
+            claim(kept(both, in_cone), told, _deg(max(psi, key=float)))
 
     def _tips(self, rows: tuple[int, int], motion: Interval) -> None:
         """Check the tip between two rows."""
