@@ -28,8 +28,8 @@ from analysis.mutation.changes import Change
 
 COPIED: Final = ("vdsm_pin", "tests", "urdf", "docs", "analysis", "pyproject.toml")
 PATIENCE: Final = 3.0
-"""A test is ended once it has computed for so many times its usual time, and a second
-more, which is noticing: other work on the machine makes no test fail."""
+"""A test is ended once it has computed for so many times its usual time, and so many
+seconds, which is noticing: other work on the machine makes no test fail."""
 
 REMEMBERED: Final = 12
 """Tests that noticed changes of one function or module are asked first, so many."""
@@ -186,7 +186,7 @@ class Bench:
             for k, name in enumerate(names):
                 item, after = items[name], [items[n] for n in names[k + 1 : k + 2]]
                 nextitem = after[0] if after else None
-                limit = 1.0 + PATIENCE * task.tests[name]
+                limit = PATIENCE * (1.0 + task.tests[name])
                 signal.setitimer(signal.ITIMER_PROF, limit)  # ends the process
                 item.ihook.pytest_runtest_protocol(item=item, nextitem=nextitem)
                 if self._failed:

@@ -148,15 +148,61 @@ def test_the_nearest_of_the_pairs_in_contact_is_named() -> None:
         )
 
 
-@pytest.mark.parametrize(("upper", "width"), [(0.2, LEAST_SHARE), (0.4, FINE_SHARE)])
-def test_a_shallow_contact_is_told_less_finely(upper: float, width: float) -> None:
-    """Of 0.5 m asked for, what misses no more than 0.1 m of them is shallow."""
-    truth = Truth(1, [(0, 0.3, 0.7)], upper=np.full(4, upper))
+def test_at_the_first_row_the_pair_is_named_that_is_in_contact_there() -> None:
+    """Another one that is nearer a moment later is not."""
+    upper = np.array([0.2, 0.0, 0.1, 0.0])
+    truth = Truth(5, [(0, 0.0, 1.0), (2, 1e-8, 1.0)], upper=upper)
+    (found,) = truth.found(noted=True)
+    assert (found.pair, found.moment) == (PAIRS[0], 0.0)
+
+
+@pytest.mark.parametrize(
+    ("pair", "span", "clear"),
+    [(2, (1.2, 1.4), False), (1, (1.2, 1.4), True), (2, (4.5, 4.7), True)],
+)
+def test_doubt_before_a_contact_is_told_of_its_own_kind(
+    pair: int, span: tuple[float, float], clear: bool
+) -> None:
+    for noted in (True, False):
+        truth = Truth(9, [(0, 4.2, 5.0)], [(pair, *span)])
+        (found,) = truth.found(noted)
+        assert found.clear_before is clear
+
+
+def test_an_end_just_past_a_row_is_told_as_finely() -> None:
+    (found,) = Truth(5, [(0, 1.5, 2.00002)], upper=np.full(4, -1.0)).found(noted=True)
+    assert found.last == pytest.approx(2.00002, abs=1.1e-6)
+
+
+def test_a_contact_in_no_interval_that_was_noted_ends_where_it_begins() -> None:
+    truth, problem = Truth(5, [(0, 1.50002, 2.5)]), SimpleNamespace(
+        required_clearance=0.5, required_self_clearance=0.5
+    )  # fmt: skip
+    nothing = {kind: np.zeros(5, bool) for kind in (True, False)}
+    asked: Any = problem, PAIRS, truth.judge(0, 5), truth, truth.judge, nothing
+    (found,) = first_contacts(*asked)
+    assert found.last == found.moment == pytest.approx(1.50002, abs=1.1e-6)
+    assert (found.intervals, found.stretches) == (1, 1)
+
+
+@pytest.mark.parametrize(
+    ("pair", "upper", "width"),
+    [(0, 0.2, LEAST_SHARE), (0, 0.4, FINE_SHARE), (0, 0.45, FINE_SHARE),
+     (1, 0.1, LEAST_SHARE), (1, 0.2, FINE_SHARE)],
+)  # fmt: skip
+def test_a_shallow_contact_is_told_less_finely(
+    pair: int, upper: float, width: float
+) -> None:
+    """What misses no more than 0.1 m of what is asked for is shallow."""
+    truth = Truth(1, [(pair, 0.3, 0.7)], upper=np.full(4, upper))
     truth.found(noted=True, shallow=0.1)
     sizes = [high - low for low, high in truth.asked if high > low]
     assert min(sizes) == width
-    # So are the moments of an end, whatever was met before it.
-    assert min(high - low for low, high in truth.asked if high == 1.0 and low) <= 0.5
+
+
+def test_intervals_with_one_between_them_are_two_stretches() -> None:
+    (found,) = Truth(5, [(0, 0.5, 0.6), (0, 2.5, 2.6)]).found(noted=True)
+    assert (found.intervals, found.stretches) == (2, 2)
 
 
 def test_time_that_stands_still_is_not_halved() -> None:
