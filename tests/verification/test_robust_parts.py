@@ -1,5 +1,6 @@
 """What the largest joint error is made of, part by part; oracles: formulas, loops."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -94,6 +95,8 @@ def test_what_no_error_brings_near_is_left_out() -> None:
         joint=0.02, base=0.03, base_turn=0.004, obstacle=0.05,
         obstacles=(ObstacleError("box", 0.05, 0.01),),
     )  # fmt: skip
+    arm = replace(ARM, base_range=(-0.5, 4.0))
+    problem = replace(problem, manipulator=arm)
     lengths, n = ARM.link_lengths, ARM.n_links
     moved = sum(
         2.0 * errors.joint * (lengths[i:].sum() + ARM.most_radius) for i in range(n)
@@ -101,7 +104,7 @@ def test_what_no_error_brings_near_is_left_out() -> None:
     moved += (
         errors.base + 0.05 + 0.01 * 3.0
     )  # a corner of the box is 3 m off its middle
-    far = np.abs(ARM.base_range).max() + lengths.sum() + ARM.most_radius
+    far = 4.0 + lengths.sum() + ARM.most_radius
     moved += errors.base_turn * (far + moved)
     bound = 0.01 + moved + SPARE
     clearances = bound + np.array([-1e-9, 1e-9, np.nan, 5.0])
@@ -148,6 +151,8 @@ def test_the_sturdiest_is_the_first_of_equals(monkeypatch: pytest.MonkeyPatch) -
     motions: Any = [0.2, 0.1, 0.3, 0.3, 0.25]
     assert sturdiest(scene(1), motions) == (2, 0.3)
     assert looked == [0.2, 0.3, 0.3]
+    motions = [0.2, 0.1]
+    assert sturdiest(scene(1), motions) == (0, 0.2)
 
 
 @pytest.mark.parametrize("met_at", [0, 1, 2, 3])

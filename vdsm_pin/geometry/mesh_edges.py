@@ -28,7 +28,7 @@ class Covers(NamedTuple):
 def welded(vertices: FloatArray, triangles: IntArray) -> IntArray:
     """For each vertex of triangles the first of theirs equal to it, shape (n,)."""
     used = distinct(triangles)
-    first, index = first_equal(vertices[used] + 0.0)  # makes -0 and 0 equal
+    first, index = first_equal(vertices[used])
     names = np.arange(len(vertices))
     names[used] = used[first[index]]
     return names
