@@ -191,7 +191,8 @@ def test_an_infeasible_problem_leaves_a_page_that_says_why(
     assert str(out / "no_plan.html") in message
     assert [path.name for path in out.iterdir()] == ["no_plan.html"]
     page = (out / "no_plan.html").read_text(encoding="utf-8")
-    assert message.removeprefix("vdsm: ").split("; see")[0].strip() in page
+    said = message.removeprefix("vdsm: ").split("; see")[0].strip()
+    assert said[0].upper() + said[1:] in page
     near = write_problem(tmp_path / "near.yaml", NEAR)
     assert vdsm("plan", near, "--out", out, "--strategy", "paper").status == 0
     assert not (out / "no_plan.html").exists(), "there is a plan now"

@@ -21,7 +21,9 @@ from vdsm_pin.geometry.convex import (
 )
 from vdsm_pin.geometry.ordering import coherent_order
 
-EPS: Final = float(np.finfo(float).eps)
+HELD: Final = 1.0 + 4.0 * float(np.finfo(float).eps)
+"""Times half its size a box holds a solid, whose size is rounded; [-]."""
+
 HULL: Final = 0
 CYLINDER: Final = 1
 HALF_SPACE: Final = 2
@@ -147,20 +149,19 @@ def _boxes(
     for k, piece in table.flat.items():
         if isinstance(piece, FlatCylinder):
             half = piece.half_length * np.abs(piece.axis)
-            half = (half + piece.radius * disc_extent(piece.axis)) * (1.0 + 2.0 * EPS)
+            half = (half + piece.radius * disc_extent(piece.axis)) * HELD
             low[k], high[k] = piece.centre - half, piece.centre + half
     return low, high
 
 
 def disc_extent(normal: FloatArray) -> FloatArray:
-    """How far a disc of radius 1 reaches along each axis at most, shape (3,); [-].
+    """How far a disc of radius 1 reaches along each axis, to an ulp, shape (3,); [-].
 
     Args:
         normal: Of length 1, shape (3,); [-].
     """
     # Not sqrt(1 - normal^2), which loses half the digits along the normal.
-    across = np.hypot(np.roll(normal, 1), np.roll(normal, 2))
-    return np.asarray(across * (1.0 + 2.0 * EPS))
+    return np.hypot(np.roll(normal, 1), np.roll(normal, 2))
 
 
 def _levels(n: int) -> list[tuple[IntArray, IntArray, IntArray]]:

@@ -133,7 +133,11 @@ class PlanningProblem(AnyProblem):
         for one in errors.obstacles:
             if one.name not in known:
                 raise UnknownName(kind="obstacle", name=one.name, known=known)
-        errors.angles(self.manipulator.n_links)
+        found, expected = len(errors.joints), self.manipulator.n_links
+        if found not in (0, expected):
+            message = f"errors of {found} joints, expected {expected}"
+            raise InvalidInput(message)
+        errors.angles(expected)
 
     @cached_property
     def packed(self) -> "PackedPieces":

@@ -15,7 +15,7 @@ from vdsm_pin.compiled import borrowed, compiled
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import FlatCylinder, HalfSpacePiece, Hulls, Piece
 from vdsm_pin.geometry.ordering import coherent_order
-from vdsm_pin.geometry.pieces import disc_extent
+from vdsm_pin.geometry.pieces import HELD, disc_extent
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.planner.fewest.mesh_distance import STEP, Surfaces, surfaces_of
 from vdsm_pin.planner.records import LinkClearance
@@ -181,7 +181,7 @@ def _boxes(piece: Piece) -> FloatArray:
     """Boxes that cover a piece, none for a half-space, shape (n, 2, 3); [m]."""
     if isinstance(piece, FlatCylinder):
         half = piece.half_length * piece.axis
-        grow = piece.radius * disc_extent(piece.axis)
+        grow = piece.radius * HELD * disc_extent(piece.axis)
         return _cut(piece.centre - half, piece.centre + half, grow)
     if isinstance(piece, HalfSpacePiece):
         return np.zeros((0, 2, 3))
