@@ -152,7 +152,9 @@ def test_arguments_of_another_kind_are_refused_in_a_sentence() -> None:
 
 
 def test_errors_are_equal_in_whatever_units_they_were_stated() -> None:
-    stated = vp.ErrorBox(joint_deg=[0.5, 0.1], base_mm=2.0, obstacles_mm={"ball": 1.0})
+    stated = vp.ErrorBox(
+        joint_deg=[0.5, 0.1, 0.2], base_mm=2.0, obstacles_mm={"ball": 1.0}
+    )
     kept = in_python().under(stated).errors
     assert type(kept) is not type(stated)
     assert kept == stated

@@ -5,6 +5,7 @@ import shlex
 from math import radians
 from pathlib import Path
 
+import made_up
 import pytest
 from typer.testing import CliRunner
 
@@ -127,3 +128,10 @@ def test_an_unknown_obstacle_and_a_list_of_another_arm_are_named(
     assert "'c'" in text and "a, b" in text
     _, text = run([*words, "--joint-error-deg", "1,2,3"])
     assert "errors of 3 joints, expected 2" in text
+
+
+def test_a_shorter_list_is_refused_beside_a_whole_one() -> None:
+    whole, short = (error_boxes.ErrorBox(joints=((0.01, 0.01),) * n) for n in (8, 3))
+    asked = made_up.problem().under(whole)
+    with pytest.raises(InvalidInput, match="errors of 3 joints, expected 8"):
+        asked.under(short)

@@ -107,6 +107,7 @@ class AnyProblem(Summarised):
         Raises:
             InvalidInput: If they are of what there is not.
         """
+        self.check_errors(errors)
         widened = self.errors.widened(errors)
         self.check_errors(widened)
         return replace(self, errors=widened).read_from(self.source)  # type: ignore[type-var]
