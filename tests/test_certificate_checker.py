@@ -35,7 +35,7 @@ from oracles.certificate_oracle import (
 )
 
 from vdsm_pin.arm.manipulator import built_in
-from vdsm_pin.certificate_checker import check_certificate, main
+from vdsm_pin.certificate_checker import check_certificate, main, program
 from vdsm_pin.certificate_checker.path import Drawing
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.convex import HalfSpacePiece
@@ -547,6 +547,24 @@ def test_exit_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert main([*files[:2], str(tmp_path / "none.csv")]) == 2
     assert "none.csv" in capsys.readouterr().err
     assert main(files[:2]) == 2
+
+
+@pytest.mark.parametrize("said", ["", "Unable to allocate 2 GiB"])
+def test_memory_that_runs_out_is_one_sentence(
+    said: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise MemoryError(said)
+
+    case = Case(tmp_path, STRAIGHT, straight_rows([0.0, 0.1]), NO_ERRORS)
+    monkeypatch.setattr(program.json, "loads", full)
+    files = [str(x) for x in (case.certificate, case.problem, case.trajectory)]
+    assert main(files) == 2
+    told = f"there is too little memory; {said}".rstrip("; ")
+    assert capsys.readouterr().err == f"vdsm: {told}\n"
 
 
 # ---- mutations -----------------------------------------------------------------------

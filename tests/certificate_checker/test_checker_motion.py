@@ -18,10 +18,14 @@ from oracles.certificate_oracle import frames_and_centres, sealed
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.certificate_checker.balls import Rejected
+from vdsm_pin.certificate_checker.motion import Branch
 from vdsm_pin.certificate_checker.program import PRECISION
 from vdsm_pin.certificate_checker.rows import Rows
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.scene import Scene
+from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.verification.limits import check_limits
+from vdsm_pin.verification.records import Verdict
 
 ARM = {
     "link_lengths": [0.4, 0.3, 0.3],
@@ -240,3 +244,41 @@ def test_limits_of_smooth_motions_are_those_of_the_curve(degree: int) -> None:
                 kept = True
             said[more < 1.0, kept] += 1
     assert said == {(True, True): 60, (False, False): 60}
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+def test_the_change_of_smooth_rows_is_judged_as_the_verifier_judges_it(
+    degree: int,
+) -> None:
+    """Two programs, one verdict; what both allow is. Oracle: samples."""
+    rng, said = np.random.default_rng(degree), Counter[bool]()
+    rows, arm = Rows.__new__(Rows), built_in("hrm8")
+    for _ in range(4):
+        q, rates, changes = rng.normal(size=(3, 3, 17)) * 0.02
+        more = [rates, changes][: degree // 2]
+        branch = Branch(q, np.array([0.0, 0.7, 2.0]), rates=more)
+        names = dict(zip(("rates", "changes"), more, strict=False))
+        motion = Trajectory(
+            *(np.zeros(3) > 0, np.zeros(3), q[:, 0], q[:, 1::2], q[:, 2::2]),
+            times=branch.times, **names)  # fmt: skip
+        samples = np.array(motion.path.at_moments(np.linspace(0, 2, 4_001)))[:, 1:]
+        turn = max(np.ptp(x, axis=0).max() for x in (samples[:2_001], samples[2_000:]))
+        for more_than in (-1e-6, 1e-5, 3e-4, 1e-3, 3e-3):
+            limit = float(turn * (1.0 + more_than))
+            rows.problem = PlanningProblem(
+                "p", arm, Scene(), None, 0.0, np.eye(4), max_row_change=limit
+            )
+            accepted = True
+            with ctx.workprec(PRECISION):
+                for k in (0, 1):
+                    piece = SimpleNamespace(controls=branch.controls(k), degree=degree)
+                    try:
+                        rows._limits(piece)
+                    except Rejected:
+                        accepted = False
+            verdict = check_limits(rows.problem, motion)[-1].verdict
+            assert accepted == (verdict is Verdict.CERTIFIED)
+            assert not (accepted and more_than < 0)
+            assert accepted or more_than < 3e-3
+            said[accepted] += 1
+    assert min(said[True], said[False]) > 4

@@ -16,13 +16,7 @@ from vdsm_pin.certificate_checker.errors import grown
 from vdsm_pin.certificate_checker.motion import Branch, Path, beside
 from vdsm_pin.certificate_checker.rows import Rows
 from vdsm_pin.certificate_checker.solids import Body, Mesh, Pair, Solid, solid
-from vdsm_pin.certificate_checker.tree import (
-    SLIDES,
-    TURNS,
-    Joint,
-    Tree,
-    frame_of,
-)
+from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Tree, frame_of
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem

@@ -167,8 +167,9 @@ def main(arguments: Sequence[str]) -> int:
     show_everything()
     try:
         outcome = check_certificate(*map(Path, arguments))
-    except InvalidInput as error:
-        sys.stderr.write(f"vdsm: {error}\n")
+    except (InvalidInput, MemoryError) as error:
+        little = "there is too little memory; " * isinstance(error, MemoryError)
+        sys.stderr.write(f"vdsm: {little}{error}".rstrip("; ") + "\n")
         return 2
     found = f"{outcome.n_intervals} intervals, {outcome.n_claims} clearances"
     verdict = "accepted" if outcome.accepted else "rejected"

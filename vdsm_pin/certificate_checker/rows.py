@@ -1,5 +1,6 @@
 """The rows of an arm's trajectory against what the problem asks of the whole motion."""
 
+from functools import reduce
 from typing import Any, Final
 
 import numpy as np
@@ -16,7 +17,7 @@ from vdsm_pin.certificate_checker.balls import (
     dot,
     norm,
 )
-from vdsm_pin.certificate_checker.motion import Interval, Slices, Sweep, kept
+from vdsm_pin.certificate_checker.motion import Interval, Slices, Sweep, kept, part
 from vdsm_pin.certificate_checker.path import Drawing
 from vdsm_pin.certificate_checker.tree import Pose, frame_of
 from vdsm_pin.problem.planning_problem import Posture
@@ -66,8 +67,11 @@ class Rows:
         """Check the control points, and the change from row to row."""
         arm, columns = self.problem.manipulator, motion.controls
         if (most := self.problem.max_row_change) is not None:
+            n = PARTS if motion.degree > 1 else 1
+            times = [(arb(k) / n, arb(k + 1) / n) for k in range(n)]
             for points in columns[1:]:
-                turn = max(points, key=float) - min(points, key=float)
+                fine = [q for both in times for q in part(points, *both)]
+                turn = reduce(arb.max, fine) - reduce(arb.min, fine)
                 claim(turn <= most + SLACK, "a joint turns by {} deg", _deg(turn))
         low, high = arm.base_range
         x0, on_rail = columns[0], lambda q: low - SLACK <= q <= high + SLACK
