@@ -93,9 +93,9 @@ def closest_row(verification: Verification, approach: ClosestApproach) -> Closes
 
 
 def counterexample_row(
-    verification: Verification, found: Counterexample
+    verification: Verification, found: Counterexample, **joints: Any
 ) -> CounterexampleRow:
-    """One counterexample as its row."""
+    """One counterexample as its row, with its joints and their errors."""
     return CounterexampleRow(
         moment=found.moment,
         **_both(found.pair),
@@ -104,25 +104,22 @@ def counterexample_row(
         link_point_m=in_file_frame(verification, found.link_point),
         other_point_m=in_file_frame(verification, found.other_point),
         deeper=found.deeper,
-        **_configuration(verification, found),
+        **joints,
     )
 
 
-def _configuration(verification: Verification, found: Counterexample) -> dict[str, Any]:
-    """The joints of a counterexample: numbered of an arm, by name of another robot."""
+def _arm_counterexample(
+    verification: ArmVerification, found: Counterexample
+) -> CounterexampleRow:
     joints, errors = found.joints.tolist(), found.offsets.tolist()
-    if not isinstance(verification, ArmVerification):
-        from vdsm_pin.report.robot_facts import erring_joints
-        from vdsm_pin.robots.judgement import RobotVerification
-
-        assert isinstance(verification, RobotVerification)
-        return {"joints": erring_joints(verification.problem.robot, joints, errors)}
-    return {
-        "x0_m": joints[0],
-        "x0_error_m": errors[0],
-        "angles_rad": tuple(joints[1:]),
-        "angle_errors_rad": tuple(errors[1:]),
-    }
+    return counterexample_row(
+        verification,
+        found,
+        x0_m=joints[0],
+        x0_error_m=errors[0],
+        angles_rad=tuple(joints[1:]),
+        angle_errors_rad=tuple(errors[1:]),
+    )
 
 
 def error_box(errors: ErrorBox, n_links: int | None = None) -> ErrorBoxRow:
@@ -183,6 +180,10 @@ def _own_facts(verification: Verification) -> dict[str, Any]:
         "error_box": error_box(verification.errors, rows.n_links),
         "left_out": left_out_rows(ArmPairs(problem).left_out),
         "motion": motion_facts(problem, rows),
+        "counterexamples": tuple(
+            _arm_counterexample(verification, one)
+            for one in verification.counterexamples
+        ),
     }
 
 
@@ -211,10 +212,6 @@ def verification_file(
         refuted_joint_error_rad=finite(verification.refuted_joint_error),
         time_limit_s=finite(verification.time_limit),
         not_done=verification.not_done,
-        counterexamples=tuple(
-            counterexample_row(verification, found)
-            for found in verification.counterexamples
-        ),
         nominal_clear=verification.nominal_clear
         if verification.counterexamples
         else None,

@@ -5,16 +5,16 @@ from typing import Final
 import numpy as np
 from shapely import MultiPoint, Polygon
 
-from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import HalfSpace
 from vdsm_pin.problem.scene import solid_of
+from vdsm_pin.report.drawings import drawing_of
 from vdsm_pin.report.html import rendered
 from vdsm_pin.report.moves import start_pose
 from vdsm_pin.report.palette import OBSTACLE, OBSTACLE_EDGE, PATH, link_colours
 from vdsm_pin.report.solids import surface
 from vdsm_pin.report.thinning import MOST_DRAWN, nearest_obstacles
-from vdsm_pin.verification.records import ArmVerification, Verification
+from vdsm_pin.verification.records import Verification
 
 _WIDTH, _HEIGHT = 240, 160
 _MARGIN: Final = 12.0
@@ -28,53 +28,29 @@ def _view(points: FloatArray) -> FloatArray:
 
 
 def picture(verification: Verification) -> str:
-    """The robot at the moment of its smallest clearance, in its scene."""
-    if isinstance(verification, ArmVerification):
-        return _of_arm(verification)
-    # Whoever draws an arm needs no robots.
-    from vdsm_pin.report.robot_page import placed_corners
-    from vdsm_pin.robots.judgement import RobotVerification
-
-    assert isinstance(verification, RobotVerification)
-    links = [_hull(_view(corners)) for corners in placed_corners(verification)]
-    return _drawn(verification, links, np.zeros((0, 2)), 0.0)
-
-
-def _of_arm(verification: ArmVerification) -> str:
-    problem, rows = verification.problem, verification.trajectory
-    k = verification.approaches[0].interval if verification.approaches else 0
-    here = (part[k : k + 1] for part in (rows.x0, rows.alpha, rows.theta))
-    centres = _view(joint_centres(problem.manipulator, *here)[0])
-    links = [centres[i : i + 2] for i in range(problem.manipulator.n_links)]
-    corners = np.zeros((0, 3)) if problem.tip_path is None else problem.path.corners
-    path, radius = _view(_thin(corners)), problem.manipulator.link_radius
-    return _drawn(verification, links, path, radius)
-
-
-def _drawn(
-    verification: Verification,
-    links: list[FloatArray],
-    path: FloatArray,
-    radius: float,
-) -> str:
-    """Links as hulls, or as lines of a radius, with path and obstacles; [m]."""
+    """The arm or robot at the moment of its smallest clearance, in its scene."""
+    near = verification.approaches[:1]
+    moment = near[0].moment if near else 0.0
+    shape = drawing_of(verification).silhouette(moment)
+    links, path = list(map(_view, shape.links)), _view(_thin(shape.path))
     everything = np.vstack([*links, path])
     low, span = everything.min(axis=0), np.ptp(everything, axis=0)
     room = np.array([_WIDTH, _HEIGHT]) - 2.0 * _MARGIN
-    scale = float(np.min(room / np.maximum(span, radius or 1e-3)))
+    scale = float(np.min(room / np.maximum(span, shape.radius or 1e-3)))
     shift = _MARGIN + (room - scale * span) / 2.0 - scale * low
 
     def text(points: FloatArray) -> str:
         return " ".join(f"{x:.1f},{y:.1f}" for x, y in scale * points + shift)
 
+    hulls = links if shape.radius else list(map(_hull, links))
     return rendered(
         "picture.svg.j2",
         width=_WIDTH,
         height=_HEIGHT,
         obstacles=list(map(text, _outlines(verification))),
         path=text(path),
-        links=list(zip(map(text, links), link_colours(len(links)), strict=True)),
-        thick=max(3.0, 2.0 * radius * scale) if radius else 0.0,
+        links=list(zip(map(text, hulls), link_colours(len(links)), strict=True)),
+        thick=max(3.0, 2.0 * shape.radius * scale) if shape.radius else 0.0,
         obstacle_colour=OBSTACLE,
         edge_colour=OBSTACLE_EDGE,
         path_colour=PATH,

@@ -5,7 +5,7 @@ from typing import Any
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.trajectory import JOINED
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.report.facts import error_box, left_out_rows
+from vdsm_pin.report.facts import counterexample_row, error_box, left_out_rows
 from vdsm_pin.report.inputs import file_notes, longer_motions
 from vdsm_pin.report.rows import ErringJointRow, JointRow, RobotFacts
 from vdsm_pin.report.words import finite
@@ -33,6 +33,12 @@ def robot_facts(verification: RobotVerification) -> dict[str, Any]:
         "error_box": error_box(cell.errors),
         "left_out": left_out_rows(cell.robot.left_out),
         "motion": _motion(cell, path),
+        "counterexamples": tuple(
+            counterexample_row(
+                verification, one, joints=_erring(cell.robot, one.joints, one.offsets)
+            )
+            for one in verification.counterexamples
+        ),
     }
 
 
@@ -67,13 +73,15 @@ def _joint(joint: RobotJoint, values: FloatArray) -> JointRow:
     return JointRow(name=joint.name, range_m=reached, limits_m=limits)
 
 
-def erring_joints(
-    robot: Robot, values: list[float], errors: list[float]
+def _erring(
+    robot: Robot, values: FloatArray, errors: FloatArray
 ) -> tuple[ErringJointRow, ...]:
     """The joints of a counterexample and what they are off by; [rad], [m]."""
     return tuple(
         ErringJointRow(name=joint.name, value_rad=value, error_rad=error)
         if joint.turns
         else ErringJointRow(name=joint.name, value_m=value, error_m=error)
-        for joint, value, error in zip(robot.joints, values, errors, strict=True)
+        for joint, value, error in zip(
+            robot.joints, values.tolist(), errors.tolist(), strict=True
+        )
     )

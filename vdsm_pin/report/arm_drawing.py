@@ -1,0 +1,220 @@
+"""What a page shows of a snake arm: its links, the desired path, its joints' plots."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from vdsm_pin.arm.cables import cable_lengths
+from vdsm_pin.arm.kinematics import joint_centres, link_angles
+from vdsm_pin.arm.manipulator import Manipulator
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.problem.planning_problem import PlanningProblem
+from vdsm_pin.problem.scene import Obstacle
+from vdsm_pin.problem.trajectory import Trajectory
+from vdsm_pin.report.charts import limit, packed, series
+from vdsm_pin.report.drawing import Silhouette, obstacle_data, row_data, solid_data
+from vdsm_pin.report.motion_facts import changed_angles
+from vdsm_pin.report.palette import link_colours
+from vdsm_pin.report.solids import FINE
+from vdsm_pin.report.thinning import Thinned
+from vdsm_pin.units import MM_PER_M
+
+_DASHES: Final = ("", "7 3", "2 3")
+_INK: Final = "currentColor"
+_MOST_BETWEEN: Final = 4_000
+"""Rows that a smooth motion is drawn with, where it has not more itself."""
+
+
+@dataclass(frozen=True)
+class ArmDrawing:
+    """How the motion of a snake arm is drawn."""
+
+    problem: PlanningProblem
+    trajectory: Trajectory
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the links, in the order of the brackets."""
+        return [f"link {i + 1}" for i in range(self.problem.manipulator.n_links)]
+
+    def scene(self, obstacles: Sequence[Obstacle]) -> dict[str, Any]:
+        """The arm, some obstacles and the desired path; base frame, [m]."""
+        problem, arm = self.problem, self.problem.manipulator
+        extent = arm.total_length
+        return {
+            **obstacle_data(problem, obstacles, self.trajectory, extent),
+            "lengths": arm.link_lengths.tolist(),
+            "radius": arm.link_radius,
+            "axes": [
+                [min(k + 1, arm.n_links) - 1, *span, radius]
+                for k, (span, radius) in enumerate(
+                    zip(arm.axis_spans.tolist(), arm.axis_radii.tolist(), strict=True)
+                )
+            ],
+            "colours": list(link_colours(arm.n_links)),
+            "carried": [
+                {"link": link, **solid_data(solid, extent, FINE)}
+                for link, solid in arm.carried
+            ],
+            "path": packed(self._corners()),
+        }
+
+    def _corners(self) -> FloatArray:
+        """Corners of the desired path, shape (n, 3); none where none is asked; [m]."""
+        path = self.problem.tip_path
+        return np.zeros((0, 3)) if path is None else path.corners
+
+    def motion(self, shown: Thinned) -> dict[str, Any]:
+        """The joint values of the rows shown; the page computes the poses from them."""
+        trajectory, rows = self.trajectory, shown.rows
+        on_path = () if self.problem.tip_path is None else trajectory.on_path[rows]
+        return {
+            **row_data(trajectory, shown),
+            **({"smooth": _smooth(trajectory)} if trajectory.is_smooth else {}),
+            "onPath": packed(on_path, "u1"),
+            "pathM": packed(trajectory.path_m[rows]),
+            "x0": packed(trajectory.x0[rows]),
+            "alpha": packed(trajectory.alpha[rows]),
+            "theta": packed(trajectory.theta[rows]),
+        }
+
+    def charts(
+        self, shown: Thinned, clearances: list[dict[str, Any]]
+    ) -> list[dict[str, Any]]:
+        """Every plot in order; angles in degrees, lengths in mm."""
+        arm, rows = self.problem.manipulator, self.trajectory
+        alpha, theta = rows.alpha[shown.rows], rows.theta[shown.rows]
+        psi = link_angles(alpha, theta)
+        return [
+            _link_angle_chart(arm, psi),
+            _base_chart(arm, rows.x0[shown.rows]),
+            *clearances,
+            _changed_chart(psi),
+            *_joint_charts(arm, alpha, theta),
+            _cable_chart(arm, alpha, theta),
+        ]
+
+    def stance(self, q: FloatArray) -> dict[str, Any]:
+        """The joints' centres at x0, alpha1, theta1, .., shape (1 + 2N,)."""
+        columns = q[:1], q[None, 1::2], q[None, 2::2]
+        return {
+            "centres": joint_centres(self.problem.manipulator, *columns)[0].tolist()
+        }
+
+    def silhouette(self, moment: float) -> Silhouette:
+        """The links' axes at a moment in waypoints, with the desired path."""
+        arm, pose = self.problem.manipulator, self.trajectory.at(np.array([moment]))
+        centres = joint_centres(arm, pose.x0, pose.alpha, pose.theta)[0]
+        links = [centres[i : i + 2] for i in range(arm.n_links)]
+        return Silhouette(links, arm.link_radius, self._corners())
+
+
+def _smooth(trajectory: Trajectory) -> dict[str, Any]:
+    """Joint values between the rows of a smooth motion, for the picture alone."""
+    count = trajectory.n_samples - 1
+    parts = max(1, min(32, _MOST_BETWEEN // count))
+    fine = trajectory.refined(parts)
+    return {
+        "moments": packed(np.arange(fine.n_samples) / parts, "<f8"),
+        "x0": packed(fine.x0),
+        "alpha": packed(fine.alpha),
+        "theta": packed(fine.theta),
+    }
+
+
+def _per_joint(symbol: str, values: FloatArray) -> list[dict[str, Any]]:
+    colours = link_colours(values.shape[1])
+    return [
+        series(f"{symbol}{i + 1}", colours[i], np.degrees(values[:, i]))
+        for i in range(values.shape[1])
+    ]
+
+
+def _link_angle_chart(arm: Manipulator, psi: FloatArray) -> dict[str, Any]:
+    cone = math.degrees(arm.max_link_angle)
+    return {
+        "id": "psi",
+        "title": "Link angles ψ",
+        "note": "Angle between neighbouring links at each joint.",
+        "unit": "°",
+        "axis": "ψ [°]",
+        "floor": 0.0,
+        "limits": [limit(f"cone {cone:g}°", cone)],
+        "series": _per_joint("ψ", psi),
+    }
+
+
+def _base_chart(arm: Manipulator, x0: FloatArray) -> dict[str, Any]:
+    low, high = (v * MM_PER_M for v in arm.base_range)
+    return {
+        "id": "x0",
+        "title": "Base position x₀",
+        "note": f"Along the rail, from {low:g} to {high:g} mm.".replace("-", "−"),
+        "unit": " mm",
+        "axis": "x₀ [mm]",
+        "limits": [limit("rail end", low), limit("rail end", high)],
+        "far_limits": True,
+        "series": [series("x₀", _INK, x0 * MM_PER_M)],
+    }
+
+
+def _changed_chart(psi: FloatArray) -> dict[str, Any]:
+    return {
+        "id": "changed",
+        "title": "Changed link angles",
+        "note": "Number of link angles above 0.05°; fewer are easier to drive.",
+        "unit": "",
+        "axis": "count",
+        "floor": 0.0,
+        "whole": True,
+        "limits": [],
+        "series": [
+            series("changed", _INK, changed_angles(psi).astype(np.float64), step=True)
+        ],
+    }
+
+
+def _joint_charts(
+    arm: Manipulator, alpha: FloatArray, theta: FloatArray
+) -> list[dict[str, Any]]:
+    box = math.degrees(arm.max_joint_angle)
+    limits = [limit(f"+{box:g}°", box), limit(f"−{box:g}°", -box)]
+    pairs = (("theta", "θ", "pitch", theta), ("alpha", "α", "yaw", alpha))
+    return [
+        {
+            "id": name,
+            "title": f"{kind.capitalize()} angles {symbol}",
+            "note": f"The {kind} of each universal joint.",
+            "unit": "°",
+            "axis": f"{symbol} [°]",
+            "limits": limits,
+            "far_limits": True,
+            "series": _per_joint(symbol, values),
+        }
+        for name, symbol, kind, values in pairs
+    ]
+
+
+def _cable_chart(
+    arm: Manipulator, alpha: FloatArray, theta: FloatArray
+) -> dict[str, Any]:
+    zero = np.zeros((1, arm.n_links))
+    lengths = cable_lengths(arm, alpha, theta)
+    change = (lengths - cable_lengths(arm, zero, zero)) * MM_PER_M
+    colours = link_colours(change.shape[1])
+    return {
+        "id": "cables",
+        "title": "Cable lengths",
+        "note": "Change against the straight arm; cables a, b, c of each link.",
+        "unit": " mm",
+        "axis": "change [mm]",
+        "limits": [],
+        "series": [
+            series(f"l{i + 1}{hole}", colours[i], change[:, i, j], dash=_DASHES[j])
+            for i in range(change.shape[1])
+            for j, hole in enumerate("abc")
+        ],
+    }

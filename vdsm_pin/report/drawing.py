@@ -1,0 +1,97 @@
+"""What differs between a page of a snake arm and one of any other robot."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
+
+from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.geometry.solids import Solid
+from vdsm_pin.problem.any_problem import AnyProblem
+from vdsm_pin.problem.scene import Obstacle, solid_of
+from vdsm_pin.report.charts import packed
+from vdsm_pin.report.moves import moves
+from vdsm_pin.report.solids import Detail, detail, surface
+from vdsm_pin.report.thinning import Thinned
+from vdsm_pin.verification.protocols import AnyMotion
+
+
+class Silhouette(NamedTuple):
+    """An arm or robot in one pose; base frame, [m].
+
+    Args:
+        links: Points of each link, shape (n, 3): the ends of its axis, or its corners.
+        radius: Of the links that are axes; 0 where they are corners.
+        path: The desired path, shape (m, 3).
+    """
+
+    links: list[FloatArray]
+    radius: float
+    path: FloatArray
+
+
+class Drawing(Protocol):
+    """How the motion of an arm or robot is drawn."""
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the links, in the order of the brackets."""
+
+    def scene(self, obstacles: Sequence[Obstacle]) -> dict[str, Any]:
+        """The arm or robot and some obstacles; base frame, [m]."""
+
+    def motion(self, shown: Thinned) -> dict[str, Any]:
+        """What the page computes the poses of the rows from."""
+
+    def charts(
+        self, shown: Thinned, clearances: list[dict[str, Any]]
+    ) -> list[dict[str, Any]]:
+        """Every plot in order, those of the clearances among them."""
+
+    def stance(self, q: FloatArray) -> dict[str, Any]:
+        """Where the links are at values of the joints, shape (n_joints,)."""
+
+    def silhouette(self, moment: float) -> Silhouette:
+        """The links at a moment in waypoints."""
+
+
+def obstacle_data(
+    problem: AnyProblem,
+    obstacles: Sequence[Obstacle],
+    trajectory: AnyMotion,
+    extent: float,
+) -> dict[str, Any]:
+    """Some obstacles, and where their frame is; base frame, [m].
+
+    What moves is in its own frame, which stands where `moves` says.
+    """
+    fine = detail(len(obstacles))
+    return {
+        "pose": problem.T_world_base.ravel().tolist(),
+        "obstacles": [
+            {**solid_data(solid_of(one), extent, fine), **moves(one, trajectory)}
+            for one in obstacles
+        ],
+    }
+
+
+def solid_data(solid: Solid, extent: float, fine: Detail) -> dict[str, Any]:
+    """Triangles to draw a solid with."""
+    skin = surface(solid, extent, fine)
+    return {
+        "name": solid.name,
+        "vertices": packed(skin.vertices),
+        "triangles": packed(skin.triangles, "<u4"),
+        "round": skin.round,
+        "creased": skin.creased,
+        "count": len(skin.triangles),
+    }
+
+
+def row_data(trajectory: AnyMotion, shown: Thinned) -> dict[str, Any]:
+    """Which rows are shown, and when they are."""
+    times = {} if trajectory.times is None else {"times": trajectory.times[shown.rows]}
+    return {
+        "nSamples": trajectory.n_samples,
+        **{name: packed(values, "<f8") for name, values in times.items()},
+        "complete": shown.complete,
+        "rows": packed(shown.rows, "<i4"),
+    }
