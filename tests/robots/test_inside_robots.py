@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from tests.oracles.certificate_cases import certificate_lines
+from tests.oracles.certificate_oracle import sealed
 from tests.robots.test_robots import write
 from vdsm_pin.certificate_checker import check_certificate
 from vdsm_pin.errors import InvalidFile
@@ -15,6 +17,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.problem.error_boxes import ErrorBox
 from vdsm_pin.proof.paths import Path as Motion
+from vdsm_pin.report.reason import reason
 from vdsm_pin.robots.cell import Cell, read_cell
 from vdsm_pin.robots.certificate import write_robot_certificate
 from vdsm_pin.robots.judgement import RobotVerification, verify_robot
@@ -159,6 +162,74 @@ def test_the_checker_asks_for_the_inside_too(tmp_path: Path) -> None:
         assert outcome.accepted is is_outside
         if not is_outside:
             assert "a body is not proved outside shell: it is inside" in outcome.reason
+
+
+def certified(cell: Cell, folder: Path) -> Any:
+    """What the checker says of the certificate of the motion in a folder."""
+    found, source = judged(cell, folder), cell.source
+    assert found.verdict is Verdict.CERTIFIED
+    assert source is not None
+    hashes = Hashes(source.sha256, sha256_of_file(folder / "t.csv"))
+    write_robot_certificate(folder / "c", found, hashes)
+    return check_certificate(folder / "c", folder / "cell.yaml", folder / "t.csv")
+
+
+def test_certificates_beside_meshes_with_gaps(tmp_path: Path) -> None:
+    """Joined where gaps are narrow, off the hull where they are wide, or a surface."""
+    torn = trimesh.creation.annulus(0.65, 0.9, 0.5, sections=24)  # the ball is within
+    corners = torn.triangles.copy()
+    corners[torn.triangles_center[:, 2] > 0.0] += [0.0, 0.0, 1e-4]
+    torn = trimesh.Trimesh(**trimesh.triangles.to_kwargs(corners), process=False)
+    assert not torn.is_watertight
+    outcome = certified(cell_in(tmp_path, torn), tmp_path)
+    assert outcome.accepted, outcome.reason
+    assert "gaps of shell, up to 0.1 mm wide, are joined" in outcome.notes
+    lines = certificate_lines(tmp_path / "c")
+    assert lines[0]["joined"]["shell"][0]
+    lines[0]["joined"] = {}
+    check_refused(tmp_path, lines, "outside shell: the mesh is not closed")
+
+    # A box beside it may be as thin as the gaps, and keeps off the hull.
+    box = '<link name="up"><collision><origin xyz="0 0 1"/><geometry>'
+    box += '<box size=".1 .1 .1"/></geometry></collision></link>'
+    box += '<joint name="lift" type="fixed"><parent link="arm"/><child link="up"/>'
+    write(tmp_path, "one.urdf", URDF.replace("</robot>", f"{box}</joint></robot>"))
+    text = (tmp_path / "cell.yaml").read_text().replace("0.005", "0")
+    outcome = certified(read_cell(write(tmp_path, "cell.yaml", text)), tmp_path)
+    assert outcome.accepted, outcome.reason
+    lines = certificate_lines(tmp_path / "c")
+    assert lines[0]["pairs"] == [["arm", "shell"], ["up", "shell"]]
+    whole = [len(proof[0][2]) == 1 for proof in lines[1]["proofs"]]
+    assert whole == [False, True]
+
+    bowl = trimesh.creation.icosphere(2, 0.3)
+    bowl.update_faces(bowl.triangles_center[:, 0] > -0.1)
+    bowl.apply_translation([1.0, 0.0, 0.0])
+    outcome = certified(cell_in(tmp_path, bowl), tmp_path)
+    assert outcome.accepted, outcome.reason
+    lines = certificate_lines(tmp_path / "c")
+    ((_, _, planes),) = lines[1]["proofs"][0]
+    half = len(bowl.triangles) // 2
+    lines[1]["proofs"][0][0][2] = [
+        [0, half, *planes[0][2:]],
+        [half, planes[0][1], *planes[0][2:]],
+    ]
+    check_refused(tmp_path, lines, "outside shell: the mesh is not closed")
+
+    bowl.apply_translation([-0.5, 0.0, 0.0])
+    cell = cell_in(tmp_path, bowl, ", solid: false")
+    assert "'shell' is a surface only" in reason(judged(cell, tmp_path))
+    outcome = certified(cell, tmp_path)
+    assert outcome.accepted, outcome.reason
+    assert "shell is a surface only" in outcome.notes
+
+
+def check_refused(folder: Path, lines: list[Any], why: str) -> None:
+    (folder / "forged").write_bytes(sealed(lines[:-1]))
+    files = folder / "cell.yaml", folder / "t.csv"
+    outcome = check_certificate(folder / "forged", *files)
+    assert not outcome.accepted
+    assert why in outcome.reason
 
 
 def test_a_planning_scene_brings_its_meshes(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from vdsm_pin.certificate_checker.balls import belongs, claim, column
 from vdsm_pin.certificate_checker.errors import grown
 from vdsm_pin.certificate_checker.motion import Branch, Path, beside
 from vdsm_pin.certificate_checker.rows import Rows
-from vdsm_pin.certificate_checker.solids import Body, Mesh, Pair, Solid, solid
+from vdsm_pin.certificate_checker.solids import Body, Mesh, Pair, Solid, cover, solid
 from vdsm_pin.certificate_checker.tree import SLIDES, TURNS, Joint, Tree, frame_of
 from vdsm_pin.io.source import sha256_of_file
 from vdsm_pin.io.trajectory_file import read_trajectory
@@ -68,7 +68,7 @@ class Arm:
         self, problem: PlanningProblem, header: Mapping[str, Any], trajectory: File
     ) -> None:
         self.problem, self.arm = problem, problem.manipulator
-        belongs(header, "errors joined", problem.sha256, sha256_of_file(trajectory))
+        belongs(header, "errors", problem.sha256, sha256_of_file(trajectory))
         joined = header["interpolation"]
         known = joined in ("linear", "cubic", "quintic")
         claim(known, f"interpolation is {joined}, expected linear, cubic or quintic")
@@ -99,16 +99,12 @@ class Arm:
 
     def _cover(self, pieces: dict[str, Any], joined: dict[str, Any]) -> None:
         """Take the bodies, and the pieces that cover them and the obstacles."""
-        self.bodies, named = [*own_bodies(self.arm)], {s.name: s for s in self.solids}
+        self.bodies = [*own_bodies(self.arm)]
         for carried in self.arm.bodies:
             parts = solid(carried.solid).parts(pieces.pop(carried.solid.name, None))
             frame = frame_of(carried.link)
             self.bodies += [Body(frame, part, own=False) for part in parts]
-        for name in pieces:
-            named[name].cut(pieces[name])
-        for name, (corners, seams) in joined.items():
-            claim(name in self.meshes, f"{name} is no mesh: nothing is joined")
-            self.meshes[name].surface.join(corners, seams)
+        cover(self.solids, pieces, joined)
 
     def _pairs(self) -> Iterator[Pair]:
         """What the problem holds apart, in order."""
@@ -153,7 +149,7 @@ class Arm:
         """
         own = [body for body in self.bodies if body.own]
         thinnest = min(body.solid.radius for body in own)
-        for mesh in self.meshes.values():
+        for mesh in (mesh for mesh in self.meshes.values() if mesh.split):
             pairs, points = [pair for pair in self.pairs if pair.solid is mesh], []
             held = [pair.body for pair in pairs]
             if all(body in held for body in own):

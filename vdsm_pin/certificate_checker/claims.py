@@ -106,7 +106,7 @@ def tiled(pair: Pair, proof: Any, place: str, motion: Interval) -> Iterator[Plan
             yield Plane(place, slice_, reached, last, (x, y, z), lower)
             reached = last
         claim(reached == size, f"the pieces end at {reached} of {size}")
-        pair.solid.whole &= len(planes) == 1
+        pair.solid.split |= {pair.body.solid} if len(planes) > 1 else set()
         time = slice_[2]
     claim(time == 1.0, f"the slices end at {time}")
 

@@ -29,7 +29,7 @@ from vdsm_pin.io.source import bounded_lines, check_is_file, check_is_file_or_ba
 from vdsm_pin.robots.files import read_cell_file
 from vdsm_pin.text import printable, show_everything
 
-VERSION: Final = 7
+VERSION: Final = 8
 PRECISION: Final = 128
 """Bits of a ball: lengths are known to about 1e-35 m."""
 

@@ -23,6 +23,7 @@ from vdsm_pin.certificate_checker.solids import (
     Mesh,
     Pair,
     Solid,
+    cover,
     hulls,
     named_parts,
     solid,
@@ -292,10 +293,9 @@ class Robot:
 
     def _pairs(self, file: CellFile, header: Any, things: list[Any]) -> Iterator[Pair]:
         """What the problem holds apart, in order."""
-        named, stated, links = {x.name: x for x in things}, header["errors"], self.links
-        asked = file.errors(self.scene, named)
-        for name, order in header["pieces"].items():
-            named[name].cut(order)
+        stated, links = header["errors"], self.links
+        asked = file.errors(self.scene, {x.name for x in things})
+        cover(things, header["pieces"], header["joined"])
         off = grown(stated, asked, self.model.least_errors(asked), things)
         self.model.err(stated)
         required, own = file.required
@@ -330,7 +330,7 @@ class Robot:
             Rejected: If one does not; `place` says where.
         """
         for pair in self.pairs:
-            if isinstance(pair.solid, Mesh):
+            if isinstance(pair.solid, Mesh) and pair.body.solid in pair.solid.split:
                 pair.solid.check_outside(first[pair.rest], [pair.inner(first)])
         for k in range(self.own.size):
             self.place, step = f"interval {k}", arb(0)

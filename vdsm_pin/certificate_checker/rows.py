@@ -125,9 +125,7 @@ class Rows:
         """Take what the tip does at both rows and in between into the drawing."""
         stations = [arb(float(self.rows.path_m[row])) for row in rows]
         on, same = self.rows.on_path[[*rows]], arb(self.problem.tip_tolerance)
-        for i in (0, 1):
-            if not on[i]:
-                continue
+        for i in np.flatnonzero(on).tolist():
             away = norm(tips[-i] - drawing.point(stations[i]))
             claim(away <= same, "the tip is {} mm off the path", MM * away)
             if i == 1 or rows[0] == 0:  # else it was taken in with the interval before
@@ -213,8 +211,7 @@ class Rows:
         """Check how much of the path is drawn, how well, and that it is drawn once."""
         path, drawn = self.problem.path, drawing.coverage()
         past = drawing.farthest - drawing.length - self.problem.tip_tolerance
-        again = self.ordered and drawing.left and drawing.closed
-        once = past <= SLACK or not again
+        once = past <= SLACK or not (self.ordered and drawing.left and drawing.closed)
         claim(once, "the path is begun again, {} mm past its end", MM * past)
         strays, most = drawing.deviation, path.spacing
         told = "the tip strays {} mm from the path, {} are allowed"

@@ -41,7 +41,7 @@ class Solid:
     ) -> None:
         self.name, self.points, self.radius = name, np.array(points, float), radius
         self.disc_axis, self.disc_radius = np.array(disc[0]), disc[1]
-        self.whole = True  # whether every plane so far serves all pieces
+        self.split = set[Solid]()  # bodies held off it by planes that serve some pieces
         self.normal: Any = None  # of a half-space
         self.ends: Any = None  # of a prism: its corners at both, shape (2, c, 3)
         far = np.abs(self.points).max() + np.abs(origin).max()
@@ -94,6 +94,17 @@ class Solid:
         claim(sum(map(len, pieces)) <= 3 * len(corners), parts)  # as many as triangles
         claim(boundary(pieces) == boundary([corners]), parts)
         self.points = np.concatenate(self.ends[:, np.array(pieces, dtype=int)], axis=1)
+
+
+def cover(things: Sequence[Any], pieces: Any, joined: Any) -> None:
+    """Take the pieces that solids are counted in, and the corners that close meshes."""
+    named = {one.name: one for one in things}
+    for name, order in pieces.items():
+        named[name].cut(order)
+    for name, (corners, seams) in joined.items():
+        mesh: Any = named.get(name)
+        claim(isinstance(mesh, Mesh), f"{name} is no mesh: nothing is joined")
+        mesh.surface.join(corners, seams)
 
 
 def away(points: Any, off: float) -> float:
@@ -157,7 +168,7 @@ class Compound:
         order, every = told.get(name, {"order": ()})["order"], [*range(len(points))]
         good = sorted(order or every) == every
         claim(good, f"pieces of {name} do not make up the whole")
-        self.name, self.whole = name, True
+        self.name, self.split = name, set[Solid]()
         self.points: list[Solid] = [points[k] for k in [*order] or every]
         self.normal, self.extent = None, max(one.extent for one in points)
 
@@ -182,7 +193,7 @@ class Mesh(Solid):
     def check_outside(
         self, rest: Any, points: Iterable[tuple[Any, Any, float]]
     ) -> None:
-        """Check that points are not inside; it is enough that its hull is proved clear.
+        """Check that points are not inside.
 
         Args:
             rest: The pose of its frame: origin and rotation.
@@ -191,7 +202,7 @@ class Mesh(Solid):
         """
         zero, axes = rest
         for (origin, turned), at, off in points:
-            if not (self.surface_only or self.whole):
+            if not self.surface_only:
                 seen = axes.transpose() * (origin + turned * at - zero)
                 why = self.surface.not_outside([*map(float, seen.entries())], off)
                 claim(not why, f"a body is not proved outside {self.name}: {why}")

@@ -7,20 +7,17 @@ from typing import Final
 
 import numpy as np
 
-from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.geometry.arrays import IntArray
 from vdsm_pin.geometry.convex import Hull
 from vdsm_pin.geometry.pieces import PackedPieces
-from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.problem.error_boxes import ErrorBox
-from vdsm_pin.problem.scene import Scene, solid_of
 from vdsm_pin.problem.trajectory import JOINED
 from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.budget import Budget
-from vdsm_pin.proof.prover import start_proof
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.robots.errors import joint_errors, proof_box
 from vdsm_pin.robots.files import HULLS
+from vdsm_pin.robots.inside import at_start, question_of_hulls, unlocated_pairs
 from vdsm_pin.robots.judgement import RobotVerification
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
 from vdsm_pin.verification.certificate_file import (
@@ -36,10 +33,13 @@ from vdsm_pin.verification.certificate_lines import (
     check_certified,
     write_lines,
 )
-from vdsm_pin.verification.certificate_writer import errors_beside, pieces_of_obstacles
+from vdsm_pin.verification.certificate_writer import (
+    errors_beside,
+    joined_corners,
+    pieces_of_obstacles,
+)
 from vdsm_pin.verification.moving import joined_path
 
-UNCLEAR: Final = "the inside of {!r} has gaps, and then none is written"
 EDGES: Final[Mapping[int, tuple[int, ...]]] = {1: (), 2: (1,), 8: (1, 2, 4)}
 """By the number of a primitive's corners those at the ends of the first one's edges."""
 
@@ -62,50 +62,42 @@ def write_robot_certificate(
 
     Raises:
         OutOfTime: If the time is over.
-        VerificationFailed: If the motion is not certified, or a mesh has no certain
-            inside: there is nothing to write.
+        VerificationFailed: If the motion is not certified: there is nothing to write.
         InvalidFile: If the file cannot be written.
     """
     check_certified(verification)
-    _check_scene(verification.problem.scene)
     cell, motion = verification.problem, verification.trajectory
-    table, budget = cell.pair_table, Budget(until=deadline.end)
     bodies, errors = cell.bodies, verification.errors
     whole, _ = joined_path(motion, cell.scene)
+    # Of a mesh without known inside the hull is proved clear, by planes for all of it.
+    hulled = unlocated_pairs(at_start(cell, whole))
     box = proof_box(cell.robot, cell.scene, errors)
-    proving, plan = start_proof(cell.tree, bodies, whole, table, box, budget)
+    asked = question_of_hulls(cell, hulled, box) if hulled else cell.question
+    proving, plan = asked.about(whole, Budget(until=deadline.end)), asked.plan
     pieces, n_links = proving.task.pieces, len(cell.robot.bodies)
+    meshes = dict.fromkeys(cell.pairs[k].one for k in hulled)
+    n_bodies = len(bodies) + len(meshes)
     # Where each body as it was given stands among those that were packed.
-    places = np.argsort(plan.number[: len(bodies)], kind="stable").tolist()
-    of_obstacles, rest = places[n_links:], cell.scene.obstacles
+    places = np.argsort(plan.number[:n_bodies], kind="stable").tolist()
+    of_obstacles, rest = places[n_links : len(bodies)], cell.scene.obstacles
     first = len(rest) - sum(len(one.links) for one in cell.others)
     obstacles = zip(of_obstacles[:first], rest[:first], strict=True)
     links = places[:n_links] + of_obstacles[first:]
     header = RobotHeaderLine(
         **hashes.as_json(),
         interpolation=JOINED[motion.degree],
-        pairs=_pairs(plan.bodies[len(bodies) :], plan.bodies, plan.pairs),
+        pairs=_pairs(plan.bodies[n_bodies:], plan.bodies, plan.pairs),
         pieces=pieces_of_obstacles(obstacles, pieces),
+        joined=joined_corners(cell.scene),
         errors=_errors(cell, errors),
         links=_links(cell, links, pieces),
         topic=topic,
     )
-    none = np.zeros(len(pieces.root), np.int64)
-    proof = Recorded(proving.task, proving.motion, none)
+    one_plane = np.zeros(len(pieces.root), np.int64)
+    for place, number in zip(places[len(bodies) :], meshes, strict=True):
+        one_plane[place] = len(bodies[number].pieces)
+    proof = Recorded(proving.task, proving.motion, one_plane)
     write_lines(path, header, proof, deadline)
-
-
-def _check_scene(scene: Scene) -> None:
-    """Refuse obstacles of which no certificate tells.
-
-    Raises:
-        VerificationFailed: If one is a mesh that has gaps or is not closed.
-    """
-    for mesh in map(solid_of, scene.obstacles):
-        if isinstance(mesh, Mesh) and not mesh.is_surface:
-            surface = mesh.closed_mesh
-            if not surface.closed or surface.gap:
-                raise VerificationFailed(UNCLEAR.format(mesh.name))
 
 
 def _errors(cell: Cell, errors: ErrorBox) -> RobotErrors:

@@ -8,7 +8,7 @@ clearance from the mesh's hull.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -16,12 +16,13 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
 from vdsm_pin.geometry.solids import Mesh
 from vdsm_pin.geometry.winding import Location, Side, locate
-from vdsm_pin.problem.scene import solid_of, with_hulls
-from vdsm_pin.proof.bodies import Body
+from vdsm_pin.problem.scene import solid_of
+from vdsm_pin.proof.bodies import Body, PairTable
 from vdsm_pin.proof.budget import Budget
 from vdsm_pin.proof.error_box import ErrorBox
 from vdsm_pin.proof.paths import Path
-from vdsm_pin.proof.prover import prove
+from vdsm_pin.proof.prover import answer
+from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.verification.brackets import ClearanceProfile
@@ -56,6 +57,54 @@ def locate_links(
     Returns:
         By the number of their pair.
     """
+    found = at_start(cell, path)
+    unknown = unlocated_pairs(found)
+    if not unknown:
+        return found
+    asked = question_of_hulls(cell, unknown, box, unknown)
+    proof = answer(asked, path, budget)
+    clear = [unknown[k] for k in np.flatnonzero(proof.verdict == CERTIFIED)]
+    outside = Location(Side.OUTSIDE)
+    return found | {k: found[k]._replace(where=outside) for k in clear}
+
+
+def unlocated_pairs(located: Mapping[int, Place]) -> list[int]:
+    """Numbers of the pairs of which it is not known on which side the link is."""
+    return [k for k, one in located.items() if one.where.side is Side.UNKNOWN]
+
+
+def question_of_hulls(
+    cell: Cell,
+    hulled: Sequence[int],
+    box: ErrorBox | None,
+    asked: Sequence[int] | None = None,
+) -> Question:
+    """Pairs of a cell, with the hulls of meshes in place of the meshes in some of them.
+
+    The hulls are bodies behind all others, each once, in the order of the pairs.
+
+    Args:
+        cell: Robot and scene.
+        hulled: Numbers of the pairs that are asked of the hull of their mesh.
+        box: The errors of the proof.
+        asked: Numbers of the pairs that are asked; None for all.
+    """
+    bodies, pairs, n = [*cell.bodies], [*cell.pairs], len(cell.robot.bodies)
+    meshes = list(dict.fromkeys(pairs[k].one for k in hulled))
+    for one in meshes:
+        mesh = cast("Mesh", solid_of(cell.scene.obstacles[one - n]))
+        bodies.append(replace(bodies[one], pieces=mesh.hull.pieces))
+    for k in hulled:
+        number = len(cell.bodies) + meshes.index(pairs[k].one)
+        pairs[k] = replace(pairs[k], one=number)
+    if box is not None and box.surfaces is not None:
+        box = replace(box, surfaces=np.append(box.surfaces, box.surfaces[meshes]))
+    table = PairTable.of(pairs if asked is None else [pairs[k] for k in asked])
+    return Question.of(cell.tree, bodies, table, box)
+
+
+def at_start(cell: Cell, path: Path) -> dict[int, Place]:
+    """Where each link begins as seen from each mesh, by the number of their pair."""
     solids = [solid_of(one) for one in cell.scene.obstacles]
     n, poses = len(cell.robot.bodies), cell.poses(path.knots[:1])[0]
     found = dict[int, Place]()
@@ -64,7 +113,7 @@ def locate_links(
         if isinstance(mesh, Mesh) and not mesh.is_surface:
             link, rest = cell.bodies[pair.other], poses[cell.bodies[pair.one].frame]
             found[k] = _place(mesh, link, poses[link.frame], rest, pair.required)
-    return found | _clear_of_hulls(cell, path, box, budget, found)
+    return found
 
 
 def _place(
@@ -96,27 +145,6 @@ def _middle(piece: Piece) -> tuple[FloatArray, float]:
         return piece.centre, 0.0
     assert isinstance(piece, Hull)  # links have no half-spaces
     return piece.points.mean(axis=0), piece.radius
-
-
-def _clear_of_hulls(
-    cell: Cell,
-    path: Path,
-    box: ErrorBox | None,
-    budget: Budget,
-    located: Mapping[int, Place],
-) -> dict[int, Place]:
-    """Pairs of an unknown inside whose link keeps clear of the mesh's hull."""
-    unknown = [k for k, one in located.items() if one.where.side is Side.UNKNOWN]
-    if not unknown:
-        return {}
-    pairs = [cell.pairs[k] for k in unknown]
-    n = len(cell.robot.bodies)
-    names = {cell.scene.obstacles[pair.one - n].name for pair in pairs}
-    hulls = replace(cell, scene=with_hulls(cell.scene, names))
-    proof = prove(cell.tree, hulls.bodies, path, pairs, box, budget)
-    clear = [unknown[k] for k in np.flatnonzero(proof.verdict == CERTIFIED)]
-    outside = Location(Side.OUTSIDE)
-    return {k: located[k]._replace(where=outside) for k in clear}
 
 
 def by_mesh(cell: Cell, located: Mapping[int, Place]) -> dict[str, Location]:

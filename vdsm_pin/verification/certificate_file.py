@@ -57,7 +57,7 @@ class RobotErrors(AnyErrors):
 class AnyHeader(LineModel):
     """Line 1, of whatever moves."""
 
-    vdsm_certificate: Literal[7] = Field(default=7, description="version of the format")
+    vdsm_certificate: Literal[8] = Field(default=8, description="version of the format")
     problem_sha256: Sha256 = Field(description="problem file and all that it names")
     trajectory_sha256: Sha256 = Field(description="the trajectory file")
     versions: dict[str, str] = Field(description="of the writer; told, not proved")
@@ -74,12 +74,6 @@ class AnyHeader(LineModel):
         "the order in which planes count them; of a mesh on a link the triangles "
         "under each of its hulls"
     )
-
-
-class HeaderLine(AnyHeader):
-    """Line 1, of an arm."""
-
-    errors: ErrorLimits
     joined: dict[
         str,
         tuple[list[tuple[Number, Number]], list[tuple[Number, Number, Number, Number]]],
@@ -88,6 +82,12 @@ class HeaderLine(AnyHeader):
         "joined with], and seams, [three corners, where the edge beside them begins]; "
         "corner 3 k + i is corner i of triangle k, both from 0"
     )
+
+
+class HeaderLine(AnyHeader):
+    """Line 1, of an arm."""
+
+    errors: ErrorLimits
 
 
 class Primitive(LineModel):

@@ -81,7 +81,7 @@ def _header(
         interpolation=trajectory.interpolation,
         pairs=_pairs(problem),
         pieces=_pieces(problem, pieces),
-        joined=_joined(problem),
+        joined=joined_corners(problem.scene),
     )
 
 
@@ -137,10 +137,10 @@ def pieces_of_obstacles(
     return result
 
 
-def _joined(problem: PlanningProblem) -> dict[str, tuple[list[Any], list[Any]]]:
+def joined_corners(scene: Scene) -> dict[str, tuple[list[Any], list[Any]]]:
     """By mesh the corners that are joined to close it, and its seams."""
     result = {}
-    for mesh in map(solid_of, problem.scene.obstacles):
+    for mesh in map(solid_of, scene.obstacles):
         if isinstance(mesh, Mesh) and mesh.has_inside:
             joined = _corners_and_seams(mesh)
             if any(joined):
