@@ -208,7 +208,7 @@ def test_pcd_of_any_fields_is_what_numpy_reads(
     rows = [" ".join(f"{v:g}" for name in names for v in row[name]) for row in table]
     body = {
         "ascii": "\n".join(rows).encode() + b"\n",
-        "binary": table.tobytes() + b"more",
+        "binary": table.tobytes(),
         "binary_compressed": struct.pack(
             "<II", len(packed := copying_lzf(columns, rng)), len(columns)
         ) + packed,
@@ -265,6 +265,50 @@ def test_headers_of_pcd_are_whole_or_refused(
         read(tmp_path / "a.pcd", text.encode())
 
 
+ANNOUNCED = [
+    name for name in FILES if name[:-4] == "count" or name[-3:] in ("pcd", "ply")
+]
+
+
+@pytest.mark.parametrize("name", [*ANNOUNCED, "m.npy"])
+def test_no_point_beyond_those_announced_is_left_out(tmp_path: Path, name: str) -> None:
+    """Fewer announced, or one byte, line or record more: refused, never dropped."""
+    content = FILES.get(name) or npy(tmp_path / name, POINTS)
+    fewer = {
+        "xyz": [(b"3\n", b"2\n")],
+        "pcd": [(b"WIDTH 3", b"WIDTH 2"), (b"POINTS 3", b"POINTS 2")],
+        "ply": [(b"vertex 3", b"vertex 2")],
+        "npy": [(b"(3, 3)", b"(2, 3)")],
+    }[name[-3:]]
+    texts = "count.xyz", "e.pcd", "j.ply"
+    odd = [
+        content + more for more in ((b"1 2 3\n",) if name in texts else (b"\0", b"1"))
+    ]
+    if name not in texts:
+        odd.append(content + bytes(12))
+    for old, new in fewer:
+        assert old in content
+        odd.append(content.replace(old, new, 1))
+    less = content
+    for old, new in fewer:
+        less = less.replace(old, new, 1)
+    for damaged in (*odd, less):
+        with pytest.raises(InvalidFile):
+            read(tmp_path / name, damaged)
+
+
+def test_a_pcd_without_points_has_width_times_height(tmp_path: Path) -> None:
+    grid = np.vstack([POINTS, POINTS + 1.0])
+    head = pcd("ascii", lines(grid)).replace(b"POINTS 3\n", b"")
+    sides = head.replace(b"WIDTH 3\nHEIGHT 1", b"WIDTH 2\nHEIGHT 3")
+    assert np.array_equal(read(tmp_path / "a.pcd", sides).points, grid)
+    with pytest.raises(InvalidFile, match="more data than its header announces: 3 po"):
+        read(tmp_path / "a.pcd", head)
+    odd = sides.replace(b"VIEWPOINT", b"POINTS 5\nVIEWPOINT")
+    with pytest.raises(InvalidFile, match="has WIDTH x HEIGHT = 6, but POINTS 5"):
+        read(tmp_path / "a.pcd", odd)
+
+
 def test_odd_lines_of_points_are_told_apart(tmp_path: Path) -> None:
     """The first line may be a title or a number of points, and no other."""
     path = tmp_path / "a.xyz"
@@ -302,6 +346,9 @@ BAD = {
     ),
     "q.ply": (FILES["j.ply"].replace(b"float z", b"float w"), "has no x, y, z"),
     "r.pcd": (pcd("ascii", b"", 0), "has no point"),
+    "s.pcd": (pcd("ascii", lines(np.hstack([POINTS, POINTS]))), "line 12: has 6 val"),
+    "t.xyz": (b"3\n1 2 3\n1 2 3\n", "line 1: announces 3 points, 2 follow"),
+    "u.xyz": (b"0.5\n1 2 3\n", "line 1: found '0.5', expected 3 numbers"),
 }
 
 

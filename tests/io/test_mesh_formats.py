@@ -342,6 +342,7 @@ GLB_DAMAGE = [
         setting("meshes", 0, "primitives", 0, "attributes", "POSITION", 99),
         "names acces",
     ),
+    (setting("accessors", 0, "count", 35), "triangles of 35 corners"),
     (setting("accessors", 0, "count", 10**9), "promises 1000000000 values, too many"),
     (setting("accessors", 0, "byteOffset", 10**9), "values, too many"),
     (setting("accessors", 0, "sparse", {}), "is sparse or no"),
@@ -382,6 +383,7 @@ TEXT_DAMAGE = [
     ("a.ply", PLY.replace("float x", "float w"), "has no x, y, z of its vertices"),
     ("a.ply", PLY.replace("vertex 3", "vertex 4"), "has 4 values, 'vertex' has 3"),
     ("a.ply", PLY.replace("face 1", "face 2"), "promises 2 of 'face', has 1"),
+    ("a.ply", f"{PLY}\n3 0 1 2", "announces: 3 of 'vertex', 1 of 'face'"),
     (
         "a.ply",
         PLY.replace("face 1", "face 99999999999"),
@@ -433,6 +435,23 @@ def test_damage_of_ply_and_dae_is_named(
     with pytest.raises(InvalidFile) as caught:
         read_mesh(path)
     assert expected in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", ["stl", "ply", "glb"])
+def test_no_triangle_behind_those_announced_is_left_out(
+    tmp_path: Path, kind: str
+) -> None:
+    """More bytes, or a second mesh behind the first: refused, never dropped."""
+    content = trimesh.creation.box().export(file_type=kind)
+    for damaged in (content + bytes(50), content + content):
+        with pytest.raises(InvalidFile, match=r"announces|promises"):
+            read_mesh(write(tmp_path, f"a.{kind}", damaged))
+    if kind == "glb":
+        size = len(content).to_bytes(4, "little")
+        twice = content + content[12:]
+        whole = twice.replace(size, len(twice).to_bytes(4, "little"), 1)
+        with pytest.raises(InvalidFile, match="two chunks of a kind"):
+            read_mesh(write(tmp_path, "a.glb", whole))
 
 
 @pytest.mark.parametrize("kind", ["stl", "ply", "glb"])

@@ -104,6 +104,7 @@ def test_scene_text_is_read_in_both_forms(tmp_path: Path) -> None:
         ),
         ("0.2 0.4", "0.2 x", "line 5: is 'x', expected a number"),
         ("\n.\n", "\n", "the file ends"),
+        ("\n.\n", "\n.\n* can\n", "is '*', expected nothing behind '.'"),
         ("* can", "can", "is 'can', expected"),
         ("0.1 0.2 0.4", "0.1 -0.2 0.4", "half_size is"),
         ("0 0 0.70710678 0.70710678", "0 0 1 1", "orientation of length 1.41"),

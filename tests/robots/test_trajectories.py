@@ -4,6 +4,7 @@ import itertools
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -106,6 +107,24 @@ def test_topics_are_chosen(tmp_path: Path, robot: Robot) -> None:
         file.write_bytes(data[:end])
         with pytest.raises(InvalidFile, match=r"has no|cannot"):
             read_bag(file)
+
+
+@pytest.mark.parametrize(
+    ("names", "q"), [(["a", "b"], 3), (["a", "b"], 1), (["a"], 1), (["a", "b", "c"], 3)]
+)
+def test_no_position_of_a_state_is_left_out(names: list[str], q: int) -> None:
+    """Each message has one position of each joint of the first, in any order."""
+    stamp = SimpleNamespace(sec=0, nanosec=0)
+
+    def state(names: list[str], q: int) -> SimpleNamespace:
+        header = SimpleNamespace(stamp=stamp)
+        return SimpleNamespace(header=header, name=names, position=np.arange(q) + 0.5)
+
+    file, good = Path("t.bag"), [state(["a", "b"], 2), state(["b", "a"], 2)]
+    points = bags._states(file, good)["points"]
+    assert [p["positions"] for p in points] == [[0.5, 1.5], [1.5, 0.5]]
+    with pytest.raises(InvalidFile, match=f"message 1: has {q} positions of"):
+        bags._states(file, [good[0], state(names, q)])
 
 
 def test_sizes_of_bags_are_held_before_they_are_read(

@@ -98,7 +98,7 @@ def _chosen(
 ) -> JointTrajectory:
     """The trajectory in the messages of a topic."""
     if kind == STATES and messages:
-        return of_message(file, _states(messages))
+        return of_message(file, _states(file, messages))
     count = len(messages)
     if number and not (number.isdecimal() and int(number) < count):
         problem = f"topic {topic} has messages 0 to {count - 1}, not {number!r}"
@@ -121,18 +121,29 @@ def _plain(message: Any) -> Any:
     return {name: _plain(getattr(message, name)) for name in fields if name[0] != "_"}
 
 
-def _states(messages: list[Any]) -> dict[str, Any]:
-    """Measured states as waypoints, with times from the first."""
+def _states(file: Path, messages: list[Any]) -> dict[str, Any]:
+    """Measured states as waypoints, with times from the first.
+
+    Raises:
+        InvalidFile: If a message has other joints than the first, or as many positions
+            as it has not.
+    """
     points, names = [], list(messages[0].name)
     first = None
-    for message in messages:
+    for k, message in enumerate(messages):
+        if sorted(message.name) != sorted(names) or len(message.position) != len(names):
+            problem = (
+                f"has {len(message.position)} positions of {message.name}, expected "
+                f"one of each of {names}"
+            )
+            raise InvalidFile(file=file, where=f"message {k}", problem=problem)
         stamp = message.header.stamp
         time = 1_000_000_000 * stamp.sec + stamp.nanosec  # [ns]
         first = time if first is None else first
-        position = dict(zip(message.name, message.position.tolist(), strict=False))
+        position = dict(zip(message.name, message.position.tolist(), strict=True))
         points.append(
             {
-                "positions": [position.get(name) for name in names],
+                "positions": [position[name] for name in names],
                 "time_from_start": (time - first) / 1e9,
             }
         )

@@ -89,6 +89,7 @@ def _npy(stream: MeshStream) -> FloatArray:
         raise stream.invalid(problem) from None
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "fiub":
         raise stream.invalid(problem="is no array of numbers")
+    stream.check_end(data.read(1), f"an array of shape {array.shape}")
     if array.ndim == 3:
         if not ((array == 0) | (array == 1)).all():
             problem = "has values besides 0 and 1, expected one of them for each cell"
@@ -123,7 +124,7 @@ def _text(stream: MeshStream) -> FloatArray:
 
 def _line_by_line(stream: MeshStream, data: bytes) -> FloatArray:
     """The same where a line is odd: the first may be the number of points, or names."""
-    rows, commas = [], set[int]()
+    rows, commas, announced = [], set[int](), ""
     for number, whole in enumerate(data.decode("latin-1").splitlines(), 1):
         line = whole.partition("#")[0].partition("//")[0].strip()
         words = _BETWEEN.split(line)
@@ -131,16 +132,28 @@ def _line_by_line(stream: MeshStream, data: bytes) -> FloatArray:
         if mixed:
             problem = "has commas inside numbers, expected decimal points"
             raise stream.invalid(problem, line=number)
-        title = number == 1 and (len(words) == 1 or words[0][:1].isalpha())
+        title = number == 1 and (words[0].isdecimal() or not _is_number(words[0]))
+        title = title and (len(words) == 1 or words[0][:1].isalpha())
         commas |= {line.count(",")} - {0}
         if len(commas) > 1:
             problem = "has another number of commas than lines before it"
             raise stream.invalid(problem, line=number)
         if title:
+            announced = words[0] if words[0].isdecimal() else ""
             _check_title(stream, [word.strip('"').lower() for word in words])
         elif words != [""]:
             rows.append(stream.numbers(words[:3], 3, number))
+    if announced and announced.lstrip("0") != str(len(rows)).lstrip("0"):
+        problem = f"announces {announced} points, {len(rows)} follow"
+        raise stream.invalid(problem, line=1)
     return np.array(rows).reshape(-1, 3)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        return float(word) is not None
+    except ValueError:
+        return False
 
 
 def _check_title(stream: MeshStream, names: list[str]) -> None:

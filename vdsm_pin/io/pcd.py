@@ -1,6 +1,7 @@
 """PCD, the format of the Point Cloud Library: text, binary, binary and compressed."""
 
 import io
+import math
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
@@ -42,9 +43,8 @@ def read_pcd(stream: MeshStream) -> FloatArray:
             return _columns(stream, header, _unpacked(stream, header, data))
         case _:
             size = header.points * header.kind.itemsize
-            if len(data) < size:
-                raise _cut_short(stream, header)
-            table = np.frombuffer(data[:size], header.kind)
+            _check_size(stream, header, len(data), size)
+            table = np.frombuffer(data, header.kind)
             return np.column_stack([_first(table[axis]) for axis in "xyz"])
 
 
@@ -72,11 +72,15 @@ def _understood(stream: MeshStream, said: dict[str, list[str]], lines: int) -> _
     sizes, kinds = said.get("SIZE", []), said.get("TYPE", [])
     counts = said.get("COUNT", ["1"] * len(names))
     form = " ".join(said["DATA"])
-    points = said.get("POINTS", said.get("WIDTH", []))
-    numbers = [*sizes, *counts, *points]
+    keys = ("WIDTH", "HEIGHT"), ("POINTS",)
+    totals = [[said[key] for key in part if key in said] for part in keys]
+    totals = [total for total in totals if total]
+    numbers = [word for total in totals for words in total for word in words]
+    numbers += [*sizes, *counts]
     good = (
         len(names) == len(sizes) == len(kinds) == len(counts)
-        and len(points) == 1
+        and totals
+        and all(len(words) == 1 for total in totals for words in total)
         and all(word.isdecimal() and len(word) < 12 for word in numbers)
         and {int(size) for size in sizes} <= set(_SIZES)
         and set(kinds) <= set(_KINDS)
@@ -90,6 +94,10 @@ def _understood(stream: MeshStream, said: dict[str, list[str]], lines: int) -> _
         problem = "has a header that is no PCD's: expected FIELDS with x y z, SIZE, "
         problem += "TYPE, POINTS, DATA ascii, binary or binary_compressed"
         raise stream.invalid(problem)
+    points, *others = (math.prod(int(w[0]) for w in total) for total in totals)
+    if others and others[0] != points:
+        problem = f"has WIDTH x HEIGHT = {points}, but POINTS {others[0]}"
+        raise stream.invalid(problem)
     seen_from = stream.numbers(said.get("VIEWPOINT", list(map(str, _FRAME))), 7, lines)
     if (*seen_from,) != _FRAME:
         problem = (
@@ -97,8 +105,8 @@ def _understood(stream: MeshStream, said: dict[str, list[str]], lines: int) -> _
         )
         problem += "points or not; expected points that it does not, and 0 0 0 1 0 0 0"
         raise stream.invalid(problem)
-    stream.check_room(int(points[0]))
-    if not int(points[0]):
+    stream.check_room(points)
+    if not points:
         raise stream.invalid(problem="has no point")
     fields = [
         (f"{name}" if name in "xyz" else f"{name} {k}", f"<{_KINDS[t]}{s}", (int(c),))
@@ -106,7 +114,7 @@ def _understood(stream: MeshStream, said: dict[str, list[str]], lines: int) -> _
             zip(names, kinds, sizes, counts, strict=True)
         )
     ]
-    return _Header(np.dtype(fields), int(points[0]), form, lines)
+    return _Header(np.dtype(fields), points, form, lines)
 
 
 def _text(stream: MeshStream, header: _Header, data: bytes) -> FloatArray:
@@ -114,14 +122,12 @@ def _text(stream: MeshStream, header: _Header, data: bytes) -> FloatArray:
     names = header.kind.names or ()
     starts = np.cumsum([0, *(int(np.prod(header.kind[name].shape)) for name in names)])
     place = [int(starts[names.index(axis)]) for axis in "xyz"]
-    lines = data.decode("latin-1").splitlines()[: header.points]
-    if len(lines) < header.points:
-        raise _cut_short(stream, header)
+    lines = data.decode("latin-1").rstrip().splitlines()
+    _check_size(stream, header, len(lines), header.points)
     with suppress(ValueError):  # told line by line below
-        text = io.StringIO("\n".join(lines))
-        table = np.loadtxt(text, usecols=place, ndmin=2, comments=None)
-        if len(table) == header.points:
-            return table
+        if {len(line.split()) for line in lines} == {starts[-1]}:
+            text = io.StringIO("\n".join(lines))
+            return np.loadtxt(text, usecols=place, ndmin=2, comments=None)
     rows = []
     for number, line in enumerate(lines, header.lines + 1):
         words = line.split()
@@ -148,9 +154,9 @@ def _unpacked(stream: MeshStream, header: _Header, data: bytes) -> bytes:
     """What LZF packed, of the size that the header promises."""
     packed, size = np.frombuffer(data[:8].ljust(8, b"\0"), "<u4").tolist()
     wanted = header.points * header.kind.itemsize
-    if len(data) < 8 + packed or size != wanted:
-        raise _cut_short(stream, header)
-    found = _from_lzf(data[8 : 8 + packed], wanted)
+    _check_size(stream, header, len(data), 8 + packed)
+    _check_size(stream, header, size, wanted)
+    found = _from_lzf(data[8:], wanted)
     if len(found) != wanted:
         raise stream.invalid(problem="has compressed data that is damaged")
     return found
@@ -183,9 +189,12 @@ def _from_lzf(data: bytes, size: int) -> bytes:
             return b""
         part = bytes(out[start : start + length])
         out += (part * (length // back + 1))[:length] if back < length else part
-    return bytes(out)
+    return bytes(out) if at == end else b""
 
 
-def _cut_short(stream: MeshStream, header: _Header) -> Exception:
-    problem = f"is cut short: its header promises {header.points} points"
-    return stream.invalid(problem)
+def _check_size(stream: MeshStream, header: _Header, size: int, wanted: int) -> None:
+    """Refuse bytes or lines that are fewer than the header announces, or more."""
+    if size < wanted:
+        problem = f"is cut short: its header promises {header.points} points"
+        raise stream.invalid(problem)
+    stream.check_end(size - wanted, f"{header.points} points")

@@ -59,6 +59,12 @@ class _Words:
             raise self.invalid(problem)
         return int(word)
 
+    def check_end(self) -> None:
+        """Refuse words behind the end of the scene."""
+        for number, word in self._words:
+            self.line, problem = number, f"is {word!r}, expected nothing behind '.'"
+            raise self.invalid(problem)
+
     def has_poses(self) -> bool:
         """Whether objects have a pose of their own, by the line after a name."""
         after = False
@@ -92,6 +98,7 @@ def read_scene_text(file: Path, text: str) -> YamlDocument:
         thing = _thing(words, with_pose)
         lines[at] = words.line
         things.append(thing)
+    words.check_end()
     data: Any = {"world": {"collision_objects": things}}
     return YamlDocument(file, data, lines)
 

@@ -18,6 +18,7 @@ from vdsm_pin.io.schema_types import LARGEST
 _LOOKS: Final = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_")
 _KNOWN: Final = frozenset({"KHR_mesh_quantization", "KHR_xmp_json_ld", "KHR_xmp"})
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_JSON, _BIN = 0x4E4F534A, 0x004E4942
 _MOST_JSON: Final = 64 << 20
 _NUMBERS: Final[dict[int, np.dtype[Any]]] = {
     5120: np.dtype("<i1"),
@@ -141,16 +142,19 @@ def _chunks(stream: MeshStream) -> tuple[bytes, bytes]:
     magic, version, length = content[:4], *_words(content, 4)
     if magic != b"glTF" or version != 2 or length > len(content):
         raise stream.invalid(problem="is no GLB file of version 2, or cut short")
+    stream.check_end(content[length:], f"{length} bytes")
     offset, found = 12, dict[int, bytes]()
-    while offset + 8 <= length:
+    while offset < length:
         size, kind = _words(content, offset)
         if offset + 8 + size > length:
             raise stream.invalid(problem=f"a chunk promises {size} bytes, fewer follow")
-        found.setdefault(kind, content[offset + 8 : offset + 8 + size])
+        if kind in (_JSON, _BIN) and kind in found:
+            raise stream.invalid(problem="has two chunks of a kind, expected one")
+        found[kind] = content[offset + 8 : offset + 8 + size]
         offset += 8 + size
-    if 0x4E4F534A not in found:
+    if _JSON not in found:
         raise stream.invalid(problem="has no JSON chunk")
-    return found[0x4E4F534A], found.get(0x004E4942, b"")
+    return found[_JSON], found.get(_BIN, b"")
 
 
 def _words(content: bytes, offset: int) -> tuple[int, int]:
@@ -240,6 +244,9 @@ class _Reader:
         if not (order < len(vertices)).all():
             problem = f"names vertex {order.max()} of {len(vertices)}"
             raise self._stream.invalid(problem)
+        if primitive.mode == _TRIANGLES and len(order) % 3:
+            problem = f"has triangles of {len(order)} corners, expected three each"
+            raise self._stream.invalid(problem)
         return Part(vertices, _triangles(order, primitive.mode))
 
     def _numbers(self, number: int, shape: str) -> FloatArray:
@@ -276,5 +283,5 @@ class _Reader:
 def _triangles(order: IntArray, mode: int) -> IntArray:
     """Vertex indices of triangles from a list, a strip or a fan."""
     if mode == _TRIANGLES:
-        return order[: len(order) // 3 * 3].reshape(-1, 3)
+        return order.reshape(-1, 3)
     return strip_triangles(order, fan=mode == _FAN)

@@ -91,7 +91,16 @@ def read_ply_points(stream: MeshStream) -> FloatArray:
 
 
 def _elements(stream: MeshStream, header: _Header) -> dict[str, _Columns]:
+    """Every element by name.
+
+    Raises:
+        InvalidFile: If there are fewer than announced, or more follows behind them.
+    """
     return _Binary(stream, header).read() if header.order else _text(stream, header)
+
+
+def _announced(header: _Header) -> str:
+    return ", ".join(f"{one.count} of {one.name!r}" for one in header.elements.values())
 
 
 def _vertices(stream: MeshStream, read: dict[str, _Columns]) -> FloatArray:
@@ -180,6 +189,7 @@ def _text(stream: MeshStream, header: _Header) -> dict[str, _Columns]:
             one.name: _Column(np.array(values[k]), np.array(sizes[k]))
             for k, one in enumerate(element.properties)
         }
+    stream.check_end(next(lines, None), _announced(header))
     return found
 
 
@@ -208,7 +218,7 @@ class _Binary:
     """The elements of a binary file, as many as there must be."""
 
     def __init__(self, stream: MeshStream, header: _Header) -> None:
-        self._stream, self._elements = stream, header.elements.values()
+        self._stream, self._header = stream, header
         self._order = header.order or sys.byteorder
         self._sign = ">" if self._order == "big" else "<"
         self._data, self._offset = stream.content.read(), 0
@@ -216,11 +226,12 @@ class _Binary:
     def read(self) -> dict[str, _Columns]:
         """Every element by name."""
         found = {}
-        for element in self._elements:
+        for element in self._header.elements.values():
             columns = self._alike(element)
             if columns is None:
                 columns = self._one_by_one(element, element.count)
             found[element.name] = columns
+        self._stream.check_end(self._data[self._offset :], _announced(self._header))
         return found
 
     def _alike(self, element: _Element) -> _Columns | None:

@@ -121,6 +121,20 @@ class MeshStream:
             raise self.invalid(problem, line=line)
         return values
 
+    def check_end(self, left: object, announced: str) -> None:
+        """Refuse what stands behind the last of what the header announces.
+
+        Args:
+            left: What was not read: bytes or words; nothing if all was.
+            announced: What the header announces.
+
+        Raises:
+            InvalidFile: If there is anything.
+        """
+        if left:
+            problem = f"has more data than its header announces: {announced}"
+            raise self.invalid(problem)
+
     def check_count(self, triangles: int) -> None:
         """Refuse more triangles than any mesh may have, before room is made for them.
 
