@@ -189,7 +189,10 @@ def test_the_feed_is_proved_and_checked(tmp_path: Path) -> None:
     thick = {"length": 600.0, "radius": 30.2}
     wrong = Files(tmp_path, problem(obstacles=[beside], feed=thick), rows).verify()
     assert wrong.verdict is Verdict.REFUTED
-    assert wrong.approaches[0].pair.own == "feed"
+    near = wrong.approaches[0]
+    assert near.pair.own == "feed"
+    # The post stands at x = -100 mm, and O_1 at 400 mm times the moment.
+    assert near.station == pytest.approx(-0.1 - 0.4 * near.moment, abs=1e-6)
 
 
 @pytest.mark.parametrize("shift", [0.0, 1.0])

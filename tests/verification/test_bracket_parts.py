@@ -34,7 +34,7 @@ from vdsm_pin.verification.brackets import ClearanceChunk, ClearanceProfile
 from vdsm_pin.verification.clearance import _merged, _steps, profile_of
 from vdsm_pin.verification.coal_distances import _Moved
 from vdsm_pin.verification.coal_missing import NEAR
-from vdsm_pin.verification.enclosed import EnclosedSink, enclosed_profile
+from vdsm_pin.verification.enclosed import EnclosedSink, enclosed_profile, pairs_inside
 from vdsm_pin.verification.moving import MOST_PARTS, PART, Knots, in_short_parts
 from vdsm_pin.verification.proved_lowers import LowersSink, ProvedLowers
 from vdsm_pin.verification.task import all_pairs
@@ -228,7 +228,7 @@ def test_the_arm_is_inside_until_its_axis_may_meet_the_surface(seed: int) -> Non
     }
     got: list[ClearanceChunk] = []
     sink, left = (
-        EnclosedSink(got.append, asked, enclosed),
+        EnclosedSink(got.append, pairs, pairs_inside(asked, pairs, enclosed)),
         {name: False for name in NAMES},
     )
     for part in range(4):

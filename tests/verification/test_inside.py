@@ -375,3 +375,23 @@ def test_the_checker_names_what_was_assumed_of_a_mesh(tmp_path: Path) -> None:
     assert gaps == "gaps of housing, up to 0.01 mm wide, are joined"
     assert joined == "linear pieces join the rows"
     assert main([str(path), str(tmp_path / "None.yaml"), str(tmp_path / "t.csv")]) == 0
+
+
+def test_what_is_carried_alone_inside_a_mesh_is_the_nearest(tmp_path: Path) -> None:
+    """A camera 15 mm beside the arm, within a hollow box that the arm is outside of."""
+    hollow = np.array([0.005, 0.0, 0.015]) + box(0.008)
+    path, rows = written(tmp_path, hollow)
+    asked = json.loads(path.read_text())
+    camera = {"name": "camera", "link": 1, "shape": "sphere"}
+    camera |= {"center": [0.005, 0.0, 0.015], "radius": 0.001}
+    asked["manipulator"] |= {"bodies": [camera]}
+    asked |= {"required_clearance": 0.0}
+    path.write_text(json.dumps(asked))
+    _, found = verified(path, rows)
+    assert found.verdict is Verdict.REFUTED
+    first = found.approaches[0]
+    assert (first.pair.own, first.pair.obstacle) == ("camera", "housing")
+    assert first.deeper and first.lower == first.upper == -0.001
+    assert found.min_clearance == found.least.upper.min() == -0.001
+    worst = next(c for c in found.checks if c.name == "clearance from obstacles")
+    assert (worst.worst, worst.where) == (-0.001, "the arm is inside 'housing'")

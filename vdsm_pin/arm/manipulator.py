@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from vdsm_pin.errors import InvalidInput, UnknownName
 from vdsm_pin.geometry.arrays import FloatArray, check_numbers, freeze, frozen
 from vdsm_pin.geometry.solids import Capsule
 from vdsm_pin.units import MM_PER_M
+
+if TYPE_CHECKING:
+    from vdsm_pin.arm.bodies import ArmBody, SelfPairs
 
 MAX_LINKS: Final = 40
 """Largest number of links the package is tested with."""
@@ -162,6 +165,20 @@ class Manipulator:
             rod = Capsule(FEED, -half * axis, axis, half, self.feed.radius)
             found.insert(0, (0, rod))
         return tuple(found)
+
+    @cached_property
+    def convex_bodies(self) -> tuple["ArmBody", ...]:
+        """Every convex body: links 1 to N, tool, feed, then the others in order."""
+        from vdsm_pin.arm.bodies import arm_bodies  # compiled code, which few need
+
+        return arm_bodies(self)
+
+    @cached_property
+    def self_pairs(self) -> "SelfPairs":
+        """Which of them are held apart."""
+        from vdsm_pin.arm.bodies import self_pairs
+
+        return self_pairs(self, self.convex_bodies)
 
     def check_ignored(self, pair: tuple[str, str], obstacles: Sequence[str]) -> None:
         """Refuse a pair of `ignore_pairs` that names nothing that is held apart.

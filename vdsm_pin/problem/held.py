@@ -117,9 +117,7 @@ class HeldApart:
     @classmethod
     def of(cls, arm: Manipulator, obstacles: Sequence[str]) -> "HeldApart":
         """By the `ignore_pairs` of an arm and the names of the obstacles."""
-        from vdsm_pin.arm.bodies import arm_bodies  # compiled code, which few need
-
-        bodies = arm_bodies(arm) if arm.ignore_pairs else ()
+        bodies = arm.convex_bodies if arm.ignore_pairs else ()
         pairs, n_axes = held_pairs(arm, bodies, obstacles), arm.axis_radii.size
         axes = np.ones((n_axes, len(obstacles)), dtype=np.bool_)
         axes[: len(pairs)] = pairs[:n_axes]

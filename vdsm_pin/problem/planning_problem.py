@@ -142,10 +142,9 @@ class PlanningProblem(AnyProblem):
     @cached_property
     def packed(self) -> "PackedPieces":
         """The obstacles, then the bodies of the arm in the frames of their links."""
-        from vdsm_pin.arm.bodies import arm_bodies  # compiled code, which few need
-        from vdsm_pin.geometry.pieces import pack_pieces
+        from vdsm_pin.geometry.pieces import pack_pieces  # compiled code, few need it
 
-        bodies = [[body.piece] for body in arm_bodies(self.manipulator)]
+        bodies = [[body.piece] for body in self.manipulator.convex_bodies]
         obstacles = [obstacle.pieces for obstacle in self.scene.obstacles]
         return pack_pieces([*obstacles, *bodies])
 

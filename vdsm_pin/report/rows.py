@@ -95,7 +95,8 @@ class ClosestRow(FileModel):
     lower_m: FiniteFloat | None = Field(description="proved lower bound")
     upper_m: FiniteFloat | None = Field(description="proved upper bound")
     station_m: FiniteFloat | None = Field(
-        description="of link_point_m, along the link's axis from its first joint"
+        description="of link_point_m, along the link's axis from its first joint; "
+        "of the feed back from O1, below 0"
     )
     link_point_m: Point | None = Field(description=f"on the link; {_FRAME}")
     other_point_m: Point | None = Field(description=f"on its partner; {_FRAME}")

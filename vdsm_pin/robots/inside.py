@@ -26,6 +26,7 @@ from vdsm_pin.proof.question import Question
 from vdsm_pin.proof.terms import CERTIFIED
 from vdsm_pin.robots.cell import Cell
 from vdsm_pin.verification.brackets import ClearanceProfile
+from vdsm_pin.verification.enclosed import Inside
 from vdsm_pin.verification.first_contact import FirstContact
 from vdsm_pin.verification.inside import worst_location
 from vdsm_pin.verification.records import Pair
@@ -155,10 +156,12 @@ def by_mesh(cell: Cell, located: Mapping[int, Place]) -> dict[str, Location]:
     return {name: worst_location(each) for name, each in found.items()}
 
 
-def points_inside(located: Mapping[int, Place]) -> dict[int, FloatArray]:
-    """A point of each link that begins inside a mesh, by the number of the pair."""
+def pairs_inside(located: Mapping[int, Place]) -> dict[int, Inside]:
+    """The pairs of a link that begins inside a mesh, by their numbers."""
     found = located.items()
-    return {k: one.point for k, one in found if one.where.side is Side.INSIDE}
+    return {
+        k: Inside(one.point, 0.0) for k, one in found if one.where.side is Side.INSIDE
+    }
 
 
 def enclosed_contacts(
@@ -167,7 +170,7 @@ def enclosed_contacts(
     located: Mapping[int, Place],
 ) -> tuple[FirstContact, ...]:
     """The first contacts: of a link that begins inside a mesh it is the first row."""
-    inside = list(points_inside(located))
+    inside = list(pairs_inside(located))
     if not inside:
         return contacts
     between = (one for one in contacts if not one.pair.obstacle)
@@ -179,7 +182,7 @@ def enclosed_profile(
 ) -> ClearanceProfile:
     """The profile with meshes as solids, until links that begin inside may come out."""
     changed = {one.name: getattr(profile, one.name).copy() for one in fields(profile)}
-    for k in points_inside(located):
+    for k in pairs_inside(located):
         pair, n = cell.pairs[k], len(cell.robot.bodies)
         met = changed["obstacle_lower"][:, pair.one - n] <= 0.0
         inside = ~np.logical_or.accumulate(met)

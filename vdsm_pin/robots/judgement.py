@@ -29,7 +29,7 @@ from vdsm_pin.robots.inside import (
     enclosed_contacts,
     enclosed_profile,
     locate_links,
-    points_inside,
+    pairs_inside,
 )
 from vdsm_pin.robots.model import Robot
 from vdsm_pin.robots.rates import rate_checks
@@ -99,7 +99,7 @@ def verify_robot(
     named = cell.named_pairs
     proved = least_clearances(cell, cell.pairs, whole, proof)
     coal, measured = _coal(cell, whole, proof, knots)
-    least, extras = enclosed_least(proved, points_inside(located), 0.0), BestEffort()
+    least, extras = enclosed_least(proved, pairs_inside(located)), BestEffort()
     profile = profile_of(proof.profile, proof.stride, knots, len(robot.bodies))
     asked = cell, whole, named, least, proof.lower_interval, deadline
     lost = extras.take("search for counterexamples", (), robot_counterexamples, *asked)

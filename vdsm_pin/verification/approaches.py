@@ -11,9 +11,6 @@ from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.brackets import LeastClearances
-from vdsm_pin.verification.clearance import ClearanceProof, least_clearances
-from vdsm_pin.verification.enclosed import enclosed_approaches
-from vdsm_pin.verification.inside import Enclosed
 from vdsm_pin.verification.records import ClosestApproach, Pair, is_deepest
 from vdsm_pin.verification.task import ball_of
 
@@ -24,8 +21,8 @@ CLOSEST: Final = 10
 def closest_approaches(
     problem: PlanningProblem,
     trajectory: Trajectory,
-    proof: ClearanceProof,
-    enclosed: Enclosed | None = None,
+    pairs: Sequence[Pair],
+    least: LeastClearances,
 ) -> tuple[ClosestApproach, ...]:
     """The pairs that come nearest, by their upper bounds; obstacles first.
 
@@ -35,19 +32,17 @@ def closest_approaches(
     Args:
         problem: Arm and scene.
         trajectory: The motion.
-        proof: The clearance proof of the motion.
-        enclosed: Bodies that begin inside a mesh, by name of the mesh.
+        pairs: Every pair.
+        least: What is proved of them, meshes as solids.
     """
-    enclosed = enclosed or {}
-    rows = list(enclosed_approaches(problem, enclosed))
-    nearest = nearest_pairs(proof.pairs, least_clearances(proof))
-    for near in nearest.values():
-        if near.pair.own in enclosed.get(near.pair.obstacle, ()):
-            continue
-        deeper = is_deepest(near.upper, ball_of(problem, near.pair))
-        station = _station(problem, trajectory, near)
-        rows.append(replace(near, station=station, deeper=deeper))
-    return tuple(rows[:CLOSEST])
+    return tuple(
+        replace(
+            near,
+            station=_station(problem, trajectory, near),
+            deeper=is_deepest(near.upper, ball_of(problem, near.pair)),
+        )
+        for near in nearest_pairs(pairs, least).values()
+    )
 
 
 def nearest_pairs(
@@ -80,11 +75,17 @@ def nearest_pairs(
 def _station(
     problem: PlanningProblem, trajectory: Trajectory, near: ClosestApproach
 ) -> float:
-    """Arc length along the link's axis of the point nearest to the witness; [m]."""
-    joints, link = trajectory.path.at_moments(np.array([near.moment])), near.pair.link
+    """Arc length along the link's axis of the point nearest to the witness; [m].
+
+    Of the feed, which lies along the rail, it counts back from O_1 and is negative.
+    """
+    arm, link = problem.manipulator, near.pair.link
+    joints = trajectory.path.at_moments(np.array([near.moment]))
+    if not link and arm.feed:
+        return float(np.clip(near.link_point[0] - joints[0, 0], -arm.feed.length, 0.0))
     now = joints[:, 0], joints[:, 1::2], joints[:, 2::2]
-    centres = joint_centres(problem.manipulator, *now)[0]
-    length = float(problem.manipulator.link_lengths[link - 1])
+    centres = joint_centres(arm, *now)[0]
+    length = float(arm.link_lengths[link - 1])
     axis = (centres[link] - centres[link - 1]) / length
     along = float(axis @ (near.link_point - centres[link - 1]))
     return min(max(along, 0.0), length)

@@ -4,7 +4,6 @@ from functools import partial
 
 import numpy as np
 
-from vdsm_pin.arm.bodies import arm_bodies
 from vdsm_pin.arm.tree import arm_tree, link_frame
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.error_boxes import ErrorBox
@@ -37,7 +36,7 @@ def arm_question(
     tree = joined_tree(own, problem.scene)
     bodies = {
         body.name: Body(link_frame(body.link), (body.piece,), body.name)
-        for body in arm_bodies(arm)
+        for body in arm.convex_bodies
     }
     if pair.obstacle:
         required = problem.required_clearance

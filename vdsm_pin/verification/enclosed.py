@@ -6,9 +6,10 @@ reported as minus the link's radius, whatever the depth. That is said of what be
 inside; what reaches out through the surface has its distance from that.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from math import nan
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,35 +23,58 @@ from vdsm_pin.verification.brackets import (
     LeastClearances,
 )
 from vdsm_pin.verification.inside import Enclosed
-from vdsm_pin.verification.records import Check, ClosestApproach, Pair, Verdict
-from vdsm_pin.verification.task import all_pairs
+from vdsm_pin.verification.records import Check, Pair, Verdict
 
 
-def _begins_inside(pair: Pair, enclosed: Enclosed) -> bool:
-    """Whether the obstacle of a pair is a mesh, and its body begins inside."""
-    return pair.own in enclosed.get(pair.obstacle, ())
+class Inside(NamedTuple):
+    """A body that begins inside a mesh.
+
+    Args:
+        point: A point of it that is inside, shape (3,); [m].
+        clearance: What is said of it: minus the radius about its core; [m].
+    """
+
+    point: FloatArray
+    clearance: float
+
+
+def pairs_inside(
+    problem: PlanningProblem, pairs: Sequence[Pair], enclosed: Enclosed
+) -> dict[int, Inside]:
+    """The pairs of an arm that begin inside a mesh, by their numbers."""
+    balls = _balls(problem)
+    return {
+        k: Inside(enclosed[pair.obstacle][pair.own], -balls[pair.own])
+        for k, pair in enumerate(pairs if enclosed else ())
+        if pair.own in enclosed.get(pair.obstacle, ())
+    }
+
+
+def _balls(problem: PlanningProblem) -> dict[str, float]:
+    """Radius about the core of each body of the arm, by its name; [m]."""
+    return {body.name: body.ball for body in problem.manipulator.convex_bodies}
 
 
 class EnclosedSink:
     """Corrects chunks for the meshes that the arm is inside of and passes them on.
 
-    The arm stays inside until its axis may meet the surface.
+    The arm stays inside until the core of a body may meet the surface.
 
     Args:
         sink: Receives the corrected chunks.
-        problem: The arm.
-        enclosed: Meshes and the bodies that begin inside them.
+        pairs: Every pair.
+        inside: Those that begin inside a mesh.
     """
 
     def __init__(
-        self, sink: ClearanceSink, problem: PlanningProblem, enclosed: Enclosed
+        self, sink: ClearanceSink, pairs: Sequence[Pair], inside: Mapping[int, Inside]
     ) -> None:
-        self.sink, self.least = sink, -problem.manipulator.least_radius
-        pairs = list(enumerate(all_pairs(problem)))
-        self.columns = [
-            np.array([k for k, pair in pairs if _begins_inside(pair, {name: inside})])
-            for name, inside in enclosed.items()
-            if inside
+        self.sink, by_mesh = sink, dict[str, list[int]]()
+        for k in inside:
+            by_mesh.setdefault(pairs[k].obstacle, []).append(k)
+        self.columns = [np.array(each) for each in by_mesh.values()]
+        self.depths = [
+            np.array([inside[k].clearance for k in each]) for each in by_mesh.values()
         ]
         self.left = [False] * len(self.columns)
 
@@ -59,11 +83,12 @@ class EnclosedSink:
         lower, upper = chunk.lower.copy(), chunk.upper.copy()
         verdict, other_point = chunk.verdict.copy(), chunk.other_point.copy()
         for k, columns in enumerate(self.columns):
-            meets = (chunk.lower[:, columns] <= self.least).any(axis=1)
+            meets = (chunk.lower[:, columns] <= self.depths[k]).any(axis=1)
             out = np.logical_or.accumulate(meets) | self.left[k]
             self.left[k] = bool(out[-1])
             inside = np.ix_(~out, columns)
-            lower[:, columns] = upper[inside] = self.least
+            lower[:, columns] = self.depths[k]
+            upper[inside] = self.depths[k]
             verdict[inside] = REFUTED
             other_point[inside] = chunk.link_point[inside]
         self.sink(
@@ -83,17 +108,19 @@ def enclosed_profile(
     """The profile with the meshes that the arm is inside of as solids."""
     if not enclosed:
         return profile
-    least = -problem.manipulator.least_radius
+    arm, balls = problem.manipulator, _balls(problem)
     lower, upper = profile.obstacle_lower.copy(), profile.obstacle_upper.copy()
     link_lower, link_upper = profile.link_lower.copy(), profile.link_upper.copy()
     for name, bodies in enclosed.items():
         column = problem.scene.names.index(name)
+        least = -min((balls[body] for body in bodies), default=arm.least_radius)
         mine: BoolArray = ~np.logical_or.accumulate(lower[:, column] <= least)
         lower[:, column] = upper[mine, column] = least
-        for link in range(problem.manipulator.n_links):
-            if f"link {link + 1}" in bodies:
-                link_lower[:, link] = np.minimum(link_lower[:, link], least)
-                link_upper[mine, link] = np.minimum(link_upper[mine, link], least)
+        for link in range(arm.n_links):
+            if (own := f"link {link + 1}") in bodies:
+                depth = -balls[own]
+                link_lower[:, link] = np.minimum(link_lower[:, link], depth)
+                link_upper[mine, link] = np.minimum(link_upper[mine, link], depth)
     return replace(
         profile,
         link_lower=frozen(link_lower),
@@ -104,64 +131,38 @@ def enclosed_profile(
 
 
 def enclosed_least(
-    least: LeastClearances, inside: Mapping[int, FloatArray], depth: float
+    least: LeastClearances, inside: Mapping[int, Inside]
 ) -> LeastClearances:
     """The least clearances with meshes as solids, of an arm or a robot.
 
     Args:
         least: What is proved of the surfaces.
-        inside: A point of each pair's body that begins inside the mesh, by the number
-            of the pair, shape (3,); [m].
-        depth: The clearance of such a pair; [m].
+        inside: The pairs that begin inside a mesh.
     """
-    rows = {k: (0, 0.0, depth, depth, REFUTED, at, at) for k, at in inside.items()}
+    rows = {
+        k: (0, 0.0, one.clearance, one.clearance, REFUTED, one.point, one.point)
+        for k, one in inside.items()
+    }
     return least.with_rows(rows) if rows else least
 
 
-def pairs_inside(pairs: Sequence[Pair], enclosed: Enclosed) -> dict[int, FloatArray]:
-    """The pairs of an arm that begin inside, as `enclosed_least` takes them."""
-    return {
-        k: enclosed[pair.obstacle][pair.own]
-        for k, pair in enumerate(pairs)
-        if _begins_inside(pair, enclosed)
-    }
-
-
-def enclosed_approaches(
-    problem: PlanningProblem, enclosed: Enclosed
-) -> tuple[ClosestApproach, ...]:
-    """Each link that begins inside a mesh, by its middle."""
-    arm = problem.manipulator
-    return tuple(
-        ClosestApproach(
-            interval=0,
-            share=0.0,
-            pair=Pair(link=link, obstacle=name),
-            lower=-arm.least_radius,
-            upper=-arm.least_radius,
-            station=float(arm.axis_spans[link - 1].mean()),
-            link_point=frozen(bodies[f"link {link}"]),
-            other_point=frozen(bodies[f"link {link}"]),
-            deeper=True,
-        )
-        for name, bodies in enclosed.items()
-        for link in range(1, arm.n_links + 1)
-        if f"link {link}" in bodies
-    )
-
-
 def enclosed_checks(
-    rows: tuple[Check, ...], problem: PlanningProblem, enclosed: Collection[str]
+    rows: tuple[Check, ...], meshes: Collection[str], clearances: Iterable[float]
 ) -> tuple[Check, ...]:
-    """The rows of the clearance, the one from obstacles first."""
-    if not enclosed:
+    """The rows of the clearance, the one from obstacles first.
+
+    Args:
+        rows: As proved of the surfaces.
+        meshes: Names of those that the arm is inside of.
+        clearances: Of the bodies inside; [m].
+    """
+    if not meshes:
         return rows
-    worst = min(rows[0].worst, -problem.manipulator.least_radius)
     refuted = replace(
         rows[0],
         verdict=Verdict.REFUTED,
-        worst=worst,
-        where="; ".join(f"the arm is inside {name!r}" for name in enclosed),
+        worst=min([rows[0].worst, *clearances]),
+        where="; ".join(f"the arm is inside {name!r}" for name in meshes),
         moment=0.0,
         first_moment=0.0,
         last_moment=nan,

@@ -13,7 +13,7 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from vdsm_pin.arm.bodies import ArmBody, arm_bodies
+from vdsm_pin.arm.bodies import ArmBody
 from vdsm_pin.arm.kinematics import joint_centres, link_frames
 from vdsm_pin.errors import OutOfTime
 from vdsm_pin.geometry.arrays import FloatArray
@@ -118,7 +118,7 @@ def _middles(
     centres = joint_centres(problem.manipulator, *joints)[0]
     frames = link_frames(*joints[1:])[0]
     found = []
-    for body in arm_bodies(problem.manipulator):
+    for body in problem.manipulator.convex_bodies:
         turned = frames[body.link - 1] if body.link else np.eye(3)
         middle = turned @ body.corners.mean(axis=0)
         found.append((body, centres[max(0, body.link - 1)] + middle))

@@ -5,13 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from vdsm_pin.arm.bodies import (
-    BY_FILE,
-    ArmBody,
-    SelfPairs,
-    arm_bodies,
-    self_pairs,
-)
+from vdsm_pin.arm.bodies import BY_FILE
 from vdsm_pin.arm.tree import RAIL, arm_tree, link_frame
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
@@ -43,8 +37,7 @@ class ArmPairs:
 
     def __init__(self, problem: PlanningProblem) -> None:
         self.problem, arm = problem, problem.manipulator
-        self.bodies: tuple[ArmBody, ...] = arm_bodies(arm)
-        self.between: SelfPairs = self_pairs(arm, self.bodies)
+        self.bodies, self.between = arm.convex_bodies, arm.self_pairs
         names = problem.scene.names
         held = held_pairs(arm, self.bodies, names).T
         ignored = np.argwhere(~held).tolist()
@@ -123,7 +116,7 @@ def ball_of(problem: PlanningProblem, pair: Pair) -> float:
 
     No depth beyond it is measured.
     """
-    bodies = arm_bodies(problem.manipulator)
+    bodies = problem.manipulator.convex_bodies
     return next(body.ball for body in bodies if body.name == pair.own)
 
 

@@ -38,6 +38,7 @@ from vdsm_pin.verification.coal_distances import coal_reach
 from vdsm_pin.verification.coal_log import CoalLog
 from vdsm_pin.verification.enclosed import (
     EnclosedSink,
+    Inside,
     enclosed_checks,
     enclosed_least,
     enclosed_profile,
@@ -50,7 +51,6 @@ from vdsm_pin.verification.first_contact import (
     arm_contacts,
 )
 from vdsm_pin.verification.inside import (
-    Enclosed,
     arm_inside,
     bodies_inside,
     check_inside,
@@ -110,15 +110,17 @@ def verify(
     located = locate_arm(problem, trajectory, box, deadline)
     enclosed = bodies_inside(problem, trajectory, arm_inside(located))
     judgement = _Judgement(problem, trajectory, box, deadline)
-    proved = judgement.proved(enclosed, sinks, reach)
+    inside = pairs_inside(problem, all_pairs(problem), enclosed)
+    proved = judgement.proved(inside, sinks, reach)
     proof = proved.proof
+    least = enclosed_least(least_clearances(proof), inside)
     counterexamples = judgement.counterexamples(proof)
     clear = bool(counterexamples) and judgement.is_nominally_clear()
     contacts = judgement.contacts(proved)
     if sinks and proof.sent < proof.n_intervals:
         judgement.extras.note(f"clearance.csv from interval {proof.sent} on", deadline)
     tip = check_tip(problem, trajectory)
-    near_misses = closest_approaches(problem, trajectory, proof, enclosed)
+    near_misses = closest_approaches(problem, trajectory, proof.pairs, least)
     log = CoalLog(proof.pairs, near_misses, tuple(enclosed))
     clearance = check_clearance(
         problem, proof, counterexamples, contacts, deadline, nominal=clear
@@ -133,7 +135,9 @@ def verify(
             lambda: pointing.check_pointing(problem, trajectory, deadline, box),
         ),
         *check_inside(located),
-        *enclosed_checks(clearance, problem, enclosed),
+        *enclosed_checks(
+            clearance, enclosed, (one.clearance for one in inside.values())
+        ),
         *judgement.by_coal(robot, proved, log),
         *guarded(
             cable_check.NAME,
@@ -141,8 +145,6 @@ def verify(
         ),
     ]
     survived = judgement.survived(proof, located) if joint_error else (nan, nan)
-    inside = pairs_inside(proof.pairs, enclosed)
-    depth = -problem.manipulator.least_radius
     return ArmVerification(
         problem=problem,
         trajectory=trajectory,
@@ -160,7 +162,7 @@ def verify(
         nominal_clear=clear,
         not_done=tuple(judgement.extras.not_done),
         time_limit=deadline.limit,
-        least=enclosed_least(least_clearances(proof), inside, depth),
+        least=least,
         coal=log.rows(),
     )
 
@@ -201,15 +203,14 @@ class _Judgement:
         self.errors, self.deadline, self.extras = errors, deadline, BestEffort()
 
     def proved(
-        self, enclosed: Enclosed, sinks: Sequence[ClearanceSink], reach: float
+        self, inside: Mapping[int, Inside], sinks: Sequence[ClearanceSink], reach: float
     ) -> _Proved:
         """The clearance of every pair; `sinks` and `reach` are those of `verify`."""
         problem, trajectory = self.problem, self.trajectory
-        wanted = [
-            EnclosedSink(one, problem, enclosed) if enclosed else one for one in sinks
-        ]
+        pairs = all_pairs(problem)
+        wanted = [EnclosedSink(one, pairs, inside) if inside else one for one in sinks]
         lowers = LowersSink(problem, trajectory)
-        noted = TooClose(all_pairs(problem), max(1, trajectory.n_samples - 1))
+        noted = TooClose(pairs, max(1, trajectory.n_samples - 1))
         if sinks or lowers.fits:
             wanted += [lowers.keep, noted]
         proof = prove_clearance(
@@ -218,7 +219,7 @@ class _Judgement:
             self.errors,
             wanted,
             deadline=self.deadline,
-            reach=math.inf if enclosed else reach,
+            reach=math.inf if inside else reach,
         )
         too_close = noted.noted if proof.sent == proof.n_intervals else None
         return _Proved(proof, lowers.proved(proof), too_close)
