@@ -1,6 +1,7 @@
 """The URDF is the arm: equal to the committed file, read back to the last bit."""
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import coal
@@ -10,6 +11,7 @@ import pytest
 
 from vdsm_pin.arm.cable_layout import CableLayout, paper_hole_angles
 from vdsm_pin.arm.manipulator import Manipulator, built_in
+from vdsm_pin.arm.mounted import Tool
 from vdsm_pin.arm.urdf_validator import validate_urdf
 from vdsm_pin.arm.urdf_writer import DENSITY, urdf_text
 
@@ -66,6 +68,39 @@ def test_a_hostile_name_stays_a_name() -> None:
     )
     assert ET.fromstring(urdf_text(arm)).get("name") == arm.name
     assert pin.buildModelFromXML(urdf_text(arm)).name == arm.name
+
+
+@pytest.mark.parametrize("tool", [None, Tool(0.2, 0.005)])
+def test_pinocchio_finds_the_arm(tool: Tool | None) -> None:
+    """Centres, limits, and one rod and two balls for each link and the tool."""
+    rng = np.random.default_rng(6)
+    arm = random_arm(rng, 5)
+    radii = rng.uniform(0.01, arm.link_radius, 5)
+    radii[2] = arm.link_radius
+    lengths = arm.link_lengths + (0.2 if tool else 0.0) * np.eye(5)[4]
+    arm = replace(arm, radii=radii, link_lengths=lengths, tool=tool)
+    text, (low, high) = urdf_text(arm), arm.base_range
+    model, box = pin.buildModelFromXML(text), np.full(10, arm.max_joint_angle)
+    np.testing.assert_array_equal(model.lowerPositionLimit, [low, *-box])
+    np.testing.assert_array_equal(model.upperPositionLimit, [high, *box])
+    offsets = [0.0, *arm.link_lengths]
+    yaws = [model.jointPlacements[model.getJointId(f"alpha{i}")] for i in range(1, 6)]
+    tip = model.frames[model.getFrameId("tip")].placement
+    for offset, place in zip(offsets, [*yaws, tip], strict=True):
+        assert place.translation.tolist() == [offset, 0.0, 0.0]
+    shapes = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
+    found, expected = [], []
+    for one in shapes.geometryObjects:
+        rod = isinstance(one.geometry, coal.Cylinder)
+        assert not rod or abs(one.placement.rotation[0, 2]) == 1.0
+        length = 2.0 * one.geometry.halfLength if rod else 0.0
+        place = float(one.placement.translation[0])
+        found.append((one.parentJoint, place, one.geometry.radius, length))
+    for k, (start, end) in enumerate(arm.axis_spans.tolist()):
+        joint, radius = model.getJointId(f"theta{min(k + 1, 5)}"), arm.axis_radii[k]
+        expected += [(joint, start + x, radius, 0.0) for x in (0.0, end - start)]
+        expected.append((joint, start + (end - start) / 2.0, radius, end - start))
+    assert sorted(found) == sorted(expected)
 
 
 def capsule_inertia(length: float, radius: float) -> tuple[float, float, float]:

@@ -3,17 +3,16 @@
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from vdsm_pin.errors import VerificationFailed
 from vdsm_pin.geometry.arrays import FloatArray, rotation_from_rpy, turn_z_to
 from vdsm_pin.geometry.convex import FlatCylinder, Hull, Piece
 from vdsm_pin.robots.hulls import coal_hull
 from vdsm_pin.robots.model import Robot
-from vdsm_pin.robots.srdf import Base
 from vdsm_pin.verification.coal_bodies import CoalBody
+from vdsm_pin.verification.pinocchio_frames import PinocchioFrames, read_model
 
 KEPT: Final = 8
 """Robots whose models are kept for their next motion."""
@@ -31,14 +30,8 @@ def pose_difference(robot: Robot, q: FloatArray) -> FloatArray:
     Raises:
         VerificationFailed: If Pinocchio refuses the URDF or has no such link.
     """
-    import pinocchio as pin
-
-    known = _known(robot)
-    data, ours = known.model.createData(), robot.poses(q)[:, [*robot.frames.values()]]
-    theirs, full = np.zeros_like(ours), known.configurations(robot.tree.values(q))
-    for row in range(len(q)):
-        pin.framesForwardKinematics(known.model, data, full[row])
-        theirs[row] = [data.oMf[number].homogeneous for number in known.links]
+    known, ours = _known(robot), robot.poses(q)[:, [*robot.frames.values()], :3]
+    theirs = known.links.poses(known.configurations(robot.tree.values(q)))
     return np.asarray(np.abs(theirs - ours).max(axis=(1, 2, 3)))
 
 
@@ -46,15 +39,13 @@ class _Known(NamedTuple):
     """A robot as Pinocchio has it.
 
     Args:
-        model: Its model.
-        links: Frames of the robot's links.
+        links: The frames of its links.
         neutral: Its q of joints at 0.
         joints: Where each joint's part of q starts, and the tree's joints that it is:
             one, or those of a joint that is planar or floats.
     """
 
-    model: Any
-    links: list[int]
+    links: PinocchioFrames
     neutral: FloatArray
     joints: list[tuple[int, int, list[int]]]
 
@@ -91,12 +82,10 @@ def _known(robot: Robot) -> _Known:
     """
     import pinocchio as pin
 
-    model = _model(robot.text, robot.base)
-    links = [model.getFrameId(name, pin.BODY) for name in robot.frames]
-    for name, number in zip(robot.frames, links, strict=True):
-        if number >= model.nframes:
-            message = f"Pinocchio has no link {name!r}"
-            raise VerificationFailed(message)
+    free = {"planar": pin.JointModelPlanar, "floating": pin.JointModelFreeFlyer}
+    base = robot.base
+    root = () if base is None else (free[base.kind](), base.name)
+    model = read_model(_bare(robot.text), *root)
     place = {joint.name: k for k, joint in enumerate(robot.tree.joints)}
     parts = {
         4: ("/x", "/y", "/theta"),
@@ -107,26 +96,8 @@ def _known(robot: Robot) -> _Known:
         name, at, count = model.names[number], model.idx_qs[number], model.nqs[number]
         own = [place[name + part] for part in parts.get(count, ("",))]
         joints.append((at, count, own))
-    return _Known(model, links, np.array(pin.neutral(model)), joints)
-
-
-def _model(text: str, base: Base | None) -> Any:
-    """Pinocchio's model of a URDF on its base.
-
-    Raises:
-        VerificationFailed: If Pinocchio refuses it.
-    """
-    import pinocchio as pin
-
-    text = _bare(text)
-    free = {"planar": pin.JointModelPlanar, "floating": pin.JointModelFreeFlyer}
-    try:
-        if base is None:
-            return pin.buildModelFromXML(text)
-        return pin.buildModelFromXML(text, free[base.kind](), base.name)
-    except (ValueError, RuntimeError) as error:
-        message = f"Pinocchio refuses the URDF: {error}"
-        raise VerificationFailed(message) from None
+    links = PinocchioFrames.of(model, robot.frames)
+    return _Known(links, np.array(pin.neutral(model)), joints)
 
 
 def _bare(text: str) -> str:

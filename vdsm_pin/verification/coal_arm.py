@@ -74,12 +74,11 @@ def arm_poses(
         joints: x0, alpha and theta at the rows.
         moving: T_base_solid of each obstacle that moves, shape (n_rows, 4, 4); [m].
     """
-    found, n = robot.link_poses(*joints), robot.manipulator.n_links
+    n = robot.manipulator.n_links
     poses = np.zeros((len(joints[0]), n + 2 + len(moving), 3, 4))
     poses[..., :3] = np.eye(3)
-    poses[:, 1 : n + 1, :, :3] = found.rotations
-    poses[:, 1 : n + 1, :, 3] = found.origins
-    poses[:, n + 1, :, 3] = found.origins[:, 0]
+    poses[:, 1 : n + 1] = robot.poses(*joints)[:, :n]
+    poses[:, n + 1, :, 3] = poses[:, 1, :, 3]
     for k, pose in enumerate(moving, start=n + 2):
         poses[:, k] = pose[:, :3]
     return poses

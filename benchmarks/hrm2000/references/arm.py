@@ -64,7 +64,8 @@ class Arm:
         self, problem: PlanningProblem, robot: RobotModel, clearance: LinkClearance
     ) -> None:
         self.problem, self.robot, self.clearance = problem, robot, clearance
-        arm = problem.manipulator
+        self.data, arm = robot.model.createData(), problem.manipulator
+        self.p_link_tip = np.array([arm.link_lengths[-1], 0.0, 0.0])
         self.n, self.nq = arm.n_links, 1 + 2 * arm.n_links
         self.cone, box = arm.max_link_angle, arm.max_joint_angle
         self.low = np.concatenate([[arm.base_range[0]], np.full(2 * self.n, -box)])
@@ -119,17 +120,17 @@ class Arm:
 
     def tip(self, q: FloatArray, goal: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Way of the tip to a goal and its Jacobian in the base frame."""
-        pin.computeJointJacobians(self.robot.model, self.robot.data, q)
+        pin.computeJointJacobians(self.robot.model, self.data, q)
         last = self.robot.model.njoints - 1
-        return self._point(last, self.robot.p_link_tip, goal)
+        return self._point(last, self.p_link_tip, goal)
 
     def _point(
         self, joint: int, local: FloatArray, goal: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        place = self.robot.data.oMi[joint]
+        place = self.data.oMi[joint]
         arm = place.rotation @ local
         frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        full = pin.getJointJacobian(self.robot.model, self.robot.data, joint, frame)
+        full = pin.getJointJacobian(self.robot.model, self.data, joint, frame)
         return goal - (place.translation + arm), full[:3] - pin.skew(arm) @ full[3:]
 
     def push(self, q: FloatArray) -> FloatArray:
@@ -142,7 +143,7 @@ class Arm:
         request = coal.DistanceRequest()
         for link in np.flatnonzero(room < PUSH_WITHIN):
             joint = 3 + 2 * int(link)  # universe, rail, then yaw and pitch of each link
-            pose = self.robot.data.oMi[joint] * pin.SE3(self.robot.T_link_capsule[link])
+            pose = self.data.oMi[joint] * pin.SE3(self.robot.T_link_capsule[link])
             place = coal.Transform3s(pose.rotation, pose.translation)
             for body in self.bodies:
                 result = coal.DistanceResult()
@@ -152,7 +153,7 @@ class Arm:
                 )  # fmt: skip
                 if gap < PUSH_WITHIN:
                     point = result.getNearestPoint1()
-                    near = self.robot.data.oMi[joint].actInv(point)
+                    near = self.data.oMi[joint].actInv(point)
                     _, turn = self._point(joint, near, point)
                     step += (PUSH_WITHIN - gap) * (turn.T @ -result.normal)
         return step

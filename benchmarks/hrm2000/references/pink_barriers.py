@@ -74,7 +74,7 @@ def follow(
     tip_frame = model.addFrame(
         pin.Frame(
             "drawing_tip", model.njoints - 1, 0,
-            pin.SE3(np.eye(3), robot.p_link_tip), pin.FrameType.OP_FRAME,
+            pin.SE3(np.eye(3), arm.p_link_tip), pin.FrameType.OP_FRAME,
         )
     )  # fmt: skip
     geometry = bodies(arm)
