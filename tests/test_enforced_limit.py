@@ -4,6 +4,7 @@ import signal
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -116,3 +117,25 @@ def test_a_command_that_hangs_in_reading_ends_with_one_word(
     assert "the time limit of 0.1 s came first" in str(found.exception)
     assert "no_plan.html" not in str(found.exception), "there was no time for it"
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("cold", [True, False])
+@pytest.mark.parametrize("asked", [None, "600"])
+def test_only_the_default_of_a_cold_machine_counts_as_a_first_plan(
+    cold: bool, asked: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A plan that ran out of a limit of the user's own, also of 600 s, does not."""
+    noted, limits = [], []
+
+    def slow(*more: Any, **_: object) -> None:
+        limits.append(more[-1].limit)
+        raise OutOfTime(limits[-1], "searched")
+
+    monkeypatch.setattr("vdsm_pin.app.workflow.plan_to_folder", slow)
+    monkeypatch.setattr("vdsm_pin.kept.is_cold", lambda: cold)
+    monkeypatch.setattr("vdsm_pin.kept.note_planned", lambda: noted.append(1))
+    words = [] if asked is None else ["--time-limit", asked]
+    out = ["--out", str(tmp_path / "out")]
+    CliRunner().invoke(app, ["plan", "paper/free", *out, *words])
+    assert limits == [600.0 if cold or asked else 60.0]
+    assert len(noted) == (cold and asked is None)

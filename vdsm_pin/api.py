@@ -283,7 +283,7 @@ def write_certificate(
         >>> result = verify(problem, made.trajectory)
         >>> write_certificate(result, "out/api/free.certificate", "out/api/free.csv")
     """
-    from vdsm_pin.io.source import sha256_of_file
+    from vdsm_pin.io.source import check_unchanged, readable, sha256_of_file
     from vdsm_pin.report.folder import check_kept
     from vdsm_pin.verification.certificate_lines import Hashes
 
@@ -295,11 +295,15 @@ def write_certificate(
     if source is None or not source.is_whole:
         message = "a certificate is bound to a problem file; this problem has none"
         raise InvalidInput(message)
-    if not subject.is_of(result, subject.read(file)):
+    with readable(file):
+        digest = sha256_of_file(file)
+    same = subject.is_of(result, subject.read(file))
+    check_unchanged(file, digest)
+    if not same:
         message = f"{trajectory}: is another motion than the verified one"
         raise InvalidInput(message)
     check_kept([Path(path)], [*source.files, file])
-    hashes = Hashes(problem=source.sha256, trajectory=sha256_of_file(file))
+    hashes = Hashes(problem=source.sha256, trajectory=digest)
     subject.certify(Path(path), result, hashes)
 
 

@@ -5,7 +5,8 @@
     │   ├── InvalidFile       names the file, the place in it and the expectation
     │   │   └── CannotWrite   a full disk, a folder that may not be written
     │   ├── UnknownName       lists the known names
-    │   └── InconsistentCables  no joint angles give these cable lengths
+    │   ├── InconsistentCables  no joint angles give these cable lengths
+    │   └── WrongLinkLength   two joint centres are not one link length apart
     ├── Infeasible            exit 1: the problem is well-formed and has no plan here
     │   ├── OutOfReach        step 1 says no
     │   ├── LinkTooShort      a projected gap exceeds its link
@@ -108,6 +109,18 @@ class InconsistentCables(InvalidInput):
             )
         message = f"waypoint {waypoint}: {self.problem}"
         super().__init__(message)
+
+
+class WrongLinkLength(InvalidInput):
+    """Two adjacent joint centres that are not one link length apart."""
+
+    def __init__(self, *, waypoint: int, link: int, gap: float, length: float) -> None:
+        self.waypoint, self.link, self.gap, self.length = waypoint, link, gap, length
+        self.problem = (
+            f"o{link} and o{link + 1} are {gap * MM_PER_M:.6f} mm apart, expected the "
+            f"length of link {link}, {length * MM_PER_M:.6f} mm"
+        )
+        super().__init__(f"waypoint {waypoint}: {self.problem}")
 
 
 @dataclass(frozen=True, slots=True)

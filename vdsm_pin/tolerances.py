@@ -153,6 +153,31 @@ class Tolerances:
     parallel: float = _held(1e-9, "-")
     """Sine of the angle below which two directions count as parallel; [-]."""
 
+    circle_plane: float = _held(1e-6, "-")
+    """How far the start of a circle may be off its plane, over its radius; [-].
+
+    Files have six digits or more; what is off by less is their rounding.
+    """
+
+    rotation: float = _held(1e-9, "-")
+    """How far R R^T may be off the identity, and a unit vector's length off 1; [-]."""
+
+    quaternion: float = _held(1e-3, "-")
+    """How far the length of a quaternion in a file may be from 1; [-].
+
+    Programs write three digits or more; it is divided by its length.
+    """
+
+    still: float = _held(1e-9, "m or rad")
+    """How far a joint may move where it must stand still; [m] and [rad]."""
+
+    held_joint: float = _held(1e-6, "m or rad")
+    """How far a joint that is judged at one value may be written elsewhere; [m] and
+    [rad]."""
+
+    mimicked_joint: float = _held(1e-3, "m or rad")
+    """How far a joint that mimics another may be measured elsewhere; [m] and [rad]."""
+
     on_boundary: float = _held(1e-9, "m")
     """A point this little inside a planner's danger region is on its boundary; [m]."""
 

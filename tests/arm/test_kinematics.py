@@ -13,7 +13,7 @@ from vdsm_pin.arm.kinematics import (
     tip_jacobian,
 )
 from vdsm_pin.arm.manipulator import built_in
-from vdsm_pin.errors import LinkTooShort
+from vdsm_pin.errors import WrongLinkLength
 
 HRM8 = built_in("hrm8")
 LIMIT = HRM8.max_joint_angle
@@ -92,10 +92,21 @@ def test_position_angle_keeps_the_quadrant_arctan_loses() -> None:
 def test_centres_a_link_length_apart_or_refused_by_name() -> None:
     x0, alpha, theta = samples("uniform", 3)
     centres = joint_centres(HRM8, x0, alpha, theta)
-    centres[1, 4] += [1e-6, 0.0, 0.0]
-    with pytest.raises(LinkTooShort, match="waypoint 1") as caught:
+    centres[:2, 4] += [[1e-7, 0.0, 0.0], [1e-6, 0.0, 0.0]]
+    with pytest.raises(WrongLinkLength, match=r"waypoint 1: o[45] and o") as caught:
         joint_angles(HRM8, centres)
     assert caught.value.link in (4, 5)
+
+
+@pytest.mark.parametrize("where", [(0, 0, 0), (1, 4, 2), (2, 8, 1)])
+def test_centres_that_are_no_numbers_are_refused_wherever(
+    where: tuple[int, int, int],
+) -> None:
+    """A nan is no link length, whatever finite differences follow it."""
+    centres = joint_centres(HRM8, *samples("uniform", 3))
+    centres[where] = np.nan
+    with pytest.raises(WrongLinkLength, match=f"waypoint {where[0]}: .* nan mm apart"):
+        joint_angles(HRM8, centres)
 
 
 @pytest.mark.parametrize("kind", KINDS)

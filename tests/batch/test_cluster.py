@@ -13,9 +13,11 @@ import pytest
 from batch_folders import tree
 from problem_files import NEAR, OUT_OF_REACH, write_problem
 
+from vdsm_pin.batch import cluster
 from vdsm_pin.batch.run import Batch, run_batch
-from vdsm_pin.batch.task import Settings
+from vdsm_pin.batch.task import Settings, Task
 from vdsm_pin.errors import InvalidInput
+from vdsm_pin.report.run_record import versions
 
 distributed = pytest.importorskip("distributed")
 
@@ -124,6 +126,22 @@ def test_a_worker_that_may_not_start_processes_is_told_how(
             )
     finally:
         ended(workers)
+
+
+def test_paths_start_from_the_folder_of_each_batch(tmp_path: Path) -> None:
+    """Oracle: what each folder's file is, though one process reads them all."""
+    task = Task("p.yaml", tmp_path / "a", tmp_path / "b", Settings("paper"))
+    here = Path.cwd()
+    for name in ("one", "two", "one"):
+        folder = tmp_path / name
+        folder.mkdir(exist_ok=True)
+        (folder / "p.yaml").write_text(f"vdsm_problem: 1\n{name}: 1\n")
+        (found,) = cluster._run(cluster._Errand((task,), folder, versions()))
+        assert found.result is not None
+        assert name in found.result.row.reason
+    assert Path.cwd() == here
+    with pytest.raises(InvalidInput, match="a worker has no folder"):
+        cluster._run(cluster._Errand((task,), tmp_path / "three", versions()))
 
 
 def test_no_scheduler_is_a_message(

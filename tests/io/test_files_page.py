@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from problem_texts import edited
 
 from vdsm_pin.arm.cable_layout import paper_hole_angles
@@ -12,6 +13,7 @@ from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io import clouds, mesh_file, motion_schema, obstacle_schema
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import write_trajectory
 from vdsm_pin.problem.trajectory import Trajectory
@@ -27,6 +29,21 @@ def test_the_example_is_read_with_all_shapes(tmp_path: Path) -> None:
     problem = read_problem(tmp_path / "p.yaml")
     assert len(problem.scene.obstacles) == 7
     assert problem.manipulator.name == "hrm8"
+
+
+@pytest.mark.parametrize(
+    ("model", "endings"),
+    [("MeshModel", mesh_file._READERS), ("PointsModel", clouds._READERS)],
+)
+def test_the_schema_names_every_kind_of_file(
+    model: str, endings: dict[str, object]
+) -> None:
+    """A shape's description names all endings that its reader knows, and no other."""
+    for owner in (obstacle_schema, motion_schema):
+        name = model if owner is obstacle_schema else model.replace("Model", "Obstacle")
+        words = str(getattr(owner, name).model_json_schema()["description"])
+        found = re.findall(r"\b[A-Z]{3,4}\b", words)
+        assert {f".{word.lower()}" for word in found} == set(endings)
 
 
 def test_the_second_arm_shown_is_read(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import io
 import json
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -435,6 +436,34 @@ def test_damage_of_ply_and_dae_is_named(
     with pytest.raises(InvalidFile) as caught:
         read_mesh(path)
     assert expected in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", ["obj", "ply", "glb", "dae"])
+@pytest.mark.parametrize("odd", ["nan", "inf", "1e300"])
+def test_vertices_that_no_triangle_names_may_be_anything(
+    tmp_path: Path, kind: str, odd: str
+) -> None:
+    """The same in all formats, and without a warning."""
+    corners = ["0 0 0", "1 0 0", "0 1 0", f"{odd} 0 0"]
+    last = trimesh.creation.box().vertices[-1].astype("<f4").tobytes()
+    with np.errstate(over="ignore"):
+        wrong = np.array([float(odd), 0.0, 0.0]).astype("<f4").tobytes()
+    before, _, behind = glb(setting("accessors", 0, "count", 3)).rpartition(last)
+    face = '<triangles><input semantic="VERTEX" source="#v"/><p>0 1 2</p></triangles>'
+    content = {
+        "obj": "".join(f"v {corner}\n" for corner in corners) + "f 1 2 3\n",
+        "ply": PLY.replace("vertex 3", "vertex 4").replace(
+            "\n3 0", f"\n{corners[3]}\n3 0"
+        ),
+        "glb": before + wrong + behind,
+        "dae": dae(HERE, root=face).replace(
+            "0 0 0 1 0 0 0 1 0 0 0 1", " ".join(corners)
+        ),
+    }[kind]
+    path = write(tmp_path, f"a.{kind}", content)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert len(read_mesh(path).triangles) == 1
 
 
 @pytest.mark.parametrize("kind", ["stl", "ply", "glb"])

@@ -91,7 +91,7 @@ LIMITS: dict[str, tuple[ModuleType, str, int, Reader, Made]] = {
     "bytes": (
         mesh_file, "MAX_MESH_BYTES", len(CONTINUED), *meshes("a.obj", CONTINUED)
     ),
-    "line": (obj, "MAX_LINE", 9, *meshes("a.obj", CONTINUED)),
+    "line": (obj, "MAX_MESH_LINE", 9, *meshes("a.obj", CONTINUED)),
     "header": (
         ply, "_MOST_LINES", PLY[: PLY.index(b"end_header")].count(b"\n") + 1,
         *meshes("a.ply", PLY),

@@ -109,6 +109,12 @@ def test_the_urdf_belongs_to_the_problem_and_its_hash(tmp_path: Path) -> None:
         ('upper="0.7', 'upper="0.6', r"alpha1.*limits|theta1.*limits"),
         ("<robot", "<robots", "XML|root"),
         ('type="prismatic"', 'type="continuous"', "x0"),
+        (
+            '<child link="yaw2" />',
+            '<child link="yaw2" /><mimic joint="alpha1" />',
+            r"alpha2.*mimics 'alpha1'",
+        ),
+        ("<limit", '<mimic joint="alpha1" /><limit', r"x0.*mimics 'alpha1'"),
     ],
 )
 def test_another_robot_is_refused_by_its_joint(

@@ -1,12 +1,14 @@
 """A second arm: held off like any obstacle, wherever its own trajectory puts it."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from vdsm_pin.errors import InvalidFile
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.io import other_arms
 from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.io.trajectory_file import read_trajectory, write_trajectory
 from vdsm_pin.problem.planning_problem import PlanningProblem
@@ -213,6 +215,24 @@ def test_what_is_wrong_with_another_arm_is_named(tmp_path: Path) -> None:
     missing.write_text(text.replace("name: mate, ", ""))
     with pytest.raises(InvalidFile, match=r"others\[0\].name .*is missing"):
         read_problem(missing)
+
+
+def test_what_is_judged_is_what_the_hash_is_of(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The file is another one as soon as it was read: neither sees that."""
+    path, _ = write_pair(tmp_path, 2)
+    whole, read = read_problem(path), other_arms.read_trajectory_text
+
+    def changed(file: Path, *more: Any) -> Trajectory:
+        file.write_text("")
+        return read(file, *more)
+
+    monkeypatch.setattr(other_arms, "read_trajectory_text", changed)
+    found = read_problem(path)
+    assert (tmp_path / "t1.csv").read_text() == ""
+    assert found.sha256 == whole.sha256
+    assert len(found.scene.moving) == len(whole.scene.moving)
 
 
 def test_its_files_belong_to_the_problem(tmp_path: Path) -> None:

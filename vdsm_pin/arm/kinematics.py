@@ -9,7 +9,7 @@ from typing import Final, NoReturn
 import numpy as np
 
 from vdsm_pin.arm.manipulator import Manipulator
-from vdsm_pin.errors import LinkTooShort
+from vdsm_pin.errors import WrongLinkLength
 from vdsm_pin.geometry.arrays import FloatArray, read_only
 from vdsm_pin.geometry.joint_kernels import centres_of, turns_of
 from vdsm_pin.tolerances import TOLERANCES
@@ -95,7 +95,7 @@ def joint_angles(
         covers (-pi, pi]; [rad].
 
     Raises:
-        LinkTooShort: If two centres are not one link length apart.
+        WrongLinkLength: If two centres are not one link length apart.
     """
     points, lengths = read_only(centres), manipulator.link_lengths
     alpha, theta = np.zeros((2, len(points), lengths.size))
@@ -111,15 +111,15 @@ def joint_angles(
 
 
 def _refuse_lengths(manipulator: Manipulator, centres: FloatArray) -> NoReturn:
-    """Name the link whose ends are least its length apart.
+    """Name the link whose ends are farthest from being its length apart.
 
     Raises:
-        LinkTooShort: Always.
+        WrongLinkLength: Always.
     """
     spans = np.linalg.norm(np.diff(centres, axis=1), axis=2)
     residual = np.abs(spans - manipulator.link_lengths)
     waypoint, link = np.unravel_index(int(np.argmax(residual)), residual.shape)
-    raise LinkTooShort(
+    raise WrongLinkLength(
         waypoint=int(waypoint),
         link=int(link) + 1,
         gap=float(spans[waypoint, link]),

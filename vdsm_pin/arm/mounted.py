@@ -44,7 +44,7 @@ class Feed(_Extension):
 
 
 BodySolid: TypeAlias = Sphere | Capsule | Cylinder | Box | Prism | Mesh
-"""Solids that may ride on a link: any shape but a half-space."""
+"""Solids that may ride on a link: no half-space, points or voxels."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class LinkBody:
 
     Args:
         link: The link, 1 to N.
-        solid: Any shape but a half-space.
+        solid: Any of `BodySolid`.
         parts: Hulls that a mesh is covered by, 1 or more.
     """
 
@@ -70,8 +70,8 @@ class LinkBody:
         """Refuse a solid that cannot ride on a link, and numbers that are none.
 
         Raises:
-            InvalidInput: If the solid is a half-space or no solid, or `link` or `parts`
-                is no whole number.
+            InvalidInput: If the solid is no `BodySolid`, or `link` or `parts` is no
+                whole number.
         """
         if not isinstance(self.solid, BodySolid):
             kind = type(self.solid).__name__

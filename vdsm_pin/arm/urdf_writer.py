@@ -25,6 +25,7 @@ from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.arm.mounted import BodySolid
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.geometry.solids import Box, Capsule, Cylinder, Mesh, Prism, Sphere
+from vdsm_pin.tolerances import TOLERANCES
 
 DENSITY: Final = 1000.0
 """Assumed mean density of a link: metal skin, joints and mostly air; [kg/m^3]."""
@@ -224,8 +225,9 @@ def _along(axis: FloatArray) -> FloatArray:
 
 def _angles(rotation: FloatArray) -> FloatArray:
     """Roll, pitch and yaw of a rotation; [rad]."""
-    pitch = math.atan2(-rotation[2, 0], math.hypot(rotation[0, 0], rotation[1, 0]))
-    if math.hypot(rotation[0, 0], rotation[1, 0]) < 1e-9:  # roll and yaw are one
+    level = math.hypot(rotation[0, 0], rotation[1, 0])
+    pitch = math.atan2(-rotation[2, 0], level)
+    if level < TOLERANCES.parallel:  # roll and yaw are one
         return np.array([math.atan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0])
     roll = math.atan2(rotation[2, 1], rotation[2, 2])
     return np.array([roll, pitch, math.atan2(rotation[1, 0], rotation[0, 0])])

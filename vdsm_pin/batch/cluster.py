@@ -38,6 +38,20 @@ _ours = threading.local()
 
 
 @dataclass(frozen=True)
+class _Placed:
+    """A task, and the folder that its relative paths start from."""
+
+    task: Task
+    folder: Path
+
+
+def _perform(placed: _Placed) -> Done:
+    """Perform a task in a warm process, which may have done others elsewhere."""
+    os.chdir(placed.folder)
+    return perform(placed.task)
+
+
+@dataclass(frozen=True)
 class _Errand:
     """Some problems for one worker.
 
@@ -136,13 +150,18 @@ def _run(errand: _Errand) -> list[Ended[Task, Done]]:
     if multiprocessing.current_process().daemon:
         message = "a Dask worker may not start processes: run it with --no-nanny"
         raise InvalidInput(message)
-    os.chdir(errand.folder)
+    if not errand.folder.is_dir():
+        message = f"a worker has no folder {errand.folder}, which paths start from"
+        raise InvalidInput(message)
     if not hasattr(_ours, "process"):
-        _ours.process = WarmProcess(perform)
-    process: WarmProcess[Task, Done] = _ours.process
-    return [
-        process.run(_attempt(task), task.settings.time_limit) for task in errand.tasks
-    ]
+        _ours.process = WarmProcess(_perform)
+    process: WarmProcess[_Placed, Done] = _ours.process
+    found = []
+    for task in errand.tasks:
+        placed = _Placed(_attempt(task), errand.folder)
+        ended = process.run(placed, task.settings.time_limit)
+        found.append(Ended(placed.task, ended.result, ended.outcome, ended.reason))
+    return found
 
 
 def _attempt(task: Task) -> Task:

@@ -25,7 +25,7 @@ from vdsm_pin.certificate_checker.claims import Clearances
 from vdsm_pin.certificate_checker.robot import Robot
 from vdsm_pin.errors import InvalidFile, InvalidInput
 from vdsm_pin.io.problem_file import ProblemOfRobot, read_problem
-from vdsm_pin.io.source import bounded_lines, check_is_file, check_is_file_or_bag
+from vdsm_pin.io.source import bounded_lines, check_is_file_or_bag, check_unchanged
 from vdsm_pin.robots.files import read_cell_file
 from vdsm_pin.text import printable, show_everything
 
@@ -70,8 +70,7 @@ def _lines(path: Path) -> Iterator[dict[str, Any]]:
     Raises:
         Rejected: If the last line is missing, not the last or does not fit the others.
     """
-    digest = hashlib.sha256()
-    lines = bounded_lines(path)
+    digest, lines = hashlib.sha256(), bounded_lines(path)
     for raw in lines:
         lists = raw.count(b"[") + raw.count(b"{")
         # An empty list takes 64 bytes when it is read, and 3 in the file.
@@ -116,6 +115,7 @@ class _Run:
         told = f"is of version {version}, as vdsm-pin {by.get('vdsm_pin')} writes and "
         claim(version == VERSION, told + f"reads it; expected {VERSION}")
         asked = self.asked(header, self.trajectory)
+        check_unchanged(self.trajectory, header["trajectory_sha256"])
         expected = [pair.names for pair in asked.pairs]
         claim(header["pairs"] == expected, "the pairs are not those of the problem")
         self.parts.append(Clearances(asked.tree, asked.path, asked.pairs))
@@ -139,7 +139,6 @@ def check_certificate(certificate: Path, problem: Path, trajectory: Path) -> Out
     Raises:
         InvalidFile: If one of the files is not what its format says.
     """
-    check_is_file(certificate)
     check_is_file_or_bag(trajectory)
     run, reason = _Run(problem, trajectory), ""
     with ctx.workprec(PRECISION), np.errstate(all="ignore"):

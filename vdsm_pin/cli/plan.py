@@ -63,9 +63,8 @@ def plan(
     from vdsm_pin.report.terminal import show_plan
     from vdsm_pin.report.words import outcome
 
-    box, limit = errors.box(), time_limit
-    if limit is None:
-        limit = COLD_LIMIT if is_cold() else LIMIT
+    box, cold = errors.box(), time_limit is None and is_cold()
+    limit = time_limit or (COLD_LIMIT if cold else LIMIT)
     deadline, begin = Deadline.after(limit), time.monotonic()
     try:
         with enforced(deadline, grace=0.0):
@@ -75,7 +74,7 @@ def plan(
             file = plan_to_folder(asked, strategy, out, context.obj, deadline)
         note_planned()
     except OutOfTime as error:  # which tells its time itself
-        if limit == COLD_LIMIT:
+        if cold:
             note_planned()
         error.args = (f"no plan found: {error}{_see(error)}",)
         raise

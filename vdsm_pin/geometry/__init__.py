@@ -1,1 +1,1 @@
-"""Closed-form geometry: no robot, no obstacle names, no robotics library."""
+"""Closed-form geometry: solids with their names, no robot, no robotics library."""

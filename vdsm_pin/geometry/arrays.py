@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdsm_pin.errors import InvalidInput
+from vdsm_pin.tolerances import TOLERANCES
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.int64]
@@ -133,16 +134,12 @@ def same_arrays(one: object, other: object, names: Sequence[str]) -> bool:
     return all(a is b or np.array_equal(a, b) for a, b in pairs)
 
 
-ROTATION_ERROR: Final = 1e-9
-"""How far R R^T may be from the identity, and a unit vector's length from 1; [-]."""
-
-
 def is_rotation(turn: FloatArray) -> bool:
     """Whether a matrix is a rotation, shape (3, 3); whatever is not finite is none."""
     if turn.shape != (3, 3):
         return False
     off = np.abs(turn @ turn.T - np.eye(3)).max()
-    return bool(off <= ROTATION_ERROR and np.linalg.det(turn) > 0.0)
+    return bool(off <= TOLERANCES.rotation and np.linalg.det(turn) > 0.0)
 
 
 def is_rigid(placement: FloatArray) -> bool:
@@ -156,7 +153,7 @@ def is_rigid(placement: FloatArray) -> bool:
 def is_unit(vector: FloatArray) -> bool:
     """Whether a vector has length 1, shape (3,)."""
     length = np.linalg.norm(vector)
-    return vector.shape == (3,) and bool(abs(length - 1.0) <= ROTATION_ERROR)
+    return vector.shape == (3,) and bool(abs(length - 1.0) <= TOLERANCES.rotation)
 
 
 def read_only(values: FloatArray) -> FloatArray:

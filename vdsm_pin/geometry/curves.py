@@ -7,12 +7,10 @@ import numpy as np
 
 from vdsm_pin.errors import InvalidInput
 from vdsm_pin.geometry.arrays import FloatArray
+from vdsm_pin.tolerances import TOLERANCES
 
 MOST_CORNERS: Final = 1_000_000
 """Of one curve: a tolerance that asks for more is a slip."""
-
-_IN_PLANE: Final = 1e-6
-"""How far the start of a circle may be off its plane, as a part of its radius."""
 
 
 def circle_from(
@@ -50,7 +48,7 @@ def circle_from(
     if not radius > 0.0:
         message = "begins at its own centre"
         raise InvalidInput(message)
-    if not abs(height) <= _IN_PLANE * radius:
+    if not abs(height) <= TOLERANCES.circle_plane * radius:
         message = (
             f"begins {abs(height) / radius:.3g} radii off the plane of the "
             "circle, expected in it"
@@ -87,7 +85,7 @@ def arc_through(
     u, v = middle - start, end - start
     normal = np.cross(u, v)
     uu, vv, nn = float(u @ u), float(v @ v), float(normal @ normal)
-    if not nn > 1e-18 * uu * vv:
+    if not nn > TOLERANCES.parallel**2 * uu * vv:
         message = "goes through three points on one line, which is no arc"
         raise InvalidInput(message)
     arm = np.cross(uu * v - vv * u, normal) / (2.0 * nn)

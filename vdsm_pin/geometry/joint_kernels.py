@@ -30,7 +30,7 @@ def turns_of(centres: FloatArray, lengths: FloatArray, turns: FloatArray) -> flo
             dz = centres[k, i + 1, 2] - centres[k, i, 2]
             span = sqrt(dx * dx + dy * dy + dz * dz)
             error = abs(span - lengths[i])
-            if not error <= worst:
+            if not error <= worst and worst == worst:  # a nan stays
                 worst = error
             links[i, 0], links[i, 1], links[i, 2] = dx / span, dy / span, dz / span
         x0, x1, x2 = 1.0, 0.0, 0.0

@@ -45,7 +45,7 @@ class RawCloud:
 
 
 def read_cloud(path: Path, digest: Digest) -> RawCloud:
-    """The points of a PLY, PCD, XYZ or NPY file.
+    """The points of a PLY, PCD, XYZ, TXT, CSV or NPY file.
 
     Args:
         path: The file; its ending tells the format.

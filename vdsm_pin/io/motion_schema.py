@@ -61,11 +61,11 @@ class HalfSpaceObstacle(_CanMove, shapes.HalfSpaceModel):
 
 
 class MeshObstacle(_CanMove, shapes.MeshModel):
-    """Triangles from an STL or OBJ file, solid where they close."""
+    """Triangles from an STL, OBJ, PLY, GLB or DAE file, solid where they close."""
 
 
 class PointsObstacle(_CanMove, shapes.PointsModel):
-    """Measured points from a PLY, PCD, XYZ or NPY file."""
+    """Measured points from a PLY, PCD, XYZ, TXT, CSV or NPY file."""
 
 
 class VoxelsObstacle(_CanMove, shapes.VoxelsModel):

@@ -116,7 +116,7 @@ class FromFileModel(_Named):
 
 
 class MeshModel(FromFileModel):
-    """Triangles from an STL or OBJ file, solid where they close."""
+    """Triangles from an STL, OBJ, PLY, GLB or DAE file, solid where they close."""
 
     shape: Literal["mesh"]
     solid: bool | None = Field(
@@ -128,7 +128,7 @@ class MeshModel(FromFileModel):
 
 
 class PointsModel(FromFileModel):
-    """Measured points from a PLY, PCD, XYZ or NPY file."""
+    """Measured points from a PLY, PCD, XYZ, TXT, CSV or NPY file."""
 
     shape: Literal["points"]
     radius: Positive = Field(

@@ -1,6 +1,7 @@
 """Other arms of a problem: obstacles that ride on a tree and move by a trajectory."""
 
 from dataclasses import dataclass, replace
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ from vdsm_pin.io.arm_builder import ArmBuilder
 from vdsm_pin.io.frames import Frame, radians
 from vdsm_pin.io.problem_schema import OtherModel
 from vdsm_pin.io.source import Digest, read_bytes
-from vdsm_pin.io.trajectory_file import TIME, read_trajectory
+from vdsm_pin.io.tables import as_text
+from vdsm_pin.io.trajectory_file import TIME, read_trajectory_text
 from vdsm_pin.io.yaml_reader import Location, YamlDocument
 from vdsm_pin.problem.scene import Carrier, Moving
 from vdsm_pin.problem.trajectory import Trajectory
@@ -61,11 +63,12 @@ class OtherArms:
         """Its trajectory, with times."""
         at, file = (*at, "trajectory"), self.folder / model.trajectory
         try:
-            motion = read_trajectory(file, arm)
+            content = read_bytes(file, limit=MAX_BYTES)
+            motion = read_trajectory_text(file, as_text(BytesIO(content)), arm)
         except InvalidFile as error:
             name = model.trajectory
             raise self.document.invalid_file(at, name, error) from None
-        self.digest.update(read_bytes(file, limit=MAX_BYTES))
+        self.digest.update(content)
         if motion.times is None:
             problem = f"{model.trajectory!r} has no column {TIME!r}, which it needs"
             raise self.document.invalid(at, problem)

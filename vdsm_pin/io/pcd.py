@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io.meshes.raw import MAX_LINE, MeshStream, doubles
+from vdsm_pin.io.meshes.raw import MAX_MESH_LINE, MeshStream, doubles
 
 _KINDS: Final = {"F": "f", "I": "i", "U": "u"}
 _SIZES: Final = (1, 2, 4, 8)
@@ -56,7 +56,7 @@ def _first(column: FloatArray) -> FloatArray:
 def _header(stream: MeshStream) -> _Header:
     said: dict[str, list[str]] = {}
     for number in range(1, _MOST_LINES + 1):
-        words = stream.content.readline(MAX_LINE).decode("latin-1").split()
+        words = stream.content.readline(MAX_MESH_LINE).decode("latin-1").split()
         if not words and number == 1:
             break
         if not words or words[0].startswith("#"):

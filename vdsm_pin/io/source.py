@@ -17,7 +17,11 @@ BLOCK: Final = 1 << 20
 """Bytes read at one time."""
 
 MAX_LINE: Final = 64 << 20
-"""Longest line that is read; [bytes]. The numbers of 5 million triangles have 40 MB."""
+"""Longest line of a certificate; [bytes]. Numbers of 5 million triangles have 40 MB.
+
+Lines of meshes and rows of tables, which `io.meshes.raw` and `io.tables` read, are far
+shorter.
+"""
 
 GZIPPED: Final = b"\x1f\x8b"
 """How a gzipped file begins."""
@@ -186,6 +190,7 @@ def bounded_lines(path: Path, *, limit: int = MAX_LINE) -> Iterator[bytes]:
     Raises:
         InvalidFile: If a line is longer, or the file cannot be read.
     """
+    check_is_file(path)
     number = 0
     with readable(path), _unpacked(path) as stream:
         while line := stream.readline(limit + 1):

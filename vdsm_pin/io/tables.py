@@ -27,7 +27,7 @@ from vdsm_pin.problem.trajectory import MAX_ROWS
 CHUNK_ROWS: Final = 5_000
 """Rows held as text at one time."""
 
-MAX_LINE: Final = 1 << 16
+MAX_ROW_LINE: Final = 1 << 16
 """Longest line looked at; [characters]. A row of 40 links has below 2,000."""
 
 PLAIN: Final = b"0123456789+-.eE, \r\n"
@@ -87,7 +87,7 @@ class Table:
         self.file, self._text = file, text
         self.open_ended = False
         self._decimal = ""  # the sign of the first number that has one
-        line = text.readline(MAX_LINE)
+        line = text.readline(MAX_ROW_LINE)
         if not line:
             raise InvalidFile(file=file, problem="is empty")
         self._check_ends([line], 1)
@@ -156,7 +156,7 @@ class Table:
             InvalidFile: If a row is cut short, or has no finite number where one is
                 wanted; names line and column.
         """
-        lines_left = iter(partial(self._text.readline, MAX_LINE), "")
+        lines_left = iter(partial(self._text.readline, MAX_ROW_LINE), "")
         number, blank = 2, 0
         while lines := list(islice(lines_left, CHUNK_ROWS)):
             self._check_ends(lines, number)
@@ -174,8 +174,8 @@ class Table:
     def _check_ends(self, lines: list[str], number: int) -> None:
         for i, line in enumerate(lines):
             if line[-1] != "\n":
-                if len(line) == MAX_LINE:
-                    problem = f"is longer than {MAX_LINE} characters"
+                if len(line) == MAX_ROW_LINE:
+                    problem = f"is longer than {MAX_ROW_LINE} characters"
                     raise Row(self.file, number + i).invalid(problem)
                 if _CUT.search(line):
                     problem = f"ends in {line[-8:]!r}, whose exponent may be cut short"

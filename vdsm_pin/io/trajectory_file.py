@@ -120,12 +120,13 @@ def read_trajectory(
     file = Path(path)
     check_is_file(file)
     with readable(file), open_text(file) as text:
-        return _read(file, text, manipulator, interpolation)
+        return read_trajectory_text(file, text, manipulator, interpolation)
 
 
-def _read(
-    file: Path, text: TextIO, arm: Manipulator, interpolation: Interpolation
+def read_trajectory_text(
+    file: Path, text: TextIO, arm: Manipulator, interpolation: Interpolation = "auto"
 ) -> Trajectory:
+    """Read the text of a trajectory, as `read_trajectory` does."""
     columns = column_names(arm.n_links)
     rates, changes = (rate_names(arm.n_links, order) for order in (1, 2))
     more = {"linear": (), "cubic": rates}.get(interpolation, (*rates, *changes))

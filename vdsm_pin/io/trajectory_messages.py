@@ -12,15 +12,10 @@ from vdsm_pin.io.source import read_text
 from vdsm_pin.io.yaml_reader import read_yaml
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.problem.trajectory import MAX_ROWS
+from vdsm_pin.tolerances import TOLERANCES
 
 ENDINGS: Final = (".yaml", ".yml", ".json")
 MAX_BYTES: Final = 256 << 20
-STILL: Final = 1e-9
-"""How far a turn or a height may be off where it must not change; [rad], [m]."""
-
-UNIT_NORM: Final = 1e-3
-"""How far a quaternion's length may be from 1; [-]."""
-
 MULTI: Final = "multi_dof_joint_trajectory"
 _FREE: Final = ("x", "y", "z", "yaw", "pitch", "roll")
 _NANO: Final = 1e-9
@@ -175,7 +170,7 @@ def _multi(file: Path, message: dict[str, Any]) -> JointTrajectory:
             raise InvalidFile(file=file, where=where, problem=problem)
     rows[..., 3:] = np.unwrap(rows[..., 3:], axis=0)
     for column, name in enumerate(names):
-        if not (np.ptp(rows[:, column, 4:], axis=0) <= STILL).all():
+        if not (np.ptp(rows[:, column, 4:], axis=0) <= TOLERANCES.still).all():
             problem = (
                 f"joint {name!r} turns about another axis than z between points, "
                 "expected one pitch and roll"
@@ -200,7 +195,7 @@ def _transform(file: Path, where: str, transform: Any) -> FloatArray:
         found += numbers
     quaternion = np.array(found[3:])
     length = float(np.linalg.norm(quaternion))
-    if not abs(length - 1.0) <= UNIT_NORM:
+    if not abs(length - 1.0) <= TOLERANCES.quaternion:
         problem = f"rotation has length {length:g}, expected 1"
         raise InvalidFile(file=file, where=where, problem=problem)
     turn = rotation_from_quaternion(quaternion / length)

@@ -127,6 +127,9 @@ class _Reading:
     def _expect(self, joint: Any, kind: str, axis: FloatArray | None = None) -> None:
         if joint.type != kind:
             raise self._invalid(joint, f"is {joint.type}, expected {kind}")
+        if joint.mimic is not None:
+            problem = f"mimics {joint.mimic.joint!r}, expected one that moves by itself"
+            raise self._invalid(joint, problem)
         if axis is not None and not np.array_equal(joint.axis, axis):
             wanted = " ".join(f"{value:g}" for value in axis)
             found = " ".join(f"{value:g}" for value in joint.axis)

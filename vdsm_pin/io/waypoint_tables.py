@@ -14,7 +14,7 @@ import numpy as np
 
 from vdsm_pin.arm.cables import angles_from_cables
 from vdsm_pin.arm.kinematics import joint_angles
-from vdsm_pin.errors import InconsistentCables, InvalidFile, LinkTooShort
+from vdsm_pin.errors import InconsistentCables, InvalidFile, WrongLinkLength
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.source import check_is_file, readable
 from vdsm_pin.io.tables import Table, open_text
@@ -60,13 +60,8 @@ def read_centres(path: Path, problem: PlanningProblem) -> Trajectory:
         raise _bad_row(path, row, f"o1 is {away} off the rail, expected on it")
     try:
         alpha, theta = joint_angles(arm, centres)
-    except LinkTooShort as error:
-        gap, length = error.gap * MM_PER_M, error.length * MM_PER_M
-        problem_said = (
-            f"o{error.link} and o{error.link + 1} are {gap:.6f} mm apart, expected the "
-            f"length of link {error.link}, {length:.6f} mm"
-        )
-        raise _bad_row(path, error.waypoint, problem_said) from None
+    except WrongLinkLength as error:
+        raise _bad_row(path, error.waypoint, error.problem) from None
     place = table[:, 1] != 0.0, table[:, 2]
     return Trajectory(*place, centres[:, 0, 0], alpha, theta, notes)
 

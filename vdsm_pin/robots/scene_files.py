@@ -23,13 +23,12 @@ from vdsm_pin.problem.scene import Obstacle, Scene
 from vdsm_pin.robots.mjcf import read_mjcf
 from vdsm_pin.robots.places import Place
 from vdsm_pin.robots.scene_text import read_scene_text
+from vdsm_pin.tolerances import TOLERANCES
 
 Reader: TypeAlias = Callable[[Place, str, FloatArray], Obstacle]
 """Of a shape by its place in the file, its name and T_world_shape."""
 
 MAX_BYTES: Final = 32 << 20
-UNIT_NORM: Final = 1e-3
-"""How far a quaternion's length may be from 1; [-]."""
 
 
 class SceneModel(FileModel):
@@ -226,7 +225,7 @@ def _pose(pose: Place) -> FloatArray:
     placement[:3, 3] = _named(pose.get("position", [0, 0, 0]), "xyz")
     quaternion = _named(pose.get("orientation", [0, 0, 0, 1]), "xyzw")
     length = float(np.linalg.norm(quaternion))
-    if not abs(length - 1.0) <= UNIT_NORM:
+    if not abs(length - 1.0) <= TOLERANCES.quaternion:
         problem = f"has an orientation of length {length:g}, expected 1"
         raise pose.invalid(problem)
     placement[:3, :3] = rotation_from_quaternion(quaternion / length)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as File
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,19 +12,14 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.io.bags import is_bag, read_bag
 from vdsm_pin.io.source import check_is_file
 from vdsm_pin.io.tables import listed
-from vdsm_pin.io.trajectory_messages import ENDINGS, STILL, read_joint_trajectory
+from vdsm_pin.io.trajectory_messages import ENDINGS, read_joint_trajectory
 from vdsm_pin.problem.joint_trajectory import JointTrajectory
 from vdsm_pin.robots.model import Robot, RobotJoint, Values
 from vdsm_pin.robots.trajectory_csv import read_csv
+from vdsm_pin.tolerances import TOLERANCES
 
 if TYPE_CHECKING:  # whoever reads waypoints alone needs no pieces
     from vdsm_pin.proof.paths import Path
-
-ROUNDED: Final = 1e-6
-"""How far a joint that stands still may be written elsewhere; [rad], [m]."""
-
-NOISE: Final = 1e-3
-"""How far a joint that mimics another may be measured elsewhere; [rad], [m]."""
 
 
 def read_motion(
@@ -111,14 +106,15 @@ def _agree(
         judged = offset + (ratio * q[:, column] if column is not None else 0.0 * stated)
         off = np.abs(stated - judged)
         row = int(np.argmax(off))
-        if not off[row] <= (ROUNDED if column is None else NOISE):
+        held, follows = TOLERANCES.held_joint, TOLERANCES.mimicked_joint
+        if not off[row] <= (held if column is None else follows):
             why = "stands still" if column is None else "mimics another"
             problem = (
                 f"has joint {name!r} at {stated[row]:.6g} at waypoint {row}, but it "
                 f"{why} and is judged at {judged[row]:.6g}"
             )
             raise InvalidFile(file=file, problem=problem)
-        if off[row] > STILL:
+        if off[row] > TOLERANCES.still:
             yield f"joint {name!r} is up to {off[row]:.2g} off where it is judged"
 
 
@@ -194,7 +190,7 @@ def _of_joints(
         joint, _, part = name.rpartition("/")
         if f"{joint}/theta" not in named or name in named:
             continue
-        if part != "yaw" and not (np.abs(motion.q[:, k]) <= STILL).all():
+        if part != "yaw" and not (np.abs(motion.q[:, k]) <= TOLERANCES.still).all():
             problem = f"joint {joint!r} is planar, expected {part} 0"
             raise InvalidFile(file=file, problem=problem)
         if part == "yaw":

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from vdsm_pin.io.meshes.faces import cut_faces
-from vdsm_pin.io.meshes.raw import MAX_LINE, MeshStream, RawMesh
+from vdsm_pin.io.meshes.raw import MAX_MESH_LINE, MeshStream, RawMesh
 
 _FREE_FORM: Final = frozenset({"cstype", "curv", "curv2", "surf", "bzp", "bsp", "cdp"})
 _ELSEWHERE: Final = frozenset({"call", "csh"})
@@ -77,8 +77,8 @@ def _whole_lines(stream: MeshStream) -> Iterator[tuple[int, str]]:
             continue
         first, length = first or number, length + len(plain)
         begun.append(plain[:-1] if goes_on else plain)
-        if length > MAX_LINE:
-            problem = f"goes on for more than {MAX_LINE} characters"
+        if length > MAX_MESH_LINE:
+            problem = f"goes on for more than {MAX_MESH_LINE} characters"
             raise stream.invalid(problem, line=first)
         if not goes_on:
             yield first, " ".join(begun)

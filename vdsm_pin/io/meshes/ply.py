@@ -10,7 +10,7 @@ import numpy as np
 
 from vdsm_pin.geometry.arrays import FloatArray, IntArray
 from vdsm_pin.io.meshes.faces import cut_faces
-from vdsm_pin.io.meshes.raw import MAX_LINE, MeshStream, RawMesh, doubles
+from vdsm_pin.io.meshes.raw import MAX_MESH_LINE, MeshStream, RawMesh, doubles
 
 _KINDS: Final = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -136,7 +136,7 @@ def _header(stream: MeshStream) -> _Header:
     elements = dict[str, _Element]()
     latest: list[_Property] | None = None
     for number in range(1, _MOST_LINES + 1):
-        raw = stream.content.readline(MAX_LINE).decode("latin-1")
+        raw = stream.content.readline(MAX_MESH_LINE).decode("latin-1")
         match raw.split():
             case ["ply"] if number == 1:
                 pass

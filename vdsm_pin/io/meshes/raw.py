@@ -16,8 +16,8 @@ MAX_TRIANGLES: Final = 5_000_000
 MAX_CORNERS: Final = 3 * MAX_TRIANGLES
 """Most vertices of a file, used or not, and most corners of all its faces."""
 
-MAX_LINE: Final = 1 << 20
-"""Longest line of a text format; [characters]."""
+MAX_MESH_LINE: Final = 1 << 20
+"""Longest line of a mesh or cloud in text; [bytes], a character each in Latin-1."""
 
 _BOM: Final = "\xef\xbb\xbf"  # of UTF-8, as Latin-1
 _UTF_16: Final = ("\xff\xfe", "\xfe\xff")
@@ -92,16 +92,16 @@ class MeshStream:
         """
         text = io.TextIOWrapper(self.content, encoding="latin-1", newline=None)
         try:
-            line = text.readline(MAX_LINE)
+            line = text.readline(MAX_MESH_LINE)
             if line.startswith(_UTF_16):
                 raise self.invalid(problem="is UTF-16 text, expected UTF-8 or ASCII")
             number, line = 1, line.removeprefix(_BOM)
             while line:
-                if len(line) == MAX_LINE and line[-1] != "\n":
-                    problem = f"is longer than {MAX_LINE} characters"
+                if len(line) == MAX_MESH_LINE and line[-1] != "\n":
+                    problem = f"is longer than {MAX_MESH_LINE} characters"
                     raise self.invalid(problem, line=number)
                 yield number, line
-                number, line = number + 1, text.readline(MAX_LINE)
+                number, line = number + 1, text.readline(MAX_MESH_LINE)
         finally:
             if not text.closed:
                 text.detach()

@@ -81,10 +81,11 @@ class Placed:
         for part in parts:
             self.n_triangles += len(part.triangles)
             self.stream.check_count(self.n_triangles)
-            self.stream.check_numbers(part.vertices, "vertex")
+            self.stream.check_numbers(part.vertices, "vertex", used=part.triangles)
             turned = part.triangles[:, ::-1] if mirrored else part.triangles
             self.triangles.append(turned + self.n_vertices)
-            self.vertices.append(part.vertices @ pose[:3, :3].T + pose[:3, 3])
+            with np.errstate(over="ignore", invalid="ignore"):  # of unused vertices
+                self.vertices.append(part.vertices @ pose[:3, :3].T + pose[:3, 3])
             self.n_vertices += len(part.vertices)
 
     def mesh(self, unit: float, *, bend: float, notes: Sequence[str]) -> RawMesh:
