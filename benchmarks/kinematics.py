@@ -22,7 +22,7 @@ from vdsm_pin.io.problem_file import read_problem
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.verification.cable_check import check_cables
-from vdsm_pin.verification.coal_check import check_coal_obstacles
+from vdsm_pin.verification.coal_check import check_coal
 from vdsm_pin.verification.fk import check_fk
 from vdsm_pin.verification.robot_model import load_robot
 
@@ -62,7 +62,7 @@ def cases(problem: PlanningProblem, rows: int) -> dict[str, Callable[[], object]
         ),
         "check: Pinocchio": lambda: check_fk(robot, problem, motion),
         "check: cables": lambda: check_cables(problem, motion),
-        "check: Coal": lambda: check_coal_obstacles(robot, problem, motion),
+        "check: Coal": lambda: check_coal(robot, problem, motion),
     }
 
 

@@ -1,8 +1,7 @@
 """Refinement: what is missing is added, and nothing uncertified is handed out."""
 
 import sys
-from collections.abc import Callable, Iterator
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,11 +23,7 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.time_limit import NO_LIMIT
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_check, coal_missing
-from vdsm_pin.verification.coal_distances import (
-    CoalDistances,
-    Partners,
-    obstacles_at_rest,
-)
+from vdsm_pin.verification.coal_arm import CoalArm, CoalDistances
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
@@ -138,26 +133,16 @@ def test_of_rivals_the_one_that_is_proved_to_survive_most_is_taken(
     assert result.verification.verdict is Verdict.CERTIFIED
 
 
-class Lying(Partners):
-    """Partners whose every distance by Coal is off."""
-
-    error = 0.0
-
-    def distances(self, *words: Any, **named: Any) -> Iterator[CoalDistances]:
-        for found in super().distances(*words, **named):
-            yield replace(found, distance=found.distance + self.error)
-
-
-def off_by(error: float) -> Callable[..., Partners]:
+def off_by(error: float) -> type[CoalArm]:
     """Coal, with an error on every distance to obstacles."""
 
-    def made(*words: Any) -> Partners:
-        honest = obstacles_at_rest(*words)
-        found = Lying(*(getattr(honest, one.name) for one in fields(Partners)))
-        object.__setattr__(found, "error", error)
-        return found
+    class Lying(CoalArm):
+        def measured(self, *words: Any) -> CoalDistances:
+            found = super().measured(*words)
+            off = np.where(self.pairs.of_obstacle[found.pair], error, 0.0)
+            return replace(found, distance=found.distance + off)
 
-    return made
+    return Lying
 
 
 @pytest.mark.parametrize("name", ["paper", "fewest"])
@@ -170,7 +155,7 @@ def test_with_a_coal_that_reports_less_the_plan_keeps_so_much_more(
     assert not honest.rounds[0].adjustments
     before = honest.verification.min_clearance
     error = 0.005 + before - problem.required_clearance
-    monkeypatch.setattr(coal_missing, "obstacles_at_rest", off_by(-error))
+    monkeypatch.setattr(coal_missing, "CoalArm", off_by(-error))
     careful = refinement.plan_and_verify(problem, name, robot)
     assert careful.verification.min_clearance >= before + 0.005
     first = careful.rounds[0]
@@ -188,7 +173,7 @@ def test_what_keeps_much_anyway_keeps_more_where_coal_finds_it_missing(
 ) -> None:
     problem = replace(short("obs3"), required_clearance=0.010)
     robot = load_robot(problem.manipulator)
-    monkeypatch.setattr(coal_missing, "obstacles_at_rest", off_by(-error))
+    monkeypatch.setattr(coal_missing, "CoalArm", off_by(-error))
     careful = refinement.plan_and_verify(problem, name, robot)
     assert careful.verification.min_clearance >= problem.required_clearance + error
     assert (len(careful.rounds) > 1) == again
@@ -204,7 +189,7 @@ def test_with_a_coal_that_reports_more_no_plan_is_returned(
     problem = short("obs3")
     robot = load_robot(problem.manipulator)
     for module in (coal_missing, coal_check):
-        monkeypatch.setattr(module, "obstacles_at_rest", off_by(0.005))
+        monkeypatch.setattr(module, "CoalArm", off_by(0.005))
     with pytest.raises(NoPlanFound, match="Coal"):
         refinement.plan_and_verify(problem, name, robot)
 

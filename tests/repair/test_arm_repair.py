@@ -26,7 +26,7 @@ from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.refinement import plan_and_verify
 from vdsm_pin.repair.arm import repair_arm
 from vdsm_pin.time_limit import Deadline
-from vdsm_pin.verification.coal_distances import obstacles_at_rest
+from vdsm_pin.verification.coal_arm import CoalArm
 from vdsm_pin.verification.robot_model import load_robot
 
 ROBOT = load_robot(built_in("hrm8"))
@@ -66,8 +66,13 @@ def test_larger_clearance_is_reached(name: str) -> None:
     assert rows.joints[0].tolist() == motion.joints[0].tolist()
     assert found.given[0] == 0
     assert 0.0 < found.moved.max() < 0.2
-    near = obstacles_at_rest(ROBOT, asked).distances(finely(rows), 0.05)
-    least = min(chunk.distance.min() for chunk in near)
+    arm = CoalArm(ROBOT, asked)
+    near = list(arm.near(finely(rows), 0.02))
+    distance, pair = (
+        np.concatenate([getattr(one, name) for one in near])
+        for name in ("distance", "pair")
+    )
+    least = distance[arm.pairs.of_obstacle[pair]].min()
     assert least >= asked.required_clearance - 5e-6
 
 

@@ -32,8 +32,9 @@ from vdsm_pin.proof.terms import REFUTED
 from vdsm_pin.verification import certificate_lines, coal_missing, proved_lowers
 from vdsm_pin.verification.brackets import ClearanceChunk, ClearanceProfile
 from vdsm_pin.verification.clearance import _merged, _steps, profile_of
-from vdsm_pin.verification.coal_distances import _Moved
+from vdsm_pin.verification.coal_arm import CoalDistances, _Moved
 from vdsm_pin.verification.coal_missing import NEAR
+from vdsm_pin.verification.coal_pairs import CoalPairs
 from vdsm_pin.verification.enclosed import EnclosedSink, enclosed_profile, pairs_inside
 from vdsm_pin.verification.moving import MOST_PARTS, PART, Knots, in_short_parts
 from vdsm_pin.verification.proved_lowers import LowersSink, ProvedLowers
@@ -349,39 +350,35 @@ def test_of_each_link_and_obstacle_the_row_that_lacks_most_is_told(
         np.random.default_rng([10, seed]),
         replace(problem(), required_clearance=0.5),
     )
-    held = rng.random((ARM.n_links + 1, 3)) < 0.8
-    told: Any = SimpleNamespace(
-        scene=asked.scene, manipulator=ARM, required_clearance=0.5,
-        held=SimpleNamespace(axes=held),
-    )  # fmt: skip
+    pairs = CoalPairs(asked)
     parts, expected = [], dict[tuple[int, int], tuple[Any, ...]]()
     for part in range(3):
         n = 60
         gaps = rng.choice([-0.2, 0.0, 0.1, 0.3, 0.5, 0.7, -np.inf], n)
-        link, other = rng.integers(0, ARM.n_links + 1, n), rng.integers(0, 3, n)
-        points = rng.normal(size=(2, n, 3))
+        pair, points = rng.integers(0, pairs.one.size, n), rng.normal(size=(2, n, 3))
         points[1, ::7] = points[0, ::7]
-        parts.append(SimpleNamespace(
-            distance=gaps, link=link, other=other, waypoint=np.arange(n) + n * part,
-            link_point=points[0], other_point=points[1],
+        moments, unknown = np.arange(n) + n * part, np.zeros(n)
+        parts.append(CoalDistances(
+            moments + 0.0, pair, gaps, unknown, unknown, points[0], points[1]
         ))  # fmt: skip
         for k in range(n):
-            if not (np.isfinite(gaps[k]) and gaps[k] < 0.5 and held[link[k], other[k]]):
+            other = int(pairs.other[pair[k]]) - pairs.n_own
+            if other < 0 or not (np.isfinite(gaps[k]) and gaps[k] < 0.5):
                 continue
-            key = min(int(link[k]) + 1, ARM.n_links), int(other[k])
+            key = min(int(pairs.one[pair[k]]) + 1, ARM.n_links), other
             if key not in expected or gaps[k] < expected[key][1]:
                 way = (points[0, k] - points[1, k]) * (1.0 if gaps[k] >= 0.0 else -1.0)
                 size = np.linalg.norm(way)
                 expected[key] = k + n * part, gaps[k], way / size if size else way
 
-    def distances(motion: str, reach: float, **_: Any) -> Any:
-        assert reach == 0.5 + NEAR * ARM.most_radius
+    def near(motion: str, room: float, **_: Any) -> Any:
+        assert room == NEAR * ARM.most_radius
         return parts
 
-    at_rest = SimpleNamespace(distances=distances)
-    monkeypatch.setattr(coal_missing, "obstacles_at_rest", lambda *_: at_rest)
+    arm = SimpleNamespace(near=near, pairs=pairs, problem=asked)
+    monkeypatch.setattr(coal_missing, "CoalArm", lambda *_: arm)
     blank: Any = None
-    found = coal_missing.coal_missing(blank, told, blank)
+    found = coal_missing.coal_missing(blank, asked, blank)
     assert [(one.link, one.obstacle) for one in found] == sorted(expected)
     for one in found:
         waypoint, gap, normal = expected[one.link, one.obstacle]

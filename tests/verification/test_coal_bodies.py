@@ -20,7 +20,7 @@ from vdsm_pin.problem.scene import Scene
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_bodies as coal_side
-from vdsm_pin.verification import coal_distances as measuring
+from vdsm_pin.verification.coal_arm import CoalArm
 from vdsm_pin.verification.coal_bodies import (
     LARGEST,
     CoalBody,
@@ -28,7 +28,7 @@ from vdsm_pin.verification.coal_bodies import (
     distance_request,
     measure,
 )
-from vdsm_pin.verification.coal_check import check_coal_obstacles
+from vdsm_pin.verification.coal_check import check_coal
 from vdsm_pin.verification.link_clearance import link_clearance
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
@@ -189,11 +189,11 @@ def test_inside_a_solid_mesh_coal_speaks_of_its_skin_only() -> None:
     problem = room(0.4 + HRM8.link_radius, True)
     still, x0 = np.zeros((1, 8)), np.full(1, 0.1)
     trajectory = Trajectory(np.zeros(1), np.zeros(1), x0, still, still)
-    (found,) = measuring.obstacles_at_rest(load_robot(HRM8), problem).distances(
-        trajectory, np.inf
-    )
-    np.testing.assert_allclose(found.distance, 0.4, atol=1e-7)
-    (check,) = check_coal_obstacles(load_robot(HRM8), problem, trajectory)
+    arm = CoalArm(load_robot(HRM8), problem)
+    (found,) = arm.near(trajectory, np.inf)
+    of_room = found.distance[arm.pairs.of_obstacle[found.pair]]
+    np.testing.assert_allclose(of_room, np.full(8, 0.4), atol=1e-7)
+    (check,) = check_coal(load_robot(HRM8), problem, trajectory)
     assert check.verdict is Verdict.CERTIFIED, "the distances to the skin agree"
     centres = joint_centres(HRM8, x0, still, still)
     assert (link_clearance(problem)(centres) < 0.0).all(), "and yet it is inside"

@@ -1,6 +1,8 @@
 """Coal against the proved brackets: agreement is seen, disagreement is reported."""
 
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -21,14 +23,9 @@ from vdsm_pin.tolerances import TOLERANCES
 from vdsm_pin.verification import coal_check
 from vdsm_pin.verification import coal_shapes as measuring
 from vdsm_pin.verification.approaches import CLOSEST
+from vdsm_pin.verification.coal_arm import CoalArm, CoalDistances, coal_reach
 from vdsm_pin.verification.coal_bodies import Measured
-from vdsm_pin.verification.coal_check import check_coal_obstacles
-from vdsm_pin.verification.coal_distances import (
-    CoalDistances,
-    Partners,
-    coal_reach,
-    obstacles_at_rest,
-)
+from vdsm_pin.verification.coal_check import CoalLog, check_coal
 from vdsm_pin.verification.proved_lowers import ProvedLowers
 from vdsm_pin.verification.records import Verdict
 from vdsm_pin.verification.robot_model import load_robot
@@ -101,18 +98,25 @@ def trajectory_of(n: int, seed: int = 1, size: float = 0.3) -> Trajectory:
     return Trajectory(np.zeros(n), np.zeros(n), rng.uniform(-0.5, 0.5, n), alpha, theta)
 
 
+def of_obstacles(problem: PlanningProblem) -> CoalArm:
+    """The arm as Coal has it, its links not held apart."""
+    links = combinations(HRM8.axis_names, 2)
+    arm = replace(HRM8, ignore_pairs=tuple(links))
+    return CoalArm(ROBOT, replace(problem, manipulator=arm))
+
+
 @pytest.mark.parametrize("shape", SHAPES)
 def test_coal_agrees_with_the_brackets_everywhere(shape: str) -> None:
     """Every (row, link, obstacle), near and far, apart and through each other."""
     rng = np.random.default_rng(SHAPES.index(shape))
     three = [replace(obstacle_of(shape, rng), name=f"number {k}") for k in range(3)]
     problem = problem_with(*three)
-    found = list(obstacles_at_rest(ROBOT, problem).distances(trajectory_of(25), np.inf))
-    assert sum(chunk.waypoint.size for chunk in found) == 25 * 8 * 3
+    found = list(of_obstacles(problem).near(trajectory_of(25), np.inf))
+    assert sum(chunk.moment.size for chunk in found) == 25 * 8 * 3
     for chunk in found:
         assert chunk.disagreement.max() < 2e-7
         apart = chunk.distance > 0.0
-        gap = np.linalg.norm(chunk.other_point - chunk.link_point, axis=1)
+        gap = np.linalg.norm(chunk.other_point - chunk.own_point, axis=1)
         np.testing.assert_allclose(gap[apart], chunk.distance[apart], atol=1e-6)
 
 
@@ -121,18 +125,19 @@ def test_culling_skips_only_what_is_far(shape: str) -> None:
     obstacle = obstacle_of(shape, np.random.default_rng(10 + SHAPES.index(shape)))
     problem, trajectory = problem_with(obstacle), trajectory_of(60)
     reach = coal_reach(problem)
-    full = list(obstacles_at_rest(ROBOT, problem).distances(trajectory, np.inf))
-    culled = list(obstacles_at_rest(ROBOT, problem).distances(trajectory, reach))
+    arm = of_obstacles(problem)
+    full = list(arm.near(trajectory, np.inf))
+    culled = list(arm.near(trajectory, HRM8.most_radius))
     near = {
         (s, i)
         for chunk in full
-        for s, i, d in zip(chunk.waypoint, chunk.link, chunk.distance, strict=True)
+        for s, i, d in zip(chunk.moment, chunk.pair, chunk.distance, strict=True)
         if d <= reach
     }
     seen = {
         (s, i)
         for chunk in culled
-        for s, i in zip(chunk.waypoint, chunk.link, strict=True)
+        for s, i in zip(chunk.moment, chunk.pair, strict=True)
     }
     assert near <= seen
     assert {i for _, i in seen} == set(range(8)), "every pair at least once"
@@ -146,36 +151,32 @@ def test_rows_close_to_each_other_are_seen_once(
     still = np.zeros((n, 8))
     along = np.concatenate([np.linspace(0.0, shift, n - 1000), np.full(1000, shift)])
     motion = Trajectory(np.zeros(n), np.zeros(n), along, still, still)
-    problem = ball_near_link_4(0.03)
-    reach = coal_reach(problem)
+    arm, room = of_obstacles(ball_near_link_4(0.03)), HRM8.most_radius
 
     def rows() -> list[int]:
-        found = obstacles_at_rest(ROBOT, problem).distances(motion, reach, travel)
-        near = np.concatenate([chunk.waypoint[chunk.link == 3] for chunk in found])
-        return near.tolist()
+        found = arm.near(motion, room, travel)
+        near = np.concatenate([chunk.moment[chunk.pair == 3] for chunk in found])
+        return near.astype(int).tolist()
 
     seen = rows()
     assert len(seen) == pytest.approx(shift / travel + 1, abs=1)
     assert seen[0] == 0
     np.testing.assert_allclose(np.diff(along[seen]), travel, atol=2e-5)
-    monkeypatch.setattr("vdsm_pin.verification.coal_distances.CHUNK_BOUNDS", 800)
+    monkeypatch.setattr("vdsm_pin.verification.coal_arm.CHUNK_BOUNDS", 800)
     assert rows() == seen, "in parts or at once"
-    everything = list(obstacles_at_rest(ROBOT, problem).distances(motion, reach))
-    assert sum(int((chunk.link == 3).sum()) for chunk in everything) == n
+    everything = list(arm.near(motion, room))
+    assert sum(int((chunk.pair == 3).sum()) for chunk in everything) == n
 
 
 def test_verdict_and_count_of_an_honest_scene() -> None:
     rng = np.random.default_rng(3)
     problem = problem_with(*(obstacle_of(shape, rng) for shape in SHAPES))
-    (check,) = check_coal_obstacles(ROBOT, problem, trajectory_of(40))
+    (check,) = check_coal(ROBOT, problem, trajectory_of(40))
     assert check.verdict is Verdict.CERTIFIED
     assert check.worst <= check.limit == TOLERANCES.coal_agreement
-    assert 8 * len(SHAPES) <= check.count <= 40 * 8 * len(SHAPES)
-    assert f"{check.count} of {40 * 8 * len(SHAPES)} pairs" in check.where
-
-
-def test_no_obstacles_no_row() -> None:
-    assert check_coal_obstacles(ROBOT, problem_with(), trajectory_of(3)) == ()
+    pairs = 8 * len(SHAPES) + 21
+    assert pairs <= check.count <= 40 * pairs
+    assert f"{check.count} of {40 * pairs} pairs" in check.where
 
 
 def ball_near_link_4(gap: float, k: int = 3) -> PlanningProblem:
@@ -203,7 +204,7 @@ def test_a_wrong_distance_is_noticed_on_both_sides(
         return Measured(found.distance + error, found.near, found.far)
 
     monkeypatch.setattr(measuring, "measure", lying)
-    (check,) = check_coal_obstacles(ROBOT, ball_near_link_4(0.01), STRAIGHT)
+    (check,) = check_coal(ROBOT, ball_near_link_4(0.01), STRAIGHT)
     expected = Verdict.CERTIFIED if excess < 1.0 else Verdict.UNDECIDED
     assert check.verdict is expected
 
@@ -221,7 +222,7 @@ def test_a_lie_leaves_the_whole_undecided(monkeypatch: pytest.MonkeyPatch) -> No
     for tell, verdict in ((honest, Verdict.CERTIFIED), (lying, Verdict.UNDECIDED)):
         monkeypatch.setattr(measuring, "measure", tell)
         found = verify(problem, drawn, ROBOT)
-        row = next(c for c in found.checks if c.name == coal_check.OBSTACLES)
+        row = next(c for c in found.checks if c.name == coal_check.COAL)
         assert row.verdict is verdict
         others = {c.verdict for c in found.checks if c is not row}
         assert others == {Verdict.CERTIFIED}
@@ -237,7 +238,7 @@ def test_no_answer_is_no_agreement(
     import coal
 
     monkeypatch.setattr(coal, "distance", lambda *arguments: answer)
-    (check,) = check_coal_obstacles(ROBOT, ball_near_link_4(0.01), STRAIGHT)
+    (check,) = check_coal(ROBOT, ball_near_link_4(0.01), STRAIGHT)
     assert check.verdict is Verdict.UNDECIDED
     assert check.worst == np.inf
 
@@ -251,7 +252,7 @@ def test_a_wrong_sign_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(measuring, "measure", flipped)
     for gap in (0.01, -0.01):
-        (check,) = check_coal_obstacles(ROBOT, ball_near_link_4(gap), STRAIGHT)
+        (check,) = check_coal(ROBOT, ball_near_link_4(gap), STRAIGHT)
         assert check.verdict is Verdict.UNDECIDED
         assert check.worst >= 0.01
 
@@ -259,16 +260,17 @@ def test_a_wrong_sign_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("k", range(8))
 def test_an_interval_proof_above_coal_is_noticed(k: int) -> None:
     problem = ball_near_link_4(0.01, k)
-    interval, none = np.full((1, 8), -1.0), np.full(8, -1)
-    interval[0, k] = 0.01 - 1e-6
-    least = interval[0].copy()
+    interval, least = np.full((1, 8), -1.0), np.full(29, -1.0)  # 21 pairs of links
+    none = np.full(29, -1)
+    columns = np.where(np.arange(29) < 8, np.arange(29), -1)
+    interval[0, k] = least[k] = 0.01 - 1e-6
     # A bound of the interval, or of the whole motion where there is none.
-    for column, bound in ((np.arange(8), interval[0]), (none, least)):
+    for column, bound in ((columns, interval[0]), (none, least)):
         proved = ProvedLowers(least, column, interval)
-        (check,) = check_coal_obstacles(ROBOT, problem, STRAIGHT, proved)
+        (check,) = check_coal(ROBOT, problem, STRAIGHT, proved)
         assert check.verdict is Verdict.CERTIFIED
         bound[k] = 0.01 + 1e-5
-        (check,) = check_coal_obstacles(ROBOT, problem, STRAIGHT, proved)
+        (check,) = check_coal(ROBOT, problem, STRAIGHT, proved)
         assert check.verdict is Verdict.UNDECIDED
         assert f"link {k + 1} and ball" in check.where
 
@@ -280,7 +282,7 @@ def test_poses_come_from_pinocchio_and_match_the_centres() -> None:
     for i in range(8):
         outward = centres[0, i] + np.array([0.0, 0.0, 5.0])
         problem = problem_with(solids.Sphere("far", outward, 0.1))
-        (chunk,) = obstacles_at_rest(ROBOT, problem).distances(trajectory, np.inf)
+        (chunk,) = of_obstacles(problem).near(trajectory, np.inf)
         expected = np.linalg.norm(
             centres[0, :-1]
             + _nearest(centres[0, :-1], centres[0, 1:], outward)[:, None]
@@ -316,27 +318,25 @@ def test_coal_stands_beside_every_closest_approach_and_measured_row() -> None:
     assert set(judged.coal.pair.tolist()) == set(range(len(judged.pairs)))
     least = judged.least.lower[judged.coal.pair]
     assert (judged.coal.distance >= least - gap).all()
-    counts = [check.count for check in judged.checks if "by Coal" in check.name]
-    assert sum(counts) == judged.coal.pair.size + CLOSEST
+    (count,) = (one.count for one in judged.checks if one.name == coal_check.COAL)
+    assert count == judged.coal.pair.size + CLOSEST
 
 
 def test_a_lie_of_coal_at_a_closest_approach_is_seen(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Only the moments of the approaches are lied about: between two waypoints."""
+    """The answers at rows are honest."""
     problem = read_problem("paper/obs1")
     plan = plan_and_verify(problem, "paper", ROBOT).plan
+    honest = CoalLog.answers
 
-    honest = Partners.measured
+    def lying(*arguments: Any) -> Iterator[CoalDistances]:
+        for found in honest(*arguments):
+            yield replace(found, distance=found.distance + 2e-5)
 
-    def lying(*arguments: Any) -> CoalDistances:
-        found = honest(*arguments)
-        off = 2e-5 * (arguments[1] is not plan.trajectory)
-        return replace(found, distance=found.distance + off)
-
-    monkeypatch.setattr(Partners, "measured", lying)
+    monkeypatch.setattr(CoalLog, "answers", lying)
     judged = verify(problem, plan.trajectory, ROBOT)
-    row = next(check for check in judged.checks if check.name == coal_check.OBSTACLES)
+    row = next(check for check in judged.checks if check.name == coal_check.COAL)
     assert row.verdict is Verdict.UNDECIDED
     assert row.moment in [near.moment for near in judged.approaches]
 

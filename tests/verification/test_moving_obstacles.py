@@ -323,7 +323,7 @@ def compare(seed: int, tmp_path: Path) -> Verdict:
     value, worst, _ = clearance(found)
     assert value is not Verdict.UNDECIDED
     assert (value is Verdict.CERTIFIED) == bool(worst >= 0.005)
-    coal = next(c for c in found.checks if "moving bodies by Coal" in c.name)
+    coal = next(c for c in found.checks if "distances by Coal" in c.name)
     assert coal.verdict is Verdict.CERTIFIED, coal
     return value
 

@@ -134,7 +134,7 @@ def compare(seed: int, folder: Path) -> Verdict:
         assert found.least.lower[k] <= float(gaps.min()) - sum(radii) + 1e-9
     row = next(c for c in found.checks if c.name == "clearance from obstacles")
     assert row.verdict in (Verdict.CERTIFIED, Verdict.REFUTED)
-    coal = next(c for c in found.checks if "moving bodies by Coal" in c.name)
+    coal = next(c for c in found.checks if "distances by Coal" in c.name)
     assert coal.verdict is Verdict.CERTIFIED
     return row.verdict
 

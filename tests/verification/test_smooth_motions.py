@@ -242,7 +242,7 @@ def compare(seed: int, tmp_path: Path) -> Verdict:
         assert check.worst == pytest.approx(float(gaps.min()), abs=2e-4)
     else:
         assert gaps.min() < 0.005 + 2e-4
-    coal = next(c for c in found.checks if "moving bodies by Coal" in c.name)
+    coal = next(c for c in found.checks if "distances by Coal" in c.name)
     assert coal.verdict is Verdict.CERTIFIED
     box = {c.name: c for c in found.checks}
     sampled = np.abs(joints[:, 1::2]).max()

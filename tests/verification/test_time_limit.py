@@ -81,7 +81,7 @@ def test_a_limit_that_is_over_judges_no_clearance(tmp_path: Path) -> None:
         assert "the time limit of 2 s came first" in row.where
         assert not np.isfinite(row.worst)
     late = [row for row in found.checks if row.where.startswith("not done")]
-    assert len(late) == 4  # joint centres, Coal twice, cables
+    assert len(late) == 3  # joint centres, Coal, cables
     assert all(row.verdict is Verdict.UNDECIDED and row.count == 0 for row in late)
     assert np.isnan(found.joint_error)
     said = dict(found.summary())

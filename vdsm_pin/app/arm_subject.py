@@ -11,7 +11,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.report.tables import write_cables, write_centres, write_link_angles
 from vdsm_pin.verification.brackets import ClearanceSink
-from vdsm_pin.verification.coal_distances import coal_reach
+from vdsm_pin.verification.coal_arm import coal_reach
 from vdsm_pin.verification.records import ArmVerification
 from vdsm_pin.verification.robot_model import load_robot
 from vdsm_pin.verification.task import ArmPairs

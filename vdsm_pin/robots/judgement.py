@@ -53,7 +53,6 @@ from vdsm_pin.verification.records import Check, Verdict, Verification
 POSES: Final = "link poses by Pinocchio against the tree's"
 LIMITS: Final = "joint {name!r} in its limits"
 NO_PAIR: Final = "no pair to check: no obstacle, no two links that are held apart"
-COAL: Final = "distances by Coal against the proved brackets"
 POSE_ERROR: Final = 1e-9
 """Where Pinocchio and the tree must agree; [m] or, of rotations, [-]."""
 
@@ -227,7 +226,7 @@ def _coal(
     off = disagreement(found, proof.lower, proof.upper)
     moments = knots.moments(proof.interval, proof.share)
     measured = np.flatnonzero(~np.isnan(found))
-    evidence = CoalEvidence(COAL, count=len(measured))
+    evidence = CoalEvidence(count=len(measured))
     if measured.size:
         worst = measured[np.argmax(off[measured])]
         evidence.add(float(off[worst]), "", float(moments[worst]))

@@ -12,7 +12,7 @@ from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.problem.trajectory import Trajectory
 from vdsm_pin.time_limit import NO_LIMIT, Deadline
-from vdsm_pin.verification.coal_distances import CoalDistances, obstacles_at_rest
+from vdsm_pin.verification.coal_arm import CoalArm, CoalDistances
 from vdsm_pin.verification.robot_model import RobotModel
 
 NEAR: Final = 0.5
@@ -64,29 +64,29 @@ def coal_missing(
     """
     if not problem.scene.obstacles:
         return ()
-    reach = problem.required_clearance + NEAR * problem.manipulator.most_radius
     worst: dict[tuple[int, int], Missing] = {}
-    obstacles = obstacles_at_rest(robot, problem, deadline)
-    for found in obstacles.distances(trajectory, reach, deadline=deadline):
-        for k in np.flatnonzero(found.distance < problem.required_clearance):
-            pair = found.link[k], found.other[k]
-            if not np.isfinite(found.distance[k]) or not problem.held.axes[pair]:
-                continue
-            one = _missing(found, int(k), problem.manipulator.n_links)
+    arm = CoalArm(robot, problem, deadline)
+    room = NEAR * problem.manipulator.most_radius
+    for found in arm.near(trajectory, room, deadline=deadline):
+        near = (found.distance < problem.required_clearance) & (
+            np.isfinite(found.distance) & arm.pairs.of_obstacle[found.pair]
+        )
+        for k in np.flatnonzero(near):
+            one = _missing(arm, found, int(k))
             key = one.link, one.obstacle
             if key not in worst or one.distance < worst[key].distance:
                 worst[key] = one
     return tuple(worst[key] for key in sorted(worst))
 
 
-def _missing(found: CoalDistances, k: int, n_links: int) -> Missing:
-    towards = found.link_point[k] - found.other_point[k]
+def _missing(arm: CoalArm, found: CoalDistances, k: int) -> Missing:
+    towards, pair = found.own_point[k] - found.other_point[k], found.pair[k]
     # Inside each other the witness points lie the other way round.
     towards = towards if found.distance[k] >= 0.0 else -towards
     return Missing(
-        waypoint=int(found.waypoint[k]),
-        link=min(int(found.link[k]) + 1, n_links),
-        obstacle=int(found.other[k]),
+        waypoint=int(found.moment[k]),
+        link=min(int(arm.pairs.one[pair]) + 1, arm.problem.manipulator.n_links),
+        obstacle=int(arm.pairs.other[pair]) - arm.pairs.n_own,
         distance=float(found.distance[k]),
         normal=towards / (np.linalg.norm(towards) or 1.0),
     )

@@ -27,15 +27,8 @@ from vdsm_pin.verification.clearance import (
     prove_clearance,
 )
 from vdsm_pin.verification.clearance_check import check_clearance
-from vdsm_pin.verification.coal_carried import CARRIED, check_coal_carried
-from vdsm_pin.verification.coal_check import (
-    LINKS,
-    OBSTACLES,
-    check_coal_links,
-    check_coal_obstacles,
-)
-from vdsm_pin.verification.coal_distances import coal_reach
-from vdsm_pin.verification.coal_log import CoalLog
+from vdsm_pin.verification.coal_arm import coal_reach
+from vdsm_pin.verification.coal_check import COAL, CoalLog, check_coal
 from vdsm_pin.verification.enclosed import (
     EnclosedSink,
     Inside,
@@ -121,7 +114,7 @@ def verify(
         judgement.extras.note(f"clearance.csv from interval {proof.sent} on", deadline)
     tip = check_tip(problem, trajectory)
     near_misses = closest_approaches(problem, trajectory, proof.pairs, least)
-    log = CoalLog(proof.pairs, near_misses, tuple(enclosed))
+    log = CoalLog(near_misses, tuple(enclosed))
     clearance = check_clearance(
         problem, proof, counterexamples, contacts, deadline, nominal=clear
     )
@@ -138,7 +131,7 @@ def verify(
         *enclosed_checks(
             clearance, enclosed, (one.clearance for one in inside.values())
         ),
-        *judgement.by_coal(robot, proved, log),
+        *judgement.by_coal(robot, proved.lowers, log),
         *guarded(
             cable_check.NAME,
             lambda: cable_check.check_cables(problem, trajectory, deadline),
@@ -151,7 +144,7 @@ def verify(
         errors=box,
         pairs=proof.pairs,
         checks=tuple(checks),
-        approaches=log.approaches,
+        approaches=tuple(log.approaches),
         profile=enclosed_profile(proof.profile, problem, enclosed),
         tip_deviation=tip.deviation,
         coverage=tip.coverage,
@@ -258,17 +251,11 @@ class _Judgement:
         return guarded(fk.PLANNED, lambda: fk.check_planned(*motion))
 
     def by_coal(
-        self, robot: RobotModel, proved: _Proved, log: CoalLog
+        self, robot: RobotModel, lowers: ProvedLowers, log: CoalLog
     ) -> tuple[Check, ...]:
-        """The second opinions on distances."""
-        motion, deadline = (robot, self.problem, self.trajectory), self.deadline
-        lowers = proved.lowers
-        checks = {
-            OBSTACLES: lambda: check_coal_obstacles(*motion, lowers, deadline, log),
-            LINKS: lambda: check_coal_links(*motion, deadline, log),
-            CARRIED: lambda: check_coal_carried(*motion, lowers, log, deadline),
-        }
-        return tuple(row for name, run in checks.items() for row in guarded(name, run))
+        """The second opinion on distances."""
+        motion = robot, self.problem, self.trajectory, lowers, log, self.deadline
+        return guarded(COAL, lambda: check_coal(*motion))
 
     def survived(
         self, proof: ClearanceProof, located: Mapping[str, Location]

@@ -14,7 +14,7 @@ from vdsm_pin.problem.planning_problem import PlanningProblem
 from vdsm_pin.refinement import Refinement, plan_and_verify
 from vdsm_pin.report.folder import check_kept, check_output_folder, staged
 from vdsm_pin.report.html import rendered
-from vdsm_pin.verification.coal_distances import obstacles_at_rest
+from vdsm_pin.verification.coal_arm import CoalArm
 from vdsm_pin.verification.robot_model import RobotModel, load_robot
 
 PAGE: Final = "explain.html"
@@ -88,17 +88,12 @@ def _checks(robot: RobotModel, found: Refinement, row: int) -> Part:
     one = plan.trajectory.part(row, row + 1)
     centres = robot.joint_centres(one.x0, one.alpha, one.theta)[0]
     error = float(np.linalg.norm(centres - plan.centres[row], axis=1).max())
-    rows, names = [], problem.manipulator.axis_names
-    for seen in obstacles_at_rest(robot, problem).distances(one, np.inf):
+    arm, rows = CoalArm(robot, problem), []
+    for seen in arm.near(one, np.inf):
         rows += [
-            (
-                names[seen.link[k]],
-                problem.scene.names[seen.other[k]],
-                mm(seen.distance[k]),
-                mm(seen.lower[k]),
-                mm(seen.upper[k]),
-            )
-            for k in range(len(seen.link))
+            (*arm.pairs.named(pair), mm(seen.distance[k]), mm(low), mm(seen.upper[k]))
+            for k, (pair, low) in enumerate(zip(seen.pair, seen.lower, strict=True))
+            if arm.pairs.of_obstacle[pair]
         ]
     head = ("link", "obstacle", "by Coal [mm]", "proved at least", "proved at most")
     return Part(
