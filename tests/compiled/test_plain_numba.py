@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from vdsm_pin.compiled import apart, borrowed, clock, compiled
 from vdsm_pin.compiled.choice import compiler
-from vdsm_pin.geometry.segments import nearest_places
+from vdsm_pin.geometry.row_bounds import _crossing_gap
 
 class Two(NamedTuple):
     values: np.ndarray
@@ -33,7 +33,7 @@ def scaled(two):
 rng = np.random.default_rng(1)
 for _ in range(20):
     ends = rng.normal(size=(4, 3))
-    print(*nearest_places(*ends))
+    print(_crossing_gap(*ends))
     value, now = scaled(Two(ends[0], 0.7))
     print(value, abs(now - time.monotonic()) < 10.0)
 print(compiler() is None)

@@ -160,8 +160,8 @@ def _from_ball(ball: FloatArray, a: FloatArray, b: FloatArray) -> float:
 def _from_edges(corners: FloatArray, a: FloatArray, b: FloatArray) -> float:
     """Squared distance of a segment from the edges of a triangle; [m^2].
 
-    As `geometry.segments.squared_gap` has it, with what is the same for all edges done
-    once.
+    Of each edge the place nearest to the segment's line, moved to an end where it must
+    be, and the place on the segment nearest to that: never less than the distance.
     """
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     uu, square = ux * ux + uy * uy + uz * uz, np.inf
