@@ -394,7 +394,10 @@ TEXT_DAMAGE = [
     ("a.ply", PLY.replace("3 0 1 2", "3 0 1 2 4"), "line 13: has 5 values, 'face' ha"),
     ("a.ply", PLY.replace("3 0 1 2", "3 0 1 3"), "a face names vertex 3, expected 0 "),
     ("a.ply", PLY.replace("3 0 1 2", "3 0 1 1.5"), "a face names vertex 1.5, expecte"),
-    ("a.ply", PLY.replace("3 0 1 2", "-3 0 1 2"), "line 13: has 4 values, too few"),
+    *(
+        ("a.ply", PLY.replace("3 0 1 2", f"{n} 0 1 2"), "line 13: has 4 values, too f")
+        for n in ("-3", "3.5", "inf", "nan", "1e300")
+    ),
     ("a.ply", PLY.replace("1 0 0", "nan 0 0"), "vertex 2: has a coordinate that is n"),
     ("a.ply", PLY.replace("3 0 1 2", "2 0 1"), "has no triangle"),
     ("a.ply", PLY.replace("ascii", "binary_little_endian"), "promises 3 of 'vertex'"),

@@ -202,7 +202,9 @@ def _split(
         size = 1
         if one.count_kind:
             head = words[place : place + 1]
-            size, place = int(stream.numbers(head, 1, line)[0]), place + 1
+            number, place = stream.numbers(head, 1, line)[0], place + 1
+            whole = 0 <= number <= len(words) and number % 1 == 0
+            size = int(number) if whole else -1
         part = words[place : place + size]
         if size < 0 or len(part) != size:
             problem = f"has {len(words)} values, too few for {element.name!r}"
