@@ -27,6 +27,26 @@ _NAMES: Final = {
 }
 
 
+_LENGTHS: Final = {"too_short": "least", "too_long": "most"}
+_WORDS: Final = {
+    "float_type": "a number",
+    "finite_number": "a finite number",
+    "string_type": "text",
+    "bool_type": "true or false",
+    "list_type": "a list",
+    "model_type": "a mapping",
+    "model_attributes_type": "a mapping",
+    "literal_error": "{expected}",
+    "greater_than": "above {gt:g}",
+    "greater_than_equal": "{ge:g} or more",
+    "less_than": "below {lt:g}",
+    "less_than_equal": "{le:g} or less",
+    "string_too_long": "at most {max_length} characters",
+    "string_too_short": "at least {min_length} characters",
+}
+"""What is expected, by pydantic's kind of error and with its values."""
+
+
 def first_error(
     error: ValidationError, document: YamlDocument, model: type[FileModel]
 ) -> InvalidFile:
@@ -133,41 +153,14 @@ def _expected(details: ErrorDetails, at: Location) -> str:
     kind, context = details["type"], details.get("ctx", {})
     if kind.endswith("_type") and at and at[-1] in _EITHER:
         return _EITHER[at[-1]]
-    words = {
-        "float_type": "a number",
-        "finite_number": "a finite number",
-        "string_type": "text",
-        "bool_type": "true or false",
-        "list_type": "a list",
-        "model_type": "a mapping",
-        "model_attributes_type": "a mapping",
-    }
-    match kind:
-        case "literal_error":
-            return str(context["expected"])
-        case "greater_than":
-            return f"above {context['gt']:g}"
-        case "greater_than_equal":
-            return f"{context['ge']:g} or more"
-        case "less_than":
-            return f"below {context['lt']:g}"
-        case "less_than_equal":
-            return f"{context['le']:g} or less"
-        case "too_short":
-            return f"at least {_entries(context['min_length'])}"
-        case "too_long":
-            return f"at most {_entries(context['max_length'])}"
-        case "string_too_long":
-            return f"at most {context['max_length']} characters"
-        case "string_too_short":
-            return f"at least {context['min_length']} characters"
-        case "string_pattern_mismatch":
-            return _NAMES[context["pattern"]]
-    return words.get(kind) or details["msg"][:1].lower() + details["msg"][1:]
-
-
-def _entries(count: int) -> str:
-    return f"{count} entry" if count == 1 else f"{count} entries"
+    if kind == "string_pattern_mismatch":
+        return _NAMES[context["pattern"]]
+    if kind in ("too_short", "too_long"):
+        many = context["min_length" if kind == "too_short" else "max_length"]
+        return f"at {_LENGTHS[kind]} {many} {'entry' if many == 1 else 'entries'}"
+    if kind in _WORDS:
+        return _WORDS[kind].format_map(context)
+    return details["msg"][:1].lower() + details["msg"][1:]
 
 
 def _shown(value: object) -> str:
