@@ -17,6 +17,7 @@ collision shape. Nothing in this package uses them; simulators want them.
 import math
 import re
 import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Mapping
 from typing import Final
 
 import numpy as np
@@ -131,22 +132,21 @@ def _joint(
 
 
 def _inertial(
-    link: ET.Element, x: float, mass: float, along: float, across: float
+    link: ET.Element, at: Iterable[float], mass: float, moments: Iterable[float]
 ) -> None:
+    """Mass at a place, with its moments about x, y and z there."""
     inertial = ET.SubElement(link, "inertial")
-    ET.SubElement(inertial, "origin", xyz=_vector(x, 0, 0), rpy=_vector(0, 0, 0))
+    ET.SubElement(inertial, "origin", xyz=_vector(*at), rpy=_vector(0, 0, 0))
     ET.SubElement(inertial, "mass", value=_vector(mass))
-    moments = {"ixx": along, "iyy": across, "izz": across}
-    products = {"ixy": 0.0, "ixz": 0.0, "iyz": 0.0}
-    text = {key: _vector(value) for key, value in (moments | products).items()}
-    ET.SubElement(inertial, "inertia", text)
+    names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    values = map(_vector, (*moments, 0.0, 0.0, 0.0))
+    ET.SubElement(inertial, "inertia", dict(zip(names, values, strict=True)))
 
 
 def _ball(link: ET.Element, radius: float) -> None:
     """Inertia of a solid ball; no shape: the clearance counts links only."""
     mass = DENSITY * 4.0 / 3.0 * math.pi * radius**3
-    moment = 0.4 * mass * radius**2
-    _inertial(link, 0.0, mass, moment, moment)
+    _inertial(link, (0.0, 0.0, 0.0), mass, 3 * (0.4 * mass * radius**2,))
 
 
 def _capsule_link(robot: ET.Element, name: str, length: float, radius: float) -> None:
@@ -159,15 +159,10 @@ def _capsule_link(robot: ET.Element, name: str, length: float, radius: float) ->
     across = rod * (length**2 / 12.0 + radius**2 / 4.0) + balls * (
         0.4 * radius**2 + length**2 / 4.0 + 3.0 / 8.0 * length * radius
     )
-    _inertial(link, length / 2.0, rod + balls, along, across)
-    for kind in ("visual", "collision"):
-        for part, x in (("start", 0.0), ("end", length)):
-            geometry = _shape(link, kind, f"{name}_{part}", x, _vector(0, 0, 0))
-            ET.SubElement(geometry, "sphere", radius=_vector(radius))
-        turned = _vector(0, math.pi / 2.0, 0)  # a URDF cylinder stands along z
-        geometry = _shape(link, kind, f"{name}_body", length / 2.0, turned)
-        size = {"radius": _vector(radius), "length": _vector(length)}
-        ET.SubElement(geometry, "cylinder", size)
+    half, axis = length / 2.0, np.array([1.0, 0.0, 0.0])
+    _inertial(link, half * axis, rod + balls, (along, across, across))
+    body, start, end = _shapes_of(Capsule(name, half * axis, axis, half, radius), "")
+    _shapes(link, {f"{name}_start": start, f"{name}_end": end, f"{name}_body": body})
 
 
 def _carried_link(robot: ET.Element, name: str, solid: BodySolid, file: str) -> None:
@@ -177,18 +172,18 @@ def _carried_link(robot: ET.Element, name: str, solid: BodySolid, file: str) -> 
     low, high = points.min(axis=0) - grown, points.max(axis=0) + grown
     x, y, z = (high - low) ** 2
     mass = DENSITY * float(np.prod(high - low))
-    inertial = ET.SubElement(link, "inertial")
-    middle = _vector(*(low + high) / 2.0)
-    ET.SubElement(inertial, "origin", xyz=middle, rpy=_vector(0, 0, 0))
-    ET.SubElement(inertial, "mass", value=_vector(mass))
-    moments = {"ixx": y + z, "iyy": x + z, "izz": x + y}
-    values = {key: _vector(mass * size / 12.0) for key, size in moments.items()}
-    zero = dict.fromkeys(("ixy", "ixz", "iyz"), _vector(0.0))
-    ET.SubElement(inertial, "inertia", values | zero)
+    moments = [mass * size / 12.0 for size in (y + z, x + z, x + y)]
+    _inertial(link, (low + high) / 2.0, mass, moments)
+    shapes = _shapes_of(solid, file)
+    _shapes(link, {f"{name}_{k}": shape for k, shape in enumerate(shapes)})
+
+
+def _shapes(link: ET.Element, shapes: "Mapping[str, _Shape]") -> None:
+    """Shapes by their names, to be seen and to collide."""
     for kind in ("visual", "collision"):
-        for number, (at, rpy, tag, size) in enumerate(_shapes_of(solid, file)):
+        for name, (at, rpy, tag, size) in shapes.items():
             where = {"xyz": _vector(*at), "rpy": _vector(*rpy)}
-            shape = ET.SubElement(link, kind, name=f"{name}_{number}")
+            shape = ET.SubElement(link, kind, name=name)
             ET.SubElement(shape, "origin", where)
             ET.SubElement(ET.SubElement(shape, "geometry"), tag, size)
 
@@ -231,9 +226,3 @@ def _angles(rotation: FloatArray) -> FloatArray:
         return np.array([math.atan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0])
     roll = math.atan2(rotation[2, 1], rotation[2, 2])
     return np.array([roll, pitch, math.atan2(rotation[1, 0], rotation[0, 0])])
-
-
-def _shape(link: ET.Element, kind: str, name: str, x: float, rpy: str) -> ET.Element:
-    shape = ET.SubElement(link, kind, name=name)
-    ET.SubElement(shape, "origin", xyz=_vector(x, 0, 0), rpy=rpy)
-    return ET.SubElement(shape, "geometry")
