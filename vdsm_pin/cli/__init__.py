@@ -12,16 +12,12 @@ from typing import Annotated, NoReturn
 import typer
 
 from vdsm_pin.cli import (
+    afterwards,
     batch,
-    certificate,
-    convert,
-    diff,
-    explain,
     export,
     formats,
     plan,
     repair,
-    simulate,
     start,
     verify,
     view,
@@ -41,9 +37,7 @@ app = typer.Typer(
     epilog="Exit status: 0 certified; 1 incomplete, refuted, undecided or infeasible; "
     "2 bad input.",
 )
-for module in (plan, verify, repair, batch, view, export, start, formats, certificate):
-    app.add_typer(module.commands)
-for module in (simulate, explain, convert, diff):
+for module in (plan, verify, repair, batch, view, export, start, formats, afterwards):
     app.add_typer(module.commands)
 
 

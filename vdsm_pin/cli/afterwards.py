@@ -1,0 +1,222 @@
+"""What follows a motion: check-certificate, simulate, explain, convert and diff."""
+
+from dataclasses import asdict
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vdsm_pin.cli.options import (
+    NOT_PASSED,
+    PASSED,
+    Answer,
+    OutFolder,
+    ProblemArgument,
+    Trajectory,
+    examples,
+    family,
+    grouped,
+)
+from vdsm_pin.cli.robot import refuse_beside
+from vdsm_pin.text import printable
+
+commands = family()
+
+
+@commands.command(
+    "check-certificate",
+    epilog=examples("vdsm check-certificate mine.certificate mine.yaml mine.csv"),
+)
+@grouped
+def check_certificate(
+    certificate: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", help="Written by vdsm verify --certificate."),
+    ],
+    problem: ProblemArgument,
+    trajectory: Annotated[
+        Path,
+        typer.Argument(metavar="TRAJECTORY", help="The motion that it is about."),
+    ],
+    *,
+    answer: Answer,
+) -> None:
+    """Recheck a certificate.
+
+    The checker is a second program that shares only the reading of files with the
+    verifier.
+    """
+    from vdsm_pin.certificate_checker import check_certificate as check
+    from vdsm_pin.certificate_checker import main
+    from vdsm_pin.progress import shown, step
+
+    if any(answer):
+        found = check(certificate, Path(problem), trajectory)
+        answer.tell("", accepted=found.accepted, **asdict(found))
+        raise typer.Exit(PASSED if found.accepted else NOT_PASSED)
+    with shown(lines=False):
+        step("recomputing every claim")
+        status = main([str(certificate), problem, str(trajectory)])
+    raise typer.Exit(status)
+
+
+@commands.command(
+    epilog=examples(
+        "vdsm simulate paper/obs3 --trajectory out/obs3/trajectory.csv --out out/loop"
+    )
+)
+@grouped
+def simulate(
+    problem: ProblemArgument,
+    trajectory: Trajectory,
+    out: OutFolder,
+    settings: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Masses, cables, motors, gains and kicks (YAML)."
+        ),
+    ] = None,
+    *,
+    answer: Answer,
+) -> None:
+    """Run a plan in closed loop.
+
+    Simulates elastic cables, motors, encoders and PID. Needs MuJoCo (extra
+    `simulation`). Writes executed.csv, simulation.csv, simulation.json and
+    simulation.html. Status 1 where the executed motion is not proved clear.
+    """
+    from vdsm_pin.io.problem_file import read_problem
+    from vdsm_pin.simulation.folder import SimulationOrder, simulate_to_folder
+    from vdsm_pin.simulation.settings import Settings, read_settings
+    from vdsm_pin.simulation.terminal import show_simulation
+
+    assumed = Settings() if settings is None else read_settings(settings)
+    asked = read_problem(problem)
+    order = SimulationOrder(asked, trajectory, out, assumed, settings)
+    file = simulate_to_folder(order)
+    if any(answer):
+        answer.tell("", **file.model_dump(mode="json"))
+    else:
+        show_simulation(file, out)
+    passed = file.executed.verdict == "certified"
+    raise typer.Exit(PASSED if passed else NOT_PASSED)
+
+
+@commands.command(
+    epilog=examples(
+        "vdsm explain paper/obs1 --out out/explain",
+        "vdsm explain paper/obs3 --waypoint 300 --out out/explain",
+    )
+)
+@grouped
+def explain(
+    problem: ProblemArgument,
+    out: OutFolder,
+    waypoint: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            metavar="NUMBER",
+            help="From 0; the one with the largest link angle if none.",
+        ),
+    ] = None,
+    *,
+    answer: Answer,
+) -> None:
+    """Follow the paper's seven steps at one waypoint.
+
+    Plans by the strategy `paper` and writes explain.html: numbers and a picture of
+    every step.
+    """
+    from vdsm_pin.app.explanation.folder import explain_to_folder
+    from vdsm_pin.io.problem_file import read_problem
+
+    page, row = explain_to_folder(read_problem(problem), waypoint, out)
+    answer.tell(f"waypoint {row}: wrote {page}", waypoint=int(row), page=page)
+
+
+class Format(StrEnum):
+    """Of a JointTrajectory."""
+
+    yaml = "yaml"
+    json = "json"
+    mcap = "mcap"
+    bag = "bag"
+
+
+@commands.command(
+    epilog=examples(
+        "vdsm convert paper/obs1 --trajectory out/obs1/trajectory.csv --out out/all",
+        "vdsm convert paper/obs1 --trajectory out/obs1/trajectory.csv --also mcap "
+        "--out out/ros",
+        "vdsm convert mine.yaml --cables cables.csv --out out/mine",
+    )
+)
+@grouped
+def convert(
+    problem: ProblemArgument,
+    out: OutFolder,
+    trajectory: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Joint angles, as trajectory.csv."),
+    ] = None,
+    centres: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Joint centres, as centres.csv.")
+    ] = None,
+    cables: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Cable lengths, as cables.csv.")
+    ] = None,
+    also: Annotated[
+        list[Format] | None,
+        typer.Option(help="Write a JointTrajectory too; mcap is ROS 2, bag ROS 1."),
+    ] = None,
+    *,
+    answer: Answer,
+) -> None:
+    """Convert angles, centres and cable lengths.
+
+    Takes joint angles, joint centres or cable lengths, and writes all of them:
+    trajectory.csv, centres.csv and cables.csv. Of a robot (problem with robot) it
+    takes a trajectory of any format and writes trajectory.csv. Nothing is judged.
+    """
+    from vdsm_pin.app.conversion import Given, convert_robot, convert_to_folder
+    from vdsm_pin.app.subjects import read_problem_or_cell
+    from vdsm_pin.problem.planning_problem import PlanningProblem
+
+    given, more = Given(trajectory, centres, cables), [one.value for one in also or ()]
+    notes: tuple[str, ...] = ()
+    asked = read_problem_or_cell(problem)
+    if isinstance(asked, PlanningProblem):
+        motion = convert_to_folder(asked, given, out, more)
+        count, notes = motion.n_samples, motion.notes
+    else:
+        refuse_beside("a robot", {"--centres": centres, "--cables": cables})
+        count = convert_robot(asked, given.file, out, more)
+    lines = [printable(f"note: {note}") for note in notes]
+    lines.append(f"wrote {count} waypoints to {out}")
+    answer.tell("\n".join(lines), waypoints=count, folder=out, notes=notes)
+
+
+@commands.command(epilog=examples("vdsm diff out/monday out/tuesday"))
+@grouped
+def diff(
+    old: Annotated[
+        Path,
+        typer.Argument(metavar="OLD", help="A result folder of vdsm batch or verify."),
+    ],
+    new: Annotated[Path, typer.Argument(metavar="NEW", help="A newer one.")],
+    *,
+    answer: Answer,
+) -> None:
+    """Compare two result folders.
+
+    Exit status 1 if anything got worse.
+    """
+    from vdsm_pin.report.diff import compare_folders, diff_lines
+
+    changes = compare_folders(old, new)
+    worse = any(one.worse for one in changes)
+    told = [asdict(one) for one in changes]
+    answer.tell("\n".join(diff_lines(changes)), worse=worse, changes=told)
+    raise typer.Exit(NOT_PASSED if worse else PASSED)
