@@ -13,8 +13,8 @@ from vdsm_pin.arm.cables import cable_lengths
 from vdsm_pin.arm.kinematics import joint_centres
 from vdsm_pin.arm.manipulator import built_in
 from vdsm_pin.geometry.arrays import FloatArray
-from vdsm_pin.io import clouds, mesh_file, motion_schema, obstacle_schema
-from vdsm_pin.io.problem_file import read_problem
+from vdsm_pin.io import clouds, mesh_file, obstacle_schema
+from vdsm_pin.io.problem_file import problem_schema, read_problem
 from vdsm_pin.io.trajectory_file import write_trajectory
 from vdsm_pin.problem.trajectory import Trajectory
 
@@ -39,9 +39,9 @@ def test_the_schema_names_every_kind_of_file(
     model: str, endings: dict[str, object]
 ) -> None:
     """A shape's description names all endings that its reader knows, and no other."""
-    for owner in (obstacle_schema, motion_schema):
-        name = model if owner is obstacle_schema else model.replace("Model", "Obstacle")
-        words = str(getattr(owner, name).model_json_schema()["description"])
+    defined = problem_schema()["$defs"][model.replace("Model", "Obstacle")]
+    plain = getattr(obstacle_schema, model).model_json_schema()
+    for words in (defined["description"], plain["description"]):
         found = re.findall(r"\b[A-Z]{3,4}\b", words)
         assert {f".{word.lower()}" for word in found} == set(endings)
 

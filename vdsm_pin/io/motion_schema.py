@@ -1,8 +1,8 @@
 """Obstacles of the problem file that may move, as pydantic models."""
 
-from typing import Annotated, TypeAlias
+from typing import TYPE_CHECKING, Annotated, TypeAlias, Union
 
-from pydantic import Field
+from pydantic import Field, create_model
 
 from vdsm_pin.io import obstacle_schema as shapes
 from vdsm_pin.io.schema_types import FileModel, Number, Vector
@@ -36,51 +36,21 @@ class _CanMove(FileModel):
     )
 
 
-class SphereObstacle(_CanMove, shapes.SphereModel):
-    """A ball."""
+def _movable(shape: type[shapes.NamedModel]) -> type[FileModel]:
+    """A shape with the field `motion`, and the same description."""
+    name = shape.__name__.replace("Model", "Obstacle")
+    both = (_CanMove, shape)
+    return create_model(name, __base__=both, __doc__=shape.__doc__, __module__=__name__)
 
 
-class CapsuleObstacle(_CanMove, shapes.CapsuleModel):
-    """A segment grown by a radius."""
-
-
-class CylinderObstacle(_CanMove, shapes.CylinderModel):
-    """A solid cylinder with flat ends."""
-
-
-class BoxObstacle(_CanMove, shapes.BoxModel):
-    """A cuboid."""
-
-
-class PrismObstacle(_CanMove, shapes.PrismModel):
-    """A simple polygon swept along an axis; it need not be convex."""
-
-
-class HalfSpaceObstacle(_CanMove, shapes.HalfSpaceModel):
-    """Everything on one side of a plane: solid where (p - point) . normal <= 0."""
-
-
-class MeshObstacle(_CanMove, shapes.MeshModel):
-    """Triangles from an STL, OBJ, PLY, GLB or DAE file, solid where they close."""
-
-
-class PointsObstacle(_CanMove, shapes.PointsModel):
-    """Measured points from a PLY, PCD, XYZ, TXT, CSV or NPY file."""
-
-
-class VoxelsObstacle(_CanMove, shapes.VoxelsModel):
-    """Occupied cells: their centres, or a NPY array of true and false."""
-
-
-MovableModel: TypeAlias = Annotated[
-    CylinderObstacle
-    | PrismObstacle
-    | SphereObstacle
-    | CapsuleObstacle
-    | BoxObstacle
-    | HalfSpaceObstacle
-    | MeshObstacle
-    | PointsObstacle
-    | VoxelsObstacle,
-    Field(discriminator="shape"),
-]
+if TYPE_CHECKING:
+    MovableModel: TypeAlias = shapes.NamedModel
+else:
+    _MODELS = tuple(
+        _movable(getattr(shapes, f"{kind}Model"))
+        for kind in (
+            *("Cylinder", "Prism", "Sphere", "Capsule", "Box"),
+            *("HalfSpace", "Mesh", "Points", "Voxels"),
+        )
+    )
+    MovableModel = Annotated[Union[_MODELS], Field(discriminator="shape")]  # noqa: UP007

@@ -22,11 +22,13 @@ Axis: TypeAlias = Annotated[
 ]
 
 
-class _Named(FileModel):
+class NamedModel(FileModel):
+    """A shape, or what it is made of."""
+
     name: Name = Field(description="Unique name of the obstacle.")
 
 
-class _Round(_Named):
+class _Round(NamedModel):
     axis: Axis = Field(description="x, y or z, or a vector of any length.")
     center: Vector = Field(description="Middle of the axis [length_unit].")
     radius: Positive = Field(description="[length_unit]")
@@ -46,7 +48,7 @@ class CapsuleModel(_Round):
     length: Positive = Field(description="Between the cap centres [length_unit].")
 
 
-class SphereModel(_Named):
+class SphereModel(NamedModel):
     """A ball."""
 
     shape: Literal["sphere"]
@@ -54,7 +56,7 @@ class SphereModel(_Named):
     radius: Positive = Field(description="[length_unit]")
 
 
-class BoxModel(_Named):
+class BoxModel(NamedModel):
     """A cuboid."""
 
     shape: Literal["box"]
@@ -65,7 +67,7 @@ class BoxModel(_Named):
     )
 
 
-class PrismModel(_Named):
+class PrismModel(NamedModel):
     """A simple polygon swept along an axis; it need not be convex."""
 
     shape: Literal["prism"]
@@ -81,7 +83,7 @@ class PrismModel(_Named):
     to: Number = Field(description="End on the axis [length_unit].")
 
 
-class HalfSpaceModel(_Named):
+class HalfSpaceModel(NamedModel):
     """Everything on one side of a plane: solid where (p - point) . normal <= 0."""
 
     shape: Literal["half_space"]
@@ -89,7 +91,7 @@ class HalfSpaceModel(_Named):
     normal: Vector = Field(description="Out of the solid, of any length.")
 
 
-class FromFileModel(_Named):
+class FromFileModel(NamedModel):
     """What stands in a file of its own, and where it goes."""
 
     file: FileName = Field(description="Path, relative to this file.")
