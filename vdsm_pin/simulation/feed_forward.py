@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdsm_pin.arm.cables import cable_lengths
+from vdsm_pin.arm.kinematics import link_frames
 from vdsm_pin.arm.manipulator import Manipulator
 from vdsm_pin.geometry.arrays import FloatArray
 from vdsm_pin.simulation.plant import stiffnesses
@@ -49,21 +50,22 @@ class Statics:
         return (ahead - behind).T / (2.0 * STEP)
 
     def gravity(self, angles: FloatArray) -> FloatArray:
-        """dV/dq of the weight at configurations (n, 2N), shape (n, 2N); [N m]."""
-        steps = STEP * np.eye(angles.shape[1])
-        ahead = self._potential(angles[:, None] + steps)
-        behind = self._potential(angles[:, None] - steps)
-        return np.asarray((ahead - behind) / (2.0 * STEP))
+        """dV/dq of the weight at configurations (n, 2N), shape (n, 2N); [N m].
 
-    def _potential(self, angles: FloatArray) -> FloatArray:
-        """Potential energy of the links, shape (.., 2N) to (..); [J]."""
-        alpha, theta = angles[..., ::2], angles[..., 1::2]
-        directions = _directions_z(alpha, theta)
-        lengths = self.manipulator.link_lengths
-        heights = np.cumsum(directions * lengths, axis=-1) - 0.5 * directions * lengths
-        bodies = self.settings.bodies
+        A joint turns all links from its own on about its axis.
+        """
+        frames = link_frames(angles[:, ::2], angles[:, 1::2])
+        before = np.concatenate([np.tile(np.eye(3), (len(angles), 1, 1, 1)), frames], 1)
+        bodies, lengths = self.settings.bodies, self.manipulator.link_lengths
         weights = bodies.gravity_m_s2 * bodies.mass_per_length_kg_m * lengths
-        return np.asarray((heights * weights).sum(axis=-1))
+        moments = lengths * (np.cumsum(weights[::-1])[::-1] - 0.5 * weights)
+        beyond = np.cumsum((moments[:, None] * frames[..., 0])[:, ::-1], axis=1)[
+            :, ::-1
+        ]
+        found = np.zeros(angles.shape)
+        for first, axes in ((0, before[:, :-1, :, 2]), (1, frames[..., 1])):
+            found[:, first::2] = np.cross(axes, beyond)[..., 2]
+        return found
 
     def tensions(self, angles: FloatArray) -> FloatArray:
         """Tensions that hold one configuration (2N,), shape (3N,); [N]."""
@@ -121,23 +123,3 @@ class Statics:
 
 def _least_eigenvalue(matrix: FloatArray) -> float:
     return float(np.linalg.eigvalsh(matrix)[0])
-
-
-def _directions_z(alpha: FloatArray, theta: FloatArray) -> FloatArray:
-    """Z of every link's direction, shape (.., N); [-].
-
-    R_i = R_{i-1} Rz(alpha_i) Ry(theta_i): only the last row of R_i is carried along.
-    """
-    row = np.zeros((*alpha.shape[:-1], 3))
-    row[..., 2] = 1.0
-    found = np.zeros(alpha.shape)
-    for i in range(alpha.shape[-1]):
-        ca, sa = np.cos(alpha[..., i]), np.sin(alpha[..., i])
-        ct, st = np.cos(theta[..., i]), np.sin(theta[..., i])
-        x, y, z = row[..., 0].copy(), row[..., 1].copy(), row[..., 2].copy()
-        along = x * ca + y * sa
-        row[..., 0] = along * ct - z * st
-        row[..., 1] = y * ca - x * sa
-        row[..., 2] = along * st + z * ct
-        found[..., i] = row[..., 0]
-    return found
