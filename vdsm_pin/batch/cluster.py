@@ -127,11 +127,7 @@ def _send(client: "Client", errand: _Errand) -> "Future":
 
 
 def _ended(future: "Future", errand: _Errand) -> list[Ended[Task, Done]]:
-    """What became of an errand.
-
-    Raises:
-        InvalidInput: If the worker could not start on it.
-    """
+    """What became of an errand."""
     from distributed import KilledWorker
 
     try:

@@ -149,11 +149,7 @@ def _all_ended(batch: Batch, tasks: list[Task]) -> Iterator[Ended[Task, Done]]:
 
 
 def _tasks(batch: Batch) -> list[Task]:
-    """The tasks.
-
-    Raises:
-        InvalidFile: If a folder to be written holds something else.
-    """
+    """The tasks."""
     problems = expanded(batch.problems)
     given: tuple[str | None, ...] = (None,)
     if batch.trajectories:
@@ -173,11 +169,7 @@ def _tasks(batch: Batch) -> list[Task]:
 
 
 def _check_own(folder: Path) -> None:
-    """Refuse a folder with files that would be overwritten and are no batch's.
-
-    Raises:
-        InvalidFile: If there is one; every batch leaves its lock beside its files.
-    """
+    """Refuse a folder with files that would be overwritten and are no batch's."""
     if (folder / _LOCK).exists():
         return
     for file in (folder / name for name in OWN):
@@ -187,11 +179,7 @@ def _check_own(folder: Path) -> None:
 
 
 def _check_replaceable(final: Path) -> None:
-    """Refuse to replace a folder in which something is that no batch wrote.
-
-    Raises:
-        InvalidFile: If there is something.
-    """
+    """Refuse to replace a folder in which something is that no batch wrote."""
     if not final.exists():
         return
     if not (final / MANIFEST).is_file():
@@ -252,11 +240,7 @@ def _seconds(folder: Path) -> float | None:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """One batch at a time in a folder; the lock ends with the process.
-
-    Raises:
-        InvalidInput: If another batch is at work there.
-    """
+    """One batch at a time in a folder; the lock ends with the process."""
     with (folder / _LOCK).open("w", encoding="utf-8") as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -96,22 +96,14 @@ def _clear(folder: Path) -> None:
 
 
 def _read(task: Task) -> ProblemOrCell:
-    """The problem of an arm, under the errors asked for, or of any other robot.
-
-    Raises:
-        InvalidFile: If it is bad, or asks for a robot what only arms have.
-    """
+    """The problem of an arm, under the errors asked for, or of any other robot."""
     plans = task.trajectory is None
     asked = read_problem(task.problem) if plans else read_problem_or_cell(task.problem)
     return asked.under(task.settings.errors)
 
 
 def _check_apart(task: Task, problem: ProblemOrCell) -> None:
-    """Refuse a problem with files in the folder that its results replace.
-
-    Raises:
-        InvalidFile: If there is one.
-    """
+    """Refuse a problem with files in the folder that its results replace."""
     final = task.final.resolve()
     files = [*problem.files]
     files += [] if task.trajectory is None else [Path(task.trajectory)]

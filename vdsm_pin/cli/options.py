@@ -148,11 +148,7 @@ class _Command(TyperCommand):
     """A command that takes no option for the value of the option before it."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Take the command line apart.
-
-        Raises:
-            InvalidInput: If an option stands where a value is expected.
-        """
+        """Take the command line apart."""
         named = {name: one for one in self.get_params(ctx) for name in one.opts}
         for name, word in pairwise(args):
             needs = name in named and not getattr(named[name], "is_flag", True)

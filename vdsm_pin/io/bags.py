@@ -122,12 +122,7 @@ def _plain(message: Any) -> Any:
 
 
 def _states(file: Path, messages: list[Any]) -> dict[str, Any]:
-    """Measured states as waypoints, with times from the first.
-
-    Raises:
-        InvalidFile: If a message has other joints than the first, or as many positions
-            as it has not.
-    """
+    """Measured states as waypoints, with times from the first."""
     points, names = [], list(messages[0].name)
     first = None
     for k, message in enumerate(messages):

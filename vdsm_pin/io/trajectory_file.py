@@ -163,9 +163,6 @@ def _smooth_columns(
         found: Columns that it has.
         wanted: Names of velocities and of accelerations.
         interpolation: What joins the rows.
-
-    Raises:
-        InvalidFile: If there are some of a kind, not all, or what they need is missing.
     """
     most = {"linear": 0, "cubic": 1}.get(interpolation, 2)
     read = [names for names in wanted[:most] if set(names) & set(found)]

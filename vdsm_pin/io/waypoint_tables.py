@@ -89,11 +89,7 @@ def read_cables(path: Path, problem: PlanningProblem) -> Trajectory:
 
 
 def _read(path: Path, columns: tuple[str, ...]) -> tuple[FloatArray, tuple[str, ...]]:
-    """All rows: waypoint, on_path, path_m, then the columns, shape (n, 3 + m); notes.
-
-    Raises:
-        InvalidFile: If the file breaks its contract.
-    """
+    """All rows: waypoint, on_path, path_m, the columns, shape (n, 3 + m); notes."""
     check_is_file(path)
     with readable(path), open_text(path) as text:
         missing = set(PLACE) - set(Table(path, text, (WAYPOINT, *columns)).ignored)

@@ -91,11 +91,7 @@ def read_ply_points(stream: MeshStream) -> FloatArray:
 
 
 def _elements(stream: MeshStream, header: _Header) -> dict[str, _Columns]:
-    """Every element by name.
-
-    Raises:
-        InvalidFile: If there are fewer than announced, or more follows behind them.
-    """
+    """Every element by name."""
     return _Binary(stream, header).read() if header.order else _text(stream, header)
 
 
